@@ -13,8 +13,8 @@ use railhead::contact::normal_stage;
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::mesh_plan::Regime;
 use railhead::contact::rolling::refinement::level_solve::{MotionTask, solve_level};
-use railhead::contact::rolling::refinement::levels::Levels;
 use railhead::contact::rolling::refinement::regime::regime;
+use railhead::contact::rolling::refinement::state::RefinementState;
 use railhead::contact::rolling::resolution::Resolution;
 use railhead::contact::rolling::resultants::Resultants;
 use railhead::contact::solution::words::Solution;
@@ -123,17 +123,17 @@ fn one_mesh(
         motion: checked.problem.motions[0],
     };
     let task = exact.rolling_task(footprint);
-    let mut levels = Levels::new(&task, &Arc::default());
-    let plan = levels.policy.plan(64, Regime::Unknown);
-    let mut solved = solve_level(&task, &mut levels, asked, plan, None, &Unmonitored)?;
+    let mut state = RefinementState::new(&task, &Arc::default());
+    let plan = state.policy.plan(64, Regime::Unknown);
+    let mut solved = solve_level(&task, &mut state, asked, plan, None, &Unmonitored)?;
     for cells in [256, cells] {
-        let level = levels.get(solved.point.level);
+        let level = state.levels.get(solved.point.level);
         let spinning = asked.motion.spin_per_mm != 0.0;
         let found = regime(&level, &solved.point.tangential, spinning);
-        let plan = levels.policy.plan(cells, found);
+        let plan = state.policy.plan(cells, found);
         solved = solve_level(
             &task,
-            &mut levels,
+            &mut state,
             asked,
             plan,
             Some(solved.point),
@@ -142,7 +142,7 @@ fn one_mesh(
     }
     let zero = Resultants::default();
     let sum = solved.point.summed.iter().fold(zero, |sum, r| sum.plus(*r));
-    Ok((sum, levels.get(solved.point.level).mesh.cells()))
+    Ok((sum, state.levels.get(solved.point.level).mesh.cells()))
 }
 
 /// Tangential forces of a wheel on a rail, summed over the frames of its patches, from a fine target.

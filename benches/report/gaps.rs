@@ -251,7 +251,7 @@ fn at_rest(checked: &CheckedCase) -> (f64, u32) {
     let rest = || {
         let search = contact.search().expect("a wheel over a rail");
         contact
-            .press(
+            .find_height(
                 &search,
                 wanted,
                 HeightStart::default(),

@@ -9,8 +9,8 @@ use railhead::contact::half_space::strip_operator::operator;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal_stage;
 use railhead::contact::rolling::refinement::level_solve::MotionTask;
-use railhead::contact::rolling::refinement::levels::Levels;
 use railhead::contact::rolling::refinement::refine;
+use railhead::contact::rolling::refinement::state::RefinementState;
 use serde_json::json;
 
 use crate::plot::{Plot, Series};
@@ -49,8 +49,8 @@ pub fn section(lu: f64, pictures: &Path) -> String {
             .expect("a contact")
             .footprint;
         let task = checked.rolling_task(&footprint);
-        let mut levels = Levels::new(&task, &Arc::default());
-        let point = refine::solve(&task, &mut levels, asked, &Unmonitored).expect("an answer");
+        let mut state = RefinementState::new(&task, &Arc::default());
+        let point = refine::solve(&task, &mut state, asked, &Unmonitored).expect("an answer");
         let cells = (side * side) as usize;
         let bytes = operator::bytes(cells, side as usize, true, Precision::Double) as f64;
         let size = Size {

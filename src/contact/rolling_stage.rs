@@ -9,7 +9,7 @@ use crate::contact::rolling::force_control;
 use crate::contact::rolling::history;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::levels::Levels;
+use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::solution::assemble::Assembly;
 use crate::contact::solution::finish::share_seconds;
 use crate::contact::solution::words::{Fields, Solution};
@@ -42,7 +42,7 @@ fn solve_motions(
     if let Some(reason) = task.falls_too_fast() {
         return Err(SolveError::NotCovered { reason });
     }
-    let mut levels = Levels::new(&task, operators);
+    let mut state = RefinementState::new(&task, operators);
     let mut assembly = Assembly::new(case, solved);
     if let Some(history) = &case.problem.history {
         let patches = solved.footprint.patches().iter();
@@ -50,18 +50,18 @@ fn solve_motions(
         if let Some(reason) = history::solve::too_long(history, &extents, case.run.steps_max) {
             return Err(SolveError::NotCovered { reason });
         }
-        for mut point in history::solve::solve(&task, history, &mut levels, watch)? {
+        for mut point in history::solve::solve(&task, history, &mut state, watch)? {
             if assembly.is_empty() {
                 point.seconds += solved.report.map_or(0.0, |report| report.seconds);
             }
-            assembly.add(&levels, &point, watch)?;
+            assembly.add(&state.levels, &point, watch)?;
             watch.advance();
         }
         return Ok(assembly.finish());
     }
     let mut before: Option<MotionAnswer> = None;
     for index in 0..case.problem.motions.len() {
-        let mut point = force_control::solve(&task, &mut levels, index, before.as_ref(), watch)?;
+        let mut point = force_control::solve(&task, &mut state, index, before.as_ref(), watch)?;
         if solved.coupling_error > 0.0 {
             let errors = point.errors.iter_mut().flatten();
             errors.for_each(|error| *error = error.hypot(solved.coupling_error));
@@ -70,8 +70,8 @@ fn solve_motions(
             // What all motions share is charged to the first.
             point.seconds += solved.report.map_or(0.0, |report| report.seconds);
         }
-        assembly.add(&levels, &point, watch)?;
-        levels.trim();
+        assembly.add(&state.levels, &point, watch)?;
+        state.trim();
         before = Some(point);
         watch.advance();
     }

@@ -22,7 +22,7 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::levels::Levels;
+use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::solution::words::NormalReport;
@@ -152,8 +152,8 @@ fn opened(
     if let Some(reason) = rolling.falls_too_fast() {
         return Err(SolveError::NotCovered { reason });
     }
-    let mut levels = Levels::new(&rolling, operators);
-    let point = force_control::solve(&rolling, &mut levels, 0, None, watch)?;
+    let mut state = RefinementState::new(&rolling, operators);
+    let point = force_control::solve(&rolling, &mut state, 0, None, watch)?;
     let sum = Resultants::default();
     let sum = point.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
     let patches = solved.footprint.patches();
@@ -162,7 +162,7 @@ fn opened(
     let Some(fields) = &point.fields else {
         unreachable!("the method that couples has fields")
     };
-    let level = levels.get(fields.level);
+    let level = state.levels.get(fields.level);
     let elasticity = &case.problem.elasticity;
     let unit = level.scale.traction / elasticity.shear_modulus;
     // Those of the three-point rule are smooth, the others alternate where they stick.

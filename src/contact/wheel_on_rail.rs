@@ -23,7 +23,7 @@ use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling_stage;
-use crate::contact::solution::track_axes::merge;
+use crate::contact::solution::track_axes::in_track;
 use crate::contact::solution::words::{Fields, NormalReport, Solution};
 use crate::contact::time_limit::TimeLimit;
 
@@ -64,7 +64,7 @@ pub(crate) fn solve(
     contact: &WheelTask,
     judge: &dyn Judge,
     monitor: &dyn Monitor,
-) -> Result<Found, SolveError> {
+) -> Result<SolvedWheel, SolveError> {
     let search = contact
         .search()
         .map_err(|reason| SolveError::NormalProblem { reason })?;
@@ -128,26 +128,30 @@ impl WheelSolve<'_> {
         wanted: NormalPass,
         start: HeightStart,
         workspace: &mut GridWorkspace<f32>,
-    ) -> Result<Rest, SolveError> {
+    ) -> Result<RestingWheel, SolveError> {
         let watch = TimeLimit::new(self.monitor, self.case.run.time_limit, 1);
         let began = self.monitor.elapsed();
         let wheel = self
             .contact
-            .press(&self.search, wanted, start, workspace, &watch);
+            .find_height(&self.search, wanted, start, workspace, &watch);
         let wheel = wheel.map_err(|failure| watch.explained(failure.into(), self.case))?;
         if matches!(wanted.accuracy, Accuracy::For(_)) {
             self.judge.before(&wheel)?;
         }
         let seconds = (self.monitor.elapsed() - began).as_secs_f64();
         let unbalanced = if self.balanced { BALANCE } else { 0.0 };
-        Ok(Rest {
+        Ok(RestingWheel {
             wheel,
             seconds,
             unbalanced,
         })
     }
 
-    fn answers(&self, at_rest: &Rest, run: &Run) -> Result<Vec<(Solution, Fields)>, SolveError> {
+    fn answers(
+        &self,
+        at_rest: &RestingWheel,
+        run: &Run,
+    ) -> Result<Vec<(Solution, Fields)>, SolveError> {
         self.answers_of_gaps(at_rest, run)
             .map_err(|error| self.judge.explain(&at_rest.wheel, error))
     }
@@ -155,7 +159,7 @@ impl WheelSolve<'_> {
     /// Solves every motion in every gap.
     fn answers_of_gaps(
         &self,
-        at_rest: &Rest,
+        at_rest: &RestingWheel,
         run: &Run,
     ) -> Result<Vec<(Solution, Fields)>, SolveError> {
         let CheckedCase { problem, label, .. } = self.case;
@@ -199,7 +203,10 @@ impl WheelSolve<'_> {
 
     /// The first rest with friction's share in it, and whether it is an exact one: the share is forecast while the height is sought, or
     /// found on a coarse mesh at about the right height.
-    fn first_rest(&self, workspace: &mut GridWorkspace<f32>) -> Result<(Rest, bool), SolveError> {
+    fn first_rest(
+        &self,
+        workspace: &mut GridWorkspace<f32>,
+    ) -> Result<(RestingWheel, bool), SolveError> {
         let WheelSolve { case, contact, .. } = *self;
         let share = |wheel: &PressedWheel| forecast(&case.problem, &contact.geometry, wheel);
         if can_forecast(&case.problem) {
@@ -221,7 +228,7 @@ impl WheelSolve<'_> {
     }
 
     /// Brings normal and tangential forces to balance the vertical force together.
-    fn balance(&self, workspace: &mut GridWorkspace<f32>) -> Result<Found, SolveError> {
+    fn balance(&self, workspace: &mut GridWorkspace<f32>) -> Result<SolvedWheel, SolveError> {
         let WheelSolve { case, contact, .. } = *self;
         let (mut at_rest, mut exact) = self.first_rest(workspace)?;
         let mut counted = at_rest.wheel.friction_share;
@@ -356,7 +363,7 @@ fn friction_share(wheel: &PressedWheel, answers: &[(Solution, Fields)]) -> f64 {
 }
 
 /// The wheel at rest with the answers for all its patches.
-pub(crate) struct Found {
+pub(crate) struct SolvedWheel {
     /// The wheel.
     pub(crate) wheel: PressedWheel,
     /// The answer.
@@ -366,28 +373,28 @@ pub(crate) struct Found {
 }
 
 /// The wheel at rest, and the time that took.
-struct Rest {
+struct RestingWheel {
     wheel: PressedWheel,
     seconds: f64,
     /// By which part of it friction may leave a vertical force unbalanced.
     unbalanced: f64,
 }
 
-impl Rest {
+impl RestingWheel {
     fn found(
         mut self,
         case: &CheckedCase,
         contact: &WheelTask,
         answers: Vec<(Solution, Fields)>,
-    ) -> Result<Found, SolveError> {
+    ) -> Result<SolvedWheel, SolveError> {
         let part = match case.run.resolution {
             Resolution::Target(target) => target,
             Resolution::Mesh(_) => UNCOUPLED,
         };
         let remark = contact.uncoupled(&self.wheel, part);
         self.wheel.remarks.extend(remark.map(RemarkEntry::from));
-        let (solution, fields) = merge(case, &contact.geometry, &self.wheel, answers)?;
-        Ok(Found {
+        let (solution, fields) = in_track(case, &contact.geometry, &self.wheel, answers)?;
+        Ok(SolvedWheel {
             wheel: self.wheel,
             solution,
             fields,
@@ -395,10 +402,10 @@ impl Rest {
     }
 
     /// A later rest, with the work of both.
-    fn again(&self, later: Rest) -> Rest {
+    fn again(&self, later: RestingWheel) -> RestingWheel {
         let mut wheel = later.wheel;
         wheel.heights += self.wheel.heights;
-        Rest {
+        RestingWheel {
             wheel,
             seconds: self.seconds + later.seconds,
             unbalanced: later.unbalanced,

@@ -6,8 +6,8 @@ use crate::contact::case::checks::{CheckedParts, PartialCase, missing_load, unus
 use crate::contact::case::digest::digest;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
-use crate::contact::case::profiles;
 use crate::contact::case::resolution::resolution;
+use crate::contact::case::wheel_task;
 use crate::contact::case::words::question::Case;
 use crate::contact::error::CaseError;
 use crate::contact::friction::law::FrictionLaw;
@@ -76,8 +76,8 @@ impl CheckedCase {
             forces,
             speeds,
             history,
-            wheelset: profiles::wheelset(&case.motion),
-            drive_torque: profiles::drive_torque(&case.motion),
+            wheelset: wheel_task::wheelset(&case.motion),
+            drive_torque: wheel_task::drive_torque(&case.motion),
             checked: Checked::without_faults(),
         };
         let run = run(case, limits);

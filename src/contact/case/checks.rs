@@ -11,7 +11,7 @@ use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{MethodName, Output, Solver};
 use crate::contact::case::words::thermal::ThermalWords;
-use crate::contact::case::{contact_task, history, motions, profiles, wheelsets};
+use crate::contact::case::{contact_task, history, motions, wheel_task, wheelsets};
 use crate::contact::error::Fault;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
@@ -160,7 +160,7 @@ fn on_rails(
     let modulus = elasticity.map(|elasticity| elasticity.contact_modulus());
     match contact {
         Contact::Wheelset { .. } => wheelsets::task(contact, load, modulus, limits),
-        _ => profiles::task(contact, load, modulus),
+        _ => wheel_task::task(contact, load, modulus),
     }
 }
 
@@ -253,7 +253,7 @@ fn collect_fault<T>(result: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option
     result.map_err(|fault| faults.push(fault)).ok()
 }
 
-/// The normal task and its remarks, if all that it depends on is known; profiles are left to [`profiles::task`].
+/// The normal task and its remarks, if all that it depends on is known; profiles are left to [`wheel_task::task`].
 pub(crate) fn normal_task(
     contact: Option<&Contact>,
     load: Option<&Load>,

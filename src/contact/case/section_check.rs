@@ -2,10 +2,10 @@
 
 use serde_json::Value;
 
-use crate::contact::case::profiles::profile;
 use crate::contact::case::read::faults::Faults;
 use crate::contact::case::read::object::Object;
-use crate::contact::case::read::profiles::section_of;
+use crate::contact::case::read::wheel_rail::section_of;
+use crate::contact::case::wheel_task::profile;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::swept_values;
-use crate::contact::case::profiles::{exchanged, profile_at};
+use crate::contact::case::wheel_task::{exchanged, profile_at};
 use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing};
 use crate::contact::case::words::motion::{Combine, Swept};
 use crate::contact::error::Fault;

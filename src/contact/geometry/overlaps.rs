@@ -17,9 +17,9 @@ const TOGETHER_ANGLE: f64 = 0.5;
 /// An overlap is cut where it is thinner than this fraction of the lobes on both sides. By Hertz's law two bodies touch where they
 /// overlap by more than half of the deepest overlap, so that a lobe may be cut where it is thin. 0.25 and 0.5 change none
 /// of 60 states of the worn pair of `cargo bench --bench worn`.
-const VALLEY: f64 = 0.35;
+const VALLEY_DEPTH: f64 = 0.35;
 /// A cut overlap ends, for its gap, where it is thinner than this fraction of its depth. 0.3 and 0.55 change none of the same states.
-const THIN: f64 = 0.4;
+const THIN_OVERLAP: f64 = 0.4;
 
 /// Lowering in mm at which overlaps are divided among gaps; others are this one times a power of [`GROUPED_RATIO`]. Loads that lower the wheel by 0.05 to
 /// 0.2 mm, as all usual ones do, share one division, so that forces do not jump along a sweep of loads or heights either.
@@ -151,7 +151,7 @@ impl ContactLocus<'_> {
                 if depths[k] < depths[valley] {
                     valley = k;
                 }
-                if depths[valley] <= VALLEY * depths[k]
+                if depths[valley] <= VALLEY_DEPTH * depths[k]
                     && (angles[k] - angles[main]).abs() > TOGETHER_ANGLE
                     && other.is_none_or(|(deepest, _)| depths[k] > deepest)
                 {
@@ -202,7 +202,7 @@ impl ContactLocus<'_> {
     /// other gap. A cut overlap gets thin before its end, a whole one ends where the bodies do not overlap any more.
     pub(crate) fn limits(&self, overlap: Overlap, lowering: f64) -> [Option<LocusPoint>; 2] {
         let (depths, main) = self.depths(overlap, lowering);
-        let thin = |k: &usize| depths[*k] <= THIN * depths[main];
+        let thin = |k: &usize| depths[*k] <= THIN_OVERLAP * depths[main];
         let thin_ends = [
             (0..=main).rev().find(thin).unwrap_or(0),
             (main..depths.len()).find(thin).unwrap_or(depths.len() - 1),

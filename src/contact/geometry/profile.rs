@@ -21,7 +21,7 @@ pub const POINTS_MAX: usize = 20_000;
 /// Points nearer to each other than this are one, in mm.
 const NEAR: f64 = 1e-3;
 /// Cosine of the turn from which on a point runs back against its neighbours.
-const BACK: f64 = -0.2;
+const FLANGE_BACK_TURN: f64 = -0.2;
 /// Part of the points that may run back.
 const ZIGZAG_SHARE_MAX: f64 = 0.05;
 
@@ -336,7 +336,7 @@ fn straighten(
         let back = points.windows(3).position(|at| {
             let (first, second) = (step(at[0], at[1]), step(at[1], at[2]));
             let lengths = first[0].hypot(first[1]) * second[0].hypot(second[1]);
-            first[0] * second[0] + first[1] * second[1] < BACK * lengths
+            first[0] * second[0] + first[1] * second[1] < FLANGE_BACK_TURN * lengths
         });
         let Some(k) = back else { break };
         points.remove(k + 1);

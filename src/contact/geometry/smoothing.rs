@@ -15,7 +15,7 @@ pub struct Spline {
 
 /// Value and the first two derivatives at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jet {
+pub struct SplineValue {
     /// Value.
     pub value: f64,
     /// First derivative.
@@ -96,7 +96,7 @@ impl Spline {
 
     /// Value and derivatives; beyond the ends the tangent there.
     #[must_use]
-    pub fn at(&self, s: f64) -> Jet {
+    pub fn at(&self, s: f64) -> SplineValue {
         self.at_in(self.interval(s), s)
     }
 
@@ -118,12 +118,12 @@ impl Spline {
 
     /// [`Spline::at`] for a place whose [`Spline::interval`] is known.
     #[must_use]
-    pub fn at_in(&self, i: usize, s: f64) -> Jet {
+    pub fn at_in(&self, i: usize, s: f64) -> SplineValue {
         let [first, last] = self.range();
         if s < first || s > last {
             let end = if s < first { first } else { last };
             let jet = self.at(end);
-            return Jet {
+            return SplineValue {
                 value: jet.value + jet.slope * (s - end),
                 slope: jet.slope,
                 bend: 0.0,
@@ -132,7 +132,7 @@ impl Spline {
         let step = self.knots[i + 1] - self.knots[i];
         let (b, a) = ((s - self.knots[i]) / step, (self.knots[i + 1] - s) / step);
         let (bend_a, bend_b) = (self.bends[i], self.bends[i + 1]);
-        Jet {
+        SplineValue {
             value: a * self.values[i]
                 + b * self.values[i + 1]
                 + ((a * a - 1.0) * a * bend_a + (b * b - 1.0) * b * bend_b) * step * step / 6.0,

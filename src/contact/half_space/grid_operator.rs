@@ -4,7 +4,7 @@ use rustfft::Fft;
 use rustfft::num_complex::Complex;
 
 use crate::contact::half_space::grid_coefficients::{coefficients, lines};
-use crate::contact::half_space::transforms::{Planners, Plans, Width};
+use crate::contact::half_space::transforms::{FftFloat, FftPlanners, FftPlans};
 
 /// Rows copied into the columns at a time, so that whole cache lines are written.
 const BLOCK: usize = 8;
@@ -30,12 +30,12 @@ pub struct GridOperator<T> {
     /// Transform of the coefficients relative to `own`, divided by the size of the padded grid; column by column. It is real
     /// because the coefficients are even.
     spectrum: Vec<T>,
-    plans: Plans<T>,
+    plans: FftPlans<T>,
 }
 
-/// Plans and buffers for the products of one solve. It fits grids of any size and carries no state from one product to the next.
-pub struct GridWorkspace<T: Width> {
-    planners: Planners<T>,
+/// FftPlans and buffers for the products of one solve. It fits grids of any size and carries no state from one product to the next.
+pub struct GridWorkspace<T: FftFloat> {
+    planners: FftPlanners<T>,
     row: Vec<T>,
     /// Spectra of a block of rows.
     spectra: Vec<Complex<T>>,
@@ -43,10 +43,10 @@ pub struct GridWorkspace<T: Width> {
     scratch: Vec<Complex<T>>,
 }
 
-impl<T: Width> Default for GridWorkspace<T> {
+impl<T: FftFloat> Default for GridWorkspace<T> {
     fn default() -> Self {
         GridWorkspace {
-            planners: Planners::default(),
+            planners: FftPlanners::default(),
             row: Vec::new(),
             spectra: Vec::new(),
             columns: Vec::new(),
@@ -55,7 +55,7 @@ impl<T: Width> Default for GridWorkspace<T> {
     }
 }
 
-impl<T: Width> GridWorkspace<T> {
+impl<T: FftFloat> GridWorkspace<T> {
     /// Resizes the buffers for an operator.
     fn fit(&mut self, operator: &GridOperator<T>) {
         let (half, plans) = (operator.half(), &operator.plans);
@@ -74,7 +74,7 @@ impl<T: Width> GridWorkspace<T> {
     }
 }
 
-impl<T: Width> GridOperator<T> {
+impl<T: FftFloat> GridOperator<T> {
     /// Prepares the influence for rectangles of `dx` by `dy` mm and the contact modulus `E*` in MPa.
     #[must_use]
     pub fn new(
@@ -259,7 +259,7 @@ impl<T: Width> GridOperator<T> {
     }
 }
 
-fn transform_columns<T: Width>(plan: &dyn Fft<T>, workspace: &mut GridWorkspace<T>) {
+fn transform_columns<T: FftFloat>(plan: &dyn Fft<T>, workspace: &mut GridWorkspace<T>) {
     plan.process_with_scratch(&mut workspace.columns, &mut workspace.scratch);
 }
 
@@ -339,7 +339,7 @@ mod tests {
         }
     }
 
-    fn compare<T: Width>(
+    fn compare<T: FftFloat>(
         operator: &GridOperator<T>,
         workspace: &mut GridWorkspace<T>,
         pressure: &[f64],

@@ -6,51 +6,51 @@ use realfft::{ComplexToReal, FftNum, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
 
 /// The floating-point precision of the transforms.
-pub trait Width: FftNum + Into<f64> {
+pub trait FftFloat: FftNum + Into<f64> {
     /// The nearest number of this precision.
     fn of(value: f64) -> Self;
 }
 
-impl Width for f32 {
+impl FftFloat for f32 {
     fn of(value: f64) -> Self {
         value as f32
     }
 }
 
-impl Width for f64 {
+impl FftFloat for f64 {
     fn of(value: f64) -> Self {
         value
     }
 }
 
-/// Plans for the transforms of rows and columns.
-pub struct Plans<T> {
+/// FftPlans for the transforms of rows and columns.
+pub struct FftPlans<T> {
     pub(crate) forward: Arc<dyn RealToComplex<T>>,
     pub(crate) backward: Arc<dyn ComplexToReal<T>>,
     pub(crate) columns_forward: Arc<dyn Fft<T>>,
     pub(crate) columns_backward: Arc<dyn Fft<T>>,
 }
 
-/// Plans made so far. A solve uses few padded sizes, and planning one takes 2 µs (64 × 64) to 14 µs (400 × 400), about a tenth
+/// FftPlans made so far. A solve uses few padded sizes, and planning one takes 2 µs (64 × 64) to 14 µs (400 × 400), about a tenth
 /// of a product; plans are therefore kept only during one solve.
-pub struct Planners<T: FftNum> {
+pub struct FftPlanners<T: FftNum> {
     real: RealFftPlanner<T>,
     complex: FftPlanner<T>,
 }
 
-impl<T: FftNum> Default for Planners<T> {
+impl<T: FftNum> Default for FftPlanners<T> {
     fn default() -> Self {
-        Planners {
+        FftPlanners {
             real: RealFftPlanner::new(),
             complex: FftPlanner::new(),
         }
     }
 }
 
-impl<T: FftNum> Planners<T> {
-    /// Plans for a padded grid of `width` by `height`.
-    pub fn plans(&mut self, width: usize, height: usize) -> Plans<T> {
-        Plans {
+impl<T: FftNum> FftPlanners<T> {
+    /// FftPlans for a padded grid of `width` by `height`.
+    pub fn plans(&mut self, width: usize, height: usize) -> FftPlans<T> {
+        FftPlans {
             forward: self.real.plan_fft_forward(width),
             backward: self.real.plan_fft_inverse(width),
             columns_forward: self.complex.plan_fft_forward(height),

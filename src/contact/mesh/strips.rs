@@ -60,7 +60,7 @@ impl Grading {
     /// Cells graded toward both ends and toward `pole`: their density is `(1 − β)/2 + β/(π√(1 − ξ²)) + g L(ξ − pole)`.
     #[must_use]
     pub fn about(pole: f64, cells: usize) -> Grading {
-        let gathering = Gathering {
+        let gathering = PoleGrading {
             pole,
             at_ends: GATHERED_AT_ENDS,
         };
@@ -100,12 +100,12 @@ const BUMP: (f64, f64) = (0.15, 0.1);
 
 /// A density of cells or strips over −1 … 1 with a bump at the pole.
 #[derive(Debug, Clone, Copy)]
-struct Gathering {
+struct PoleGrading {
     pole: f64,
     at_ends: f64,
 }
 
-impl Gathering {
+impl PoleGrading {
     fn density(self, t: f64) -> f64 {
         let (weight, width) = BUMP;
         let ends = if self.at_ends > 0.0 {
@@ -234,11 +234,11 @@ impl Mesh {
     /// y in mm at which every cell's traction acts.
     #[must_use]
     pub fn rows(&self) -> Vec<f64> {
-        self.segments
-            .iter()
-            .zip(&self.arm)
-            .flat_map(|(s, y)| s.cells.clone().map(|_| *y))
-            .collect()
+        let mut rows = Vec::with_capacity(self.cells());
+        for (segment, y) in self.segments.iter().zip(&self.arm) {
+            rows.resize(segment.cells.end, *y);
+        }
+        rows
     }
 
     /// The same mesh, moved so that `origin` becomes `(0, 0)`, then with all lengths multiplied by `factor`.
@@ -324,7 +324,7 @@ pub fn equal_strips(low: f64, high: f64, count: usize) -> Vec<(f64, f64)> {
 /// `count` strips between `low` and `high` as `(y, dy)`, narrower about `pole`, a place between −1 and 1.
 #[must_use]
 pub fn strips_about(pole: f64, low: f64, high: f64, count: usize) -> Vec<(f64, f64)> {
-    let gathering = Gathering { pole, at_ends: 0.0 };
+    let gathering = PoleGrading { pole, at_ends: 0.0 };
     let mut edges = vec![-1.0];
     for k in 1..=count {
         let last = edges[k - 1];
@@ -347,7 +347,7 @@ mod tests {
     #[test]
     fn cells_about_a_pole_follow_their_density() {
         for pole in [0.0, 0.37, -0.95] {
-            let gathering = Gathering {
+            let gathering = PoleGrading {
                 pole,
                 at_ends: GATHERED_AT_ENDS,
             };

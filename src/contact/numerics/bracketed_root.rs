@@ -2,7 +2,7 @@
 
 /// Largest argument tried: a hundred times the creepage at which the cubic law predicts full slip. Chosen by judgement; how much it matters was not
 /// measured.
-pub(crate) const PLACE_MAX: f64 = 65.0;
+pub(crate) const FRACTION_MAX: f64 = 65.0;
 /// Most arguments tried. Keeps the numbers safe; not tuned.
 const TRIALS_MAX: u32 = 40;
 /// Width of a bracket, relative to its ends, below which it is not divided further. Keeps the numbers safe; not tuned.
@@ -58,7 +58,7 @@ pub(crate) fn find_root<E>(
 ) -> Result<Root, E> {
     let mut tolerance = 0.0;
     let (mut low, mut high): (Option<[f64; 2]>, Option<[f64; 2]>) = (None, None);
-    let mut place = start.clamp(-PLACE_MAX, PLACE_MAX);
+    let mut place = start.clamp(-FRACTION_MAX, FRACTION_MAX);
     let (mut stride, mut last) = (0.0_f64, None::<[f64; 2]>);
     let ended = |place, exit| Ok(Root { place, exit });
     for _ in 0..TRIALS_MAX {
@@ -87,7 +87,7 @@ pub(crate) fn find_root<E>(
             place = (p * g - q * f) / (g - f);
             continue;
         }
-        if place.abs() >= PLACE_MAX && (place < 0.0) != below {
+        if place.abs() >= FRACTION_MAX && (place < 0.0) != below {
             return ended(place, RootExit::SignKept);
         }
         // Only one bound is known: follow the line through the last two points, but limit how much the step grows.
@@ -101,7 +101,7 @@ pub(crate) fn find_root<E>(
             needed.min(4.0 * stride)
         };
         let step = if below { stride } else { -stride };
-        place = (place + step).clamp(-PLACE_MAX, PLACE_MAX);
+        place = (place + step).clamp(-FRACTION_MAX, FRACTION_MAX);
     }
     ended(place, RootExit::TrialsUsedUp)
 }

@@ -163,7 +163,7 @@ pub(crate) fn interval(axis: &[f64], x: f64) -> usize {
 /// parabola of the adjacent node is used.
 pub(crate) fn sober_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
     /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
-    const BEND_MAX: f64 = 8.0;
+    const SLOPE_LIMIT: f64 = 8.0;
     let n = axis.len();
     let rises: Vec<f64> = (1..n)
         .map(|k| (values[k] - values[k - 1]) / (axis[k] - axis[k - 1]))
@@ -174,7 +174,7 @@ pub(crate) fn sober_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
     let bend = |k: usize| 2.0 * (rises[k] - rises[k - 1]) / (axis[k + 1] - axis[k - 1]);
     let bends: Vec<f64> = (0..n).map(|k| bend(k.clamp(1, n - 2))).collect();
     let allowed = |k: usize| {
-        BEND_MAX
+        SLOPE_LIMIT
             * bends[k.saturating_sub(1)]
                 .abs()
                 .min(bends[(k + 1).min(n - 1)].abs())

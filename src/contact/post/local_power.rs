@@ -207,7 +207,7 @@ impl Differences {
                 return Err(stop);
             }
             rows.resize(3 * cells * segment.cells.len(), T::ZERO);
-            edges.look_from(mesh, segment.chord.y);
+            edges.observe_from(mesh, segment.chord.y);
             arch.dispatch(SegmentRows {
                 edges: &mut edges,
                 points: &edges_of(mesh, segment),

@@ -35,10 +35,10 @@ pub fn resample(fields: &PatchCells, values: &[f64], nx: usize, ny: usize) -> Gr
         fields.x_mm.len(),
         "there must be one value per cell"
     );
-    sample(fields, nx, ny, |spot| {
-        let near = along(fields, values, &spot.near);
-        spot.far.as_ref().map_or(near, |far| {
-            near + spot.weight * (along(fields, values, far) - near)
+    sample(fields, nx, ny, |sample| {
+        let near = along(fields, values, &sample.near);
+        sample.far.as_ref().map_or(near, |far| {
+            near + sample.weight * (along(fields, values, far) - near)
         })
     })
 }
@@ -56,9 +56,9 @@ pub fn resample_zone(fields: &PatchCells, zones: &[Zone], nx: usize, ny: usize) 
         fields.x_mm.len(),
         "there must be one zone per cell"
     );
-    sample(fields, nx, ny, |spot| {
-        let cells = &spot.near.cells;
-        let beyond = |i: &usize| fields.x_mm[*i] + 0.5 * fields.dx_mm[*i] < spot.near.x;
+    sample(fields, nx, ny, |sample| {
+        let cells = &sample.near.cells;
+        let beyond = |i: &usize| fields.x_mm[*i] + 0.5 * fields.dx_mm[*i] < sample.near.x;
         let inside = cells.clone().find(|i| !beyond(i)).unwrap_or(cells.end - 1);
         zones[inside]
     })
@@ -71,7 +71,7 @@ struct CellPosition {
 }
 
 /// A sample point inside the patch.
-struct Spot {
+struct SamplePoint {
     /// The point in the nearest strip.
     near: CellPosition,
     /// The point at the same relative position in the next strip on its side, if the segment continues there.
@@ -80,7 +80,12 @@ struct Spot {
     weight: f64,
 }
 
-fn sample<T>(fields: &PatchCells, nx: usize, ny: usize, value: impl Fn(&Spot) -> T) -> Gridded<T> {
+fn sample<T>(
+    fields: &PatchCells,
+    nx: usize,
+    ny: usize,
+    value: impl Fn(&SamplePoint) -> T,
+) -> Gridded<T> {
     assert!(
         nx >= 2 && ny >= 2,
         "a grid needs at least two points along each axis"
@@ -106,8 +111,8 @@ fn sample<T>(fields: &PatchCells, nx: usize, ny: usize, value: impl Fn(&Spot) ->
             x_mm.iter()
                 .map(|&x| {
                     row.iter()
-                        .find_map(|chord| chord.spot(&strips, x))
-                        .map(|spot| value(&spot))
+                        .find_map(|chord| chord.sample(&strips, x))
+                        .map(|sample| value(&sample))
                 })
                 .collect()
         })
@@ -122,7 +127,7 @@ fn centres(from: f64, to: f64, n: usize) -> Vec<f64> {
 }
 
 /// The intersection of a line of constant y with a segment.
-struct Cut {
+struct ChordCut {
     near: usize,
     far: Option<usize>,
     weight: f64,
@@ -130,8 +135,8 @@ struct Cut {
     right: f64,
 }
 
-impl Cut {
-    fn spot(&self, strips: &Strips, x: f64) -> Option<Spot> {
+impl ChordCut {
+    fn sample(&self, strips: &Strips, x: f64) -> Option<SamplePoint> {
         if x < self.left || x > self.right {
             return None;
         }
@@ -147,7 +152,7 @@ impl Cut {
                 x: segment.left + part * (segment.right - segment.left),
             }
         };
-        Some(Spot {
+        Some(SamplePoint {
             near: place(self.near),
             far: self.far.map(place),
             weight: self.weight,
@@ -156,7 +161,7 @@ impl Cut {
 }
 
 /// All intersections of the line at `y` with the patch.
-fn chords(strips: &Strips, y: f64) -> Vec<Cut> {
+fn chords(strips: &Strips, y: f64) -> Vec<ChordCut> {
     let covers = |strip: &&std::ops::Range<usize>| {
         let first = &strips.segments[strip.start];
         (y - first.y).abs() <= 0.5 * first.dy * (1.0 + 1e-9)
@@ -184,7 +189,7 @@ fn chords(strips: &Strips, y: f64) -> Vec<Cut> {
             let weight = (y - segment.y) / (end_y - segment.y);
             let left = segment.left + weight * (end_left - segment.left);
             let right = segment.right + weight * (end_right - segment.right);
-            Cut {
+            ChordCut {
                 near,
                 far,
                 weight,

@@ -143,7 +143,7 @@ impl Finding {
     }
 
     /// Whether it becomes a remark; `changes` is whether another reading of the points changes the patch much.
-    pub fn is_told(&self, changes: bool) -> bool {
+    pub fn is_reported(&self, changes: bool) -> bool {
         match self.cause {
             Cause::Coarse => self.has_evidence(),
             Cause::Noise { .. } | Cause::Waves | Cause::Polygon { .. } if self.smoothing > 0.0 => {
@@ -173,11 +173,11 @@ impl Finding {
     pub fn remark(&self) -> RemarkEntry {
         RemarkEntry {
             patch: Some(self.patch),
-            ..self.told().at_pointer(self.pointer())
+            ..self.report().at_pointer(self.pointer())
         }
     }
 
-    fn told(&self) -> Remark {
+    fn report(&self) -> Remark {
         let profile = self.body.name();
         let (y_mm, waviness_mpa, share) = (self.y, self.pressure, self.share);
         let smoothing_mm = (self.advised > 0.0).then(|| (10.0 * self.advised).round() / 10.0);

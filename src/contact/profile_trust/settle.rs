@@ -87,7 +87,7 @@ pub(crate) fn settled(
         accuracy: Accuracy::About(TOLERANCE),
     };
     let watch = TimeLimit::new(monitor, case.run.time_limit, 1);
-    let wheel = trial.press(
+    let wheel = trial.find_height(
         &search,
         wanted,
         HeightStart::default(),

@@ -18,7 +18,7 @@ use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::profile_quality::{PatchQuality, ProfileQuality};
 use crate::contact::solution::words::{Fields, Solution};
 use crate::contact::wheel_on_rail;
-use crate::contact::wheel_on_rail::{Found, Judge};
+use crate::contact::wheel_on_rail::{Judge, SolvedWheel};
 
 /// Solves a wheel on a rail and assesses its profiles.
 ///
@@ -48,7 +48,7 @@ pub(crate) fn judged(
     case: &CheckedCase,
     contact: &WheelTask,
     monitor: &dyn Monitor,
-) -> Result<Found, SolveError> {
+) -> Result<SolvedWheel, SolveError> {
     wheel_on_rail::solve(operators, case, contact, &Judgement::new(contact), monitor)
 }
 
@@ -60,9 +60,9 @@ pub(crate) fn trusted(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     contact: &WheelTask,
-    found: Found,
+    found: SolvedWheel,
     monitor: &dyn Monitor,
-) -> Result<Found, SolveError> {
+) -> Result<SolvedWheel, SolveError> {
     assessed(operators, case, &Judgement::new(contact), found, monitor)
 }
 
@@ -70,9 +70,9 @@ fn assessed(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     judgement: &Judgement,
-    mut found: Found,
+    mut found: SolvedWheel,
     monitor: &dyn Monitor,
-) -> Result<Found, SolveError> {
+) -> Result<SolvedWheel, SolveError> {
     let contact = judgement.contact;
     let (qualities, findings) = judgement.of(&found.wheel)?;
     let solution = &mut found.solution;
@@ -84,12 +84,14 @@ fn assessed(
     });
     let suspicious = rough || settle::undecided(contact);
     let changes = uncertainty::add(operators, case, contact, suspicious, solution, monitor)?;
-    let told = findings
+    let reported = findings
         .into_iter()
-        .filter(|finding| finding.is_told(changes[finding.patch]));
-    let told = worst_of_each(told);
+        .filter(|finding| finding.is_reported(changes[finding.patch]));
+    let reported = worst_of_each(reported);
     solution.remarks.extend(settle::remarks(contact));
-    solution.remarks.extend(told.iter().map(Finding::remark));
+    solution
+        .remarks
+        .extend(reported.iter().map(Finding::remark));
     solution
         .remarks
         .extend(uncertainty::target_below(case, solution));
@@ -147,7 +149,7 @@ impl Judge for Judgement<'_> {
         };
         let worst = findings
             .iter()
-            .filter(|finding| finding.refused || finding.is_told(false))
+            .filter(|finding| finding.refused || finding.is_reported(false))
             .reduce(|worst, other| {
                 if other.worse_than(worst) {
                     other

@@ -244,7 +244,7 @@ impl Open {
     }
 
     /// The uncertainty with its lower bounds added, for a given μN and largest pressure.
-    fn told(self, limit: f64, pressure: f64) -> ProfileUncertainty {
+    fn report(self, limit: f64, pressure: f64) -> ProfileUncertainty {
         ProfileUncertainty {
             force_x_n: self.force[0] + FORCE_FLOOR * limit,
             force_y_n: self.force[1] + FORCE_FLOOR * limit,
@@ -296,9 +296,9 @@ fn write(
         .iter()
         .map(|patch| friction * patch.normal_force_n)
         .sum();
-    let told = of_all.told(limit, largest(solution));
+    let reported = of_all.report(limit, largest(solution));
     for total in &mut solution.total {
-        total.profile_uncertainty = Some(told);
+        total.profile_uncertainty = Some(reported);
     }
     let mut changes = Vec::with_capacity(of_patches.len());
     for (patch, open) in solution.patches.iter_mut().zip(of_patches) {
@@ -312,9 +312,9 @@ fn write(
                     .any(|force| *force > limit && limit > 0.0),
         );
         let open = open.all;
-        let told = open.told(friction * patch.normal_force_n, patch.pressure_max_mpa);
+        let reported = open.report(friction * patch.normal_force_n, patch.pressure_max_mpa);
         for point in &mut patch.points {
-            point.profile_uncertainty = Some(told);
+            point.profile_uncertainty = Some(reported);
         }
     }
     changes

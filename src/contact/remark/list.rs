@@ -7,7 +7,7 @@
 mod case;
 mod motions;
 mod normal;
-mod profiles;
+mod profile_quality;
 mod wheel_on_rail;
 
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ use crate::contact::remark::kind::{RemarkKind, Severity};
 use crate::contact::remark::list::case::case_remarks;
 use crate::contact::remark::list::motions::motion_remarks;
 use crate::contact::remark::list::normal::normal_remarks;
-use crate::contact::remark::list::profiles::profile_remarks;
+use crate::contact::remark::list::profile_quality::profile_remarks;
 use crate::contact::remark::list::wheel_on_rail::wheel_remarks;
 use crate::contact::remark::table::remarks;
 

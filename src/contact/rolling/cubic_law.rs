@@ -1,12 +1,12 @@
 //! The cubic law of Vermeulen and Johnson with Kalker's coefficients: about which creepage gives which force.
 
-use crate::contact::numerics::bracketed_root::PLACE_MAX;
+use crate::contact::numerics::bracketed_root::FRACTION_MAX;
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::task::RollingTask;
 
 /// From this place on the cubic law is continued by its tangent. Chosen by judgement; how much it matters was not measured.
-const KNEE: f64 = 0.9;
+const CUBIC_UNTIL: f64 = 0.9;
 
 /// The cubic law of a problem.
 #[derive(Debug, Clone, Copy)]
@@ -34,8 +34,8 @@ impl CubicLaw {
 
     /// Force of linear theory over μN at which the cubic law gives the force `place` μN.
     pub(crate) fn linear(place: f64) -> f64 {
-        let inside = place.abs().min(KNEE);
-        let slope = (1.0 - KNEE).powf(-2.0 / 3.0);
+        let inside = place.abs().min(CUBIC_UNTIL);
+        let slope = (1.0 - CUBIC_UNTIL).powf(-2.0 / 3.0);
         let beyond = slope * (place.abs() - inside);
         (3.0 * (1.0 - (1.0 - inside).cbrt()) + beyond).copysign(place)
     }
@@ -46,10 +46,10 @@ impl CubicLaw {
 
     pub(crate) fn place(&self, k: usize, creepage: f64) -> f64 {
         let linear = (creepage * self.stiffness[k]).abs();
-        let knee = CubicLaw::linear(KNEE);
+        let knee = CubicLaw::linear(CUBIC_UNTIL);
         let inside = 1.0 - (1.0 - linear.min(knee) / 3.0).powi(3);
-        let beyond = (linear - knee).max(0.0) * (1.0 - KNEE).powf(2.0 / 3.0);
-        (inside + beyond).min(PLACE_MAX).copysign(creepage)
+        let beyond = (linear - knee).max(0.0) * (1.0 - CUBIC_UNTIL).powf(2.0 / 3.0);
+        (inside + beyond).min(FRACTION_MAX).copysign(creepage)
     }
 
     pub(crate) fn places(&self, motion: &Motion) -> [f64; 2] {

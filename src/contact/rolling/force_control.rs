@@ -17,8 +17,8 @@ use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::level_solve::MotionTask;
-use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::refine;
+use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
@@ -58,17 +58,17 @@ const CORRECTIONS_MAX: u32 = 5;
 /// Why there is no answer.
 pub fn solve(
     task: &RollingTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     index: usize,
     before: Option<&MotionAnswer>,
     monitor: &dyn Monitor,
 ) -> Result<MotionAnswer, SolveError> {
     let motion = task.motions[index];
     if task.forces[index] == [None; 2] || task.friction.is_frictionless() {
-        return refine::solve(task, levels, MotionTask { index, motion }, monitor);
+        return refine::solve(task, state, MotionTask { index, motion }, monitor);
     }
     let began = monitor.elapsed();
-    let mut search = ForceSearch::new(task, levels, index, monitor);
+    let mut search = ForceSearch::new(task, state, index, monitor);
     let mut place = search.places.start(&task.motions[index], before);
     for _ in 0..CLIMBS_MAX {
         // Refinement chooses the levels; on them the force is one function of the creepage.
@@ -87,7 +87,7 @@ pub fn solve(
 /// The search for the creepages of one motion.
 struct ForceSearch<'a, 'p> {
     task: &'a RollingTask<'a>,
-    levels: &'a mut Levels<'p>,
+    state: &'a mut RefinementState<'p>,
     index: usize,
     monitor: &'a dyn Monitor,
     forces: PrescribedForces,
@@ -116,7 +116,7 @@ struct ForceSearch<'a, 'p> {
 impl<'a, 'p> ForceSearch<'a, 'p> {
     fn new(
         task: &'a RollingTask<'a>,
-        levels: &'a mut Levels<'p>,
+        state: &'a mut RefinementState<'p>,
         index: usize,
         monitor: &'a dyn Monitor,
     ) -> ForceSearch<'a, 'p> {
@@ -124,8 +124,8 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         let limit = task.friction.limit_of_all(patches);
         ForceSearch {
             task,
-            places: ForcePlaces::new(task, levels, limit, task.forces[index]),
-            levels,
+            places: ForcePlaces::new(task, state, limit, task.forces[index]),
+            state,
             index,
             monitor,
             forces: task.forces[index],
@@ -292,17 +292,17 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
     fn judge(&mut self, place: [f64; 2]) -> Result<[f64; 2], SolveError> {
         let asked = self.asked(place);
         let path = &self.path;
-        let found = refine::on_levels(self.task, self.levels, asked, path, self.monitor)?;
+        let found = refine::on_levels(self.task, self.state, asked, path, self.monitor)?;
         let (mut point, missing) = match found {
             Some(found) => found,
             None => (
-                refine::solve(self.task, self.levels, asked, self.monitor)?,
+                refine::solve(self.task, self.state, asked, self.monitor)?,
                 false,
             ),
         };
         if self.path.is_empty() {
-            let plan = |number: &usize| self.levels.get(*number).plan;
-            self.path = self.levels.path.iter().map(plan).collect();
+            let plan = |number: &usize| self.state.levels.get(*number).plan;
+            self.path = self.state.sweep.path.iter().map(plan).collect();
         }
         self.work.add(point.work);
         let forces = self.relative(&point.resultants);
@@ -329,7 +329,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
     fn sums(&mut self, asked: MotionTask) -> Result<Vec<Resultants>, SolveError> {
         let path = &self.path;
         let (sums, work) =
-            refine::sums_on_finest(self.task, self.levels, asked, path, self.monitor)?;
+            refine::sums_on_finest(self.task, self.state, asked, path, self.monitor)?;
         self.work.add(work);
         Ok(sums)
     }
@@ -385,7 +385,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         let inexact = self.inexact();
         let mut point = match self.best.take() {
             Some((_, point)) => point,
-            None => refine::solve(self.task, self.levels, asked, self.monitor)?,
+            None => refine::solve(self.task, self.state, asked, self.monitor)?,
         };
         point.remarks.extend(inexact);
         point.work = self.work;

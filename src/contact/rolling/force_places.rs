@@ -3,13 +3,13 @@
 //! By Vermeulen and Johnson's cubic law with Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3) the creepage at
 //! place r gives the force r μN, so that the force found is close to r. A search starts where the table of creep forces has the forces.
 
-use crate::contact::numerics::bracketed_root::PLACE_MAX;
+use crate::contact::numerics::bracketed_root::FRACTION_MAX;
 use crate::contact::rolling::cubic_law::CubicLaw;
 use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::motion_answer::MotionAnswer;
-use crate::contact::rolling::refinement::levels::Levels;
+use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
 
@@ -37,12 +37,12 @@ impl<'a> ForcePlaces<'a> {
     /// Of forces to be found; `limit` is μN of all patches in N.
     pub(crate) fn new(
         task: &'a RollingTask<'a>,
-        levels: &Levels,
+        state: &RefinementState,
         limit: f64,
         forces: PrescribedForces,
     ) -> ForcePlaces<'a> {
         let ellipses = if table::tells(task.elasticity, task.interface, task.friction) {
-            levels.ellipses().to_vec()
+            state.ellipses().to_vec()
         } else {
             Vec::new()
         };
@@ -105,7 +105,7 @@ impl<'a> ForcePlaces<'a> {
             if length(off) <= TABLE_MISSED {
                 return Some(place);
             }
-            place = [0, 1].map(|k| (place[k] - off[k]).clamp(-PLACE_MAX, PLACE_MAX));
+            place = [0, 1].map(|k| (place[k] - off[k]).clamp(-FRACTION_MAX, FRACTION_MAX));
         }
         None
     }

@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     /// For the three-point rule.
-    pub mirror: [Vec<f64>; 2],
+    pub three_point: [Vec<f64>; 2],
     /// For the trapezoid rule, if there is a better one than the three-point solution.
     pub trapezoid: Option<[Vec<f64>; 2]>,
 }

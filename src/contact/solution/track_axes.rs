@@ -29,7 +29,7 @@ const FRAME: &str = "every patch in its own axes: x along rolling (leading edge 
 ///
 /// # Errors
 /// Rail or wheel were not found over the load centre of a patch, or the rail over its ends.
-pub fn merge(
+pub fn in_track(
     case: &CheckedCase,
     geometry: &WheelRail,
     wheel: &PressedWheel,

@@ -18,7 +18,7 @@ use crate::contact::profile_trust::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::solution::words::{PatchSolution, Solution};
-use crate::contact::wheel_on_rail::Found;
+use crate::contact::wheel_on_rail::SolvedWheel;
 
 /// The heights of the centre by both wheels may differ by so much in mm. It leaves a roll of 2e-7 rad, which moves a contact by 1e-4 mm.
 const LEVEL: f64 = 3e-4;
@@ -55,14 +55,14 @@ pub(crate) struct AtRest {
     /// Torque about the axle in N mm that balances the forces of the rails.
     pub(crate) torque: f64,
     /// Left and right.
-    pub(crate) sides: [Found; 2],
+    pub(crate) sides: [SolvedWheel; 2],
 }
 
 /// Both wheels solved at one roll and one angular velocity.
 struct Both {
     wheels: [WheelTask; 2],
     cases: [CheckedCase; 2],
-    found: [Found; 2],
+    found: [SolvedWheel; 2],
 }
 
 impl Both {
@@ -107,7 +107,7 @@ impl WheelsetSolve<'_> {
             cases,
             found: [left, right],
         } = both;
-        let trusted = |found: Found, k: usize| {
+        let trusted = |found: SolvedWheel, k: usize| {
             trust::trusted(self.operators, &cases[k], &wheels[k], found, self.monitor)
                 .map_err(|error| self.of_side(error, k, pose))
         };
@@ -247,11 +247,11 @@ impl WheelsetSolve<'_> {
 }
 
 /// Torque of the rails on the wheelset about its axle in N mm, positive if it drives forward.
-fn torque_of_rails(found: &[Found; 2], pose: [f64; 3], height: f64) -> f64 {
+fn torque_of_rails(found: &[SolvedWheel; 2], pose: [f64; 3], height: f64) -> f64 {
     let [_, yaw, roll] = pose;
     let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
     let centre = [0.0, pose[0], height];
-    let patches = |found: &Found| -> f64 {
+    let patches = |found: &SolvedWheel| -> f64 {
         let Solution { patches, .. } = &found.solution;
         patches
             .iter()

@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use crate::contact::case::read::faults::Interval;
 use crate::contact::case::read::object::{Object, shown};
-use crate::contact::case::read::profiles;
-use crate::contact::case::read::samples::{Quantity, axis, line, samples};
+use crate::contact::case::read::samples::{SampleQuantity, axis, line, samples};
+use crate::contact::case::read::wheel_rail;
 use crate::contact::case::read::wheelset;
 use crate::contact::case::words::contact::{Contact, Load};
 
@@ -16,12 +16,12 @@ const APPROACH: Interval = Interval::positive(1e6, "mm");
 const APPROACH_OF_GAP: Interval = Interval::closed(-1e6, 1e6, "mm");
 /// Members of a load; the first is for profiles only.
 const LOADS: [&str; 3] = ["vertical_force_n", "normal_force_n", "approach_mm"];
-const PRESSURE: Quantity = Quantity {
+const PRESSURE: SampleQuantity = SampleQuantity {
     member: "pressure_mpa",
     word: "pressure",
     allowed: Interval::closed(0.0, 1e12, "MPa"),
 };
-const GAP: Quantity = Quantity {
+const GAP: SampleQuantity = SampleQuantity {
     member: "gap_mm",
     word: "gap",
     allowed: Interval::closed(-1e6, 1e6, "mm"),
@@ -102,7 +102,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
                 pressure_mpa: pressure_mpa?,
             })
         }
-        ContactWord::Profiles => profiles::read(&mut block),
+        ContactWord::Profiles => wheel_rail::read(&mut block),
         ContactWord::Wheelset => wheelset::read(&mut block),
     }
 }
@@ -187,10 +187,10 @@ fn no_load(case: &mut Object) -> Option<Load> {
     None
 }
 
-type Grid = (Option<Vec<f64>>, Option<Vec<f64>>, Option<Vec<Vec<f64>>>);
+type GridMembers = (Option<Vec<f64>>, Option<Vec<f64>>, Option<Vec<Vec<f64>>>);
 
 /// Both axes of a grid and its samples.
-fn grid(block: &mut Object, quantity: Quantity) -> Grid {
+fn grid(block: &mut Object, quantity: SampleQuantity) -> GridMembers {
     let x_mm = axis(block, "x_mm");
     let y_mm = axis(block, "y_mm");
     let (nx, ny) = (given(block, "x_mm"), given(block, "y_mm"));

@@ -71,7 +71,7 @@ pub(crate) fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
 
 /// What the samples of a grid or line are called, and the values allowed.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Quantity {
+pub(crate) struct SampleQuantity {
     /// The member that holds them.
     pub(crate) member: &'static str,
     /// One of them in words.
@@ -80,8 +80,12 @@ pub(crate) struct Quantity {
 }
 
 /// The samples of a line with `n` points, where the axis is known.
-pub(crate) fn line(block: &mut Object, quantity: Quantity, n: Option<usize>) -> Option<Vec<f64>> {
-    let Quantity {
+pub(crate) fn line(
+    block: &mut Object,
+    quantity: SampleQuantity,
+    n: Option<usize>,
+) -> Option<Vec<f64>> {
+    let SampleQuantity {
         member,
         word,
         allowed,
@@ -113,11 +117,11 @@ pub(crate) fn line(block: &mut Object, quantity: Quantity, n: Option<usize>) -> 
 /// The samples of a grid with `nx` by `ny` points, where the axes are known.
 pub(crate) fn samples(
     block: &mut Object,
-    quantity: Quantity,
+    quantity: SampleQuantity,
     nx: Option<usize>,
     ny: Option<usize>,
 ) -> Option<Vec<Vec<f64>>> {
-    let Quantity {
+    let SampleQuantity {
         member,
         word,
         allowed,

@@ -3,10 +3,10 @@
 use crate::contact::case::read::faults::Interval;
 use crate::contact::case::read::motion::swept;
 use crate::contact::case::read::object::{Object, shown};
-use crate::contact::case::read::profiles::{
+use crate::contact::case::read::samples::{count_rest, numbers};
+use crate::contact::case::read::wheel_rail::{
     ANGLE, CANT, DEPTH, DISTANCE, PLACE, ROLLING_RADIUS, flag, section,
 };
-use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::words::contact::{Contact, KinematicsWords, Load, RightSide};
 use crate::contact::case::words::motion::{Combine, Swept};
 

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use crate::contact::geometry::formats::profile_file::{ProfileFile, numbers, unreadable};
 
 #[derive(Debug, Clone, Copy)]
-struct Settings {
+struct SimpackSettings {
     wheel: Option<bool>,
     in_spline: bool,
     shift: [f64; 2],
@@ -23,7 +23,7 @@ struct Settings {
 
 /// Reads the points; their weights are ignored.
 pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
-    let mut settings = Settings {
+    let mut settings = SimpackSettings {
         wheel: None,
         in_spline: false,
         shift: [0.0; 2],
@@ -65,7 +65,7 @@ pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
     settings.apply(points)
 }
 
-impl Settings {
+impl SimpackSettings {
     /// Stores one setting; `None` if a known setting has no valid number.
     fn take(&mut self, name: &str, value: &str) -> Option<()> {
         let number = || {

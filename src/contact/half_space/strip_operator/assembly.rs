@@ -46,7 +46,7 @@ impl<T: Number> CellEdges<T> {
         }
     }
 
-    pub(crate) fn look_from(&mut self, mesh: &Mesh, y: f64) {
+    pub(crate) fn observe_from(&mut self, mesh: &Mesh, y: f64) {
         let ln_or_zero = |q: f64| if q == 0.0 { 0.0 } else { q.abs().ln() };
         let mut start = 0;
         for segment in &mesh.segments {
@@ -162,7 +162,7 @@ impl OperatorAssembly<'_> {
                 return Err(stop);
             }
             observe(self.mesh, segment, &mut points);
-            edges.look_from(self.mesh, segment.chord.y);
+            edges.observe_from(self.mesh, segment.chord.y);
             arch.dispatch(SegmentRows {
                 edges: &mut edges,
                 points: &points,

@@ -25,7 +25,7 @@ impl GapTask {
         for _ in 0..BOXES_MAX {
             let grid = PressureGrid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored());
             let pressed = self
-                .press(&grid, None, &reach, &mut workspace, &Unmonitored)
+                .pressure_on(&grid, None, &reach, &mut workspace, &Unmonitored)
                 .ok()?;
             let depth = pressed.approach - reach.least;
             if pressed.approach > reach.level {

@@ -5,7 +5,7 @@
 //! distances are scaled by what a cell's own pressure displaces, so that small cells take no more iterations than large ones.
 
 use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
-use crate::contact::half_space::transforms::Width;
+use crate::contact::half_space::transforms::FftFloat;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::hertz::Pressing;
 
@@ -28,7 +28,7 @@ pub(crate) trait PressureInfluence {
     fn yielding(&self, cell: usize) -> f64;
 }
 
-impl<T: Width> PressureInfluence for GridOperator<T> {
+impl<T: FftFloat> PressureInfluence for GridOperator<T> {
     const CHANGES_MAX: usize = 12;
     type Workspace = GridWorkspace<T>;
 
@@ -106,7 +106,7 @@ pub(crate) struct PressureTask<'a> {
 /// Solves for the pressure under which the surfaces touch.
 ///
 /// `start` is any pressure that is not 0 everywhere; it decides the number of iterations only.
-pub(crate) fn press<I: PressureInfluence>(
+pub(crate) fn solve_pressure<I: PressureInfluence>(
     task: &PressureTask,
     influence: &I,
     start: Vec<f64>,
@@ -349,7 +349,7 @@ mod tests {
             pressing,
             tolerance: 1e-9,
         };
-        press(&task, &influence, start, &mut workspace, &Unmonitored).unwrap()
+        solve_pressure(&task, &influence, start, &mut workspace, &Unmonitored).unwrap()
     }
 
     #[test]
@@ -363,7 +363,7 @@ mod tests {
             tolerance: -1.0,
         };
         let start = vec![1.0; CELLS * CELLS];
-        match press(&task, &influence, start, &mut workspace, &Unmonitored) {
+        match solve_pressure(&task, &influence, start, &mut workspace, &Unmonitored) {
             Err(PressureFailure::NotConverged(residual)) => assert!(residual < 1e-6, "{residual}"),
             Err(PressureFailure::Stopped(_)) => panic!("stopped"),
             Ok(pressed) => panic!("{}", pressed.residual),

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::contact::normal::gap::conjugate_gradients::Pressed;
 use crate::contact::normal::gap::edges;
-use crate::contact::normal::gap::search_box::Reach;
+use crate::contact::normal::gap::search_box::SearchBox;
 use crate::contact::normal::gap::surface::{GapSurface, Window};
 use crate::contact::numerics::flood_fill::groups;
 
@@ -140,7 +140,7 @@ impl PressureGrid {
     }
 
     /// A pressure to start from: Hertz's law over the region that overlaps by more than half of the approach.
-    pub(crate) fn first_pressure(&self, gap: &[f64], reach: &Reach, modulus: f64) -> Vec<f64> {
+    pub(crate) fn first_pressure(&self, gap: &[f64], reach: &SearchBox, modulus: f64) -> Vec<f64> {
         let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
         let depth = (reach.level - least).max(1e-3 * (reach.level - reach.least));
         let part = |h: &f64| (1.0 - 2.0 * (h - least) / depth).max(0.0);

@@ -16,7 +16,7 @@ const MARGIN: f64 = 1.3;
 
 /// A box of the contact plane and the depth of overlap it was made for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Reach {
+pub(crate) struct SearchBox {
     pub(crate) window: Window,
     /// No point outside the window has a gap of less than this, in mm (as far as the data go).
     pub(crate) level: f64,
@@ -25,7 +25,7 @@ pub(crate) struct Reach {
 }
 
 /// The points at which a gap is evaluated, and its values there.
-struct Look {
+struct GapSamples {
     axes: [Vec<f64>; 2],
     values: Vec<f64>,
     least: f64,
@@ -36,13 +36,13 @@ struct Look {
 /// Contact lies where the gap is smaller than the approach, whatever the pressure. The approach belonging to a force is
 /// estimated as if the region overlapping by half of it were a circle of the same area pressed by a sphere, which is
 /// exact for a paraboloid: `N = 4/3 E* √(A/π) δ` with A the area where the gap is less than `δ/2` above its least value.
-pub(crate) fn reach(gap: &GapSurface, pressing: Pressing, contact_modulus: f64) -> Reach {
+pub(crate) fn reach(gap: &GapSurface, pressing: Pressing, contact_modulus: f64) -> SearchBox {
     let limits = gap.window();
     let mut window = first_box(gap);
     let mut level = f64::INFINITY;
     let mut least = f64::INFINITY;
     for _ in 0..LOOKS_MAX {
-        let look = Look::new(gap, window);
+        let look = GapSamples::new(gap, window);
         least = look.least;
         level = match pressing {
             Pressing::Approach(approach) => approach,
@@ -61,7 +61,7 @@ pub(crate) fn reach(gap: &GapSurface, pressing: Pressing, contact_modulus: f64) 
             break;
         }
     }
-    Reach {
+    SearchBox {
         window,
         level,
         least,
@@ -69,7 +69,7 @@ pub(crate) fn reach(gap: &GapSurface, pressing: Pressing, contact_modulus: f64) 
 }
 
 /// The box in which the gap is less than `level`.
-pub(crate) fn reach_of_level(gap: &GapSurface, level: f64) -> Reach {
+pub(crate) fn reach_of_level(gap: &GapSurface, level: f64) -> SearchBox {
     reach(gap, Pressing::Approach(level), f64::NAN)
 }
 
@@ -88,13 +88,13 @@ fn first_box(gap: &GapSurface) -> Window {
     window
 }
 
-impl Look {
-    fn new(gap: &GapSurface, window: Window) -> Look {
+impl GapSamples {
+    fn new(gap: &GapSurface, window: Window) -> GapSamples {
         let samples = gap.samples();
         let axes = [0, 1].map(|k| points(window[k], samples[k]));
         let values = gap.on(&axes[0], &axes[1]);
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-        Look {
+        GapSamples {
             axes,
             values,
             least,

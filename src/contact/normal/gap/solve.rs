@@ -7,14 +7,14 @@
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalAnswer, NormalError, edge_reached, no_touch};
-use crate::contact::normal::gap::conjugate_gradients::{Pressed, PressureTask, press};
+use crate::contact::normal::gap::conjugate_gradients::{Pressed, PressureTask, solve_pressure};
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, NEAR, PRESSURE_CHANGE,
     REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL, TOLERANCE,
     TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
-use crate::contact::normal::gap::search_box::{Reach, reach, reach_of_level};
+use crate::contact::normal::gap::search_box::{SearchBox, reach, reach_of_level};
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
 use crate::contact::normal::hertz::Pressing;
@@ -87,7 +87,7 @@ impl GapTask {
         {
             return Err(NormalError::NoAnswer(no_touch(approach, reach.least)));
         }
-        let first = |reach: &Reach| {
+        let first = |reach: &SearchBox| {
             PressureGrid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored())
         };
         let mut grid = first(&reach);
@@ -95,7 +95,7 @@ impl GapTask {
         let (mut iterations, mut pressure_change) = (0, 0.0);
         let (mut exit, mut capped) = (GridsExit::GridsUsedUp, false);
         for _ in 0..GRIDS_MAX {
-            let pressed = self.press(&grid, solved.as_ref(), &reach, workspace, monitor)?;
+            let pressed = self.pressure_on(&grid, solved.as_ref(), &reach, workspace, monitor)?;
             iterations += pressed.iterations;
             if let Some((_, before)) = &solved {
                 pressure_change = before.largest() / pressed.largest() - 1.0;
@@ -141,11 +141,11 @@ impl GapTask {
         })
     }
 
-    pub(crate) fn press(
+    pub(crate) fn pressure_on(
         &self,
         grid: &PressureGrid,
         before: Option<&(PressureGrid, Pressed)>,
-        reach: &Reach,
+        reach: &SearchBox,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<Pressed, NormalError> {
@@ -166,7 +166,7 @@ impl GapTask {
             pressing: self.pressing,
             tolerance,
         };
-        let mut pressed = press(&task, &influence, start, workspace, monitor)?;
+        let mut pressed = solve_pressure(&task, &influence, start, workspace, monitor)?;
         grid.symmetrise(&mut pressed.pressure);
         Ok(pressed)
     }

@@ -10,7 +10,7 @@ use std::ops::Range;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, edge_reached};
-use crate::contact::normal::gap::conjugate_gradients::{Pressed, PressureTask, press};
+use crate::contact::normal::gap::conjugate_gradients::{Pressed, PressureTask, solve_pressure};
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
 };
@@ -130,7 +130,7 @@ impl GapTask {
             pressing: self.pressing,
             tolerance: TOLERANCE,
         };
-        let pressed = press(&task, &influence, start, workspace, monitor)?;
+        let pressed = solve_pressure(&task, &influence, start, workspace, monitor)?;
         let parts = grids.into_iter().zip(influence.ranges);
         let tile = |(grid, range): (PressureGrid, Range<usize>)| {
             let mut pressure = pressed.pressure[range.clone()].to_vec();

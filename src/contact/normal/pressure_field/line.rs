@@ -18,7 +18,7 @@ pub(crate) struct GridLine<'f, V, S, A> {
 
 /// A cubic kept within the bounds that its ends suggest.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Bounded {
+pub(crate) struct BoundedCubic {
     cubic: Cubic,
     bounds: [f64; 2],
 }
@@ -93,8 +93,8 @@ where
 }
 
 /// The curve between nodes `i` and `i + 1` of the axis; `values` belong to the nodes `i − 1` to `i + 2`.
-pub(crate) fn cubic(axis: &[f64], i: usize, values: [f64; 4]) -> Bounded {
-    Bounded {
+pub(crate) fn cubic(axis: &[f64], i: usize, values: [f64; 4]) -> BoundedCubic {
+    BoundedCubic {
         cubic: Cubic::between(axis, i, values),
         bounds: bounds(values[1], values[2], true),
     }
@@ -121,7 +121,7 @@ pub(crate) fn bounds(left: f64, right: f64, smooth: bool) -> [f64; 2] {
     [low, high]
 }
 
-impl Bounded {
+impl BoundedCubic {
     /// Value at x, never negative.
     pub(crate) fn at(&self, x: f64) -> f64 {
         self.cubic

@@ -129,7 +129,7 @@ impl WheelTask {
     ///
     /// # Errors
     /// A reason why there is no answer; or the monitor stopped the work.
-    pub fn press(
+    pub fn find_height(
         &self,
         search: &ContactLocus,
         wanted: NormalPass,
@@ -179,16 +179,17 @@ impl WheelTask {
             None => search.estimated_lowering(force / self.contact_modulus),
         };
         for heights in 1..=HEIGHTS_MAX {
-            let mut found = match self.looked_at(search, lowering, fineness, workspace, monitor) {
-                Ok(found) => found,
-                Err(NormalError::NoAnswer(reason)) => {
-                    // The wheel may lie too deep; the load may be carried higher up.
-                    let higher = bracket.refuse(lowering, reason);
-                    lowering = higher.map_err(NormalError::NoAnswer)?;
-                    continue;
-                }
-                Err(stopped) => return Err(stopped),
-            };
+            let mut found =
+                match self.at_height_or_finer(search, lowering, fineness, workspace, monitor) {
+                    Ok(found) => found,
+                    Err(NormalError::NoAnswer(reason)) => {
+                        // The wheel may lie too deep; the load may be carried higher up.
+                        let higher = bracket.refuse(lowering, reason);
+                        lowering = higher.map_err(NormalError::NoAnswer)?;
+                        continue;
+                    }
+                    Err(stopped) => return Err(stopped),
+                };
             let [carried, slope] = found.found;
             let known = bracket.slope;
             let fine = fineness.detail == Detail::Fine;
@@ -228,7 +229,7 @@ impl WheelTask {
     }
 
     /// The wheel at one height; where coarse gaps have no answer, fine ones may.
-    fn looked_at(
+    fn at_height_or_finer(
         &self,
         search: &ContactLocus,
         lowering: f64,
@@ -265,7 +266,7 @@ impl WheelTask {
         let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
         let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
         let patches = touching
-            .map(|(gap, depth)| self.pressed(gap, *depth, centre, fineness, workspace, monitor))
+            .map(|(gap, depth)| self.solve_gap(gap, *depth, centre, fineness, workspace, monitor))
             .collect::<Result<Vec<_>, _>>()?;
         if patches.is_empty() {
             return Err(NormalError::NoAnswer(
@@ -290,7 +291,7 @@ impl WheelTask {
     }
 
     /// One gap under the overlap it has; approaches count from the first touch of its patch along the normal.
-    fn pressed(
+    fn solve_gap(
         &self,
         gap: &LocalGap,
         depth: f64,

@@ -99,13 +99,13 @@ pub fn worst_place(
     }
     let polished = starts
         .into_iter()
-        .map(|start| climb(start, |at| badness(at, LoadResolution::FINE)));
+        .map(|start| search_from(start, |at| badness(at, LoadResolution::FINE)));
     let (_, best) = polished.max_by(|a, b| a.0.total_cmp(&b.0))?;
     columns.place(best)
 }
 
 /// The highest point that Nelder and Mead's simplex finds from a start, with its height.
-fn climb(start: [f64; 3], height: impl Fn([f64; 3]) -> f64) -> (f64, [f64; 3]) {
+fn search_from(start: [f64; 3], height: impl Fn([f64; 3]) -> f64) -> (f64, [f64; 3]) {
     let mut simplex = vec![(height(start), start)];
     for k in 0..3 {
         let mut at = start;
@@ -167,7 +167,7 @@ mod tests {
             let off: f64 = (0..3).map(|k| (at[k] - top[k]).powi(2)).sum();
             5.0 - off
         };
-        let (found, at) = climb([0.2, 0.0, -0.7], height);
+        let (found, at) = search_from([0.2, 0.0, -0.7], height);
         assert!(found > 5.0 - 1e-3, "{found} at {at:?}");
     }
 }

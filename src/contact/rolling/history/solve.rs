@@ -11,7 +11,7 @@ use crate::contact::rolling::history::task::HistoryTask;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{HistoryAnswer, MotionAnswer, SolvedFields};
 use crate::contact::rolling::refinement::level_solve::named;
-use crate::contact::rolling::refinement::levels::Levels;
+use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
@@ -116,7 +116,7 @@ fn half_length(extents: &[[f64; 4]]) -> Option<f64> {
 pub fn solve(
     task: &RollingTask,
     history: &HistoryTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     monitor: &dyn Monitor,
 ) -> Result<Vec<MotionAnswer>, SolveError> {
     let plans = level_plans(task);
@@ -124,7 +124,7 @@ pub fn solve(
     let mut seconds = 0.0;
     let mut work = Work::default();
     for (k, plan) in plans.iter().enumerate() {
-        let mut found = on_level(task, history, *plan, levels, monitor)?;
+        let mut found = on_level(task, history, *plan, state, monitor)?;
         seconds += found.seconds;
         found.seconds = seconds;
         let last = k + 1 == plans.len();
@@ -177,12 +177,12 @@ fn on_level(
     task: &RollingTask,
     history: &HistoryTask,
     plan: HistoryLevel,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     monitor: &dyn Monitor,
 ) -> Result<SolvedHistory, SolveError> {
     let began = monitor.elapsed();
-    let number = levels.level(plan.size.into())?;
-    let level = levels.get(number);
+    let number = state.levels.level(plan.size.into())?;
+    let level = state.levels.get(number);
     let forced = task.has_prescribed_forces();
     let residual = match task.resolution {
         Resolution::Target(target) => (0.02 * target).clamp(1e-6, 1e-4),
@@ -194,7 +194,7 @@ fn on_level(
     } else {
         [residual, 1e-5]
     };
-    let workspace = &mut levels.workspace;
+    let workspace = &mut state.workspace;
     let run = LevelRun::new(task, history, &level, tolerance, workspace, monitor)?;
     let points = run
         .run(plan.longest)

@@ -10,7 +10,7 @@ use crate::contact::rolling::methods::boundary_element::solve as boundary_elemen
 use crate::contact::rolling::methods::boundary_element::task::LevelTask;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::level_solve::MotionTask;
-use crate::contact::rolling::refinement::levels::Levels;
+use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::refinement::warm_start::nested_tractions;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
@@ -59,23 +59,23 @@ impl Companion {
     pub(crate) fn solve(
         self,
         task: &RollingTask,
-        levels: &mut Levels,
+        state: &mut RefinementState,
         number: usize,
         answer: &LevelAnswer,
         asked: MotionTask,
         monitor: &dyn Monitor,
     ) -> Result<(CompanionAnswer, Work), SolveError> {
         let missing = (CompanionAnswer::Missing, Work::default());
-        let Some(plan) = self.plan(levels.get(number).plan) else {
+        let Some(plan) = self.plan(state.levels.get(number).plan) else {
             return Ok(missing);
         };
-        let companion = match levels.level(plan) {
+        let companion = match state.levels.level(plan) {
             Ok(companion) => companion,
             // Half the strips may miss a patch.
             Err(SolveError::Unmeshable { .. }) => return Ok(missing),
             Err(error) => return Err(error),
         };
-        let (fine, level) = (levels.get(number), levels.get(companion));
+        let (fine, level) = (state.levels.get(number), state.levels.get(companion));
         let start = nested_tractions(&fine, &answer.traction, &level);
         let of_level = LevelTask {
             level: &level,
@@ -86,7 +86,7 @@ impl Companion {
                 .map(|laws| level.scale.passage(&laws)),
             tolerance: task.tolerance(),
         };
-        match boundary_element::trapezoid(of_level, &start, &mut levels.workspace, monitor) {
+        match boundary_element::trapezoid(of_level, &start, &mut state.workspace, monitor) {
             Ok((traction, work)) => {
                 let patches = task.footprint.patches().len();
                 let found = (0..patches)

@@ -18,9 +18,9 @@ use crate::contact::rolling::refinement::error_estimate;
 use crate::contact::rolling::refinement::error_estimate::{
     CoarserLevel, EstimateContext, Indicators,
 };
-use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::slender::slender;
-use crate::contact::rolling::refinement::warm_start::nested_start;
+use crate::contact::rolling::refinement::state::RefinementState;
+use crate::contact::rolling::refinement::warm_start::from_coarser;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::start::Start;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -111,24 +111,24 @@ pub struct JudgedAnswer {
 /// Why there is no answer.
 pub fn solve_level(
     task: &RollingTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     asked: MotionTask,
     plan: MeshPlan,
     coarser: Option<SolvedLevel>,
     monitor: &dyn Monitor,
 ) -> Result<JudgedAnswer, SolveError> {
     let began = monitor.elapsed();
-    let number = levels.level(plan)?;
-    let level = levels.get(number);
+    let number = state.levels.level(plan)?;
+    let level = state.levels.get(number);
     let below = coarser
         .as_ref()
-        .map(|point| (levels.get(point.level), &point.tangential));
+        .map(|point| (state.levels.get(point.level), &point.tangential));
     let motion = level.scale.motion(&asked.motion);
     // The motion before on this mesh is preferred: its tractions need not be interpolated from other cells.
-    let warm = levels.sweep.start(number, &level, &motion);
+    let warm = state.sweep.start(number, &level, &motion);
     let start =
-        warm.or_else(|| below.map(|(coarse, answer)| nested_start(&coarse, answer, &level)));
-    let workspace = &mut levels.workspace;
+        warm.or_else(|| below.map(|(coarse, answer)| from_coarser(&coarse, answer, &level)));
+    let workspace = &mut state.workspace;
     let tangential = run_method(task, &level, asked, start, workspace, monitor)
         // A part of a sweep counts from its own first motion, the client from that of the case.
         .map_err(|f| named(f, task, task.first_motion + asked.index))?;
@@ -138,19 +138,19 @@ pub fn solve_level(
         .collect();
     let before = coarser
         .as_ref()
-        .and_then(|point| before(levels, &level, point));
+        .and_then(|point| before(state, &level, point));
     let finer = finer_for_sums(task, &level, asked, &tangential);
     let circumstances = EstimateContext {
         motion: &asked.motion,
         before,
         finer: finer.as_ref(),
-        slenderness: levels.policy.slenderness(),
+        slenderness: state.policy.slenderness(),
         tolerance: task.tolerance(),
     };
     let indicators = Indicators::of_level(task, &level, &tangential, &summed, circumstances);
-    levels.sweep.remember(number, motion, &tangential);
+    state.sweep.remember(number, motion, &tangential);
     // A search for creepages solves its later trials on the same levels.
-    levels.path.push(number);
+    state.sweep.path.push(number);
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
     work.add(tangential.work);
     let seconds =
@@ -172,11 +172,11 @@ pub fn solve_level(
 
 /// The level before, if it is coarse enough to compare with.
 pub(crate) fn before<'a>(
-    levels: &Levels,
+    state: &RefinementState,
     level: &StripMesh,
     point: &'a SolvedLevel,
 ) -> Option<CoarserLevel<'a>> {
-    let below = levels.get(point.level);
+    let below = state.levels.get(point.level);
     let ratio = level.mesh.cells() as f64 / below.mesh.cells() as f64;
     (ratio >= LEVEL_RATIO_MIN).then(|| CoarserLevel {
         summed: &point.summed,

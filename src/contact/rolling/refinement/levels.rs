@@ -1,15 +1,10 @@
 //! The meshes of a footprint that exist: made once, shared by all motions, the least recently used dropped.
 
-use std::cell::OnceCell;
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
-use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::mesh_plan::MeshPlan;
-use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::operator_store::{CaseOperators, OperatorStore};
-use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
-use crate::contact::rolling::refinement::warm_start::SweepState;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
@@ -26,18 +21,6 @@ pub struct Levels<'a> {
     /// With their numbers, which are never given twice, in the order of their last use.
     kept: Vec<(usize, Arc<StripMesh>)>,
     made: usize,
-    /// What the motions solved so far left on the levels.
-    pub sweep: SweepState,
-    /// The levels on which the last motion was solved, coarse to fine.
-    pub path: Vec<usize>,
-    /// Where the next motion of a sweep may begin.
-    pub begin: Option<MeshPlan>,
-    /// Which meshes suit the patches.
-    pub policy: MeshPolicy,
-    /// Buffers of the iterations on all levels.
-    pub workspace: NewtonWorkspace,
-    /// The ellipses that stand for the patches, where a method has asked for them.
-    ellipses: OnceCell<Vec<LoadEllipse>>,
 }
 
 impl<'a> Levels<'a> {
@@ -49,21 +32,7 @@ impl<'a> Levels<'a> {
             operators: CaseOperators::new(store),
             kept: Vec::new(),
             made: 0,
-            sweep: SweepState::default(),
-            path: Vec::new(),
-            begin: None,
-            policy: MeshPolicy::new(task.footprint),
-            workspace: NewtonWorkspace::default(),
-            ellipses: OnceCell::new(),
         }
-    }
-
-    /// The ellipses that stand for the patches.
-    pub fn ellipses(&self) -> &[LoadEllipse] {
-        let footprint = self.task.footprint;
-        let all = 0..footprint.patches().len();
-        self.ellipses
-            .get_or_init(|| all.map(|patch| LoadEllipse::of(footprint, patch)).collect())
     }
 
     /// The number of the level of this plan; it is made if it is not there.
@@ -93,14 +62,11 @@ impl<'a> Levels<'a> {
         Arc::clone(level)
     }
 
-    /// Drops the least recently used levels beyond [`LEVELS_KEPT`], and what motions left on them. Called between motions: no answer
-    /// may refer to a level by its number after that.
-    pub fn trim(&mut self) {
+    /// Drops the least recently used levels beyond [`LEVELS_KEPT`] and gives their numbers. Called between motions: no answer may refer to
+    /// a level by its number after that.
+    pub fn trim(&mut self) -> Vec<usize> {
         let surplus = self.kept.len().saturating_sub(LEVELS_KEPT);
-        let dropped = self.kept.drain(..surplus).map(|(number, _)| number);
-        for number in dropped {
-            self.sweep.forget(number);
-            self.path.retain(|on_path| *on_path != number);
-        }
+        let dropped = self.kept.drain(..surplus);
+        dropped.map(|(number, _)| number).collect()
     }
 }

@@ -12,4 +12,5 @@ pub mod mesh_policy;
 pub mod refine;
 pub mod regime;
 pub mod slender;
+pub mod state;
 pub mod warm_start;

@@ -15,9 +15,9 @@ use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::level_solve::{
     JudgedAnswer, MotionTask, SolvedLevel, solve_level,
 };
-use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
 use crate::contact::rolling::refinement::regime::regime;
+use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
@@ -35,29 +35,29 @@ const SIDE_HALVED: u32 = 8;
 /// Why there is no answer.
 pub fn solve(
     task: &RollingTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     asked: MotionTask,
     monitor: &dyn Monitor,
 ) -> Result<MotionAnswer, SolveError> {
-    levels.path.clear();
+    state.sweep.path.clear();
     if task.method == Method::Table {
-        return table::solve(task, levels.ellipses(), &asked.motion, monitor);
+        return table::solve(task, state.ellipses(), &asked.motion, monitor);
     }
     let sizes = MeshPolicy::fixed_sizes(task.resolution, task.method);
     match (sizes, task.resolution) {
         (Some(sizes), _) => {
-            let mut solved = solve_level(task, levels, asked, sizes[0].into(), None, monitor)?;
+            let mut solved = solve_level(task, state, asked, sizes[0].into(), None, monitor)?;
             for size in &sizes[1..] {
                 let below = Some(solved.point);
-                solved = solve_level(task, levels, asked, (*size).into(), below, monitor)?;
+                solved = solve_level(task, state, asked, (*size).into(), below, monitor)?;
             }
             Ok(solved.point.into())
         }
         (None, Resolution::Mesh(size)) => {
-            on_mesh(task, levels, asked, size, monitor).map(MotionAnswer::from)
+            on_mesh(task, state, asked, size, monitor).map(MotionAnswer::from)
         }
         (None, Resolution::Target(target)) => {
-            to_target(task, levels, asked, target, monitor).map(MotionAnswer::from)
+            to_target(task, state, asked, target, monitor).map(MotionAnswer::from)
         }
     }
 }
@@ -65,7 +65,7 @@ pub fn solve(
 /// Solves a motion on a mesh given by the client; a large mesh is started from one of half as many strips and cells.
 fn on_mesh(
     task: &RollingTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     asked: MotionTask,
     size: MeshSize,
     monitor: &dyn Monitor,
@@ -76,19 +76,19 @@ fn on_mesh(
         strips: (size.strips / 4 * 2).max(SIDE_HALVED),
         cells: (size.cells / 2).max(SIDE_HALVED),
     };
-    let number = levels.level(size.into())?;
-    let level = levels.get(number);
+    let number = state.levels.level(size.into())?;
+    let level = state.levels.get(number);
     let motion = level.scale.motion(&asked.motion);
-    let started = levels.sweep.start(number, &level, &motion).is_some();
+    let started = state.sweep.start(number, &level, &motion).is_some();
     if !started && cells(size) >= CELLS_NESTED && 2 * cells(half) <= cells(size) {
-        coarser = match on_mesh(task, levels, asked, half, monitor) {
+        coarser = match on_mesh(task, state, asked, half, monitor) {
             Ok(point) => Some(point),
             // The mesh that was asked for may have an answer all the same.
             Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => None,
             Err(error) => return Err(error),
         };
     }
-    solve_level(task, levels, asked, size.into(), coarser, monitor).map(|solved| solved.point)
+    solve_level(task, state, asked, size.into(), coarser, monitor).map(|solved| solved.point)
 }
 
 /// Solves a motion on given levels, one after the other, and judges it on the finest. Whether a companion that was tried has no answer,
@@ -98,15 +98,15 @@ fn on_mesh(
 /// Why there is no answer.
 pub fn on_levels(
     task: &RollingTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     asked: MotionTask,
     path: &[MeshPlan],
     monitor: &dyn Monitor,
 ) -> Result<Option<(MotionAnswer, bool)>, SolveError> {
-    let Some(mut solved) = along_path(task, levels, asked, path, monitor)? else {
+    let Some(mut solved) = along_path(task, state, asked, path, monitor)? else {
         return Ok(None);
     };
-    judge(task, levels, asked, &mut solved, None, monitor)?;
+    judge(task, state, asked, &mut solved, None, monitor)?;
     let missing = solved.indicators.companion_missing();
     Ok(Some((solved.point.into(), missing)))
 }
@@ -118,7 +118,7 @@ pub fn on_levels(
 /// Why there is no answer.
 pub fn sums_on_finest(
     task: &RollingTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     asked: MotionTask,
     path: &[MeshPlan],
     monitor: &dyn Monitor,
@@ -126,16 +126,16 @@ pub fn sums_on_finest(
     let Some(finest) = path.last() else {
         unreachable!("an answer that was judged stands on a level")
     };
-    let number = levels.level(*finest)?;
-    let level = levels.get(number);
+    let number = state.levels.level(*finest)?;
+    let level = state.levels.get(number);
     let motion = level.scale.motion(&asked.motion);
-    let near = levels.sweep.start(number, &level, &motion).is_some();
+    let near = state.sweep.start(number, &level, &motion).is_some();
     let path = if near {
         std::slice::from_ref(finest)
     } else {
         path
     };
-    match along_path(task, levels, asked, path, monitor)? {
+    match along_path(task, state, asked, path, monitor)? {
         Some(solved) => Ok((solved.point.summed, solved.point.work)),
         None => unreachable!("the path has levels"),
     }
@@ -144,16 +144,16 @@ pub fn sums_on_finest(
 /// Solves a motion on given levels, each started from the one before.
 fn along_path(
     task: &RollingTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     asked: MotionTask,
     path: &[MeshPlan],
     monitor: &dyn Monitor,
 ) -> Result<Option<JudgedAnswer>, SolveError> {
-    levels.path.clear();
+    state.sweep.path.clear();
     let mut solved: Option<JudgedAnswer> = None;
     for plan in path {
         let below = solved.map(|solved| solved.point);
-        solved = Some(solve_level(task, levels, asked, *plan, below, monitor)?);
+        solved = Some(solve_level(task, state, asked, *plan, below, monitor)?);
     }
     Ok(solved)
 }
@@ -167,30 +167,30 @@ fn along_path(
 /// Why there is no answer.
 pub(crate) fn to_target(
     task: &RollingTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     asked: MotionTask,
     target: f64,
     monitor: &dyn Monitor,
 ) -> Result<SolvedLevel, SolveError> {
-    let begun = match levels.begin.take() {
-        Some(plan) => begin_on(task, levels, asked, plan, monitor)?,
+    let begun = match state.sweep.begin.take() {
+        Some(plan) => begin_on(task, state, asked, plan, monitor)?,
         None => None,
     };
     let mut solved = match begun {
         Some(solved) => solved,
         None => {
-            let first = levels.policy.first();
-            solve_level(task, levels, asked, first, None, monitor)?
+            let first = state.policy.first();
+            solve_level(task, state, asked, first, None, monitor)?
         }
     };
     loop {
-        let cells = levels.get(solved.point.level).mesh.cells();
+        let cells = state.levels.get(solved.point.level).mesh.cells();
         let small = target < FINE_TARGET && cells < CELLS_FINE;
-        let larger = levels.policy.is_refinable(cells);
+        let larger = state.policy.is_refinable(cells);
         if !(small && larger) {
             judge(
                 task,
-                levels,
+                state,
                 asked,
                 &mut solved,
                 larger.then_some(target),
@@ -204,14 +204,14 @@ pub(crate) fn to_target(
             break;
         }
         let excess = solved.point.error().map_or(1.0, |error| error / target);
-        let found = regime_of(levels, asked, &solved.point);
-        let plan = levels.policy.next(cells, excess, found, task.single_motion);
-        solved = solve_level(task, levels, asked, plan, Some(solved.point), monitor)?;
+        let found = regime_of(state, asked, &solved.point);
+        let plan = state.policy.next(cells, excess, found, task.single_motion);
+        solved = solve_level(task, state, asked, plan, Some(solved.point), monitor)?;
     }
-    let level = levels.get(solved.point.level);
+    let level = state.levels.get(solved.point.level);
     let (plan, cells) = (level.plan, level.mesh.cells());
     let excess = solved.point.error().map(|error| error / target);
-    levels.begin = Some(levels.policy.next_begin(plan, cells, excess));
+    state.sweep.begin = Some(state.policy.next_begin(plan, cells, excess));
     Ok(solved.point)
 }
 
@@ -222,7 +222,7 @@ pub(crate) fn to_target(
 /// Why there is no answer.
 pub(crate) fn judge(
     task: &RollingTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     asked: MotionTask,
     solved: &mut JudgedAnswer,
     target: Option<f64>,
@@ -242,7 +242,7 @@ pub(crate) fn judge(
             break;
         }
         let (found, work) =
-            which.solve(task, levels, point.level, &point.tangential, asked, monitor)?;
+            which.solve(task, state, point.level, &point.tangential, asked, monitor)?;
         solved.indicators.see(task, k, &point.summed, &found);
         seen[k] = found;
         point.work.add(Work {
@@ -255,7 +255,7 @@ pub(crate) fn judge(
         CompanionAnswer::Found(across, strips),
         CompanionAnswer::Found(on_levels, cells),
     ] = &seen
-        && levels.get(point.level).plan.pole().is_none()
+        && state.levels.get(point.level).plan.pole().is_none()
     {
         for (p, patch) in task.footprint.patches().iter().enumerate() {
             let bound = task.friction.limit(patch);
@@ -276,7 +276,7 @@ pub(crate) fn judge(
 /// Begins a motion of a sweep on the mesh where the last motion ended, if that serves this one too.
 fn begin_on(
     task: &RollingTask,
-    levels: &mut Levels,
+    state: &mut RefinementState,
     asked: MotionTask,
     plan: MeshPlan,
     monitor: &dyn Monitor,
@@ -284,26 +284,26 @@ fn begin_on(
     if plan.regime == Regime::Unknown {
         return Ok(None);
     }
-    let number = levels.level(plan)?;
-    let level = levels.get(number);
+    let number = state.levels.level(plan)?;
+    let level = state.levels.get(number);
     let motion = level.scale.motion(&asked.motion);
-    if levels.sweep.start(number, &level, &motion).is_none() {
+    if state.sweep.start(number, &level, &motion).is_none() {
         return Ok(None);
     }
-    let solved = solve_level(task, levels, asked, plan, None, monitor)?;
-    let found = regime_of(levels, asked, &solved.point);
+    let solved = solve_level(task, state, asked, plan, None, monitor)?;
+    let found = regime_of(state, asked, &solved.point);
     if plan.serves(found) {
         return Ok(Some(solved));
     }
     // Its tractions are still a good start for a mesh that does serve.
-    levels.path.clear();
-    let cells = levels.get(number).mesh.cells() as u32;
-    let plan = levels.policy.plan(cells, found);
-    solve_level(task, levels, asked, plan, Some(solved.point), monitor).map(Some)
+    state.sweep.path.clear();
+    let cells = state.levels.get(number).mesh.cells() as u32;
+    let plan = state.policy.plan(cells, found);
+    solve_level(task, state, asked, plan, Some(solved.point), monitor).map(Some)
 }
 
 /// What the tractions of a solved level look like.
-fn regime_of(levels: &Levels, asked: MotionTask, point: &SolvedLevel) -> Regime {
+fn regime_of(state: &RefinementState, asked: MotionTask, point: &SolvedLevel) -> Regime {
     let spinning = asked.motion.spin_per_mm != 0.0;
-    regime(&levels.get(point.level), &point.tangential, spinning)
+    regime(&state.levels.get(point.level), &point.tangential, spinning)
 }

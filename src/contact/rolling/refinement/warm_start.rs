@@ -1,6 +1,7 @@
 //! Warm starts: the answers of the last motions on each level, from which the next motion of a sweep starts.
 
 use crate::contact::rolling::answer::LevelAnswer;
+use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::interpolate;
 use crate::contact::rolling::start::Start;
@@ -17,10 +18,15 @@ const STEP_MAX: f64 = 1.5;
 /// changes products by less than 0.3 %.
 const NEAR: f64 = 0.25;
 
-/// The answers of the last two motions on every level.
+/// What the motions of a sweep left for the next one.
 #[derive(Debug, Default)]
 pub struct SweepState {
+    /// The answers of the last two motions on every level.
     steps: Vec<Remembered>,
+    /// The levels on which the last motion was solved, coarse to fine.
+    pub path: Vec<usize>,
+    /// The mesh on which the next motion may begin.
+    pub begin: Option<MeshPlan>,
 }
 
 #[derive(Debug)]
@@ -28,7 +34,7 @@ struct Remembered {
     level: usize,
     /// Dimensionless, about the level's origin.
     motion: Motion,
-    mirror: [Vec<f64>; 2],
+    three_point: [Vec<f64>; 2],
     trapezoid: [Vec<f64>; 2],
 }
 
@@ -46,7 +52,7 @@ impl SweepState {
         self.steps.push(Remembered {
             level: number,
             motion,
-            mirror: second.clone(),
+            three_point: second.clone(),
             trapezoid: answer.traction.clone(),
         });
     }
@@ -54,6 +60,7 @@ impl SweepState {
     /// Forgets a level.
     pub fn forget(&mut self, number: usize) {
         self.steps.retain(|step| step.level != number);
+        self.path.retain(|on_path| *on_path != number);
     }
 
     /// A start for a motion on a level: the last two answers extrapolated, or the last answer itself if its motion is near.
@@ -79,13 +86,13 @@ impl SweepState {
                 values
             };
             return Some(Start {
-                mirror: beyond(&last.mirror, &before.mirror),
+                three_point: beyond(&last.three_point, &before.three_point),
                 trapezoid: Some(beyond(&last.trapezoid, &before.trapezoid)),
             });
         }
         let whole = components(motion);
         (dot(to_go, to_go) <= NEAR * NEAR * dot(whole, whole)).then(|| Start {
-            mirror: last.mirror.clone(),
+            three_point: last.three_point.clone(),
             trapezoid: Some(last.trapezoid.clone()),
         })
     }
@@ -117,10 +124,10 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// A start from the answer on a coarser level.
-pub(crate) fn nested_start(coarse: &StripMesh, answer: &LevelAnswer, level: &StripMesh) -> Start {
+pub(crate) fn from_coarser(coarse: &StripMesh, answer: &LevelAnswer, level: &StripMesh) -> Start {
     let second = answer.second.as_ref().unwrap_or(&answer.traction);
     Start {
-        mirror: nested_tractions(coarse, second, level),
+        three_point: nested_tractions(coarse, second, level),
         trapezoid: None,
     }
 }

@@ -209,7 +209,7 @@ impl<'a> RuleSequence<'a> {
     }
 
     /// The three-point rule: from the start, else from zero, else from the upwind solution.
-    pub(super) fn mirror(
+    pub(super) fn three_point(
         &mut self,
         t: &mut [f64],
         started: bool,

@@ -44,14 +44,14 @@ pub fn solve(
     } else if level.is_mirrored() {
         skips.push(Skip::HalfTheOperator);
     }
-    let mut t = solve.start(start.map(|start| &start.mirror));
-    let mirror = solve.mirror(&mut t, start.is_some())?;
-    if mirror.by_fixed_point {
+    let mut t = solve.start(start.map(|start| &start.three_point));
+    let three_point = solve.three_point(&mut t, start.is_some())?;
+    if three_point.by_fixed_point {
         skips.push(Skip::FullSlip);
     }
     let by_mirror = solve.expand(&t);
     let mut remarks = Vec::new();
-    if let Some(force_change) = mirror.other {
+    if let Some(force_change) = three_point.other {
         remarks.push(Remark::SeveralSolutions { force_change });
     }
     let warm = start.and_then(|start| start.trapezoid.as_ref());
@@ -60,12 +60,12 @@ pub fn solve(
         Some(slips) => (slips, Some(by_mirror)),
         None => {
             remarks.push(Remark::SecondRuleFailed {});
-            (mirror.slips, None)
+            (three_point.slips, None)
         }
     };
     let mut traction = solve.expand(&t);
     let bound = solve.bounds();
-    let slip = project_on_bound(&bound, &slips, &mut traction, &mirror.slip);
+    let slip = project_on_bound(&bound, &slips, &mut traction, &three_point.slip);
     Ok(LevelAnswer {
         traction,
         second,
@@ -104,7 +104,7 @@ pub fn trapezoid(
         slips = solve.few_steps(&mut t)?;
     }
     if slips.is_none() {
-        solve.mirror(&mut t, true)?;
+        solve.three_point(&mut t, true)?;
         slips = solve.trapezoid(&mut t, None)?;
     }
     let Some(slips) = slips else {

@@ -1,0 +1,59 @@
+//! What refinement keeps from one motion of a footprint to the next: levels, what a sweep left on them, and buffers.
+
+use std::cell::OnceCell;
+use std::sync::Arc;
+
+use crate::contact::rolling::load_ellipse::LoadEllipse;
+use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::refinement::levels::Levels;
+use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
+use crate::contact::rolling::refinement::warm_start::SweepState;
+use crate::contact::rolling::task::RollingTask;
+
+/// The state of the refinement of one footprint.
+#[derive(Debug)]
+pub struct RefinementState<'a> {
+    task: &'a RollingTask<'a>,
+    /// The meshes that exist.
+    pub levels: Levels<'a>,
+    /// What the motions solved so far left on them.
+    pub sweep: SweepState,
+    /// Which meshes suit the patches.
+    pub policy: MeshPolicy,
+    /// Buffers of the iterations on all levels.
+    pub workspace: NewtonWorkspace,
+    /// The ellipses that stand for the patches, where a method has asked for them.
+    ellipses: OnceCell<Vec<LoadEllipse>>,
+}
+
+impl<'a> RefinementState<'a> {
+    /// Before the first motion; operators come from a store.
+    #[must_use]
+    pub fn new(task: &'a RollingTask<'a>, store: &Arc<OperatorStore>) -> RefinementState<'a> {
+        RefinementState {
+            task,
+            levels: Levels::new(task, store),
+            sweep: SweepState::default(),
+            policy: MeshPolicy::new(task.footprint),
+            workspace: NewtonWorkspace::default(),
+            ellipses: OnceCell::new(),
+        }
+    }
+
+    /// The ellipses that stand for the patches.
+    pub fn ellipses(&self) -> &[LoadEllipse] {
+        let footprint = self.task.footprint;
+        let all = 0..footprint.patches().len();
+        self.ellipses
+            .get_or_init(|| all.map(|patch| LoadEllipse::of(footprint, patch)).collect())
+    }
+
+    /// Drops the levels that were not used for long, and what motions left on them. Called between motions: no answer may refer to a level
+    /// by its number after that.
+    pub fn trim(&mut self) {
+        for number in self.levels.trim() {
+            self.sweep.forget(number);
+        }
+    }
+}
