@@ -147,5 +147,5 @@ fn a_small_solve_allocates_a_bounded_number_of_times() {
     let to_target = count(&json!({ "target_error": 0.005 }));
     // Most are made with meshes, operators and factors, each once.
     assert!(on_mesh < 270, "{on_mesh} allocations on one mesh");
-    assert!(to_target < 2300, "{to_target} allocations to the target");
+    assert!(to_target < 1800, "{to_target} allocations to the target");
 }
