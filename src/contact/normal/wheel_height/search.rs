@@ -179,17 +179,16 @@ impl WheelTask {
             None => search.estimated_lowering(force / self.contact_modulus),
         };
         for heights in 1..=HEIGHTS_MAX {
-            let mut found =
-                match self.at_height_or_finer(search, lowering, fineness, workspace, monitor) {
-                    Ok(found) => found,
-                    Err(NormalError::NoAnswer(reason)) => {
-                        // The wheel may lie too deep; the load may be carried higher up.
-                        let higher = bracket.refuse(lowering, reason);
-                        lowering = higher.map_err(NormalError::NoAnswer)?;
-                        continue;
-                    }
-                    Err(stopped) => return Err(stopped),
-                };
+            let mut found = match self.at_height(search, lowering, fineness, workspace, monitor) {
+                Ok(found) => found,
+                Err(NormalError::NoAnswer(reason)) => {
+                    // The wheel may lie too deep; the load may be carried higher up.
+                    let higher = bracket.refuse(lowering, reason);
+                    lowering = higher.map_err(NormalError::NoAnswer)?;
+                    continue;
+                }
+                Err(stopped) => return Err(stopped),
+            };
             let [carried, slope] = found.found;
             let known = bracket.slope;
             let fine = fineness.detail == Detail::Fine;
@@ -229,7 +228,7 @@ impl WheelTask {
     }
 
     /// The wheel at one height; where coarse gaps have no answer, fine ones may.
-    fn at_height_or_finer(
+    fn at_height(
         &self,
         search: &ContactLocus,
         lowering: f64,
