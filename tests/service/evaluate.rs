@@ -1,5 +1,7 @@
 //! Rows of numbers answered at once.
 
+use std::io::{Read, Write};
+
 use railhead::jobs::codec::arrow::{ArrowWriter, read};
 use railhead::jobs::codec::table::{RowTable, TableColumn};
 use reqwest::Method;
@@ -80,6 +82,101 @@ async fn arrow_in_and_out_is_what_csv_is() {
     assert_eq!(json!(forces), by_arrow.json["columns"]["force_x_n"]);
     let broken = send(arrow, "json", b"no stream".to_vec()).await;
     assert_problem(&broken, 422, "faulty-table", "Arrow");
+}
+
+/// An NPZ archive of arrays of float64, as `numpy.savez_compressed` writes it.
+fn npz(arrays: &[(&str, Vec<f64>)]) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (name, values) in arrays {
+        let header = format!(
+            "{{'descr': '<f8', 'fortran_order': False, 'shape': ({},), }}\n",
+            values.len()
+        );
+        let options = zip::write::SimpleFileOptions::default()
+            .compression_method(zip::CompressionMethod::Deflated);
+        archive
+            .start_file(format!("{name}.npy"), options)
+            .expect("an entry");
+        let mut file = b"\x93NUMPY\x01\x00".to_vec();
+        file.extend(u16::try_from(header.len()).expect("short").to_le_bytes());
+        file.extend(header.as_bytes());
+        file.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+        archive.write_all(&file).expect("in memory");
+    }
+    archive.finish().expect("an archive").into_inner()
+}
+
+#[tokio::test]
+async fn arrays_of_numpy_in_and_out_are_what_csv_is_and_runs_take_them() {
+    let mut setup = Setup::new();
+    setup.http.evaluate_max_bytes = 20_000;
+    let server = setup.start().await;
+    let mut case = template("table");
+    case["load"]["normal_force_n"] = json!(1e5);
+    case["motion"]["creepage_x"] = json!(0.0);
+    let job = server.submit(&case).await;
+    let send = async |to: &str, form: &str, body: Vec<u8>| {
+        let path = format!("{to}template={}", &job[9..]);
+        let shape =
+            |request: reqwest::RequestBuilder| request.header("content-type", form).body(body);
+        server.send(Method::POST, &path, shape).await
+    };
+    let rows = npz(&[
+        ("normal_force_n", vec![1e5, 5e4]),
+        ("/motion/creepage_x", vec![1e-3, -2e-3]),
+    ]);
+    let csv = b"normal_force_n,/motion/creepage_x\n100000,1e-3\n50000,-2e-3\n".to_vec();
+    let form = "application/x-npz";
+    let by_numpy = send("/v1/evaluate?", form, rows.clone()).await;
+    assert_eq!(by_numpy.status, 200, "{}", by_numpy.text);
+    assert_eq!(
+        by_numpy.json,
+        send("/v1/evaluate?", "text/csv", csv).await.json
+    );
+    let answer = send("/v1/evaluate?format=npz&", form, rows.clone()).await;
+    let mut archive = zip::ZipArchive::new(std::io::Cursor::new(answer.bytes)).expect("a ZIP");
+    let mut last = |name: &str, bytes: usize| {
+        let mut file = Vec::new();
+        archive
+            .by_name(name)
+            .expect(name)
+            .read_to_end(&mut file)
+            .expect(name);
+        file.split_off(file.len() - bytes)
+    };
+    let forces: Vec<f64> = last("force_x_n.npy", 16)
+        .chunks(8)
+        .map(|bytes| f64::from_le_bytes(bytes.try_into().expect("8 bytes")))
+        .collect();
+    assert_eq!(json!(forces), by_numpy.json["columns"]["force_x_n"]);
+    assert_eq!(last("status.npy", 8), b"o\0\0\0k\0\0\0");
+    for (columns, status, kind, detail) in [
+        (
+            vec![("a", vec![1.0]), ("b", vec![])],
+            422,
+            "faulty-table",
+            "`b` has 0 numbers, `a` has 1",
+        ),
+        (
+            vec![("normal_force_n", vec![f64::NAN])],
+            422,
+            "faulty-table",
+            "row 0",
+        ),
+        // Packed it is small.
+        (
+            vec![("normal_force_n", vec![1e5; 10_000])],
+            413,
+            "body-too-large",
+            "20000",
+        ),
+    ] {
+        let answer = send("/v1/evaluate?", form, npz(&columns)).await;
+        assert_problem(&answer, status, kind, detail);
+    }
+    let run = send("/v1/runs?", form, rows).await;
+    assert_eq!(run.status, 202, "{}", run.text);
+    assert_eq!(run.json["rows"], json!(2));
 }
 
 #[tokio::test]

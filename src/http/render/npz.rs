@@ -10,6 +10,7 @@ use zip::result::ZipResult;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
+use crate::contact::evaluate::answer::RowsAnswer;
 use crate::http::dto::cells::Outlines;
 use crate::http::render::csv::single;
 use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table, zone_code};
@@ -28,6 +29,7 @@ pub fn write(table: &Table, outlines: &Outlines) -> ZipResult<Vec<u8>> {
     let mut archive = Archive {
         zip: ZipWriter::new(Cursor::new(Vec::new())),
         precision: table.precision,
+        method: CompressionMethod::Deflated,
     };
     let shape = match &table.rows {
         Rows::Cells { places, strip } => {
@@ -66,9 +68,38 @@ pub fn write(table: &Table, outlines: &Outlines) -> ZipResult<Vec<u8>> {
     Ok(archive.zip.finish()?.into_inner())
 }
 
+/// Writes answers to rows: an array for each column of numbers, NaN where a row has none, and `status` as text.
+///
+/// # Errors
+/// The archive would be larger than the format allows.
+pub fn write_rows(answer: &RowsAnswer) -> ZipResult<Vec<u8>> {
+    let mut archive = Archive {
+        zip: ZipWriter::new(Cursor::new(Vec::new())),
+        precision: Precision::Double,
+        // Digits of measured forces do not pack.
+        method: CompressionMethod::Stored,
+    };
+    let rows = answer.status.len();
+    for (name, column) in answer.columns() {
+        archive.numbers(name, &[rows], column)?;
+    }
+    let names = answer.status.iter().map(|status| status.name());
+    let longest = names.clone().map(str::len).max().unwrap_or(1);
+    // NumPy's text: four bytes for each character, filled up with zeros.
+    let mut texts = Vec::with_capacity(4 * longest * rows);
+    for name in names {
+        let begin = texts.len();
+        texts.extend(name.chars().flat_map(|c| u32::from(c).to_le_bytes()));
+        texts.resize(begin + 4 * longest, 0);
+    }
+    archive.add("status", &format!("<U{longest}"), &[rows], &texts)?;
+    Ok(archive.zip.finish()?.into_inner())
+}
+
 struct Archive {
     zip: ZipWriter<Cursor<Vec<u8>>>,
     precision: Precision,
+    method: CompressionMethod,
 }
 
 impl Archive {
@@ -107,7 +138,7 @@ impl Archive {
 
     fn add(&mut self, name: &str, kind: &str, shape: &[usize], values: &[u8]) -> ZipResult<()> {
         // The time of an entry stays that of the format's epoch: equal fields are equal files.
-        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
+        let options = SimpleFileOptions::default().compression_method(self.method);
         self.zip.start_file(format!("{name}.npy"), options)?;
         self.zip.write_all(&header(kind, shape))?;
         self.zip.write_all(values)?;

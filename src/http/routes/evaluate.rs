@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -19,6 +20,7 @@ use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json;
 use crate::http::extract::json::essence;
+use crate::http::extract::npz::read_npz;
 use crate::http::extract::query::{Parameters, id, query};
 use crate::http::extract::rows::{declared_bytes, read_arrow, read_body, read_csv, read_json};
 use crate::http::limits::holding_body::hold_while_sent;
@@ -27,6 +29,7 @@ use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
+use crate::http::render::npz;
 use crate::http::render::rows::{arrow_body, csv_body, json_body};
 use crate::jobs::Jobs;
 use crate::jobs::batch::template::{Cell, fill};
@@ -34,8 +37,10 @@ use crate::jobs::batch::template::{Cell, fill};
 /// The forms of Arrow data.
 const ARROW_STREAM: &str = "application/vnd.apache.arrow.stream";
 const ARROW_FILE: &str = "application/vnd.apache.arrow.file";
+/// NumPy's archive of arrays.
+const NPZ: &str = "application/x-npz";
 /// The forms of an answer.
-const FORMATS: &[Format] = &[Format::Json, Format::Csv, Format::Arrow];
+const FORMATS: &[Format] = &[Format::Json, Format::Csv, Format::Arrow, Format::Npz];
 
 /// Rows to evaluate: a case, and columns of numbers that stand in place of some of its numbers.
 #[derive(Debug, Serialize, ToSchema)]
@@ -130,8 +135,8 @@ query! {
         /// With a table, and needed there: the job whose case is the template
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
-        /// `json`, `csv` or `arrow`; overrides `Accept`
-        #[param(pattern = "^(json|csv|arrow)$", example = "csv")]
+        /// `json`, `csv`, `arrow` or `npz`; overrides `Accept`
+        #[param(pattern = "^(json|csv|arrow|npz)$", example = "csv")]
         format: Format as String = one_of(FORMATS);
     }
 }
@@ -146,8 +151,8 @@ query! {
     tag = "cases",
     operation_id = "evaluate_rows",
     params(EvaluateQuery),
-    request_body(content((EvaluateRequest = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream")), description = "At most 1 000 000 rows and 64 MiB"),
-    responses((status = 200, description = "The rows' resultants", content((EvaluateAnswer = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"))), EvaluateProblems)
+    request_body(content((EvaluateRequest = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/x-npz")), description = "At most 1 000 000 rows and 64 MiB"),
+    responses((status = 200, description = "The rows' resultants", content((EvaluateAnswer = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/x-npz"))), EvaluateProblems)
 )]
 pub async fn evaluate(
     Caller(jobs): Caller,
@@ -159,33 +164,42 @@ pub async fn evaluate(
     let format = choose(request.headers(), format, FORMATS)?;
     let essence = essence(request.headers());
     let template = stored_template(&jobs, &essence, template).await?;
-    let arrow = essence != "text/csv";
     // First the text and its numbers, then these and the answer: about twice the text at any time.
-    let bytes = 2 * declared_bytes(&request, &options).min(options.evaluate_max_bytes);
-    let mut share = memory.rows(jobs.tenant(), bytes).await?;
+    let bytes = match &*essence {
+        // May be packed.
+        NPZ => options.evaluate_max_bytes,
+        _ => declared_bytes(&request, &options).min(options.evaluate_max_bytes),
+    };
+    let mut share = memory.rows(jobs.tenant(), 2 * bytes).await?;
     let text = read_body(request, &options).await?;
     let turn = memory.turn(2 * text.len()).await?;
-    let rows_max = options.evaluate_max_rows;
+    let (rows_max, bytes_max) = (options.evaluate_max_rows, options.evaluate_max_bytes);
     let work = tokio::task::spawn_blocking(move || {
         let _turn = turn;
         let (template, columns) = match template {
-            Some(template) if arrow => (template, read_arrow(text.clone())?),
-            Some(template) => (template, read_csv(&text)?),
+            Some(template) if essence == NPZ => (template, read_npz(text.clone(), bytes_max)?),
+            Some(template) if essence == "text/csv" => (template, read_csv(&text)?),
+            Some(template) => (template, read_arrow(text.clone())?),
             None => read_json(&text)?,
         };
         drop(text);
         let answer = answer(&jobs, &template, columns, rows_max)?;
+        let (bytes, body) = match format {
+            Format::Csv => (answer.bytes(), csv_body(answer)),
+            Format::Arrow => (answer.bytes(), arrow_body(answer)),
+            Format::Npz => {
+                let archive =
+                    npz::write_rows(&answer).map_err(|error| ApiError::internal(&error))?;
+                (archive.len(), Body::from(archive))
+            }
+            _ => (answer.bytes(), json_body(answer)),
+        };
         if let Some(share) = &mut share {
-            share.keep(answer.bytes());
+            share.keep(bytes);
         }
-        Ok::<_, ApiError>((answer, share))
+        Ok::<_, ApiError>((body, share))
     });
-    let (answer, share) = work.await.map_err(|error| ApiError::internal(&error))??;
-    let body = match format {
-        Format::Csv => csv_body(answer),
-        Format::Arrow => arrow_body(answer),
-        _ => json_body(answer),
-    };
+    let (body, share) = work.await.map_err(|error| ApiError::internal(&error))??;
     let headers = [
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
@@ -205,19 +219,19 @@ async fn stored_template(
             "template",
             "`template` belongs to a table; JSON has a `template` of its own",
         )),
-        ("text/csv" | ARROW_STREAM | ARROW_FILE, Some(job)) => {
+        ("text/csv" | ARROW_STREAM | ARROW_FILE | NPZ, Some(job)) => {
             let case = jobs.case(job).await;
             let case = case.map_err(|error| ApiError::from(error).about("template"))?;
             json::read_json(&case).map(Some)
         }
-        ("text/csv" | ARROW_STREAM | ARROW_FILE, None) => Err(ApiError::bad_parameter(
+        ("text/csv" | ARROW_STREAM | ARROW_FILE | NPZ, None) => Err(ApiError::bad_parameter(
             "template",
             "a table needs `?template=` with the id of a job; its case is what the columns are filled into",
         )),
         (other, _) => Err(ApiError::new(
             ProblemKind::UnsupportedMediaType,
             format!(
-                "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv` or `application/vnd.apache.arrow.stream`"
+                "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv`, `application/vnd.apache.arrow.stream` or `application/x-npz`"
             ),
         )),
     }

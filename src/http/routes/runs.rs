@@ -72,7 +72,8 @@ query! {
         (String = "text/csv"),
         (String = "application/x-ndjson"),
         (Vec<u8> = "application/vnd.apache.arrow.stream"),
-        (Vec<u8> = "application/vnd.apache.parquet")
+        (Vec<u8> = "application/vnd.apache.parquet"),
+        (Vec<u8> = "application/x-npz")
     ), description = "At most 10 000 000 rows and 1 GiB"),
     responses(
         (status = 202, description = "The rows are stored and will be solved", body = RunAnswer, headers(

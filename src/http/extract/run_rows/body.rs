@@ -1,7 +1,7 @@
 //! The body of `POST /v1/runs`: its form, its template, and its rows into a draft.
 
 use std::fs::File;
-use std::io::{BufReader, Seek, SeekFrom, Write};
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 
 use axum::body::Body;
 use axum::extract::Request;
@@ -12,6 +12,7 @@ use uuid::Uuid;
 use crate::contact::evaluate::varied::Values;
 use crate::http::extract::arriving::Arriving;
 use crate::http::extract::json::{essence, read_json};
+use crate::http::extract::npz::{read_arrays, too_large};
 use crate::http::extract::rows::{declared_bytes, read_body, read_json_columns};
 use crate::http::extract::run_rows::text::{CsvRows, JsonRows, faulty};
 use crate::http::extract::run_rows::titles::column;
@@ -44,6 +45,8 @@ pub enum RowsForm {
     Arrow,
     /// A Parquet file.
     Parquet,
+    /// NumPy's archive of arrays, held in memory as JSON is.
+    Npz,
 }
 
 /// The form that the rows are declared to have, and the template if a job holds it.
@@ -63,11 +66,12 @@ pub async fn form(
             RowsForm::Arrow
         }
         "application/vnd.apache.parquet" => RowsForm::Parquet,
+        "application/x-npz" => RowsForm::Npz,
         other => {
             return Err(ApiError::new(
                 ProblemKind::UnsupportedMediaType,
                 format!(
-                    "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv`, `application/x-ndjson`, `application/vnd.apache.arrow.stream` or `application/vnd.apache.parquet`"
+                    "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv`, `application/x-ndjson`, `application/vnd.apache.arrow.stream`, `application/vnd.apache.parquet` or `application/x-npz`"
                 ),
             ));
         }
@@ -123,9 +127,15 @@ pub async fn read_run(
         return read.await.map_err(|error| ApiError::internal(&error))?;
     };
     let file = spool(&jobs, options, request).await?;
+    let bytes_max = options.evaluate_max_bytes;
+    // An archive is read as a whole, once packed and once as numbers.
+    let bytes = match form {
+        RowsForm::Npz => 2 * bytes_max,
+        _ => PIECE_BYTES,
+    };
     let held = (
-        memory.rows(jobs.tenant(), PIECE_BYTES).await?,
-        memory.turn(PIECE_BYTES).await?,
+        memory.rows(jobs.tenant(), bytes).await?,
+        memory.turn(bytes).await?,
     );
     let read = tokio::task::spawn_blocking(move || {
         let _held = held;
@@ -151,6 +161,7 @@ pub async fn read_run(
                 from_tables(tables, draft)
             }
             RowsForm::Parquet => from_tables(groups(file)?, draft),
+            RowsForm::Npz => from_tables(std::iter::once(npz_table(file, bytes_max)), draft),
             RowsForm::Csv | RowsForm::Json => {
                 let mut rows = CsvRows::new(BufReader::new(file))?;
                 let mut draft = draft(rows.columns.clone())?;
@@ -181,6 +192,22 @@ async fn spool(
     let ready = file.flush().and_then(|()| file.seek(SeekFrom::Start(0)));
     ready.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
     Ok(file)
+}
+
+/// The arrays of an NPZ archive, which is read as a whole.
+fn npz_table(file: File, bytes_max: usize) -> Result<RowTable, ApiError> {
+    let mut archive = Vec::new();
+    file.take(bytes_max as u64 + 1)
+        .read_to_end(&mut archive)
+        .map_err(|error| faulty(format!("the NPZ archive cannot be read: {error}")))?;
+    if archive.len() > bytes_max {
+        return Err(too_large(bytes_max));
+    }
+    let arrays = read_arrays(archive.into(), bytes_max)?.into_iter();
+    let columns = arrays.map(|(name, values)| (name, TableColumn::Numbers(values)));
+    Ok(RowTable {
+        columns: columns.collect(),
+    })
 }
 
 /// The groups of rows of a Parquet file.
