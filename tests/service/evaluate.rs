@@ -106,6 +106,15 @@ fn npz(arrays: &[(&str, Vec<f64>)]) -> Vec<u8> {
     archive.finish().expect("an archive").into_inner()
 }
 
+/// The values of an array of an archive, which end its file and take so many bytes.
+fn values_of(archive: &[u8], name: &str, bytes: usize) -> Vec<u8> {
+    let mut archive = zip::ZipArchive::new(std::io::Cursor::new(archive)).expect("a ZIP");
+    let mut file = Vec::new();
+    let mut entry = archive.by_name(name).expect(name);
+    entry.read_to_end(&mut file).expect(name);
+    file.split_off(file.len() - bytes)
+}
+
 #[tokio::test]
 async fn arrays_of_numpy_in_and_out_are_what_csv_is_and_runs_take_them() {
     let mut setup = Setup::new();
@@ -134,22 +143,13 @@ async fn arrays_of_numpy_in_and_out_are_what_csv_is_and_runs_take_them() {
         send("/v1/evaluate?", "text/csv", csv).await.json
     );
     let answer = send("/v1/evaluate?format=npz&", form, rows.clone()).await;
-    let mut archive = zip::ZipArchive::new(std::io::Cursor::new(answer.bytes)).expect("a ZIP");
-    let mut last = |name: &str, bytes: usize| {
-        let mut file = Vec::new();
-        archive
-            .by_name(name)
-            .expect(name)
-            .read_to_end(&mut file)
-            .expect(name);
-        file.split_off(file.len() - bytes)
-    };
-    let forces: Vec<f64> = last("force_x_n.npy", 16)
+    let forces: Vec<f64> = values_of(&answer.bytes, "force_x_n.npy", 16)
         .chunks(8)
         .map(|bytes| f64::from_le_bytes(bytes.try_into().expect("8 bytes")))
         .collect();
     assert_eq!(json!(forces), by_numpy.json["columns"]["force_x_n"]);
-    assert_eq!(last("status.npy", 8), b"o\0\0\0k\0\0\0");
+    let status = values_of(&answer.bytes, "status.npy", 8);
+    assert_eq!(status, b"o\0\0\0k\0\0\0");
     for (columns, status, kind, detail) in [
         (
             vec![("a", vec![1.0]), ("b", vec![])],

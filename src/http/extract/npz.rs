@@ -131,7 +131,11 @@ fn array(file: &[u8]) -> Result<Vec<f64>, String> {
 }
 
 /// Numbers of an NPY type, such as `<f8`.
-#[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_lossless,
+    reason = "one expression for every type; as every number of a case"
+)]
 fn decoded(kind: &str, bytes: &[u8]) -> Option<Vec<f64>> {
     macro_rules! numbers {
         ($($little:literal | $big:literal => $type:ty),*) => {

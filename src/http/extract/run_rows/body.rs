@@ -108,23 +108,7 @@ pub async fn read_run(
     let rows_max = options.run_max_rows;
     let jobs = jobs.clone();
     let Some(template) = template else {
-        let bytes = 2 * declared_bytes(&request, options).min(options.evaluate_max_bytes);
-        let share = memory.rows(jobs.tenant(), bytes).await?;
-        let text = read_body(request, options).await?;
-        let turn = memory.turn(2 * text.len()).await?;
-        let read = tokio::task::spawn_blocking(move || {
-            let _held = (share, turn);
-            let (template, columns) = read_json_columns(&text)?;
-            drop(text);
-            let (titles, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
-            let named = titles.iter().zip(&values);
-            let named =
-                named.map(|(title, values)| column(title, matches!(values, Values::Texts(_))));
-            let mut draft = jobs.draft_run(template, named.collect(), rows_max)?;
-            draft.push(values)?;
-            Ok(draft)
-        });
-        return read.await.map_err(|error| ApiError::internal(&error))?;
+        return from_json(jobs, memory, options, request).await;
     };
     let file = spool(&jobs, options, request).await?;
     let bytes_max = options.evaluate_max_bytes;
@@ -171,6 +155,32 @@ pub async fn read_run(
                 Ok(draft)
             }
         }
+    });
+    read.await.map_err(|error| ApiError::internal(&error))?
+}
+
+/// Rows in JSON, which has a template of its own and is held in memory.
+async fn from_json(
+    jobs: Jobs,
+    memory: &Memory,
+    options: &HttpOptions,
+    request: Request<Body>,
+) -> Result<RunDraft, ApiError> {
+    let rows_max = options.run_max_rows;
+    let bytes = 2 * declared_bytes(&request, options).min(options.evaluate_max_bytes);
+    let share = memory.rows(jobs.tenant(), bytes).await?;
+    let text = read_body(request, options).await?;
+    let turn = memory.turn(2 * text.len()).await?;
+    let read = tokio::task::spawn_blocking(move || {
+        let _held = (share, turn);
+        let (template, columns) = read_json_columns(&text)?;
+        drop(text);
+        let (titles, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
+        let named = titles.iter().zip(&values);
+        let named = named.map(|(title, values)| column(title, matches!(values, Values::Texts(_))));
+        let mut draft = jobs.draft_run(template, named.collect(), rows_max)?;
+        draft.push(values)?;
+        Ok(draft)
     });
     read.await.map_err(|error| ApiError::internal(&error))?
 }
