@@ -48,6 +48,20 @@ pub async fn fill(pool: &PgPool, from: i64, to: i64) {
         .expect("figures");
 }
 
+/// Text of numbers, as solutions are; it hardly compresses.
+fn solution() -> Vec<u8> {
+    let mut seed: u64 = 0x2545_f491_4f6c_dd1d;
+    let mut text = Vec::new();
+    while text.len() < RESULT_BYTES {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        text.extend(format!("0.{seed},").bytes());
+    }
+    text.truncate(RESULT_BYTES);
+    text
+}
+
 /// What the workers did in some time: jobs, and the seconds of each claim with its end.
 #[derive(Default)]
 struct Work {
@@ -58,7 +72,7 @@ struct Work {
 
 async fn work(store: Arc<PostgresStore>, until: Instant, group: usize) -> Work {
     let result = EncodedResult {
-        solution: vec![b'x'; RESULT_BYTES].into(),
+        solution: solution().into(),
         fields: None,
     };
     let ending = Ending::Succeeded {
