@@ -28,6 +28,7 @@ pub mod numerics;
 pub mod post;
 pub mod problem;
 pub mod profile_trust;
+pub(crate) mod pulled_wheel;
 pub mod remark;
 pub mod rolling;
 pub mod rolling_stage;
@@ -134,7 +135,10 @@ fn solve_motions(
 ) -> Result<(Solution, Fields), SolveError> {
     let began = monitor.elapsed();
     let answer = match &case.problem.task {
-        NormalTask::Wheel(wheel) => trust::solve(operators, case, wheel, monitor)?,
+        NormalTask::Wheel(wheel) => match case.problem.pull() {
+            None => trust::solve(operators, case, wheel, monitor)?,
+            Some(force) => pulled_wheel::solve(operators, case, wheel, force, monitor)?,
+        },
         NormalTask::Wheelset(wheelset) => {
             wheelset::solve::solve(operators, case, wheelset, monitor)?
         }

@@ -54,6 +54,7 @@ mod profile_cases;
 mod profile_conforming;
 mod profile_damage;
 mod profile_faults;
+mod profile_forces;
 mod profile_formats;
 mod profile_geometry;
 mod profile_laws;

@@ -384,6 +384,11 @@ async fn sections_and_patches_on_the_profiles_are_drawn_where_there_are_any() {
     ] {
         assert!(section.text.contains(word), "the section lacks `{word}`");
     }
+    let wheelset = path_of(&server.solve(&example("wheelset.case.json")).await);
+    let refused = server
+        .get(&format!("{wheelset}/plot.svg?view=profiles"))
+        .await;
+    assert_problem(&refused, 400, "bad-query", "one wheel and one rail");
     let hertz = path_of(&server.solve(&asked("spin.case.json", &everything())).await);
     for (query, word) in [
         ("view=profiles", "of the type `profiles`"),

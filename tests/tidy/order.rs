@@ -40,6 +40,7 @@ const ORDER: &[&str] = &[
     "contact::wheel_on_rail",
     "contact::unlike_bodies",
     "contact::profile_trust",
+    "contact::pulled_wheel",
     "contact::wheelset",
     "contact::slices",
     "contact::evaluate",

@@ -50,8 +50,9 @@ impl CheckedCase {
         };
         let of_material = elasticity.remark(case.solver.method.into());
         let of_material = of_material.map(|r| r.at_pointer("/material"));
-        let of_case = unusual_friction(&case.friction);
-        let of_case = of_material.into_iter().chain(of_case);
+        let of_case = of_material
+            .into_iter()
+            .chain(unusual_friction(&case.friction));
         let ExpandedMotions {
             motions,
             forces,
@@ -78,6 +79,7 @@ impl CheckedCase {
             history,
             wheelset: wheel_task::wheelset(&case.motion),
             drive_torque: wheel_task::drive_torque(&case.motion),
+            longitudinal_force: wheel_task::longitudinal_force(&case.motion),
             checked: Checked::without_faults(),
         };
         let run = run(case, limits);
@@ -86,12 +88,7 @@ impl CheckedCase {
         Ok(CheckedCase {
             problem,
             run,
-            label: Label {
-                name: case.name.clone(),
-                labels: case.labels.clone(),
-                digest,
-                asked: asked(case),
-            },
+            label: label(case, digest),
             remarks,
         })
     }
@@ -102,6 +99,16 @@ fn given_creepages<'a>(motions: &'a [Motion], forces: &[PrescribedForces]) -> &'
     match forces.iter().all(|forces| *forces == [None; 2]) {
         true => motions,
         false => &[],
+    }
+}
+
+/// What a case is called, with its digest.
+fn label(case: &Case, digest: String) -> Label {
+    Label {
+        name: case.name.clone(),
+        labels: case.labels.clone(),
+        digest,
+        asked: asked(case),
     }
 }
 

@@ -186,9 +186,19 @@ fn motion_faults(
             faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
         }
         faults.extend(expanded.force_fault(motion, what));
+        faults.extend(pull_fault(motion, what));
     }
     faults.extend(given.after.faults(motion, expanded, limits));
     faults
+}
+
+/// The fault of a longitudinal force under a wheel, where friction falls and two angular velocities may give it.
+fn pull_fault(motion: &Motions, what: &str) -> Option<Fault> {
+    wheel_task::longitudinal_force(motion)?;
+    let detail = format!(
+        "given with friction that falls with {what}, where two angular velocities may give one force; give the angular velocity instead"
+    );
+    Some(Fault::new("/motion/wheelset/force_x_n", detail))
 }
 
 /// Faults of a case that the table does not cover, as far as that is known before patches are found.

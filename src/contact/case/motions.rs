@@ -67,8 +67,16 @@ impl ExpandedMotions {
             let pointer = pointer(given, index, ["force_x_n", "force_y_n"][k]);
             let [x, y] = forces.map(|force| force.unwrap_or(0.0));
             let length = x.hypot(y);
-            let detail = if of_profiles {
-                "given with profiles, whose patches have a frame each; give creepages or a wheelset"
+            let across = of_profiles && forces[1].is_some();
+            let pointer = match across {
+                true => self::pointer(given, index, "force_y_n"),
+                false => pointer,
+            };
+            let detail = if across {
+                "given with profiles, where normal forces have a part across the track; give creepage_y or a wheelset"
+                    .to_owned()
+            } else if of_profiles && self.forces.len() > 1 {
+                "given with profiles in several motions, which share their patches; give one motion"
                     .to_owned()
             } else if let Some(limit) = limit.filter(|limit| length > *limit) {
                 format!(

@@ -151,6 +151,9 @@ const STEP_CELLS_SECONDS: f64 = 5e-9;
 /// Times longer where the creepage of a step is sought.
 const STEP_TRIALS: f64 = 2.0;
 
+/// Solves of a wheel whose rail is to carry a longitudinal force: a coarse look, three to five trials and the answer.
+const ROUNDS_PULL: f64 = 6.0;
+
 /// The estimated time of a case, in s on one core of the machine the figures were taken on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolveTime {
@@ -179,7 +182,15 @@ impl CheckedCase {
         let whole = normal + tangential + after;
         SolveTime {
             normal,
-            whole: self.wheelset_seconds(whole),
+            whole: self.wheelset_seconds(self.pull_times() * whole),
+        }
+    }
+
+    /// Solves of a wheel whose rail is to carry a longitudinal force.
+    fn pull_times(&self) -> f64 {
+        match self.problem.pull() {
+            Some(_) => ROUNDS_PULL,
+            None => 1.0,
         }
     }
 
@@ -224,7 +235,7 @@ impl CheckedCase {
 
     fn is_prescribed(&self, k: usize) -> bool {
         let forces = self.problem.forces.get(k);
-        forces.is_some_and(|forces| *forces != [None; 2])
+        self.problem.pull().is_none() && forces.is_some_and(|forces| *forces != [None; 2])
     }
 
     /// Time of a history: its steps on the level that a target usually leads to, or on the mesh given, with the coarser one before it.

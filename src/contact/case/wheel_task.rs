@@ -56,6 +56,7 @@ pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
         angular_velocity_rad_per_s,
         free_rolling_radius_mm,
         drive_torque_n_mm: _,
+        force_x_n: _,
         lateral_velocity_mm_per_s,
         yaw_rate_rad_per_s,
         roll_rate_rad_per_s,
@@ -74,6 +75,14 @@ pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
 pub(crate) fn drive_torque(motions: &Motions) -> Option<f64> {
     match motions {
         Motions::Wheelset { wheelset } => wheelset.drive_torque_n_mm,
+        _ => None,
+    }
+}
+
+/// The longitudinal force in N that the rail is to carry.
+pub(crate) fn longitudinal_force(motions: &Motions) -> Option<f64> {
+    match motions {
+        Motions::Wheelset { wheelset } => wheelset.force_x_n,
         _ => None,
     }
 }

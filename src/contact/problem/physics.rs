@@ -33,6 +33,8 @@ pub struct Problem {
     pub wheelset: Option<WheelsetMotion>,
     /// Torque about the axle in N mm that the rails are to balance; the angular velocity of the wheelset is then found.
     pub drive_torque: Option<f64>,
+    /// Longitudinal force in N that the rail is to carry under the wheel; the angular velocity of the wheelset is then found.
+    pub longitudinal_force: Option<f64>,
     /// Forces prescribed instead of creepages, motion by motion.
     pub forces: Vec<PrescribedForces>,
     /// Rolling speeds in mm/s, motion by motion, where they are given.
@@ -82,6 +84,26 @@ impl Problem {
             task: NormalTask::Wheel(wheel),
             wheelset: Some(wheelset),
             drive_torque: None,
+            ..self.clone()
+        }
+    }
+
+    /// The longitudinal force in N that the rail is to carry under one wheel, if it is prescribed.
+    pub(crate) fn pull(&self) -> Option<f64> {
+        match self.task {
+            NormalTask::Wheel(_) => self.longitudinal_force.or(self.forces.first()?[0]),
+            _ => None,
+        }
+    }
+
+    /// The same question about a wheel that moves as given.
+    #[must_use]
+    pub(crate) fn moving(&self, motion: Motion, wheelset: Option<WheelsetMotion>) -> Problem {
+        Problem {
+            motions: vec![motion],
+            forces: vec![[None; 2]],
+            wheelset,
+            longitudinal_force: None,
             ..self.clone()
         }
     }

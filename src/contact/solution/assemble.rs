@@ -162,6 +162,7 @@ impl<'a> Assembly<'a> {
             remarks: merged(self.remarks),
             normal: self.solved.report,
             wheel_lowering_mm: None,
+            angular_velocity_rad_per_s: None,
             wheelset: None,
             origin: Origin {
                 x_mm: 0.0,

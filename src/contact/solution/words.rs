@@ -32,6 +32,10 @@ pub struct Solution {
     /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub wheel_lowering_mm: Option<f64>,
+    /// Angular velocity of the wheelset in rad/s, found for the longitudinal force that was prescribed; only for `profiles` with `wheelset.force_x_n`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub angular_velocity_rad_per_s: Option<f64>,
     /// The positions of the wheelset and its kinematics; only for `wheelset`. `total` then has one entry per position, and every patch
     /// belongs to one side of one position.
     #[serde(skip_serializing_if = "Option::is_none", default)]

@@ -154,10 +154,11 @@ async fn of_profiles(
 ) -> Result<Drawing, ApiError> {
     let mut patches = Vec::new();
     for (number, patch) in solution.patches.iter().enumerate() {
-        let Some(position) = patch.position else {
+        // The wheelset has two wheels in every position.
+        let Some(position) = patch.position.filter(|_| solution.wheelset.is_none()) else {
             return Err(ApiError::bad_parameter(
                 "view",
-                "only contacts of the type `profiles` have a wheel and a rail",
+                "only contacts of the type `profiles` have one wheel and one rail",
             ));
         };
         let cells = match jobs.point_fields(id, number, 0).await {

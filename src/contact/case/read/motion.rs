@@ -126,23 +126,24 @@ fn speed(block: &mut Object) -> Option<Option<f64>> {
     }
 }
 
-/// The motion of a wheelset; only one on both rails can have a torque balanced.
+/// The motion of a wheelset; on both rails a torque can be balanced, on one a longitudinal force.
 fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
-    const SPINS: [(&str, Interval); 3] = [
-        ("angular_velocity_rad_per_s", RATE),
-        ("free_rolling_radius_mm", RADIUS),
-        ("drive_torque_n_mm", TORQUE),
-    ];
+    const TORQUE_NAME: (&str, Interval) = ("drive_torque_n_mm", TORQUE);
+    const FORCE_NAME: (&str, Interval) = ("force_x_n", FORCE);
     const RATES: [(&str, Interval); 3] = [
         ("lateral_velocity_mm_per_s", VELOCITY),
         ("yaw_rate_rad_per_s", RATE),
         ("roll_rate_rad_per_s", RATE),
     ];
-    let spins = if on_both_rails {
-        &SPINS[..]
-    } else {
-        &SPINS[..2]
-    };
+    let spins = [
+        ("angular_velocity_rad_per_s", RATE),
+        ("free_rolling_radius_mm", RADIUS),
+        if on_both_rails {
+            TORQUE_NAME
+        } else {
+            FORCE_NAME
+        },
+    ];
     let names = spins.iter().chain(&RATES).map(|(name, _)| *name);
     let names: Vec<&str> = ["speed_mm_per_s"].into_iter().chain(names).collect();
     block.only(&names, &[]);
@@ -166,7 +167,7 @@ fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
             let others: Vec<&str> = spins[1..].iter().map(|(name, _)| *name).collect();
             let others = others.join(" or ");
             block.fault(
-                SPINS[0].0,
+                spins[0].0,
                 format!("missing; {RATE} is needed, or {others} instead"),
             );
             return None;
@@ -179,18 +180,15 @@ fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
             return None;
         }
     }
-    let [
-        angular_velocity_rad_per_s,
-        free_rolling_radius_mm,
-        drive_torque_n_mm,
-    ] = spin;
+    let [angular_velocity_rad_per_s, free_rolling_radius_mm, balanced] = spin;
     spin.into_iter().flatten().next()?;
     let [lateral, yaw, roll] = rates;
     Some(Wheelset {
         speed_mm_per_s: speed_mm_per_s?,
         angular_velocity_rad_per_s,
         free_rolling_radius_mm,
-        drive_torque_n_mm,
+        drive_torque_n_mm: balanced.filter(|_| on_both_rails),
+        force_x_n: balanced.filter(|_| !on_both_rails),
         lateral_velocity_mm_per_s: lateral?,
         yaw_rate_rad_per_s: yaw?,
         roll_rate_rad_per_s: roll?,

@@ -36,11 +36,11 @@ pub struct AskedMotion {
     /// Spin in 1/mm.
     #[schema(required = false)]
     pub spin_per_mm: f64,
-    /// Longitudinal force on the lower body in N, over all patches, at most μN. Excludes `creepage_x`.
+    /// Longitudinal force on the lower body in N, over all patches, at most μN. Excludes `creepage_x`; with `profiles` in one motion alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub force_x_n: Option<f64>,
-    /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`.
+    /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`; not with `profiles`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub force_y_n: Option<f64>,
@@ -78,7 +78,7 @@ pub enum Motions {
     },
 }
 
-/// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s`, `free_rolling_radius_mm` and `drive_torque_n_mm` is given.
+/// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s`, `free_rolling_radius_mm`, `drive_torque_n_mm` and `force_x_n` is given.
 ///
 /// With the speed V, the axle e, the angular velocity ω = Ω e + (roll rate, 0, yaw rate) and r from the wheelset's centre to the
 /// patch, the wheel's material moves with v = (V, lateral velocity, 0) + ω × r; the creepages of a patch with the tangent t and the
@@ -101,6 +101,11 @@ pub struct Wheelset {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub drive_torque_n_mm: Option<f64>,
+    /// Longitudinal force on the rail in N, over all patches of the wheel; for the contact `profiles` only. The angular velocity is found at which
+    /// the rail carries it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub force_x_n: Option<f64>,
     /// Velocity of the centre to the left in mm/s; 0 when left out.
     #[schema(required = false)]
     pub lateral_velocity_mm_per_s: f64,
