@@ -13,7 +13,7 @@ use crate::contact::post::damage::figures::DamageTask;
 use crate::contact::post::heat::{ThermalTask, heating};
 use crate::contact::post::local_power::{CellPower, PowerTask, cell_power};
 use crate::contact::post::subsurface::states::{STORED, in_patch_axes, point, stored};
-use crate::contact::post::subsurface::surface_load::{LoadResolution, SurfaceLoad};
+use crate::contact::post::subsurface::surface_load::{LoadResolution, LoadWorkspace, SurfaceLoad};
 use crate::contact::post::subsurface::task::{LoadedBody, StressPlaces, SubsurfaceTask};
 use crate::contact::post::subsurface::worst::worst_place;
 use crate::contact::problem::checked_case::CheckedCase;
@@ -181,11 +181,12 @@ fn subsurface(
         .iter()
         .map(least_depth)
         .fold(f64::INFINITY, f64::min);
-    let stress = |at: [f64; 3]| {
-        let stress = load.stress(at, LoadResolution::FINE);
+    let workspace = &mut load.workspace();
+    let stress = |at: [f64; 3], workspace: &mut LoadWorkspace| {
+        let stress = load.stress(at, LoadResolution::FINE, workspace);
         in_patch_axes(stress, task.body)
     };
-    let evaluate = |places: &[[f64; 3]]| {
+    let evaluate = |places: &[[f64; 3]], workspace: &mut LoadWorkspace| {
         let mut values = Vec::with_capacity(places.len() * STORED);
         for (k, [x, y, depth]) in places.iter().enumerate() {
             if k % POINTS_UNASKED == 0
@@ -194,12 +195,12 @@ fn subsurface(
                 return Err(stop);
             }
             let at = [*x, *y, depth.max(least)];
-            values.extend(stored(at, stress(at)));
+            values.extend(stored(at, stress(at, workspace)));
         }
         Ok(values)
     };
     let shared = match &task.places {
-        StressPlaces::Points(points) => evaluate(points)?,
+        StressPlaces::Points(points) => evaluate(points, workspace)?,
         StressPlaces::BelowWorst(_) => Vec::new(),
     };
     let below_worst = matches!(task.places, StressPlaces::BelowWorst(_));
@@ -209,12 +210,12 @@ fn subsurface(
             return Err(stop);
         }
         let worst = (task.worst || below_worst)
-            .then(|| worst_place(&load, of.footprint, k, least_depth(patch)))
+            .then(|| worst_place(&load, of.footprint, k, least_depth(patch), workspace))
             .flatten();
         let points = match (&task.places, worst) {
             (StressPlaces::BelowWorst(depths), Some([x, y, _])) => {
                 let line: Vec<[f64; 3]> = depths.iter().map(|depth| [x, y, *depth]).collect();
-                evaluate(&line)?
+                evaluate(&line, workspace)?
             }
             _ => shared.clone(),
         };
@@ -224,7 +225,7 @@ fn subsurface(
                 LoadedBody::Upper => BodyName::Upper,
             },
             least_depth_mm: least,
-            worst: worst.map(|at| point(at, stress(at))),
+            worst: worst.map(|at| point(at, stress(at, workspace))),
         };
         found.push(PatchStresses { summary, points });
     }

@@ -5,7 +5,6 @@
 //! contact.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::{LazyLock, Mutex, PoisonError};
 
 use realfft::RealFftPlanner;
 
@@ -14,12 +13,14 @@ const TAPER: f64 = 2.0;
 /// Padded length relative to that of the heights; the zeros keep the periodic transform from coupling the two ends.
 const PADDING: usize = 2;
 
-/// Plans of the transforms, which take longer to make than to use. Lengths are powers of two, so that there are few.
-static PLANNER: LazyLock<Mutex<RealFftPlanner<f64>>> = LazyLock::new(Mutex::default);
-
-/// Pressure in MPa that flattens `heights` in mm, `step` mm apart, with the contact modulus in MPa; one value per height.
-#[must_use]
-pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
+/// Pressure in MPa that flattens `heights` in mm, `step` mm apart, with the contact modulus in MPa; one value per height. The planner keeps
+/// the plans of the transforms, which take longer to make than to use.
+pub fn flattening(
+    heights: &[f64],
+    step: f64,
+    modulus: f64,
+    planner: &mut RealFftPlanner<f64>,
+) -> Vec<f64> {
     let count = heights.len();
     let padded = (PADDING * count).max(2).next_power_of_two();
     let mut values = vec![0.0; padded];
@@ -31,14 +32,8 @@ pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
             *height
         };
     }
-    let (forward, backward) = {
-        // A planner that a panic left behind holds whole plans still.
-        let mut planner = PLANNER.lock().unwrap_or_else(PoisonError::into_inner);
-        (
-            planner.plan_fft_forward(padded),
-            planner.plan_fft_inverse(padded),
-        )
-    };
+    let forward = planner.plan_fft_forward(padded);
+    let backward = planner.plan_fft_inverse(padded);
     let mut spectrum = forward.make_output_vec();
     // The buffers have the lengths of the plans, so that neither transform can fail.
     let done = forward.process(&mut values, &mut spectrum);

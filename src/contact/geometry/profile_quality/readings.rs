@@ -1,5 +1,7 @@
 //! Compares two readings of the same points: the spline in use with a smoother one, and with Akima's curve.
 
+use realfft::RealFftPlanner;
+
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::flattening::flattening;
 use crate::contact::geometry::profile_quality::noise::{MEDIAN_OF_NORMAL, median};
@@ -48,11 +50,12 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
     let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
     let used = spline(part, smoothing);
     let used: Vec<CurvePoint> = places.iter().map(|s| used.at(*s)).collect();
-    let pressures = |other: &dyn Fn(f64) -> [f64; 2]| {
+    let planner = &mut RealFftPlanner::new();
+    let mut pressures = |other: &dyn Fn(f64) -> [f64; 2]| {
         let heights: Vec<f64> = (used.iter().zip(&places))
             .map(|(used, s)| above(used, other(*s)))
             .collect();
-        flattening(&heights, step, modulus)
+        flattening(&heights, step, modulus, planner)
     };
     let over_contact = |pressures: &[f64]| {
         let (mut sum, mut count) = (0.0, 0.0_f64);

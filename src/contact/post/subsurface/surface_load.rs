@@ -5,7 +5,6 @@
 //! cell carries the mean pressure over its piece of the true outline, and that times traction over pressure, which is interpolated
 //! between the cells. The shift of its ends between its two sides counts as width, so that refined cells fill the outline.
 
-use std::cell::RefCell;
 use std::f64::consts::PI;
 
 use crate::contact::half_space::corner_sums::CornerSums;
@@ -46,9 +45,15 @@ pub struct SurfaceLoad<'a> {
     strips: Vec<LoadedStrip<'a>>,
     footprint: &'a Footprint,
     poisson_ratio: f64,
-    /// Kept from point to point.
-    corners: RefCell<CornerSums>,
-    parts: RefCell<LoadParts>,
+    /// Cells of the mesh.
+    cells: usize,
+}
+
+/// What is kept from point to point of one [`SurfaceLoad`]: buffers, and the parts of cells that were worked out. The caller owns it.
+#[derive(Debug)]
+pub struct LoadWorkspace {
+    corners: CornerSums,
+    parts: LoadParts,
 }
 
 /// The loads on a segment of a strip.
@@ -96,21 +101,32 @@ impl<'a> SurfaceLoad<'a> {
             strips: strips.iter().map(strip).collect(),
             footprint,
             poisson_ratio,
-            corners: RefCell::default(),
-            parts: RefCell::new(LoadParts::new(cells)),
+            cells,
+        }
+    }
+
+    /// A workspace for this load, which serves no other.
+    #[must_use]
+    pub fn workspace(&self) -> LoadWorkspace {
+        LoadWorkspace {
+            corners: CornerSums::default(),
+            parts: LoadParts::new(self.cells),
         }
     }
 
     /// The stress at `[x, y, depth]` in mm, in axes with z into the body.
-    #[must_use]
-    pub fn stress(&self, at: [f64; 3], resolution: LoadResolution) -> Stress {
-        let corners = &mut *self.corners.borrow_mut();
-        corners.clear();
-        self.parts.borrow_mut().trim();
+    pub fn stress(
+        &self,
+        at: [f64; 3],
+        resolution: LoadResolution,
+        workspace: &mut LoadWorkspace,
+    ) -> Stress {
+        workspace.corners.clear();
+        workspace.parts.trim();
         for j in 0..self.strips.len() {
-            self.push_strip(j, at, resolution, corners);
+            self.push_strip(j, at, resolution, workspace);
         }
-        corners.stress(at[2], self.poisson_ratio)
+        workspace.corners.stress(at[2], self.poisson_ratio)
     }
 
     fn push_strip(
@@ -118,8 +134,9 @@ impl<'a> SurfaceLoad<'a> {
         j: usize,
         at: [f64; 3],
         resolution: LoadResolution,
-        corners: &mut CornerSums,
+        workspace: &mut LoadWorkspace,
     ) {
+        let corners = &mut workspace.corners;
         let strip = &self.strips[j];
         let chord = &strip.segment.chord;
         let sides = [chord.y - 0.5 * chord.dy, chord.y + 0.5 * chord.dy];
@@ -172,7 +189,7 @@ impl<'a> SurfaceLoad<'a> {
         }
         push_edge(cells, before.map(|load| -load));
         for k in near {
-            self.push_parts(j, k, at, resolution, corners);
+            self.push_parts(j, k, at, resolution, workspace);
         }
     }
 
@@ -183,9 +200,8 @@ impl<'a> SurfaceLoad<'a> {
         cell: usize,
         at: [f64; 3],
         resolution: LoadResolution,
-        corners: &mut CornerSums,
+        LoadWorkspace { corners, parts }: &mut LoadWorkspace,
     ) {
-        let parts = &mut *self.parts.borrow_mut();
         let root = self.strips[j].first_root + cell;
         let u = [0, 1].map(|k| self.strips[j].angles[cell + k]);
         let mut open = match parts.root(root, || self.part(j, u, StripPart::WHOLE)) {

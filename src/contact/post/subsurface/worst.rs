@@ -6,7 +6,7 @@
 
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::post::subsurface::states::von_mises;
-use crate::contact::post::subsurface::surface_load::{LoadResolution, SurfaceLoad};
+use crate::contact::post::subsurface::surface_load::{LoadResolution, LoadWorkspace, SurfaceLoad};
 
 // With the numbers below, measured on a prototype for four of the reference contacts (no friction to full slip): the stress found was
 // never less than the largest of a scan of 7854 points, and up to 0.9 % more.
@@ -56,6 +56,7 @@ pub fn worst_place(
     footprint: &Footprint,
     patch: usize,
     least: f64,
+    workspace: &mut LoadWorkspace,
 ) -> Option<[f64; 3]> {
     let [x_min, x_max, y_min, y_max] = footprint.patches()[patch].extent;
     let columns = PatchColumns {
@@ -66,10 +67,10 @@ pub fn worst_place(
         small: 0.5 * (x_max - x_min).min(y_max - y_min),
         least,
     };
-    let badness = |at: [f64; 3], resolution| {
+    let mut badness = |at: [f64; 3], resolution| {
         columns
             .place(at)
-            .map_or(0.0, |at| von_mises(load.stress(at, resolution)))
+            .map_or(0.0, |at| von_mises(load.stress(at, resolution, workspace)))
     };
     let mut scanned: Vec<(f64, [f64; 3])> = Vec::with_capacity(ALONG * ACROSS * DEPTHS.len());
     let spread =
@@ -105,7 +106,7 @@ pub fn worst_place(
 }
 
 /// The highest point that Nelder and Mead's simplex finds from a start, with its height.
-fn search_from(start: [f64; 3], height: impl Fn([f64; 3]) -> f64) -> (f64, [f64; 3]) {
+fn search_from(start: [f64; 3], mut height: impl FnMut([f64; 3]) -> f64) -> (f64, [f64; 3]) {
     let mut simplex = vec![(height(start), start)];
     for k in 0..3 {
         let mut at = start;
