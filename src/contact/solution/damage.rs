@@ -182,7 +182,7 @@ pub struct DamageFiguresUsed {
     pub archard: ArchardFigures,
     /// The damage function.
     pub wlrm: WlrmFigures,
-    /// Models that were evaluated with figures from memory, neither confirmed nor the client's.
+    /// Models that were evaluated with figures that are neither confirmed against their sources nor the client's.
     pub unconfirmed: Vec<DamageModel>,
     /// Where the figures of the set are from.
     pub sources: Vec<String>,

@@ -16,9 +16,9 @@ pub const SHAKEDOWN_LIMIT: f64 = 4.0;
 /// Where the figures of the named sets are from.
 const SOURCES: [&str; 6] = [
     "usfd: Lewis and Olofsson 2004, Braghin et al. 2006 (wheel R8T on rail UIC 900A), slopes and limits as programs in use have them; without the step that published offsets leave at the second limit",
-    "archard: Jendel 2002; from memory, not confirmed",
-    "wlrm: Burstow 2004; from memory, not confirmed; other rail grades have other functions",
-    "shear_yield_mpa: Ekberg, Kabo and Andersson 2002, cyclic; from memory, not confirmed",
+    "archard: Jendel 2002; not confirmed against the source",
+    "wlrm: Burstow 2004; not confirmed against the source; other rail grades have other functions",
+    "shear_yield_mpa: Ekberg, Kabo and Andersson 2002, cyclic; not confirmed against the source",
     "hardness_mpa: 260 HB, the least of the grade",
     "limits of shakedown: Johnson 1985, chapter 9: 4.0 for a line contact, less than for any ellipse, and 1 over the utilisation at the surface",
 ];
@@ -68,7 +68,7 @@ impl DamageTask {
         }
     }
 
-    /// The models asked for whose figures are from memory and not the client's.
+    /// The models asked for whose figures are neither confirmed nor the client's.
     #[must_use]
     pub fn unconfirmed(&self) -> Vec<DamageModel> {
         let own = &self.figures.own;
