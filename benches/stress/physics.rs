@@ -1,4 +1,4 @@
-//! Friction that falls with slip, varies across or has a layer below it, and bodies that differ: random cases held against laws.
+//! Friction that falls with slip or temperature, varies across or has a layer below it, and bodies that differ: random cases held against laws.
 
 use std::fmt::Write as _;
 
@@ -12,10 +12,12 @@ use crate::random::Random;
 /// A class, how many cases of it are solved, and how one is made.
 type Class = (&'static str, usize, fn(&mut Random, &mut Value));
 
-const CLASSES: [Class; 4] = [
+const CLASSES: [Class; 6] = [
     ("friction falls with slip", 600, falling),
     ("friction varies across", 400, across),
+    ("friction falls with temperature", 300, heated),
     ("a layer, a reduction", 400, layered),
+    ("a layer that yields", 200, yielding),
     ("bodies differ", 60, unlike),
 ];
 
@@ -48,6 +50,27 @@ fn layered(random: &mut Random, case: &mut Value) {
             json!({ "coefficient": 0.35, "layer": layer, "reduction": random.between(0.1, 1.0) })
         }
     };
+}
+
+fn heated(random: &mut Random, case: &mut Value) {
+    let mut mu: Vec<f64> = (0..3).map(|_| random.between(0.02, 0.6)).collect();
+    mu.sort_by(|a, b| b.total_cmp(a));
+    let (first, second) = (random.decades(5.0, 500.0), random.decades(5.0, 500.0));
+    let temperatures = json!([20.0, 20.0 + first, 20.0 + first + second]);
+    case["friction"] =
+        json!({ "by_temperature": { "temperature_c": temperatures, "coefficient": mu } });
+    case["motion"]["speed_mm_per_s"] = json!(random.decades(300.0, 80_000.0));
+    case["thermal"] = json!({
+        "conductivity_w_per_mk": 50, "density_kg_per_m3": 7850, "specific_heat_j_per_kgk": 450, "bulk_c": 20
+    });
+}
+
+fn yielding(random: &mut Random, case: &mut Value) {
+    layered(random, case);
+    case["friction"]["layer"]["yield_mpa"] = json!(random.decades(1.0, 1000.0));
+    if random.part() < 0.5 {
+        case["friction"]["layer"]["hardening_mpa_per_mm"] = json!(random.decades(1.0, 1e4));
+    }
 }
 
 fn unlike(random: &mut Random, case: &mut Value) {

@@ -8,12 +8,13 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::problem::checked_case::CheckedCase;
 
-/// The monitor of a whole case: adds the case's own time limit and turns motions done into progress.
+/// The monitor of a whole case: adds the case's own time limit and turns motions done into progress, which never falls.
 pub(crate) struct TimeLimit<'a> {
     inner: &'a dyn Monitor,
     time_limit: Option<Duration>,
     motions: usize,
     done: Cell<usize>,
+    reached: Cell<f64>,
 }
 
 impl<'a> TimeLimit<'a> {
@@ -28,6 +29,7 @@ impl<'a> TimeLimit<'a> {
             time_limit,
             motions,
             done: Cell::new(0),
+            reached: Cell::new(0.0),
         }
     }
 
@@ -51,15 +53,19 @@ impl<'a> TimeLimit<'a> {
 }
 
 impl Monitor for TimeLimit<'_> {
-    fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
+    /// `progress` is that of the motions not yet done, where they are solved together.
+    fn tick(&self, progress: f64) -> ControlFlow<Stop> {
         if self
             .time_limit
             .is_some_and(|limit| self.inner.elapsed() > limit)
         {
             return ControlFlow::Break(Stop::OutOfTime);
         }
-        self.inner
-            .tick(self.done.get() as f64 / self.motions.max(1) as f64)
+        let all = self.motions.max(1) as f64;
+        let done = self.done.get() as f64;
+        let now = (done + progress * (all - done)) / all;
+        self.reached.set(self.reached.get().max(now));
+        self.inner.tick(self.reached.get())
     }
 
     fn elapsed(&self) -> Duration {

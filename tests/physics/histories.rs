@@ -1,9 +1,13 @@
 //! Rolling that changes: references, closed forms and laws.
 
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+use std::time::Duration;
+
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::mesh::size::MeshSize;
-use railhead::contact::monitor::Unmonitored;
+use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::normal_stage;
 use railhead::contact::rolling::history::level_run::LevelRun;
 use railhead::contact::rolling::history::record::PointRecord;
@@ -322,6 +326,37 @@ fn a_long_way_ends_in_steady_rolling_and_steady_rolling_stays() {
             point.motion
         );
     }
+}
+
+/// Keeps what a solve says of its progress.
+#[derive(Default)]
+struct Listener(RefCell<Vec<f64>>);
+
+impl Monitor for Listener {
+    fn tick(&self, progress: f64) -> ControlFlow<Stop> {
+        self.0.borrow_mut().push(progress);
+        ControlFlow::Continue(())
+    }
+
+    fn elapsed(&self) -> Duration {
+        Duration::ZERO
+    }
+}
+
+#[test]
+fn progress_of_a_history_grows_while_it_is_solved() {
+    let history = json!({ "history": { "distance_mm": [0, 5, 10, 20], "creepage_x": 0.001 } });
+    let case = contact::check(&sphere(0.28, history), &Limits::default()).unwrap();
+    let listener = Listener::default();
+    contact::solve(&case, &listener).unwrap();
+    let heard = listener.0.into_inner();
+    assert!(heard.is_sorted(), "progress never falls");
+    let between = heard.iter().filter(|p| (0.2..0.8).contains(*p)).count();
+    assert!(
+        between > 20 && heard.iter().all(|p| *p <= 1.0),
+        "{between} of {}",
+        heard.len()
+    );
 }
 
 #[test]

@@ -180,12 +180,16 @@ impl Passage<'_> {
                     bounds[i] = heat.bound(rest[i], slip[i], ahead, right - left);
                 }
                 if let Some(law) = self.yielding {
-                    let way = slip[i] * (right - left);
-                    let stress = law.stress + law.hardening * (plastic + 0.5 * way);
-                    if stress < bounds[i] {
-                        bounds[i] = stress;
-                        plastic += way;
-                    }
+                    // Where friction holds less than the layer, it slides on the layer and leaves it as it is.
+                    let room = match law.hardening > 0.0 {
+                        true => (bounds[i] - law.stress) / law.hardening - plastic,
+                        false if law.stress < bounds[i] => f64::INFINITY,
+                        false => 0.0,
+                    };
+                    let grown = (slip[i] * (right - left)).min(room.max(0.0));
+                    let stress = law.stress + law.hardening * (plastic + 0.5 * grown);
+                    bounds[i] = bounds[i].min(stress);
+                    plastic += grown;
                 }
                 heated.cells.push((left, right, bounds[i] * slip[i]));
             }
@@ -280,7 +284,9 @@ mod tests {
         for (i, bound) in found.iter().enumerate() {
             let way = 1.0 - 0.5 * (mesh.left[i] + mesh.right[i]);
             let known = (0.5 + 0.25 * way).min(0.8);
-            assert!((bound - known).abs() < 1e-12, "{i}: {bound} {known}");
+            // The layer stops hardening inside one cell, whose bound is that of the mean of its way.
+            let within = if known > 0.78 { 0.011 } else { 1e-12 };
+            assert!((bound - known).abs() < within, "{i}: {bound} {known}");
         }
         // Nothing slips: the whole layer has its first strength.
         let still = laws

@@ -1,5 +1,6 @@
 //! A history on one level: step by step, with the displacements that each step remembers.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::contact::half_space::strip_operator::kind::Parity;
@@ -136,6 +137,7 @@ impl<'a> LevelRun<'a> {
         let mut points = Vec::with_capacity(self.history.distances.len());
         let (level, operator) = (self.level, Arc::clone(&self.operator));
         let (parity, edges) = (self.parity, self.edges.clone());
+        let mut done = 0.0;
         for alike in steps.chunk_by(|a, b| a.kind == b.kind) {
             let kind = alike[0].kind;
             let equations = steady(Rule::ThreePoint, (level, &operator, parity));
@@ -148,6 +150,10 @@ impl<'a> LevelRun<'a> {
             };
             let mut search = self.search(kind);
             for step in alike {
+                if let ControlFlow::Break(stop) = self.monitor.tick(done / steps.len() as f64) {
+                    return Err((step.point, stop.into()));
+                }
+                done += 1.0;
                 self.step(&of, step, &mut search)
                     .map_err(|failure| (step.point, failure))?;
                 if step.last {

@@ -2,7 +2,7 @@
 
 use crate::contact::error::SolveError;
 use crate::contact::mesh::size::MeshSize;
-use crate::contact::monitor::Monitor;
+use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan;
@@ -109,6 +109,18 @@ fn half_length(extents: &[[f64; 4]]) -> Option<f64> {
     lengths.reduce(f64::min).filter(|half| *half > 0.0)
 }
 
+/// Progress before a level, and what it adds: two levels usually suffice, of which the second takes most of the time.
+fn progress(level: usize) -> [f64; 2] {
+    match level {
+        0 => [0.0, 0.15],
+        1 => [0.15, 0.75],
+        later => {
+            let left = 0.1 * 0.5_f64.powi(later as i32 - 2);
+            [1.0 - left, 0.5 * left]
+        }
+    }
+}
+
 /// Solves a history: an answer per point.
 ///
 /// # Errors
@@ -124,7 +136,13 @@ pub fn solve(
     let mut seconds = 0.0;
     let mut work = Work::default();
     for (k, plan) in plans.iter().enumerate() {
-        let mut found = on_level(task, history, *plan, state, monitor)?;
+        let [before_level, own] = progress(k);
+        let part = MonitorPart {
+            inner: monitor,
+            before: before_level,
+            own,
+        };
+        let mut found = on_level(task, history, *plan, state, &part)?;
         seconds += found.seconds;
         found.seconds = seconds;
         let last = k + 1 == plans.len();
