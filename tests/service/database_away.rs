@@ -79,7 +79,7 @@ async fn a_database_that_is_away_is_no_full_disk_and_costs_no_job() {
         pause().await;
     }
     let job = service.until(&solving, "succeeded").await;
-    assert_eq!(job["attempt"], 1, "{job}");
+    assert_eq!(job["attempt"], 1, "{job}\n{}", service.log_text());
 }
 
 #[tokio::test(flavor = "multi_thread")]

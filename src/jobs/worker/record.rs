@@ -264,7 +264,10 @@ impl Worker {
             return Ok(());
         }
         let shared = &self.shared;
-        let released = shared.store.release(claims, why, shared.now_ms()).await?;
+        // While the store is away the jobs stay claimed: a lease that ran out would count as an attempt.
+        let released = shared
+            .write_with_retries(|| shared.store.release(claims, why, shared.now_ms()))
+            .await?;
         for (id, state) in &released {
             if state.ended() {
                 shared.metrics.ended(*state, 1);
