@@ -258,7 +258,16 @@ pub(crate) fn judge(
         && state.levels.get(point.level).plan.pole().is_none()
     {
         for (p, patch) in task.footprint.patches().iter().enumerate() {
-            let bound = task.friction.limit(patch);
+            let bound = match task.friction.across() {
+                // Its limit is a sum over samples of a load that is not quite that of the cells.
+                Some(_) => {
+                    let sum = point.summed[p];
+                    task.friction
+                        .limit(patch)
+                        .max(sum.force_x.hypot(sum.force_y))
+                }
+                None => task.friction.limit(patch),
+            };
             let companions = [(across[p], strips), (on_levels[p], cells)];
             let companions = companions.map(|(other, reach)| (other, EXTRAPOLATED * reach));
             point.resultants[p] = point.summed[p].beyond_all(companions, bound);
