@@ -4,9 +4,6 @@ use std::sync::Arc;
 
 use crate::contact::normal::patch::Patch;
 
-/// Samples of the load across an ellipse, whose friction limit is taken as their sum.
-const SAMPLES: usize = 64;
-
 /// What the places of a table are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AcrossPlace {
@@ -72,16 +69,29 @@ impl AcrossLaw {
         }
     }
 
-    /// Friction limit of a patch in N, its load spread across as an ellipse has it.
+    /// Friction limit of a patch in N, its load spread across as an ellipse has it: a parabola, so that Simpson's rule is exact for every
+    /// linear piece of the table.
     #[must_use]
     pub fn limit(&self, patch: &Patch) -> f64 {
         let [low, high] = [patch.extent[2], patch.extent[3]];
-        let loads = (0..SAMPLES).map(|k| {
-            let eta = (2 * k + 1) as f64 / SAMPLES as f64 - 1.0;
-            let y = 0.5 * (low + high) + 0.5 * (high - low) * eta;
-            (y, 1.0 - eta * eta)
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let load = |y: f64| 0.75 / half * (1.0 - ((y - middle) / half).powi(2));
+        let (first, last) = (self.table[0], self.table[self.table.len() - 1]);
+        let inner = self.table.windows(2).map(|pair| [pair[0], pair[1]]);
+        let outer = [
+            [(low.min(first.0), first.1), first],
+            [last, (high.max(last.0), last.1)],
+        ];
+        let pieces = inner.chain(outer).map(|[(y0, mu0), (y1, mu1)]| {
+            let (begin, end) = (y0.max(low), y1.min(high));
+            if begin >= end {
+                return 0.0;
+            }
+            let traction = |y: f64| (mu0 + (y - y0) / (y1 - y0) * (mu1 - mu0)) * load(y);
+            let inside = traction(0.5 * (begin + end));
+            (end - begin) / 6.0 * (traction(begin) + 4.0 * inside + traction(end))
         });
-        self.mean(loads) * patch.normal_force
+        pieces.sum::<f64>() * patch.normal_force
     }
 }
 
@@ -92,6 +102,29 @@ mod tests {
     fn law() -> AcrossLaw {
         let at = vec![-1.0, 1.0, 1.0, 2.0];
         AcrossLaw::new(AcrossPlace::Y, at, vec![0.1, 0.3, 0.5, 0.2])
+    }
+
+    #[test]
+    fn the_limit_of_a_patch_is_the_integral_of_its_load() {
+        let law = law();
+        let count = 400_000_u32;
+        for extent in [[-0.5, 2.5], [-3.0, -1.5], [0.9, 1.1], [1.5, 9.0]] {
+            let patch = Patch {
+                normal_force: 1000.0,
+                approach: None,
+                area: 1.0,
+                pressure_max: 1.0,
+                semi_axes: None,
+                extent: [-1.0, 1.0, extent[0], extent[1]],
+            };
+            let samples = (0..count).map(|k| {
+                let eta = f64::from(2 * k + 1) / f64::from(count) - 1.0;
+                let y = 0.5 * (extent[0] + extent[1]) + 0.5 * (extent[1] - extent[0]) * eta;
+                (y, 1.0 - eta * eta)
+            });
+            let sum = 1000.0 * law.mean(samples);
+            assert!((law.limit(&patch) / sum - 1.0).abs() < 1e-5, "{extent:?}");
+        }
     }
 
     #[test]
