@@ -18,7 +18,6 @@ use crate::contact::rolling::cubic_law::CubicLaw;
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::resolution::Resolution;
 use crate::contact::solution::words::{Fields, PatchSolution, Solution};
 use crate::contact::wheel_on_rail::SolvedWheel;
 
@@ -27,13 +26,13 @@ use crate::contact::wheel_on_rail::SolvedWheel;
 const MISSED_OF_TARGET: f64 = 0.1;
 /// See [`MISSED_OF_TARGET`].
 const MISSED_LEAST: f64 = 5e-5;
-/// The target that stands for an explicit mesh.
-const TARGET_OF_MESH: f64 = 0.005;
 /// Allowed error of the resultants in the first look, which tells patches, loads and radii.
+/// Chosen by judgement; how much it matters was not measured.
 const TARGET_FIRST: f64 = 0.05;
 /// Progress of the first look and of the search; the rest is the answer.
 const PROGRESS: [f64; 2] = [0.1, 0.8];
 /// Trials after which the progress of the search stands still.
+/// Chosen by judgement; how much it matters was not measured.
 const TRIALS_USUAL: f64 = 6.0;
 
 /// Solves a wheel on a rail that carries `force` in N along x, at the creepage or the angular velocity that gives it.
@@ -157,10 +156,7 @@ impl PullSearch<'_> {
 
     /// The answer at the force.
     fn to(&self, force: f64, first: &FirstLook) -> Result<(Solution, Fields), SolveError> {
-        let target = match self.case.run.resolution {
-            Resolution::Target(target) => target,
-            Resolution::Mesh(_) => TARGET_OF_MESH,
-        };
+        let target = self.case.run.resolution.target_or_usual();
         // Outputs never change forces, so that trials need none.
         let run = self.case.run.for_resultants(0.0);
         let (mut trials, mut nearest) = (0.0, f64::INFINITY);

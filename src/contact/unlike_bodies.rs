@@ -23,7 +23,6 @@ use crate::contact::remark::list::Remark;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::state::RefinementState;
-use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::solution::words::NormalReport;
 use crate::contact::time_limit::TimeLimit;
@@ -40,8 +39,6 @@ const LEFT: f64 = 0.25;
 const LEFT_BY_PRESSURE: f64 = 0.02;
 /// The change that is left has to be below this part of the target. Chosen by judgement; how much it matters was not measured.
 const PART_OF_TARGET: f64 = 0.3;
-/// The target that stands for an explicit mesh.
-const TARGET_OF_MESH: f64 = 0.005;
 /// The opening is sampled on so many points along each axis, over the patches and by this part of their size around them; beyond it
 /// is taken as constant. It is as smooth as displacements are. Both were chosen by judgement; how much they matter was not measured.
 const SAMPLES: usize = 41;
@@ -66,10 +63,7 @@ pub(crate) fn solve(
         run: case.run.for_resultants(TARGET_OF_ROUNDS),
         ..case.clone()
     };
-    let target = match case.run.resolution {
-        Resolution::Target(target) => target,
-        Resolution::Mesh(_) => TARGET_OF_MESH,
-    };
+    let target = case.run.resolution.target_or_usual();
     let workspace = &mut GridWorkspace::default();
     let mut before = None;
     let mut left = f64::INFINITY;

@@ -152,6 +152,7 @@ const STEP_CELLS_SECONDS: f64 = 5e-9;
 const STEP_TRIALS: f64 = 2.0;
 
 /// Solves of a wheel whose rail is to carry a longitudinal force: a coarse look, three to five trials and the answer.
+/// Chosen by judgement; how much it matters was not measured.
 const ROUNDS_PULL: f64 = 6.0;
 
 /// The estimated time of a case, in s on one core of the machine the figures were taken on.

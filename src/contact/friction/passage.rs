@@ -5,14 +5,13 @@
 
 use std::sync::Arc;
 
+use crate::contact::friction::falling::SLIP_OF_CELL;
 use crate::contact::friction::interface::LayerYield;
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::numerics::monotone_root::{self, CloseEnough, Course};
 
-/// Largest temperature in K by which the temperature of a cell may be missed; bounds change by some 10⁻⁴ per K.
+/// Largest temperature in K by which the temperature of a cell may be missed; bounds change by some 10⁻⁴ per K. Keeps the numbers safe; not tuned.
 const KELVIN: f64 = 1e-6;
-/// Largest slip that a unit of traction over G on one cell takes from it, as for friction that falls with slip.
-const SLIP_OF_CELL: f64 = 1.7;
 /// Largest stability number that is answered: bounds and slips are found in turn. Of 200 random motions on one ellipse with numbers from 0.1 to
 /// 0.95 all were solved, with half as many products again at 0.95 as at 0.1.
 const STABILITY_MAX: f64 = 1.0;

@@ -27,8 +27,9 @@ const MARGIN_MM: f64 = 0.1;
 const WIDENING: f64 = 1.5;
 /// Number of times a window is made longer at most.
 const WIDENINGS_MAX: usize = 5;
-/// Slope with which surfaces are bent apart beyond a cut: steep enough that they do not touch there.
-const PATCH_DISTANCE: f64 = 0.5;
+/// Slope with which surfaces are bent apart beyond a cut: steep enough that they do not touch there. Chosen by judgement; how
+/// much it matters was not measured.
+const SLOPE_BEYOND_CUT: f64 = 0.5;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
 /// Clearance in mm below which the inclination of a line is kept: more than usual loads lower a wheel. It changes times, no answer.
@@ -298,7 +299,7 @@ fn apart(mut gap: LocalGap, limits: [Option<f64>; 2]) -> LocalGap {
         let above = upper.map_or(0.0, |end| v - end);
         let beyond = below.max(above).max(0.0);
         row.iter_mut()
-            .for_each(|height| *height += PATCH_DISTANCE * beyond);
+            .for_each(|height| *height += SLOPE_BEYOND_CUT * beyond);
     }
     gap
 }

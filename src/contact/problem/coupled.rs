@@ -5,15 +5,12 @@ use crate::contact::problem::physics::Problem;
 use crate::contact::problem::run::Run;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::methods::method::Method;
-use crate::contact::rolling::resolution::Resolution;
 
 /// Error of forces relative to μN over |K| μ, where tractions feel the pressure but the pressure does not feel them: 0.09 to 0.55 in nine
 /// contacts with |K| from 0.05 to 0.25 and μ of 0.3 and 0.6, on 10 × 20 cells against CONTACT.
 const FIRST_ORDER: f64 = 0.6;
 /// An error below this part of the target is not worth a second look at the pressure.
 const PART_OF_TARGET: f64 = 0.1;
-/// The target that stands for an explicit mesh.
-const TARGET_OF_MESH: f64 = 0.005;
 
 impl Problem {
     /// Error of forces, relative to μN, that is left if only tractions feel the other: 0 where the bodies are alike or without friction.
@@ -49,9 +46,5 @@ impl Problem {
 
 /// The error of forces below which the pressure need not feel the tractions.
 pub(crate) fn negligible(run: &Run) -> f64 {
-    PART_OF_TARGET
-        * match run.resolution {
-            Resolution::Target(target) => target,
-            Resolution::Mesh(_) => TARGET_OF_MESH,
-        }
+    PART_OF_TARGET * run.resolution.target_or_usual()
 }

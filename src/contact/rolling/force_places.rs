@@ -14,6 +14,7 @@ use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
 
 /// Steps by which a start is moved to where the table has the forces; they fall short where the force hardly grows with its place.
+/// Chosen by judgement; how much it matters was not measured.
 const TABLE_STEPS: u32 = 40;
 /// The start is good enough when the table misses the forces by no more than this, relative to μN: about what the table is off.
 const TABLE_MISSED: f64 = 1e-3;

@@ -2,6 +2,9 @@
 
 use crate::contact::mesh::size::MeshSize;
 
+/// The target that stands for an explicit mesh where a search needs one. Chosen by judgement; how much it matters was not measured.
+const TARGET_OF_MESH: f64 = 0.005;
+
 /// Mesh chosen by the solver for a target, or given by the client.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Resolution {
@@ -19,6 +22,12 @@ impl Resolution {
             Resolution::Target(target) => Some(target),
             Resolution::Mesh(_) => None,
         }
+    }
+
+    /// The target, or what stands for it with an explicit mesh.
+    #[must_use]
+    pub fn target_or_usual(self) -> f64 {
+        self.target().unwrap_or(TARGET_OF_MESH)
     }
 
     /// The target reduced so that its root sum of squares with another error equals the original; unchanged if that error is 0 or at least

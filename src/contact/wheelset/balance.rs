@@ -16,7 +16,6 @@ use crate::contact::numerics::bracketed_root::find_root;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_trust::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::resolution::Resolution;
 use crate::contact::solution::words::{PatchSolution, Solution};
 use crate::contact::wheel_on_rail::SolvedWheel;
 
@@ -29,8 +28,6 @@ const LEVEL_POOR: f64 = 1e-2;
 /// A torque is balanced to this part of the target of forces, and at least to this part of the friction limit.
 const TORQUE_OF_TARGET: f64 = 0.2;
 const TORQUE_LEAST: f64 = 1e-4;
-/// The target that stands for an explicit mesh.
-const TARGET_OF_MESH: f64 = 0.005;
 /// Kalker's coefficient C₁₁ of a circle at ν = 0.28, for the unit of creepage in the search for the angular velocity.
 const C11: f64 = 4.3;
 
@@ -153,10 +150,7 @@ impl WheelsetSolve<'_> {
     ) -> Result<(Both, f64), SolveError> {
         let radius = 0.5 * (rigid.touches[0].radius + rigid.touches[1].radius);
         let free = motion.speed / radius;
-        let target = match self.case.run.resolution {
-            Resolution::Target(target) => target,
-            Resolution::Mesh(_) => TARGET_OF_MESH,
-        };
+        let target = self.case.run.resolution.target_or_usual();
         let modulus = self.case.problem.elasticity.shear_modulus;
         // What the search calls 1: the slip at which linear theory reaches the limit of friction.
         let (mut unit, mut last) = (None, None);
