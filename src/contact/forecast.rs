@@ -4,6 +4,7 @@ use crate::contact::error::SolveError;
 use crate::contact::friction::on_rail::in_frame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
+use crate::contact::normal::load_across::LoadAcross;
 use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::problem::physics::Problem;
 use crate::contact::rolling::load_ellipse::LoadEllipse;
@@ -40,7 +41,8 @@ pub(crate) fn forecast(
             let ellipse = LoadEllipse::of_samples(&gap.field, k);
             let modulus = problem.interface.reduction * problem.elasticity.shear_modulus;
             let poisson_ratio = problem.elasticity.poisson_ratio;
-            let limit = friction.limit(patch);
+            let limit =
+                friction.limit_under(patch.normal_force, || LoadAcross::of_samples(&gap.field, k));
             let [_, across] = forces(modulus, poisson_ratio, &ellipse, limit, &motion);
             lifted -= across * gap.frame.angle.sin();
         }

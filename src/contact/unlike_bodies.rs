@@ -150,8 +150,7 @@ fn opened(
     let point = force_control::solve(&rolling, &mut state, 0, None, watch)?;
     let sum = Resultants::default();
     let sum = point.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
-    let patches = solved.footprint.patches();
-    let limit = case.problem.friction.limit_of_all(patches);
+    let limit = case.problem.friction.limit_of_all(&solved.footprint);
     let force = [sum.force_x / limit, sum.force_y / limit];
     let Some(fields) = &point.fields else {
         unreachable!("the method that couples has fields")
@@ -169,7 +168,7 @@ fn opened(
         f64::INFINITY,
         f64::NEG_INFINITY,
     ];
-    for patch in patches {
+    for patch in solved.footprint.patches() {
         for k in [0, 2] {
             extent[k] = extent[k].min(patch.extent[k]);
             extent[k + 1] = extent[k + 1].max(patch.extent[k + 1]);

@@ -230,6 +230,37 @@ fn forces_of_a_mirrored_coefficient_are_mirrored() {
     assert!(m.abs() > 0.1 * x, "more friction on one side turns");
 }
 
+/// Under a crown that is sharp on one side the load is nowhere near an ellipse's: the friction limit is the force of full sliding all the
+/// same, and a parabola of load is not.
+#[test]
+fn sliding_under_a_skew_crown_takes_the_friction_limit_of_a_coefficient_that_varies_across() {
+    let y: Vec<f64> = (-120..=120).map(|k| 0.25 * f64::from(k)).collect();
+    let radius = |y: f64| if y < 0.0 { 400.0 } else { 60.0 };
+    let gap: Vec<f64> = y.iter().map(|y| 0.5 * y * y / radius(*y)).collect();
+    let case = json!({
+        "material": { "shear_modulus_mpa": 82_000, "poisson_ratio": 0.28 },
+        "friction": { "across": { "y_mm": [-3.0, -3.0], "coefficient": [0.1, 0.5] } },
+        "contact": { "type": "gap_profile", "rolling_mm": 460, "y_mm": y, "gap_mm": gap },
+        "load": { "normal_force_n": 80_000 },
+        "motion": { "creepage_x": 0.1 },
+        "solver": { "target_error": 0.001 },
+        "outputs": ["resultants"],
+    });
+    let (solution, _) = solve(&case);
+    let patch = &solution.patches[0];
+    let limit = patch.friction_limit_n.expect("known");
+    let force = patch.points[0].force_x_n.abs();
+    assert!((force / limit - 1.0).abs() < 2e-3, "{force} {limit}");
+    let [.., low, high] = patch.extent_mm;
+    let part = (-3.0 - low) / (high - low);
+    let parabola = 0.5 - 0.4 * part * part * (3.0 - 2.0 * part);
+    let as_ellipse = parabola * patch.normal_force_n;
+    assert!(
+        (force / as_ellipse - 1.0).abs() > 0.02,
+        "{force} {as_ellipse}"
+    );
+}
+
 /// A wheel at the gauge corner and at the flange of a rail that is lubricated there.
 #[test]
 fn every_patch_of_a_wheel_has_the_friction_of_its_place_on_the_rail() {

@@ -2,6 +2,7 @@
 
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
@@ -21,23 +22,25 @@ impl CheckedCase {
     /// # Errors
     /// A sentence, if no part of the wheel lies above the rail.
     pub fn understood(&self) -> Result<Understanding, String> {
-        let patches = self.problem.task.known_patches();
+        let known = self.problem.task.known_footprint();
         let friction = &self.problem.friction;
         let placement = match &self.problem.task {
             NormalTask::Wheel(task) => Some(placed(task)?),
             _ => None,
         };
         Ok(Understanding {
-            friction_limit_n: patches
-                .as_ref()
-                .map(|patches| friction.limit_of_all(patches)),
-            patches: patches.iter().flatten().map(known).collect(),
+            friction_limit_n: known.as_ref().map(|known| friction.limit_of_all(known)),
+            patches: known
+                .iter()
+                .flat_map(Footprint::patches)
+                .map(known_patch)
+                .collect(),
             placement,
         })
     }
 }
 
-fn known(patch: &Patch) -> KnownPatch {
+fn known_patch(patch: &Patch) -> KnownPatch {
     KnownPatch {
         normal_force_n: patch.normal_force,
         approach_mm: patch.approach,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::contact::normal::patch::Patch;
+use crate::contact::normal::load_across::LoadAcross;
 
 /// What the places of a table are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,29 +69,10 @@ impl AcrossLaw {
         }
     }
 
-    /// Friction limit of a patch in N, its load spread across as an ellipse has it: a parabola, so that Simpson's rule is exact for every
-    /// linear piece of the table.
+    /// The mean coefficient over a load.
     #[must_use]
-    pub fn limit(&self, patch: &Patch) -> f64 {
-        let [low, high] = [patch.extent[2], patch.extent[3]];
-        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-        let load = |y: f64| 0.75 / half * (1.0 - ((y - middle) / half).powi(2));
-        let (first, last) = (self.table[0], self.table[self.table.len() - 1]);
-        let inner = self.table.windows(2).map(|pair| [pair[0], pair[1]]);
-        let outer = [
-            [(low.min(first.0), first.1), first],
-            [last, (high.max(last.0), last.1)],
-        ];
-        let pieces = inner.chain(outer).map(|[(y0, mu0), (y1, mu1)]| {
-            let (begin, end) = (y0.max(low), y1.min(high));
-            if begin >= end {
-                return 0.0;
-            }
-            let traction = |y: f64| (mu0 + (y - y0) / (y1 - y0) * (mu1 - mu0)) * load(y);
-            let inside = traction(0.5 * (begin + end));
-            (end - begin) / 6.0 * (traction(begin) + 4.0 * inside + traction(end))
-        });
-        pieces.sum::<f64>() * patch.normal_force
+    pub fn mean_over(&self, load: &LoadAcross) -> f64 {
+        load.mean(&self.table)
     }
 }
 
@@ -105,25 +86,17 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_of_a_patch_is_the_integral_of_its_load() {
+    fn the_mean_over_an_ellipse_is_the_integral_of_its_load() {
         let law = law();
         let count = 400_000_u32;
         for extent in [[-0.5, 2.5], [-3.0, -1.5], [0.9, 1.1], [1.5, 9.0]] {
-            let patch = Patch {
-                normal_force: 1000.0,
-                approach: None,
-                area: 1.0,
-                pressure_max: 1.0,
-                semi_axes: None,
-                extent: [-1.0, 1.0, extent[0], extent[1]],
-            };
             let samples = (0..count).map(|k| {
                 let eta = f64::from(2 * k + 1) / f64::from(count) - 1.0;
                 let y = 0.5 * (extent[0] + extent[1]) + 0.5 * (extent[1] - extent[0]) * eta;
                 (y, 1.0 - eta * eta)
             });
-            let sum = 1000.0 * law.mean(samples);
-            assert!((law.limit(&patch) / sum - 1.0).abs() < 1e-5, "{extent:?}");
+            let mean = law.mean_over(&LoadAcross::of_ellipse(extent));
+            assert!((mean / law.mean(samples) - 1.0).abs() < 1e-5, "{extent:?}");
         }
     }
 
@@ -147,19 +120,12 @@ mod tests {
 
     #[test]
     fn an_even_table_carries_its_coefficient_times_the_load() {
-        let patch = Patch {
-            normal_force: 100.0,
-            approach: None,
-            area: 1.0,
-            pressure_max: 1.0,
-            semi_axes: None,
-            extent: [-1.0, 1.0, -2.0, 3.0],
-        };
+        let load = LoadAcross::of_ellipse([-2.0, 3.0]);
         let even = AcrossLaw::new(AcrossPlace::Y, vec![0.0, 1.0], vec![0.3, 0.3]);
-        assert!((even.limit(&patch) - 30.0).abs() < 1e-12);
+        assert!((even.mean_over(&load) - 0.3).abs() < 1e-14);
         // A straight line has the value of its middle.
         let slope = AcrossLaw::new(AcrossPlace::Y, vec![-10.0, 10.0], vec![0.0, 0.4]);
-        assert!((slope.limit(&patch) - 21.0).abs() < 1e-12);
+        assert!((slope.mean_over(&load) - 0.21).abs() < 1e-14);
         assert_eq!(slope.mean([(0.0, 0.0), (5.0, 0.0)].into_iter()), 0.25);
     }
 }

@@ -5,9 +5,13 @@
 //! takes it from [`FrictionLaw::limit`]. Where the bound of a cell falls with its slip, these are the bounds at rest, and the method
 //! follows [`FrictionLaw::bound_fall`] from there.
 
+use std::borrow::Borrow;
+
 use crate::contact::friction::across::AcrossLaw;
 use crate::contact::friction::falling::{BoundFall, FallingLaw};
 use crate::contact::friction::passage::HeatedLaw;
+use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::load_across::LoadAcross;
 use crate::contact::normal::patch::Patch;
 
 /// How the coefficient of friction varies over the contact.
@@ -114,26 +118,38 @@ impl FrictionLaw {
         }
     }
 
-    /// Friction limit of a patch in N: the largest tangential force it can carry, `μN` for a constant coefficient.
+    /// Friction limit in N of a patch: the largest tangential force it can carry, `μN` for a constant coefficient.
     #[must_use]
-    pub fn limit(&self, patch: &Patch) -> f64 {
+    pub fn limit(&self, footprint: &Footprint, patch: usize) -> f64 {
+        let force = footprint.patches()[patch].normal_force;
+        self.limit_under(force, || footprint.load_across(patch))
+    }
+
+    /// The same of a patch with a normal force in N and a load, which is asked for where the coefficient varies across.
+    #[must_use]
+    pub fn limit_under<L: Borrow<LoadAcross>>(
+        &self,
+        normal_force: f64,
+        load: impl FnOnce() -> L,
+    ) -> f64 {
         match self {
             FrictionLaw::Constant(_) | FrictionLaw::Falling(_) | FrictionLaw::Heated(_) => {
-                self.largest() * patch.normal_force
+                self.largest() * normal_force
             }
-            FrictionLaw::Across(law) => law.limit(patch),
+            FrictionLaw::Across(law) => law.mean_over(load().borrow()) * normal_force,
         }
     }
 
-    /// The same for all patches together.
+    /// Friction limit in N of all patches together.
     #[must_use]
-    pub fn limit_of_all(&self, patches: &[Patch]) -> f64 {
+    pub fn limit_of_all(&self, footprint: &Footprint) -> f64 {
+        let patches = footprint.patches();
         match self {
             FrictionLaw::Constant(coefficient) => {
                 coefficient * patches.iter().map(|patch| patch.normal_force).sum::<f64>()
             }
             FrictionLaw::Falling(_) | FrictionLaw::Across(_) | FrictionLaw::Heated(_) => {
-                patches.iter().map(|patch| self.limit(patch)).sum()
+                (0..patches.len()).map(|k| self.limit(footprint, k)).sum()
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::hertz::Ellipse;
+use crate::contact::normal::load_across::{LoadAcross, LoadsOnce};
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 
@@ -12,6 +13,7 @@ pub struct Footprint {
     shape: FootprintShape,
     patches: Vec<Patch>,
     uncertainty: Option<NormalUncertainty>,
+    loads: LoadsOnce,
 }
 
 /// Where the pressure comes from.
@@ -40,6 +42,7 @@ impl Footprint {
             patches: vec![ellipse.patch()],
             shape: FootprintShape::Hertz(ellipse),
             uncertainty: None,
+            loads: LoadsOnce::default(),
         }
     }
 
@@ -50,6 +53,7 @@ impl Footprint {
             patches: field.patches(),
             shape: FootprintShape::Sampled(field),
             uncertainty: None,
+            loads: LoadsOnce::default(),
         }
     }
 
@@ -70,6 +74,18 @@ impl Footprint {
     #[must_use]
     pub fn patches(&self) -> &[Patch] {
         &self.patches
+    }
+
+    /// How the load of a patch is spread across; computed when it is first asked for.
+    #[must_use]
+    pub fn load_across(&self, patch: usize) -> &LoadAcross {
+        let loads = self.loads.get_or_make(|| match &self.shape {
+            FootprintShape::Hertz(ellipse) => vec![LoadAcross::of_ellipse([-ellipse.b, ellipse.b])],
+            FootprintShape::Sampled(field) => (0..self.patches.len())
+                .map(|k| LoadAcross::of_samples(field, k))
+                .collect(),
+        });
+        &loads[patch]
     }
 
     /// The uncertainty of region and pressure, where they were computed.

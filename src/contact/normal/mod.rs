@@ -4,6 +4,7 @@ pub mod answer;
 pub mod footprint;
 pub mod gap;
 pub mod hertz;
+pub mod load_across;
 pub mod neighbours;
 pub mod normal_task;
 pub mod patch;

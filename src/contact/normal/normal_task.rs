@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::patch::Patch;
@@ -9,7 +10,7 @@ use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
 
-/// What is known of a contact before it is solved. Solved, it is a [`Footprint`](crate::contact::normal::footprint::Footprint).
+/// What is known of a contact before it is solved. Solved, it is a [`Footprint`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum NormalTask {
     /// Hertz's ellipse, in closed form.
@@ -25,6 +26,16 @@ pub enum NormalTask {
 }
 
 impl NormalTask {
+    /// The contact where it is known; nothing where it has to be found.
+    #[must_use]
+    pub fn known_footprint(&self) -> Option<Footprint> {
+        match self {
+            NormalTask::Hertz(ellipse) => Some(Footprint::hertz(*ellipse)),
+            NormalTask::Given(field) => Some(Footprint::given(field.clone())),
+            NormalTask::Gap(_) | NormalTask::Wheel(_) | NormalTask::Wheelset(_) => None,
+        }
+    }
+
     /// The patches, in order of their smallest y and at least one; nothing where they have to be found.
     #[must_use]
     pub fn known_patches(&self) -> Option<Vec<Patch>> {

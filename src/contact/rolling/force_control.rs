@@ -120,8 +120,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         index: usize,
         monitor: &'a dyn Monitor,
     ) -> ForceSearch<'a, 'p> {
-        let patches = task.footprint.patches();
-        let limit = task.friction.limit_of_all(patches);
+        let limit = task.friction.limit_of_all(task.footprint);
         ForceSearch {
             task,
             places: ForcePlaces::new(task, state, limit, task.forces[index]),

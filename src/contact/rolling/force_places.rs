@@ -92,13 +92,12 @@ impl<'a> ForcePlaces<'a> {
     fn by_table(&self, force: [f64; 2], rest: &Motion, start: [f64; 2]) -> Option<[f64; 2]> {
         let modulus = self.task.interface.reduction * self.task.elasticity.shear_modulus;
         let poisson_ratio = self.task.elasticity.poisson_ratio;
-        let patches = self.task.footprint.patches();
         let mut place = start;
         for _ in 0..TABLE_STEPS * u32::from(!self.ellipses.is_empty()) {
             let motion = self.motion(place, rest);
             let mut found = [0.0; 2];
-            for (ellipse, patch) in self.ellipses.iter().zip(patches) {
-                let limit = self.task.friction.limit(patch);
+            for (k, ellipse) in self.ellipses.iter().enumerate() {
+                let limit = self.task.friction.limit(self.task.footprint, k);
                 let own = table::forces(modulus, poisson_ratio, ellipse, limit, &motion);
                 found = [0, 1].map(|k| found[k] + own[k] / self.limit);
             }

@@ -34,6 +34,8 @@ pub struct Assembly<'a> {
     case: &'a CheckedCase,
     solved: &'a SolvedFootprint,
     patches: Vec<Patch>,
+    /// Their friction limits in N.
+    limits: Vec<f64>,
     /// Motion by motion, for every patch.
     points: Vec<Vec<PointSolution>>,
     total: Vec<Total>,
@@ -48,11 +50,13 @@ impl<'a> Assembly<'a> {
     #[must_use]
     pub fn new(case: &'a CheckedCase, solved: &'a SolvedFootprint) -> Assembly<'a> {
         let patches = solved.footprint.patches().to_vec();
+        let limit = |k| case.problem.friction.limit(&solved.footprint, k);
         let remarks = case.remarks.iter().chain(&solved.remarks);
         Assembly {
             case,
             solved,
             points: vec![Vec::new(); patches.len()],
+            limits: (0..patches.len()).map(limit).collect(),
             patches,
             total: Vec::new(),
             remarks: remarks.cloned().collect(),
@@ -87,12 +91,12 @@ impl<'a> Assembly<'a> {
         if self.remarks.len() > REMARKS_AT_ONCE {
             self.remarks = merged(std::mem::take(&mut self.remarks));
         }
-        let patches = self.patches.iter().enumerate();
+        let patches = self.patches.iter().zip(&self.limits).enumerate();
         let mut points: Vec<PointSolution> = patches
-            .map(|(k, patch)| point_solution(case, on_level, patch, k, point))
+            .map(|(k, (patch, limit))| point_solution(case, on_level, (patch, *limit), k, point))
             .collect();
         let speed = case.problem.speeds[index];
-        maintain::add_damage(case, &self.patches, speed, &mut points);
+        maintain::add_damage(case, &self.patches, &self.limits, speed, &mut points);
         if let Some((level, fields)) = on_level {
             let solved = SolvedMotion {
                 footprint: &self.solved.footprint,
@@ -111,7 +115,7 @@ impl<'a> Assembly<'a> {
                 self.add_fields(level, fields, kept);
             }
         }
-        self.total.push(total(case, &self.patches, point));
+        self.total.push(total(&self.patches, &self.limits, point));
         for (all, point) in self.points.iter_mut().zip(points) {
             all.push(point);
         }
@@ -153,10 +157,10 @@ impl<'a> Assembly<'a> {
     #[must_use]
     pub fn finish(self) -> (Solution, Fields) {
         let case = self.case;
-        let patches = self.patches.iter().zip(self.points);
+        let patches = self.patches.iter().zip(self.limits).zip(self.points);
         let solution = Solution {
             patches: patches
-                .map(|(patch, points)| patch_solution(case, patch, points))
+                .map(|((patch, limit), points)| patch_solution(patch, limit, points))
                 .collect(),
             total: self.total,
             remarks: merged(self.remarks),
@@ -201,10 +205,10 @@ pub fn wants_fields(case: &CheckedCase) -> bool {
     case.run.outputs.iter().any(kept)
 }
 
-fn patch_solution(case: &CheckedCase, patch: &Patch, points: Vec<PointSolution>) -> PatchSolution {
+fn patch_solution(patch: &Patch, limit: f64, points: Vec<PointSolution>) -> PatchSolution {
     PatchSolution {
         normal_force_n: patch.normal_force,
-        friction_limit_n: Some(case.problem.friction.limit(patch)),
+        friction_limit_n: Some(limit),
         approach_mm: patch.approach,
         area_mm2: patch.area,
         pressure_max_mpa: patch.pressure_max,
@@ -219,7 +223,7 @@ fn patch_solution(case: &CheckedCase, patch: &Patch, points: Vec<PointSolution>)
 fn point_solution(
     case: &CheckedCase,
     on_level: Option<(&StripMesh, &SolvedFields)>,
-    patch: &Patch,
+    (patch, limit): (&Patch, f64),
     index: usize,
     point: &MotionAnswer,
 ) -> PointSolution {
@@ -243,12 +247,13 @@ fn point_solution(
     };
     PointSolution {
         motion: (*motion).into(),
-        normalised: normalised(case, patch, motion),
+        normalised: normalised(case, patch, limit, motion),
         force_x_n: found.force_x,
         force_y_n: found.force_y,
         moment_z_n_mm: found.moment_z,
         profile_uncertainty: None,
-        error_estimate: point.errors[index].map(|e| absolute(case, std::slice::from_ref(patch), e)),
+        error_estimate: point.errors[index]
+            .map(|e| absolute(std::slice::from_ref(patch), limit, e)),
         stick_area_mm2: areas
             .map(|a| a.stick_area)
             .or_else(|| by_table(|stick| stick)),
@@ -352,15 +357,14 @@ fn pressure_power(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64
 }
 
 /// Creepages made dimensionless with E = 2G(1+ν) and c = √(A/π) (Kalker 1990).
-fn normalised(case: &CheckedCase, patch: &Patch, motion: &Motion) -> NormalisedMotion {
+fn normalised(case: &CheckedCase, patch: &Patch, limit: f64, motion: &Motion) -> NormalisedMotion {
     let c = (patch.area / std::f64::consts::PI).sqrt();
-    let bound = case.problem.friction.limit(patch);
     let unit = 2.0 * case.problem.elasticity.shear_modulus
         / (1.0 - case.problem.elasticity.poisson_ratio)
         * c
         * c
-        / bound;
-    let scaled = |value: f64| (bound > 0.0).then_some(value * unit);
+        / limit;
+    let scaled = |value: f64| (limit > 0.0).then_some(value * unit);
     NormalisedMotion {
         creepage_x: scaled(motion.creepage_x),
         creepage_y: scaled(motion.creepage_y),
@@ -369,11 +373,10 @@ fn normalised(case: &CheckedCase, patch: &Patch, motion: &Motion) -> NormalisedM
     }
 }
 
-/// Converts a relative error to absolute ones. That of the moment grows with the distance of the patches from the origin.
-fn absolute(case: &CheckedCase, patches: &[Patch], relative: f64) -> ErrorEstimate {
-    let (mut force, mut area, mut reach) = (0.0, 0.0, 0.0_f64);
+/// Converts an error relative to a friction limit to absolute ones. That of the moment grows with the distance of the patches from the origin.
+fn absolute(patches: &[Patch], limit: f64, relative: f64) -> ErrorEstimate {
+    let (mut area, mut reach) = (0.0, 0.0_f64);
     for patch in patches {
-        force += case.problem.friction.limit(patch);
         area += patch.area;
         let middle = (0.5 * (patch.extent[0] + patch.extent[1]))
             .hypot(0.5 * (patch.extent[2] + patch.extent[3]));
@@ -381,13 +384,13 @@ fn absolute(case: &CheckedCase, patches: &[Patch], relative: f64) -> ErrorEstima
     }
     let length = (area / std::f64::consts::PI).sqrt();
     ErrorEstimate {
-        force_x_n: relative * force,
-        force_y_n: relative * force,
-        moment_z_n_mm: relative * force * (length + reach),
+        force_x_n: relative * limit,
+        force_y_n: relative * limit,
+        moment_z_n_mm: relative * limit * (length + reach),
     }
 }
 
-fn total(case: &CheckedCase, patches: &[Patch], point: &MotionAnswer) -> Total {
+fn total(patches: &[Patch], limits: &[f64], point: &MotionAnswer) -> Total {
     let sum = point
         .resultants
         .iter()
@@ -403,7 +406,7 @@ fn total(case: &CheckedCase, patches: &[Patch], point: &MotionAnswer) -> Total {
             .last()
             .copied()
             .flatten()
-            .map(|e| absolute(case, patches, e)),
+            .map(|e| absolute(patches, limits.iter().sum(), e)),
     }
 }
 

@@ -44,22 +44,22 @@ pub(crate) struct SolvedMotion<'a> {
     pub(crate) speed: Option<f64>,
 }
 
-/// Damage of every patch, from its resultants.
+/// Damage of every patch, from its resultants and its friction limit in N.
 pub(crate) fn add_damage(
     case: &CheckedCase,
     patches: &[Patch],
+    limits: &[f64],
     speed: Option<f64>,
     points: &mut [PointSolution],
 ) {
     let Some(task) = &case.run.after.damage else {
         return;
     };
-    for (patch, point) in patches.iter().zip(points) {
-        let limit = case.problem.friction.limit(patch);
+    for ((patch, limit), point) in patches.iter().zip(limits).zip(points) {
         let of = DamagedPatch {
             patch,
             point,
-            limit,
+            limit: *limit,
             speed,
         };
         point.damage = Some(Box::new(damage(task, of)));

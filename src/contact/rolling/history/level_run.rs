@@ -206,10 +206,7 @@ impl<'a> LevelRun<'a> {
         if forces == [None; 2] {
             solved = Some((given, self.solve(of, &given, &memory)?));
         } else {
-            let limit = self
-                .task
-                .friction
-                .limit_of_all(self.task.footprint.patches());
+            let limit = self.task.friction.limit_of_all(self.task.footprint);
             let wanted = forces.map(|force| force.unwrap_or(0.0) / limit);
             let start = match of.kind {
                 StepKind::Shift => [given.creepage_x, given.creepage_y],

@@ -234,7 +234,7 @@ fn sum(resultants: &[Resultants]) -> Resultants {
 fn changes(task: &RollingTask, coarse: &[PointRecord], fine: &[PointRecord]) -> Vec<Change> {
     let patches = task.footprint.patches();
     let area: f64 = patches.iter().map(|patch| patch.area).sum();
-    let limit = task.friction.limit_of_all(patches);
+    let limit = task.friction.limit_of_all(task.footprint);
     let length = |area: f64| (area / std::f64::consts::PI).sqrt();
     let own: Vec<Change> = coarse
         .iter()
@@ -244,7 +244,11 @@ fn changes(task: &RollingTask, coarse: &[PointRecord], fine: &[PointRecord]) -> 
                 let [x0, x1, y0, y1] = patch.extent;
                 let middle = [0.5 * (x0 + x1), 0.5 * (y0 + y1)];
                 let [a, b] = [a, b].map(|point| point.resultants[k].about(middle));
-                a.distance(&b, task.friction.limit(patch), length(patch.area))
+                a.distance(
+                    &b,
+                    task.friction.limit(task.footprint, k),
+                    length(patch.area),
+                )
             });
             let all = sum(&a.resultants).distance(&sum(&b.resultants), limit, length(area));
             let apart = |of: fn(&PointRecord) -> [f64; 2]| {
@@ -338,10 +342,10 @@ fn answers(
             let found = |changes: [f64; 2]| {
                 [0, 1].map(|k| forces[k].map(|_| CREEPAGE_ERROR_OVER_CHANGE * changes[k]))
             };
-            let patches = task.footprint.patches().iter().zip(&change.coarser);
-            let resultants = point.resultants.iter().zip(patches);
-            let extrapolated = resultants.map(|(fine, (patch, coarse))| {
-                fine.beyond(*coarse, EXTRAPOLATED, task.friction.limit(patch))
+            let resultants = point.resultants.iter().zip(&change.coarser).enumerate();
+            let extrapolated = resultants.map(|(patch, (fine, coarse))| {
+                let limit = task.friction.limit(task.footprint, patch);
+                fine.beyond(*coarse, EXTRAPOLATED, limit)
             });
             MotionAnswer {
                 motion: point.motion,

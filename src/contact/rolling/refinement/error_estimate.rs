@@ -424,8 +424,8 @@ fn distances(
     let mut distances = Vec::with_capacity(patches.len() + 1);
     let (mut sum, mut sum_other) = (Resultants::default(), Resultants::default());
     let (mut force, mut area, mut centre) = (0.0, 0.0, [0.0, 0.0]);
-    for ((patch, found), other) in patches.iter().zip(found).zip(other) {
-        let bound = task.friction.limit(patch);
+    for (k, ((patch, found), other)) in patches.iter().zip(found).zip(other).enumerate() {
+        let bound = task.friction.limit(task.footprint, k);
         let at = [
             0.5 * (patch.extent[0] + patch.extent[1]),
             0.5 * (patch.extent[2] + patch.extent[3]),

@@ -257,16 +257,15 @@ pub(crate) fn judge(
     ] = &seen
         && state.levels.get(point.level).plan.pole().is_none()
     {
-        for (p, patch) in task.footprint.patches().iter().enumerate() {
+        for p in 0..task.footprint.patches().len() {
+            let limit = task.friction.limit(task.footprint, p);
             let bound = match task.friction.across() {
-                // Its limit is a sum over samples of a load that is not quite that of the cells.
+                // The loads of the strips are not quite those of the limit.
                 Some(_) => {
                     let sum = point.summed[p];
-                    task.friction
-                        .limit(patch)
-                        .max(sum.force_x.hypot(sum.force_y))
+                    limit.max(sum.force_x.hypot(sum.force_y))
                 }
-                None => task.friction.limit(patch),
+                None => limit,
             };
             let companions = [(across[p], strips), (on_levels[p], cells)];
             let companions = companions.map(|(other, reach)| (other, EXTRAPOLATED * reach));

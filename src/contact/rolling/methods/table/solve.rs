@@ -48,9 +48,9 @@ pub fn solve(
     let mut found = Vec::with_capacity(patches.len());
     let (mut of_all, mut limits) = (0.0, 0.0);
     let mut errors = Vec::with_capacity(patches.len() + 1);
-    for (number, (patch, ellipse)) in patches.iter().zip(ellipses).enumerate() {
+    for (number, ellipse) in ellipses.iter().enumerate() {
         covers(number, ellipse)?;
-        let limit = task.friction.limit(patch);
+        let limit = task.friction.limit(task.footprint, number);
         let answer = on_ellipse(task.elasticity, ellipse, limit, motion);
         let mut error = answer.error;
         if ellipse.misplaced > 0.0 {
