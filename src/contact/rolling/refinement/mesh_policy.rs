@@ -27,6 +27,15 @@ const POLE_GRID: f64 = 0.05;
 /// was not measured.
 const SMALL_STEPS_BELOW: i32 = 4;
 
+/// By how many half-doublings of its cells a mesh was to be finer than the first one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HalfDoublings(i32);
+
+impl HalfDoublings {
+    /// Of a mesh that was not planned as finer than another.
+    pub const NONE: HalfDoublings = HalfDoublings(i32::MIN);
+}
+
 /// The meshes that suit the patches of a footprint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshPolicy {
@@ -118,11 +127,15 @@ impl MeshPolicy {
         }
     }
 
-    /// May a mesh of so many cells be refined?
+    /// May a mesh of so many cells, `planned` by [`MeshPolicy::next`], be refined?
     #[must_use]
-    pub fn is_refinable(&self, cells: usize) -> bool {
-        let largest = (2.0 * (f64::from(CELLS_MAX) / self.cells_first()).log2() + 1e-9).floor();
-        self.half_doublings(cells) < largest as i32
+    pub fn is_refinable(&self, cells: usize, planned: HalfDoublings) -> bool {
+        self.half_doublings(cells).max(planned.0) < self.largest()
+    }
+
+    /// Half-doublings of the finest mesh that a target may ask for.
+    fn largest(&self) -> i32 {
+        (2.0 * (f64::from(CELLS_MAX) / self.cells_first()).log2() + 1e-9).floor() as i32
     }
 
     /// By how many half-doublings a mesh has more cells than the first one.
@@ -137,8 +150,18 @@ impl MeshPolicy {
 
     /// The mesh after one of so many cells whose error is `excess` times the target: errors fall about as 1/N. Motions of a sweep take
     /// coarse steps, so that they share their meshes; a motion alone may take small ones.
+    ///
+    /// A mesh has not quite the cells that were `planned`, because strips are even in number and may miss a patch. The next plan is finer
+    /// than the last one all the same, so that refinement ends.
     #[must_use]
-    pub fn next(&self, cells: usize, excess: f64, regime: Regime, alone: bool) -> MeshPlan {
+    pub fn next(
+        &self,
+        cells: usize,
+        planned: HalfDoublings,
+        excess: f64,
+        regime: Regime,
+        alone: bool,
+    ) -> (MeshPlan, HalfDoublings) {
         let here = self.half_doublings(cells);
         let least = if alone && here < SMALL_STEPS_BELOW {
             1
@@ -146,8 +169,9 @@ impl MeshPolicy {
             2
         };
         let step = ((2.0 * (MARGIN * excess).log2()).ceil() as i32).clamp(least, 4);
-        let largest = (2.0 * (f64::from(CELLS_MAX) / self.cells_first()).log2() + 1e-9).floor();
-        self.at((here + step).min(largest as i32), regime)
+        let finer = (here + step).max(planned.0.saturating_add(1));
+        let finer = finer.min(self.largest());
+        (self.at(finer, regime), HalfDoublings(finer))
     }
 
     /// Where the next motion of a sweep should begin after a mesh whose error is `excess` times the target: on the same mesh, which
@@ -163,5 +187,41 @@ impl MeshPolicy {
             return self.at(here - 2, plan.regime);
         }
         plan
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Shapes of every kind, errors just above the target, and cells as they come out of even numbers of strips, a part of which miss the
+    /// patch.
+    #[test]
+    fn refinement_ends_whatever_the_shape_of_the_patch() {
+        let ratios = (0..400).map(|k| 0.02 * 2500.0_f64.powf(f64::from(k) / 399.0));
+        for (a_over_b, missed) in ratios.flat_map(|ratio| [0.0, 0.1, 0.4].map(|part| (ratio, part)))
+        {
+            let policy = MeshPolicy {
+                a_over_b,
+                patches: 1.0,
+            };
+            for regime in [
+                Regime::Unknown,
+                Regime::Sticking { spinning: true },
+                Regime::Spinning([0.2, 0.1]),
+            ] {
+                let (mut plan, mut planned) = (policy.first(), HalfDoublings::NONE);
+                let mut steps = 0;
+                loop {
+                    let cells = f64::from(plan.size.strips * plan.size.cells) * (1.0 - missed);
+                    if !policy.is_refinable(cells as usize, planned) {
+                        break;
+                    }
+                    (plan, planned) = policy.next(cells as usize, planned, 1.01, regime, true);
+                    steps += 1;
+                    assert!(steps < 20, "a/b {a_over_b}, {missed} missed: {plan:?}");
+                }
+            }
+        }
     }
 }

@@ -15,7 +15,7 @@ use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::level_solve::{
     JudgedAnswer, MotionTask, SolvedLevel, solve_level,
 };
-use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
+use crate::contact::rolling::refinement::mesh_policy::{HalfDoublings, MeshPolicy};
 use crate::contact::rolling::refinement::regime::regime;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resolution::Resolution;
@@ -24,7 +24,7 @@ use crate::contact::rolling::task::RollingTask;
 
 /// Explicit meshes of at least so many cells are started from a coarser mesh. On 24 ellipses of `benches/calibrate` with meshes of 720 to
 /// 2464 cells, 500 and 2000 take 5 to 10 % more time, and no such start 24 % more.
-const CELLS_NESTED: u64 = 1000;
+pub(crate) const CELLS_NESTED: u64 = 1000;
 /// Fewest strips, and cells in one, of that coarser mesh. 4 and 16 take as many products on these ellipses, to 1 %.
 const SIDE_HALVED: u32 = 8;
 
@@ -183,10 +183,11 @@ pub(crate) fn to_target(
             solve_level(task, state, asked, first, None, monitor)?
         }
     };
+    let mut planned = HalfDoublings::NONE;
     loop {
         let cells = state.levels.get(solved.point.level).mesh.cells();
         let small = target < FINE_TARGET && cells < CELLS_FINE;
-        let larger = state.policy.is_refinable(cells);
+        let larger = state.policy.is_refinable(cells, planned);
         if !(small && larger) {
             judge(
                 task,
@@ -205,7 +206,10 @@ pub(crate) fn to_target(
         }
         let excess = solved.point.error().map_or(1.0, |error| error / target);
         let found = regime_of(state, asked, &solved.point);
-        let plan = state.policy.next(cells, excess, found, task.single_motion);
+        let plan;
+        (plan, planned) = state
+            .policy
+            .next(cells, planned, excess, found, task.single_motion);
         solved = solve_level(task, state, asked, plan, Some(solved.point), monitor)?;
     }
     let level = state.levels.get(solved.point.level);
