@@ -1,16 +1,22 @@
 //! Is everything of a data folder there after it was moved into a database, and is nothing moved twice?
 
 use std::collections::BTreeMap;
+use std::process::Command;
 
 use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::postgres::database;
+use crate::seaweed::{railhead_at, server};
 use crate::support::{Service, case, endless_case, long_case, railhead};
 
 /// What the program says about a data folder and a database, and whether it succeeded.
 fn say(words: &[&str]) -> (bool, String) {
-    let done = railhead().args(words).output().unwrap();
+    said_by(&mut railhead(), words)
+}
+
+fn said_by(program: &mut Command, words: &[&str]) -> (bool, String) {
+    let done = program.args(words).output().unwrap();
     let said = [done.stdout, done.stderr].concat();
     (
         done.status.success(),
@@ -217,6 +223,47 @@ async fn results_of_a_database_move_to_another_place_and_from_there_to_a_third()
         .unwrap();
     assert_eq!(left, 0, "what was in the database is not kept twice");
     assert_refused_to_another(&places[1].0).await;
+}
+
+#[tokio::test]
+async fn results_of_a_database_move_into_a_bucket_and_from_there_into_another() {
+    let (Some(url), Some(port)) = (database().await, server()) else {
+        return;
+    };
+    let node = tempfile::tempdir().unwrap();
+    assert!(say(&["migrate", "--database-url", &url]).0);
+    let at_database = ["--database-url", &url];
+    let flags = [
+        &at_database[..],
+        &["--workers", "1", "--drain-delay-s", "0"],
+    ]
+    .concat();
+    let mut service = Service::start(node.path(), &flags);
+    let paths = fill(&service).await;
+    let known = read(&service, &paths).await;
+    for place in ["s3://first/results", "s3://second/results"] {
+        stop(service);
+        let there = ["--results-url", place];
+        let words = [&["move-results"], &at_database[..], &there].concat();
+        let (moved, said) = said_by(&mut railhead_at(port), &words);
+        assert!(
+            moved && said.contains("large results\t1\n") && said.contains("missing\t0"),
+            "{said}"
+        );
+        let flags = [&flags[..], &there].concat();
+        service = Service::start_as(&mut railhead_at(port), "serve", node.path(), &flags);
+        assert_eq!(read(&service, &paths).await, known);
+    }
+    // A node that still names the bucket before is refused.
+    stop(service);
+    let mut before = railhead_at(port);
+    before.args(["serve", "--listen", "127.0.0.1:0", "--data-dir"]);
+    before.arg(node.path());
+    let (started, said) = said_by(
+        &mut before,
+        &[&flags[..], &["--results-url", "s3://first/results"]].concat(),
+    );
+    assert!(!started && said.contains("s3://second/results"), "{said}");
 }
 
 /// The place of a database is not given to another one.

@@ -94,6 +94,14 @@ async fn settle_outside(
         Some(_) if deployment.results_place.as_ref() == Some(&place) => Ok(()),
         // The same results under another name, or a place that was marked by a node that then failed.
         Some(_) if deployment.results_place.as_deref() != Some(INSIDE) => {
+            if let Some(known) = &deployment.results_place
+                && is_another(objects, known, &deployment).await?
+            {
+                return refused(format!(
+                    "the results of this database are in {known}; {place} holds a copy of them, or what a move has left there. Start the \
+                     node with --results-url {known}"
+                ));
+            }
             decide(cluster, &deployment, &place).await
         }
         Some(_) | None if deployment.in_use() => {
@@ -116,6 +124,43 @@ async fn settle_outside(
             mark(objects, &deployment, &place).await?;
             decide(cluster, &deployment, &place).await
         }
+    }
+}
+
+/// Whether the place that the database knows is still there and does not show what is written to `objects`: then these are not
+/// the same results under another name, but a copy, or what a move has left behind.
+///
+/// # Errors
+/// The place could not be written to; nodes use the known place, and it does not answer.
+async fn is_another(
+    objects: &dyn ObjectStore,
+    known: &str,
+    deployment: &Deployment,
+) -> Result<bool, JobsError> {
+    let url: ResultsUrl = known.parse().map_err(JobsError::ResultPlace)?;
+    if url.folder().is_some_and(|folder| !folder.exists()) {
+        return Ok(false);
+    }
+    let there = url.open(StoreRequests::default())?;
+    match marker(&*there).await {
+        Ok(Some(marker)) if marker.deployment == deployment.id => {}
+        Ok(_) => return Ok(false),
+        // Nobody writes there, and whoever starts this node may not be allowed to any more.
+        Err(_) if deployment.nodes == 0 => return Ok(false),
+        Err(error) => return Err(error),
+    }
+    let path = Path::from(format!("probe-{}", uuid::Uuid::now_v7()));
+    let written = objects
+        .put(&path, PutPayload::from_static(b"railhead"))
+        .await;
+    written.map_err(|error| unusable(&error))?;
+    let seen = there.head(&path).await;
+    let removed = objects.delete(&path).await;
+    removed.map_err(|error| unusable(&error))?;
+    match seen {
+        Ok(_) => Ok(false),
+        Err(Error::NotFound { .. }) => Ok(true),
+        Err(error) => Err(unusable(&error)),
     }
 }
 
