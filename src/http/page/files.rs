@@ -74,6 +74,8 @@ pub const FILES: &[PageFile] = files!(
     "js/strips.js",
     "js/tables.js",
     "js/typed.js",
+    "js/wheelsetdata.js",
+    "js/wheelsetview.js",
     "page.css",
     "theme.css",
     "theme.js",

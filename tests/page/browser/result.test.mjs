@@ -168,6 +168,38 @@ test('a click on the creep curve chooses the motion, and error bars reach as far
   assert.deepEqual([inked.end, inked.beyond], [true, false], JSON.stringify(inked));
 }));
 
+test('a wheelset shows Δr over its shift, its conicity and its positions, and a click goes to the nearest of them', () => onPage('', async (page) => {
+  const { id, result } = await service.solved(example('wheelset'));
+  const { kinematics, positions } = result.wheelset;
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  await page.locator('creep-curve canvas').waitFor();
+  const curve = page.locator('creep-curve');
+  const data = () => curve.evaluate((element) => /** @type {HTMLElement & { plot: { data: number[][] } }} */ (element).plot.data);
+  assert.deepEqual((await data()).slice(0, 2), [kinematics.lateral_shift_mm, kinematics.radius_difference_mm]);
+  const table = page.getByRole('region', { name: 'Positions of the wheelset' });
+  assert.equal(await table.locator('tbody tr').count(), positions.length);
+  const last = positions.length - 1;
+  const place = await curve.evaluate((element, shift) => {
+    const { plot } = /** @type {HTMLElement & { plot: { valToPos: (value: number, scale: string) => number } }} */ (element);
+    return { x: plot.valToPos(shift, 'x'), y: plot.valToPos(0, 'y') };
+  }, positions[last].lateral_shift_mm);
+  const area = await curve.locator('.u-over').boundingBox();
+  assert.ok(area);
+  await page.mouse.click(area.x + place.x, area.y + place.y);
+  await page.waitForFunction((patch) => location.hash.includes(`patch=${patch}`), positions[last].left.patches[0]);
+  await table.locator('tr[aria-current]').nth(0).waitFor();
+  assert.equal(await table.locator('tr[aria-current] td').first().textContent(), '4.00');
+  await page.getByRole('radio', { name: 'Conicity', exact: true }).check();
+  await page.waitForFunction(() => /** @type {any} */ (document.querySelector('creep-curve'))?.plot?.data.length === 4);
+  const known = kinematics.conicity.filter((/** @type {{ conicity?: number }} */ of) => of.conicity !== undefined);
+  assert.deepEqual((await data())[1], known.map((/** @type {{ conicity: number }} */ of) => of.conicity));
+  // Its form: another gauge is another case.
+  await page.getByRole('button', { name: 'Edit case' }).click();
+  await page.getByRole('textbox', { name: 'Gauge' }).fill('1438');
+  await page.waitForFunction(() => document.querySelector('textarea')?.value.includes('"gauge_mm": 1438'));
+  assert.equal(await page.getByLabel('Δr and equivalent conicity').isChecked(), true);
+}));
+
 test('two patches have one scale of colours, and stand on the profiles', () => onPage('', async (page) => {
   const { id, result } = await service.solved(withFields('wheel-rail-flange'));
   await page.goto(`${service.base}/#/jobs/${id}`);

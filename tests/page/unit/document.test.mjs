@@ -64,3 +64,13 @@ test('a case keeps what it asks for beside the fields when its contact is anothe
   assert.deepEqual(document.damage, asked.damage);
   assert.deepEqual(document.outputs, ['resultants', 'zones', 'tractions', 'pressure', 'slip', 'damage']);
 });
+
+test('one wheel becomes a wheelset with its cross-sections, and has loads and motions of its own', () => {
+  const [rail, wheel] = [{ points_mm: [[0, 0], [1, 0]] }, { format: 'columns', text: '0 0' }];
+  const one = withContact({ contact: { type: 'profiles', rail, wheel }, load: { vertical_force_n: 70_000 } }, 'wheelset');
+  const { contact, load } = /** @type {{ contact: import('../../../src/http/page/web/js/document.js').JsonObject, load: object }} */ (/** @type {unknown} */ (one));
+  assert.deepEqual([contact.rail, contact.wheel, load], [rail, wheel, { vertical_force_n: 150_000 }]);
+  const back = withContact(one, 'profiles');
+  assert.deepEqual(back.contact, { ...withContact(null, 'profiles').contact, rail, wheel });
+  assert.deepEqual(withContact(back, 'radii').contact, withContact(null, 'radii').contact);
+});

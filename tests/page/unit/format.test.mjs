@@ -39,6 +39,15 @@ test('ticks lie inside, at steps of 1, 2 or 5', () => {
   assert.deepEqual(ticks(1, 1, 5), [1]);
 });
 
+test('a step of two and a half shows its half', () => {
+  const marks = [-5, -2.5, 0, 2.5, 5];
+  assert.deepEqual(marks.map((mark) => tickLabel(mark, marks)), ['−5.0', '−2.5', '0.0', '2.5', '5.0']);
+  const small = [0, 0.025, 0.05];
+  assert.deepEqual(small.map((mark) => tickLabel(mark, small)), ['0.000', '0.025', '0.050']);
+  const whole = [0, 20, 40];
+  assert.deepEqual(whole.map((mark) => tickLabel(mark, whole)), ['0', '20', '40']);
+});
+
 test('times, sizes and angles are told in units that are read', () => {
   assert.equal(seconds(0.00543), '5.43 ms');
   assert.equal(seconds(300), '5.00 min');

@@ -82,7 +82,7 @@ function drawing({ understood }, document) {
     case 'pressure_grid':
       return drawGrid(document);
     case 'wheelset':
-      return html`<p class="hint">Both wheels on both rails: the patches of every position are drawn with the result. Change it in the JSON.</p>`;
+      return html`<p class="pad hint">Both wheels on both rails: the patches of every position are drawn with the result.</p>`;
     default:
       return nothing;
   }

@@ -3,7 +3,7 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt, put } from './document.js';
 import { change, editDocument } from './editing.js';
-import { lacksSection, withContact } from './starts.js';
+import { hasSections, lacksSection, withContact } from './starts.js';
 import { faultAt, field, fieldId } from './field.js';
 import { number } from './format.js';
 import { parseGapCurve, parseGrid, profileKind } from './tables.js';
@@ -33,7 +33,7 @@ export function contactFields(app, type) {
       return dropZone(type === 'gap_grid' ? 'Gap on a grid' : 'Pressure on a grid', pointsOf(app, `/contact/${member}`), `/contact/${member}`, app, (file) => takeGrid(app, file, member));
     }
     case 'wheelset':
-      return html`<p class="hint">Profiles, shifts and yaw of a wheelset are changed in the JSON.</p>`;
+      return wheelsetFields(app);
     default:
       return html`<p class="hint">Choose a kind of contact, or drop the files of a rail and a wheel anywhere here.</p>`;
   }
@@ -55,6 +55,27 @@ function profileFields(app) {
       ${field(app, '/contact/cant_rad', 'Rail inclination', 'rad', { hint: cant ? `1 : ${number(1 / cant, 3)}` : '1 : 40 is 0.025' })}</div>
     <label class="slide"><span>Wheelset shift to the left <output>${number(shift, 3)} mm</output></span>
       <input type="range" min="-8" max="8" step="0.05" .value=${String(shift)} @input=${slide}></label>`;
+}
+
+/** @param {App} app */
+function wheelsetFields(app) {
+  const document = app.store.get().compose.document ?? {};
+  const place = (/** @type {'lateral_shift_mm' | 'yaw_rad'} */ member, /** @type {string} */ label, /** @type {string} */ unit, factor = 1) => {
+    const range = at(document, `/contact/${member}`);
+    if (!isObject(range)) return html`<div class="pair">${field(app, `/contact/${member}`, label, unit, { factor, empty: '0' })}</div>`;
+    if (Array.isArray(range.values)) return html`<p class="hint">${label}: ${range.values.map((value) => number(Number(value) / factor)).join(', ')} ${unit}</p>`;
+    return html`<div class="triple">${field(app, `/contact/${member}/from`, `${label} from`, unit, { factor })}
+      ${field(app, `/contact/${member}/to`, 'to', unit, { factor })}${field(app, `/contact/${member}/points`, 'Positions', '')}</div>`;
+  };
+  const asked = isObject(at(document, '/contact/kinematics'));
+  const ask = (/** @type {Event} */ event) =>
+    change(app, '/contact/kinematics', /** @type {HTMLInputElement} */ (event.target).checked ? {} : undefined);
+  return html`
+    <div class="pair">${sectionZone(app, 'rail')}${sectionZone(app, 'wheel')}</div>
+    <div class="pair">${field(app, '/contact/rolling_radius_mm', 'Rolling radius', 'mm')}${field(app, '/contact/gauge_mm', 'Gauge', 'mm', { empty: '1435' })}</div>
+    ${place('lateral_shift_mm', 'Shift to the left', 'mm')}${place('yaw_rad', 'Yaw', 'mrad', 0.001)}
+    <div class="checks"><label><input type="checkbox" .checked=${asked} @change=${ask}> Δr and equivalent conicity</label></div>
+    ${at(document, '/contact/right') === undefined ? nothing : html`<p class="hint">What differs on the right is changed in the JSON.</p>`}`;
 }
 
 /** @param {App} app @param {'rail' | 'wheel'} body */
@@ -146,7 +167,7 @@ function nameOf({ wheel, rail }) {
  */
 export async function takeProfiles(app, files, onto) {
   const { document: before, files: taken } = app.store.get().compose;
-  const fresh = !before || at(before, '/contact/type') !== 'profiles';
+  const fresh = !before || !hasSections(at(before, '/contact/type'));
   let document = fresh ? put(put(withContact(before, 'profiles'), '/labels', undefined), '/name', undefined) : before;
   const known = { ...taken };
   for (const file of files) {

@@ -1,4 +1,5 @@
-// <creep-curve>: forces or the moment against the motion that varies, with the errors that the solver estimates. A click chooses.
+// <creep-curve>: lines with the errors that the solver estimates: forces or the moment against the motion that varies, Δr of a wheelset against its
+// shift. A click chooses.
 
 import uPlot from '../vendor/uPlot.esm.js';
 import { number, tickLabel } from './format.js';
@@ -10,6 +11,8 @@ import { adoptShown } from './adopt.js';
 
 /** Half the width of the end of an error bar, in pixels. */
 const CAP = 4;
+/** Values of a line that have marks and error bars; more of them are a line. */
+const MARKED_MAX = 60;
 
 export class CreepCurve extends HTMLElement {
   /** @type {uPlot | null} */ #plot = null;
@@ -70,7 +73,7 @@ export class CreepCurve extends HTMLElement {
       axes: [{ ...axis, size: 30, gap: 4, label: curve.xLabel }, { ...axis, size: 58, label: curve.yLabel }],
       series: [
         { label: curve.xLabel, value: (_, value) => number(value) },
-        ...curve.lines.map((line) => seriesOf(line, token)),
+        ...curve.lines.map((line) => seriesOf(line, token, curve.x.length <= MARKED_MAX)),
       ],
       legend: { live: true },
       cursor: { points: { size: 9 }, drag: { x: false, y: false } },
@@ -111,7 +114,7 @@ export class CreepCurve extends HTMLElement {
       pen.fillText(bound > 0 ? 'μN' : '−μN', left + 6 * density, y - 5 * density);
     }
     pen.setLineDash([]);
-    for (const line of curve.lines) drawErrors(plot, curve, line, token(line.colour), density);
+    if (curve.x.length <= MARKED_MAX) for (const line of curve.lines) drawErrors(plot, curve, line, token(line.colour), density);
     const x = plot.valToPos(curve.x[curve.order.indexOf(chosen)], 'x', true);
     pen.strokeStyle = token('--accent');
     pen.globalAlpha = 0.3;
@@ -127,14 +130,15 @@ export class CreepCurve extends HTMLElement {
 /**
  * @param {Line} line
  * @param {(name: string) => string} token
+ * @param {boolean} marked
  * @returns {uPlot.Series}
  */
-const seriesOf = (line, token) => ({
+const seriesOf = (line, token, marked) => ({
   label: line.label,
   stroke: token(line.colour),
   width: 2,
   dash: line.dash,
-  points: { show: true, size: 6, fill: token('--surface'), width: 1.5 },
+  points: { show: marked, size: 6, fill: token('--surface'), width: 1.5 },
   value: (_plot, value, _series, at) => {
     const error = at === null ? null : line.error[at];
     return `${number(value)}${error ? ` ± ${number(error, 2)}` : ''} ${line.unit}`;

@@ -4,7 +4,7 @@ import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt } from './document.js';
 import { change, editDocument } from './editing.js';
 import { contactFields } from './contactform.js';
-import { ALL_OUTPUTS, withContact, withoutNameOf } from './starts.js';
+import { ALL_OUTPUTS, hasSections, withContact, withoutNameOf } from './starts.js';
 import { faultAt, field } from './field.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -12,8 +12,8 @@ import { faultAt, field } from './field.js';
 /** @typedef {import('./document.js').JsonValue} JsonValue */
 
 const CONTACTS = [
-  ['radii', 'Radii'], ['ellipse', 'Ellipse'], ['profiles', 'Profiles'], ['gap_profile', 'Gap curve'], ['gap_grid', 'Gap grid'],
-  ['pressure_grid', 'Pressure grid'],
+  ['radii', 'Radii'], ['ellipse', 'Ellipse'], ['profiles', 'Profiles'], ['wheelset', 'Wheelset'], ['gap_profile', 'Gap curve'],
+  ['gap_grid', 'Gap grid'], ['pressure_grid', 'Pressure grid'],
 ];
 const COMPONENTS = /** @type {const} */ ([
   { key: 'creepage_x', label: 'Creepage along', unit: '%', factor: 0.01 },
@@ -57,7 +57,7 @@ function loadField(app, type) {
   const document = app.store.get().compose.document ?? {};
   if (type === 'pressure_grid') return html`<p class="hint">The load is that of the given pressure.</p>`;
   if (at(document, '/load/approach_mm') !== undefined) return field(app, '/load/approach_mm', 'Approach', 'μm', { factor: 0.001 });
-  const vertical = at(document, '/load/vertical_force_n') !== undefined || (type === 'profiles' && at(document, '/load/normal_force_n') === undefined);
+  const vertical = at(document, '/load/vertical_force_n') !== undefined || (hasSections(type) && at(document, '/load/normal_force_n') === undefined);
   return vertical
     ? field(app, '/load/vertical_force_n', 'Vertical force', 'kN', { factor: 1000 })
     : field(app, '/load/normal_force_n', 'Normal force', 'kN', { factor: 1000 });
@@ -67,7 +67,7 @@ function loadField(app, type) {
 function motionFields(app, type) {
   const { motion } = app.store.get().compose.document ?? {};
   const kind = Array.isArray(motion) ? 'list' : isObject(motion) && 'sweep' in motion ? 'sweep' : isObject(motion) && 'wheelset' in motion ? 'wheelset' : isObject(motion) && 'history' in motion ? 'history' : 'one';
-  const kinds = [...(type === 'profiles' ? [['wheelset', 'Wheelset']] : []), ['one', 'Creepages'], ['sweep', 'Creep curve']];
+  const kinds = [...(hasSections(type) ? [['wheelset', 'Wheelset']] : []), ['one', 'Creepages'], ['sweep', 'Creep curve']];
   return html`
     <div class="segs" role="group" aria-label="Kind of motion">${kinds.map(([key, label]) => html`<label class="seg">
       <input type="radio" name="motion" .checked=${key === kind} @change=${() => change(app, '/motion', startMotion(key, motion))}><span>${label}</span></label>`)}</div>
@@ -76,8 +76,16 @@ function motionFields(app, type) {
     ${kind === 'one' ? html`<div class="triple">${COMPONENTS.map(({ key, label, unit, factor }) => field(app, `/motion/${key}`, label, unit, { factor }))}</div>` : nothing}
     ${kind === 'wheelset' ? html`<div class="pair">
       ${field(app, '/motion/wheelset/speed_mm_per_s', 'Speed', 'km/h', { factor: 1e6 / 3600 })}
-      ${field(app, '/motion/wheelset/free_rolling_radius_mm', 'Free rolling radius', 'mm')}</div>` : nothing}
+      ${turningField(app)}</div>` : nothing}
     ${kind === 'sweep' && isObject(motion) && isObject(motion.sweep) ? sweepFields(app, motion.sweep) : nothing}`;
+}
+
+/** How the wheelset turns, in the form that the case has. @param {App} app */
+function turningField(app) {
+  const given = (/** @type {string} */ member) => at(app.store.get().compose.document ?? {}, `/motion/wheelset/${member}`) !== undefined;
+  if (given('drive_torque_n_mm')) return field(app, '/motion/wheelset/drive_torque_n_mm', 'Torque of the drive', 'N·m', { factor: 1000 });
+  if (given('angular_velocity_rad_per_s')) return field(app, '/motion/wheelset/angular_velocity_rad_per_s', 'Angular velocity', 'rad/s');
+  return field(app, '/motion/wheelset/free_rolling_radius_mm', 'Free rolling radius', 'mm');
 }
 
 /** @param {App} app @param {JsonObject} sweep */

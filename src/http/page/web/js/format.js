@@ -98,7 +98,10 @@ export function tickLabel(value, all) {
   const largest = Math.max(...all.map(Math.abs));
   if (largest > 0 && (largest < 1e-3 || largest >= 1e6)) return number(value, 2);
   const step = all.length > 1 ? Math.abs(all[1] - all[0]) : Math.abs(value) || 1;
-  return fixed(value, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+  // Steps of 2.5 have a digit more than their size tells.
+  const tens = Math.floor(Math.log10(step) + 1e-9);
+  const whole = Math.abs(Math.round(step / 10 ** tens) - step / 10 ** tens) < 1e-6;
+  return fixed(value, Math.max(0, (whole ? 0 : 1) - tens));
 }
 
 /**

@@ -33,6 +33,7 @@ import { formatRoute } from './routes.js';
  * @property {boolean} arrows
  * @property {boolean} mesh
  * @property {'forces' | 'moment'} curve
+ * @property {import('./wheelsetdata.js').Kind} wheelset
  */
 
 /** @type {Looked | null} */
@@ -51,7 +52,7 @@ export function tellingPoint(points) {
 /** @param {Job} job @returns {Looked} */
 const fresh = (job) => ({
   job, result: null, document: null, placed: null, asked: new Map(), fields: [], patch: 0, point: -1, quantity: '',
-  held: null, border: true, arrows: true, mesh: false, curve: 'forces',
+  held: null, border: true, arrows: true, mesh: false, curve: 'forces', wheelset: 'radii',
 });
 
 /**

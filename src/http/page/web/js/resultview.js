@@ -16,6 +16,7 @@ import { FieldMap } from './fieldmap.js';
 import { count, degrees, number, seconds, withError } from './format.js';
 import { choose, frictionOf, lookedAt, rememberView, sharedRange } from './result.js';
 import { formatRoute } from './routes.js';
+import { positionOf, wheelsetPanel } from './wheelsetview.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./result.js').Looked} Looked */
@@ -83,6 +84,7 @@ function loaded(app, looked, answer) {
         <button class="primary" @click=${() => again(app, looked)}>Solve again with fields</button></section>`}
       <div class="aside">
         ${looked.placed && patch.position ? profilePanel(app, looked, answer) : nothing}
+        ${answer.wheelset ? wheelsetPanel(app, looked, answer.wheelset) : nothing}
         ${patch.points.length > 2 ? curvePanel(app, looked, patch) : nothing}
         ${answer.patches.length > 1 ? totalPanel(answer, looked.point, looked.patch) : nothing}
         ${factsPanel(answer, patch, point)}
@@ -261,15 +263,9 @@ function curvePanel(app, looked, patch) {
 /** @param {unknown} label @param {unknown} value */
 const row = (label, value) => html`<div><dt>${label}</dt><dd>${value}</dd></div>`;
 
-/** The position of a wheelset that a patch belongs to. @param {JobResult} answer @param {number} patch */
-function positionOf(answer, patch) {
-  const { positions } = answer.wheelset ?? {};
-  return positions?.findIndex(({ left, right }) => left.patches.includes(patch) || right.patches.includes(patch));
-}
-
 /** The sum of all patches. @param {JobResult} answer @param {number} point @param {number} patch */
 function totalPanel(answer, point, patch) {
-  const total = answer.total[positionOf(answer, patch) ?? point];
+  const total = answer.total[answer.wheelset ? positionOf(answer.wheelset, patch) : point];
   if (!total) return nothing;
   const errors = total.error_estimate;
   const force = (/** @type {number} */ value, /** @type {number | undefined} */ error) => {

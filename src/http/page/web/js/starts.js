@@ -28,6 +28,11 @@ const STARTS = {
     load: { vertical_force_n: 75000 },
     motion: { wheelset: { speed_mm_per_s: 20000, free_rolling_radius_mm: 460 } },
   },
+  wheelset: {
+    contact: { type: 'wheelset', rail: {}, wheel: {}, rolling_radius_mm: 460, cant_rad: 0.025, lateral_shift_mm: { from: 0, to: 4, points: 3 }, kinematics: {} },
+    load: { vertical_force_n: 150000 },
+    motion: { wheelset: { speed_mm_per_s: 20000, drive_torque_n_mm: 0 } },
+  },
   gap_profile: {
     contact: { type: 'gap_profile', rolling_mm: 460, y_mm: GAP_YS, gap_mm: GAP_YS.map((y) => Math.round((y * y * 1e6) / 600) / 1e6) },
     load: { normal_force_n: 100000 },
@@ -44,6 +49,12 @@ const STARTS = {
   },
 };
 
+/** Is a contact of this kind given by cross-sections? @param {unknown} type */
+export const hasSections = (type) => type === 'profiles' || type === 'wheelset';
+
+/** Contacts of one family have loads and motions alike. @param {unknown} type */
+const family = (type) => (hasSections(type) ? type : 'patch');
+
 /**
  * A case with another kind of contact: material, friction, name and labels stay, and what else still fits.
  * @param {JsonObject | null} document
@@ -54,15 +65,17 @@ export function withContact(document, type) {
   const start = STARTS[type];
   const before = document ?? {};
   const contact = /** @type {JsonObject} */ (before.contact ?? {});
-  const alike = start.load && (type === 'profiles') === (contact.type === 'profiles');
+  const alike = family(type) === family(contact.type);
+  /** @type {JsonObject} */
+  const sections = hasSections(type) && hasSections(contact.type) ? { rail: contact.rail ?? {}, wheel: contact.wheel ?? {} } : {};
   const { load, ...kept } = before;
   return {
     ...kept,
     material: before.material ?? STEEL,
     friction: before.friction ?? { coefficient: 0.3 },
-    contact: start.contact,
+    contact: { ...start.contact, ...sections },
     ...(start.load ? { load: alike && load ? load : start.load } : {}),
-    motion: (type === 'profiles') === (contact.type === 'profiles') && before.motion ? before.motion : start.motion,
+    motion: alike && before.motion ? before.motion : start.motion,
     outputs: withFields(before.outputs),
   };
 }
@@ -75,7 +88,7 @@ export function withFields(asked) {
 
 /** Are nothing but the empty braces of a cross-section there yet? @param {JsonObject} document @param {'rail' | 'wheel'} body */
 export function lacksSection({ contact }, body) {
-  if (!isObject(contact) || contact.type !== 'profiles') return false;
+  if (!isObject(contact) || !hasSections(contact.type)) return false;
   const section = contact[body];
   return isObject(section) && Object.keys(section).length === 0;
 }

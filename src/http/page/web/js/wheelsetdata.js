@@ -1,0 +1,67 @@
+// The curves of a wheelset: Δr and contact angles over its shift, equivalent conicity over the amplitude.
+
+/** @typedef {import('./api.js').JobResult} JobResult */
+/** @typedef {import('./curvedata.js').Curve} Curve */
+/** @typedef {NonNullable<NonNullable<JobResult['wheelset']>['kinematics']>} Kinematics */
+/** @typedef {'radii' | 'angles' | 'conicity'} Kind */
+
+export const KINDS = /** @type {const} */ ([['radii', 'Δr'], ['angles', 'Contact angles'], ['conicity', 'Conicity']]);
+
+const DEGREE = Math.PI / 180;
+
+/**
+ * A curve of the rigid wheelset without yaw.
+ * @param {Kinematics} kinematics
+ * @param {Kind} kind
+ * @returns {Curve | null} Null where there are fewer than two values.
+ */
+export function wheelsetCurve(kinematics, kind) {
+  const curve = kind === 'conicity' ? conicity(kinematics) : overShift(kinematics, kind);
+  return curve.x.length > 1 ? curve : null;
+}
+
+/** @param {Kinematics} kinematics @param {'radii' | 'angles'} kind @returns {Curve} */
+function overShift(kinematics, kind) {
+  const { lateral_shift_mm: shifts, left, right } = kinematics;
+  const none = shifts.map(() => null);
+  const degrees = (/** @type {number[]} */ angles) => angles.map((angle) => Math.abs(angle) / DEGREE);
+  return {
+    xLabel: 'shift to the left / mm',
+    yLabel: kind === 'radii' ? 'left less right rolling radius / mm' : 'contact angle / °',
+    x: shifts,
+    order: [...shifts.keys()],
+    lines: kind === 'radii'
+      ? [
+        { label: 'Δr', unit: 'mm', colour: '--c1', y: kinematics.radius_difference_mm, error: kinematics.profile_uncertainty_mm },
+        { label: 'axle held level', unit: 'mm', colour: '--c2', dash: [7, 4], y: kinematics.radius_difference_without_roll_mm, error: none },
+      ]
+      : [
+        { label: 'left', unit: '°', colour: '--c1', y: degrees(left.contact_angle_rad), error: none },
+        { label: 'right', unit: '°', colour: '--c2', dash: [7, 4], y: degrees(right.contact_angle_rad), error: none },
+      ],
+    bound: NaN,
+  };
+}
+
+/** Amplitudes without a stable equilibrium, or beyond the shifts that were asked for, have no conicity. @param {Kinematics} kinematics @returns {Curve} */
+function conicity(kinematics) {
+  const known = kinematics.conicity.filter((of) => typeof of.conicity === 'number');
+  const of = (/** @type {'conicity' | 'conicity_without_roll' | 'conicity_harmonic'} */ name) => known.map((at) => at[name] ?? NaN);
+  const none = known.map(() => null);
+  return {
+    xLabel: 'amplitude / mm',
+    yLabel: 'equivalent conicity',
+    x: known.map((at) => at.amplitude_mm),
+    order: [...known.keys()],
+    lines: [
+      { label: 'EN 15302', unit: '', colour: '--c1', y: of('conicity'), error: known.map((at) => Math.hypot(at.error_estimate ?? 0, at.profile_uncertainty ?? 0)) },
+      { label: 'axle held level', unit: '', colour: '--c2', dash: [7, 4], y: of('conicity_without_roll'), error: none },
+      { label: 'harmonic', unit: '', colour: '--c3', dash: [2, 3], y: of('conicity_harmonic'), error: none },
+    ],
+    bound: NaN,
+  };
+}
+
+/** The index of the value nearest to another. @param {readonly number[]} values @param {number} wanted */
+export const nearest = (values, wanted) =>
+  values.reduce((best, value, at) => (Math.abs(value - wanted) < Math.abs(values[best] - wanted) ? at : best), 0);
