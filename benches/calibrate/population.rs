@@ -38,10 +38,10 @@ impl Class {
     pub fn count(self) -> usize {
         match self {
             Class::Ellipse => 400,
-            Class::Smooth => 80,
-            Class::Jump => 40,
-            Class::Gap => 100,
-            Class::Profiles => 24,
+            Class::Smooth => 320,
+            Class::Jump => 80,
+            Class::Gap => 200,
+            Class::Profiles => 96,
         }
     }
 }
