@@ -57,7 +57,7 @@ fn forget_peak() {
 pub fn creep_maps() -> String {
     let mut text = "## Creep maps\n\nRadii 460 and 300 mm, 100 kN, μ 0.3, spin 0.003/mm, creepages whose pole lies inside the patch, target 0.001, resultants only. *Peak*:\n\
          resident memory above that of the idle process, the operator store of 128 MiB included.\n\n\
-         | motions | target met | s | estimated s | peak MiB | afterwards | store MiB | estimated MiB |\n|---|---|---|---|---|---|---|---|\n"
+         | motions | target met | s | estimated s | peak MiB | afterwards | store MiB | estimated MiB, store of it |\n|---|---|---|---|---|---|---|---|\n"
         .to_owned();
     for side in SIDES {
         let idle = status("VmRSS:").unwrap_or(f64::NAN);
@@ -77,10 +77,11 @@ pub fn creep_maps() -> String {
         let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
         let _ = writeln!(
             text,
-            "| {motions} | {met} | {seconds:.1} | {:.1} | {peak:.0} | {after:.0} | {:.0} | {:.0} |",
+            "| {motions} | {met} | {seconds:.1} | {:.1} | {peak:.0} | {after:.0} | {:.0} | {:.0}, {:.0} |",
             cost.seconds,
             mebibytes(store.bytes()),
-            mebibytes(cost.bytes)
+            mebibytes(cost.bytes),
+            mebibytes(cost.operator_store_bytes)
         );
     }
     text.push('\n');

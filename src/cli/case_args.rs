@@ -24,6 +24,7 @@ impl CaseArgs {
     pub fn limits(self) -> Limits {
         Limits {
             memory_bytes: self.memory_limit_mb << 20,
+            operator_store_bytes: self.operator_store_mb << 20,
             ..Limits::default()
         }
     }

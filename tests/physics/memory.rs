@@ -99,3 +99,47 @@ fn the_memory_of_a_long_sweep_of_resultants_is_some_kilobytes_a_motion() {
     assert!(many - few < 9900.0 * 4e3, "{few} and {many}");
     assert!(many < 300e6, "{many}");
 }
+
+/// What a case leaves in a store is what its cost says, within a factor that covers the sizes of meshes that its target leads to, and is
+/// a part of the memory that the cost counts.
+#[test]
+fn the_cost_counts_the_operators_that_a_case_leaves_in_the_store() {
+    let ellipse = |solver: Value, motions: Value| {
+        json!({
+            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": { "type": "ellipse", "a_mm": 6, "b_mm": 4 },
+            "load": { "normal_force_n": 80_000 },
+            "motion": motions,
+            "solver": solver,
+            "outputs": ["resultants"],
+        })
+    };
+    let mesh = json!({ "mesh": { "strips": 20, "cells": 30 } });
+    let creep = json!([{ "creepage_x": 0.001 }, { "creepage_x": 0.002 }]);
+    let all = json!([{ "creepage_x": 0.001, "creepage_y": 0.0005, "spin_per_mm": 0.0004 }]);
+    let cases = [
+        (ellipse(mesh, all.clone()), 1.01),
+        (ellipse(json!({ "target_error": 0.005 }), creep), 6.0),
+        (ellipse(json!({ "target_error": 0.005 }), all), 6.0),
+        (creep_map(9, 0.005), 2.5),
+    ];
+    for (case, factor) in cases {
+        for bytes in [0, 4 << 20, 128 << 20] {
+            let limits = Limits {
+                operator_store_bytes: bytes,
+                ..Limits::default()
+            };
+            let checked = check(&case, &limits).expect("a valid case");
+            let store = Arc::new(OperatorStore::new(bytes));
+            answer(&store, &checked);
+            let (cost, kept) = (checked.cost(), store.bytes() as f64);
+            let told = cost.operator_store_bytes as f64;
+            assert!(told <= bytes as f64 && cost.operator_store_bytes <= cost.bytes);
+            assert!(
+                (kept / factor..=kept * factor).contains(&told),
+                "{told} told, {kept} kept of {bytes}: {case}"
+            );
+        }
+    }
+}

@@ -131,6 +131,7 @@ fn run(case: &Case, limits: &Limits) -> Run {
         resolution: resolution(&case.solver),
         time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
         memory_bytes: limits.memory_bytes,
+        operator_store_bytes: limits.operator_store_bytes,
         steps_max: limits.motions_max,
         outputs: case.outputs.clone(),
         after: AfterTasks::new(case),

@@ -17,7 +17,9 @@ use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
-use crate::contact::problem::memory::{SizeInput, length_over_width, positions, segments};
+use crate::contact::problem::memory::{
+    SizeInput, length_over_width, positions, segments, spinning,
+};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::history::task::HistoryTask;
@@ -98,10 +100,13 @@ impl CheckedParts {
                     .map_or_else(|| vec![1.0], |(task, _)| segments(task)),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len())
                     * task.as_ref().map_or(1, |(task, _)| positions(task)),
+                spinning: motions.as_ref().map_or(0, |m| spinning(&m.motions))
+                    * task.as_ref().map_or(1, |(task, _)| positions(task)),
                 history: motions.as_ref().is_some_and(|m| m.history.is_some()),
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),
                 stress_points: given.after.stress_points(),
                 ellipse: task.as_ref().and_then(|(task, _)| length_over_width(task)),
+                store: limits.operator_store_bytes,
             };
             faults.extend(size.faults(limits));
         }

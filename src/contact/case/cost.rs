@@ -1,14 +1,16 @@
-//! What a case will cost, estimated before it is queued: memory from its finest mesh (`problem/memory.rs`), time from its motions (`solve_time.rs`).
+//! What a case will cost, estimated before it is queued: memory from its meshes (`problem/memory.rs`), time from its motions (`solve_time.rs`).
 
 use crate::contact::problem::checked_case::CheckedCase;
 
 impl CheckedCase {
-    /// Estimated cost of solving this: the operator of the finest mesh and what stands beside it, the matrices of the dense method,
-    /// the answer. What the process keeps for all cases, the operator store, comes on top. Seconds are rough.
+    /// Estimated cost of solving this: the operators of its meshes and what stands beside them, the matrices of the dense method, the
+    /// answer. Seconds are rough.
     #[must_use]
     pub fn cost(&self) -> Cost {
+        let size = self.size_input();
         Cost {
-            bytes: self.size_input().bytes() as u64,
+            bytes: size.bytes() as u64,
+            operator_store_bytes: size.stored() as u64,
             seconds: self.solve_time().whole,
         }
     }
@@ -19,6 +21,16 @@ impl CheckedCase {
 pub struct Cost {
     /// Peak memory in bytes.
     pub bytes: u64,
+    /// Of these, what its operators take of the store of the process.
+    pub operator_store_bytes: u64,
     /// Solve time in s on one core of the machine the figures were taken on; rough.
     pub seconds: f64,
+}
+
+impl Cost {
+    /// Memory in bytes that nobody shares.
+    #[must_use]
+    pub fn own_bytes(&self) -> u64 {
+        self.bytes.saturating_sub(self.operator_store_bytes)
+    }
 }

@@ -1,4 +1,4 @@
-//! How much memory a case will take, estimated from its finest mesh.
+//! How much memory a case will take, estimated from its finest mesh and from the operators that it leaves in the store of the process.
 
 use crate::contact::error::SolveError;
 use crate::contact::normal::footprint::Footprint;
@@ -6,9 +6,11 @@ use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::post::subsurface::task::SubsurfaceTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::methods::method::Method;
-use crate::contact::rolling::operator_store::OperatorKind;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::operator_store::{OperatorKind, kept_bytes};
 use crate::contact::rolling::refinement::levels::LEVELS_KEPT;
-use crate::contact::rolling::refinement::mesh_policy::{CELLS_MAX, MeshPolicy};
+use crate::contact::rolling::refinement::mesh_policy::{CELLS_FIRST, CELLS_MAX, MeshPolicy};
+use crate::contact::rolling::refinement::refine::CELLS_NESTED;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::task::precision_of;
 
@@ -44,6 +46,8 @@ pub(crate) struct SizeInput {
     /// Segments per strip, for each patch.
     pub(crate) segments: Vec<f64>,
     pub(crate) motions: usize,
+    /// Motions with spin, which may each want a mesh about a pole of its own.
+    pub(crate) spinning: usize,
     /// Values per cell are kept motion by motion.
     pub(crate) fields: bool,
     /// Points of every motion at which stresses below the surface are answered.
@@ -52,6 +56,8 @@ pub(crate) struct SizeInput {
     pub(crate) ellipse: Option<f64>,
     /// Are the motions the points of a history, which is kept whole on two levels?
     pub(crate) history: bool,
+    /// Bound in bytes of the store of operators.
+    pub(crate) store: u64,
 }
 
 /// Segments per strip of every patch; of a gap, whose patches are not known yet, one for every summit.
@@ -63,6 +69,12 @@ pub(crate) fn segments(task: &NormalTask) -> Vec<f64> {
         // Both wheels of one position; the answers of all are kept.
         NormalTask::Wheelset(_) => vec![1.0; 2],
     }
+}
+
+/// Motions with spin.
+pub(crate) fn spinning(motions: &[Motion]) -> usize {
+    let spin = |motion: &&Motion| motion.spin_per_mm != 0.0;
+    motions.iter().filter(spin).count()
 }
 
 /// Positions of a wheelset, each with answers of its own; 1 of other contacts.
@@ -103,19 +115,13 @@ impl SizeInput {
     pub(crate) fn bytes(&self) -> f64 {
         let (cells, segments) = self.finest();
         let motions = self.motions as f64;
-        let operator = match self.method {
-            Method::Fastsim | Method::Table => 0.0,
-            Method::BoundaryElement | Method::LiuHsu => {
-                let kind = OperatorKind {
-                    poisson_ratio: 0.0,
-                    // Cells that gather about a pole are not.
-                    folded: self.ellipse.is_some()
-                        && matches!(self.resolution, Resolution::Mesh(_)),
-                    precision: precision_of(self.resolution),
-                };
-                let each = (cells / segments.max(1.0)).ceil();
-                kind.bytes(segments.ceil() as usize, each as usize) as f64
-            }
+        let (all, store) = (self.operators(), self.store as f64);
+        let operator = self.operator(cells, segments);
+        let operators = if all > store {
+            // The next operator is computed before others leave the store.
+            store + operator
+        } else {
+            all.max(operator)
         };
         let solve = match self.method {
             // Factored blocks of two unknowns per cell.
@@ -131,12 +137,61 @@ impl SizeInput {
         } else {
             0.0
         };
-        operator
+        operators
             + solve
             + cells * (8.0 * VECTORS_PER_CELL + levels * LEVEL_BYTES_PER_CELL)
             + self.kept_of_history(cells)
             + motions * patches * (MOTION_BYTES + STRESS_BYTES * self.stress_points as f64)
             + fields
+    }
+
+    /// Bytes of the operator of a mesh.
+    fn operator(&self, cells: f64, segments: f64) -> f64 {
+        if matches!(self.method, Method::Fastsim | Method::Table) {
+            return 0.0;
+        }
+        let kind = OperatorKind {
+            poisson_ratio: 0.0,
+            // Cells that gather about a pole are not.
+            folded: self.ellipse.is_some()
+                && (self.spinning == 0 || matches!(self.resolution, Resolution::Mesh(_))),
+            precision: precision_of(self.resolution),
+        };
+        let each = (cells / segments.max(1.0)).ceil();
+        kind.bytes(segments.ceil() as usize, each as usize) as f64
+    }
+
+    /// Bytes of all operators of the case that a store keeps, if it has room for them: of the mesh, or of the meshes that lead to a target and of their
+    /// companions; of these every motion with spin has its own.
+    fn operators(&self) -> f64 {
+        let (finest, segments) = self.finest();
+        let of = |cells: f64| {
+            let part = (cells / finest).sqrt();
+            kept_bytes(self.operator(cells, segments * part) as u64, self.store) as f64
+        };
+        match (self.method, self.resolution) {
+            (Method::Fastsim | Method::Table, _) => 0.0,
+            (Method::BoundaryElement, Resolution::Mesh(_)) if finest >= CELLS_NESTED as f64 => {
+                of(finest) + of(finest / 4.0)
+            }
+            (_, Resolution::Mesh(_)) => of(finest),
+            (Method::LiuHsu, Resolution::Target(_)) => of(finest) + of(finest / 4.0),
+            (Method::BoundaryElement, Resolution::Target(_)) => {
+                let usual = self.usual_cells(finest);
+                let halves = std::iter::successors(Some(0.5 * usual), |cells| Some(0.5 * cells));
+                let coarser: f64 = halves
+                    .take_while(|cells| *cells >= CELLS_FIRST)
+                    .map(of)
+                    .sum();
+                let with_companions = of(usual) + 2.0 * of(0.5 * usual);
+                coarser + with_companions * self.spinning.max(1) as f64
+            }
+        }
+    }
+
+    /// Bytes that the case leaves in the store of operators.
+    pub(crate) fn stored(&self) -> f64 {
+        self.operators().min(self.store as f64)
     }
 
     /// Bytes of the tractions and slips of a history on two levels.
@@ -189,10 +244,12 @@ impl CheckedCase {
             resolution: self.run.resolution,
             segments: segments(&self.problem.task),
             motions: self.problem.motions.len() * positions(&self.problem.task),
+            spinning: spinning(&self.problem.motions) * positions(&self.problem.task),
             history: self.problem.history.is_some(),
             fields: self.run.outputs.iter().any(|output| output.is_per_cell()),
             stress_points: self.run.after.subsurface.as_ref().map_or(0, places),
             ellipse: length_over_width(&self.problem.task),
+            store: self.run.operator_store_bytes,
         }
     }
 

@@ -22,6 +22,8 @@ pub struct Run {
     pub time_limit: Option<Duration>,
     /// Memory the solve may use, in bytes.
     pub memory_bytes: u64,
+    /// Bound of the store of operators that it shares with others, in bytes.
+    pub operator_store_bytes: u64,
     /// Steps that a history may take.
     pub steps_max: usize,
     /// What to compute, sorted, without repetition.

@@ -23,6 +23,16 @@ pub const BYTES_DEFAULT: u64 = 128 << 20;
 /// An operator larger than this fraction of the bound is not kept, because it would push out all others.
 const LARGEST_PART: u64 = 2;
 
+/// Bytes that a store of `bytes_max` keeps of an operator of so many: all or nothing.
+#[must_use]
+pub(crate) fn kept_bytes(bytes: u64, bytes_max: u64) -> u64 {
+    if bytes <= bytes_max / LARGEST_PART {
+        bytes
+    } else {
+        0
+    }
+}
+
 /// What the fast solver prepares for a mesh, whatever the motion, friction and load.
 #[derive(Debug)]
 pub struct LevelOperator {
@@ -132,7 +142,7 @@ impl OperatorStore {
         });
         let lengths = mesh.segments.iter().map(|segment| segment.cells.len());
         let bytes = kind.bytes_of(mesh.cells(), lengths);
-        if bytes <= self.bytes_max / LARGEST_PART {
+        if kept_bytes(bytes, self.bytes_max) > 0 {
             let kept = Kept {
                 kind,
                 mesh: mesh.clone(),

@@ -47,6 +47,8 @@ pub struct CheckReport {
 pub struct Estimate {
     /// Peak memory in bytes.
     bytes: u64,
+    /// Of these, what stays in the store of operators that all workers share.
+    operator_store_bytes: u64,
     /// Solve time on one core, in s.
     seconds: f64,
 }
@@ -89,6 +91,7 @@ pub async fn check(
             motions: checked.problem.motions.len(),
             estimate: Estimate {
                 bytes: cost.bytes,
+                operator_store_bytes: cost.operator_store_bytes,
                 seconds: cost.seconds,
             },
             understood,

@@ -37,7 +37,7 @@ pub(crate) fn solve_chunk(
     let (varied, carried) = parted(&head, chunk);
     let limits = &shared.options.limits;
     if let Ok(checked) = (shared.engine.check)(&head.case, limits) {
-        control.set_memory_bytes(checked.cost().bytes);
+        control.set_memory_bytes(checked.cost().own_bytes());
     }
     let task = ManyTask {
         case: &head.case,

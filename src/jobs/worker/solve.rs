@@ -61,7 +61,7 @@ fn check_and_solve(
     };
     let limit = shared.options.time_limit;
     checked.run.time_limit = Some(checked.run.time_limit.map_or(limit, |time| time.min(limit)));
-    control.set_memory_bytes(checked.cost().bytes);
+    control.set_memory_bytes(checked.cost().own_bytes());
     let slices = (shared.engine.slices)(&checked);
     solve_next(
         shared,
