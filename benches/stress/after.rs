@@ -13,7 +13,7 @@ const MOTIONS: [[f64; 3]; 3] = [[8e-4, 0.0, 0.0], [1e-3, 5e-4, 2e-4], [2e-4, 0.0
 const REPEATED: usize = 3;
 
 /// Names of what is asked for, and its members of the case.
-fn options() -> [(&'static str, Value); 7] {
+fn options() -> [(&'static str, Value); 8] {
     let axis = |reach: f64, points: u32| json!({ "from": -reach, "to": reach, "points": points });
     let depths = json!({ "from": 0.2, "to": 8, "points": 25 });
     let plane = json!({ "x_mm": axis(8.0, 40), "y_mm": 0.3, "depths_mm": depths });
@@ -35,6 +35,10 @@ fn options() -> [(&'static str, Value); 7] {
             json!({ "outputs": ["subsurface"], "subsurface": { "plane": plane, "worst": false } }),
         ),
         ("worst point", json!({ "outputs": ["subsurface"] })),
+        (
+            "passage",
+            json!({ "outputs": ["subsurface"], "subsurface": { "passage": { "dang_van_slope": 0.3 } } }),
+        ),
         (
             "damage",
             json!({ "outputs": ["damage"], "damage": { "models": models } }),

@@ -44,6 +44,9 @@ fn stressed(random: &mut Random, case: &mut Value) {
     if random.part() < 0.5 {
         case["subsurface"]["body"] = json!("upper");
     }
+    if random.part() < 0.3 {
+        case["subsurface"]["passage"] = json!({ "dang_van_slope": random.part() });
+    }
 }
 
 fn damaged(random: &mut Random, case: &mut Value) {
@@ -136,6 +139,19 @@ fn stresses_are_in_balance(answer: &Value, case: &Value) -> Result<(), String> {
     let most = all("/von_mises_mpa")?.into_iter().fold(0.0, f64::max);
     held(most <= 1.001 * worst, || {
         format!("{most} MPa in the plane, {worst} MPa at the worst point")
+    })?;
+    residual_stresses_help(&point(answer)["subsurface"]["passage"])
+}
+
+/// Shakedown never needs more yield in shear than staying elastic does, as closely as the worst places are found.
+fn residual_stresses_help(passage: &Value) -> Result<(), String> {
+    if passage.is_null() {
+        return Ok(());
+    }
+    let needed = ["yield_with_residual", "yield_without_residual"]
+        .map(|name| passage[name]["stress_mpa"].as_f64().unwrap_or(f64::NAN));
+    held(needed[0] > 0.0 && needed[0] <= 1.02 * needed[1], || {
+        format!("yield in shear with and without residual stresses: {needed:?} MPa")
     })
 }
 

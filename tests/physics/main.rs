@@ -79,6 +79,7 @@ mod robustness;
 mod skips;
 mod stress;
 mod subsurface;
+mod subsurface_passage;
 mod sweeps;
 mod table;
 mod table_rows;

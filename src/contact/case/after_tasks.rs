@@ -64,6 +64,7 @@ impl AfterWords<'_> {
         let mut faults = Vec::new();
         if let Some(words) = self.subsurface {
             faults.extend(subsurface::fault(words, motions.motions.len(), limits));
+            faults.extend(subsurface::passage_fault(words, given));
         }
         let archard = self
             .damage

@@ -9,6 +9,8 @@ const STRESS_SECONDS: f64 = 1.3e-5;
 const WORST_SECONDS: f64 = 0.014;
 const POWER_SECONDS: f64 = 8e-5;
 const DAMAGE_SECONDS: f64 = 3e-6;
+/// For the passages below a patch, for each thing that is judged of them: one ellipse, a build of the tests on a busy machine.
+const PASSAGE_SECONDS: f64 = 0.13;
 
 impl CheckedCase {
     /// Estimated time in s for what follows from one solved motion, for so many patches.
@@ -27,6 +29,13 @@ impl CheckedCase {
                 0.0
             };
             seconds += STRESS_SECONDS * count + WORST_SECONDS * searched;
+            if let Some(passage) = task.passage {
+                let judged = 1 + u8::from(passage.dang_van_slope.is_some());
+                seconds += PASSAGE_SECONDS * f64::from(judged) * patches;
+                if searched == 0.0 {
+                    seconds += WORST_SECONDS * patches;
+                }
+            }
         }
         if after.needs_power(&self.run.outputs) {
             seconds += POWER_SECONDS * patches;

@@ -2,11 +2,14 @@
 
 use crate::contact::case::limits::Limits;
 use crate::contact::case::words::material::Material;
+use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::subsurface::{
     BodyName, DepthLineAt, FoundPlace, GridAxis, StressGrid, SubsurfaceWords,
 };
 use crate::contact::error::Fault;
-use crate::contact::post::subsurface::task::{LoadedBody, StressPlaces, SubsurfaceTask};
+use crate::contact::post::subsurface::task::{
+    LoadedBody, PassageTask, StressPlaces, SubsurfaceTask,
+};
 
 /// Number of points of every motion.
 pub(crate) fn count(words: &SubsurfaceWords) -> usize {
@@ -35,6 +38,17 @@ pub(crate) fn fault(words: &SubsurfaceWords, motions: usize, limits: &Limits) ->
     })
 }
 
+/// The fault of a passage judged beside a history.
+pub(crate) fn passage_fault(words: &SubsurfaceWords, motion: &Motions) -> Option<Fault> {
+    let history = matches!(motion, Motions::History { .. });
+    (history && words.passage.is_some()).then(|| {
+        Fault::new(
+            "/subsurface/passage",
+            "given with a history; a passage is judged in steady rolling only",
+        )
+    })
+}
+
 /// The task of a checked case.
 pub(crate) fn task(words: &SubsurfaceWords, material: &Material) -> SubsurfaceTask {
     let (lower, upper) = match material {
@@ -50,6 +64,9 @@ pub(crate) fn task(words: &SubsurfaceWords, material: &Material) -> SubsurfaceTa
         body,
         poisson_ratio: elastic.poisson_ratio,
         worst: words.worst,
+        passage: words.passage.map(|passage| PassageTask {
+            dang_van_slope: passage.dang_van_slope,
+        }),
     }
 }
 

@@ -16,6 +16,7 @@ use crate::contact::post::subsurface::states::{STORED, in_patch_axes, point, sto
 use crate::contact::post::subsurface::surface_load::{LoadResolution, LoadWorkspace, SurfaceLoad};
 use crate::contact::post::subsurface::task::{LoadedBody, StressPlaces, SubsurfaceTask};
 use crate::contact::post::subsurface::worst::worst_place;
+use crate::contact::post::subsurface::worst_passage::{PassagesOf, passage};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::methods::method::Method;
@@ -164,18 +165,24 @@ fn least_depth(patch: &Patch) -> f64 {
     LEAST_DEPTH * 0.5 * (x_max - x_min).min(y_max - y_min)
 }
 
+/// The body and the loads on it.
+fn loaded<'a>(task: &SubsurfaceTask, of: SolvedMotion<'a>) -> (BodyName, SurfaceLoad<'a>) {
+    // The lower body's normal is up, the upper's down, and tractions on it are the reactions.
+    let (body, sign) = match task.body {
+        LoadedBody::Lower => (BodyName::Lower, 1.0),
+        LoadedBody::Upper => (BodyName::Upper, -1.0),
+    };
+    let load = SurfaceLoad::new(of.level, of.footprint, of.answer, sign, task.poisson_ratio);
+    (body, load)
+}
+
 /// Stresses below every patch. Patches of one frame load the same body: each point feels all of them.
 fn subsurface(
     task: &SubsurfaceTask,
     of: SolvedMotion,
     monitor: &dyn Monitor,
 ) -> Result<Vec<PatchStresses>, Stop> {
-    // The lower body's normal is up, the upper's down, and tractions on it are the reactions.
-    let sign = match task.body {
-        LoadedBody::Lower => 1.0,
-        LoadedBody::Upper => -1.0,
-    };
-    let load = SurfaceLoad::new(of.level, of.footprint, of.answer, sign, task.poisson_ratio);
+    let (body, load) = loaded(task, of);
     let patches = of.footprint.patches();
     let least = patches
         .iter()
@@ -209,8 +216,14 @@ fn subsurface(
         if let ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(stop);
         }
-        let worst = (task.worst || below_worst)
-            .then(|| worst_place(&load, of.footprint, k, least_depth(patch), workspace))
+        let place = PassagesOf {
+            load: &load,
+            footprint: of.footprint,
+            patch: k,
+            least: least_depth(patch),
+        };
+        let worst = (task.worst || below_worst || task.passage.is_some())
+            .then(|| worst_place(&load, of.footprint, k, place.least, workspace))
             .flatten();
         let points = match (&task.places, worst) {
             (StressPlaces::BelowWorst(depths), Some([x, y, _])) => {
@@ -220,12 +233,14 @@ fn subsurface(
             _ => shared.clone(),
         };
         let summary = SubsurfaceSummary {
-            body: match task.body {
-                LoadedBody::Lower => BodyName::Lower,
-                LoadedBody::Upper => BodyName::Upper,
-            },
+            body,
             least_depth_mm: least,
-            worst: worst.map(|at| point(at, stress(at, workspace))),
+            worst: worst
+                .filter(|_| task.worst || below_worst)
+                .map(|at| point(at, stress(at, workspace))),
+            passage: (task.passage.zip(worst))
+                .map(|(judged, worst)| passage(judged, place, worst, monitor))
+                .transpose()?,
         };
         found.push(PatchStresses { summary, points });
     }

@@ -57,6 +57,32 @@ pub struct SubsurfaceSummary {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub worst: Option<StressPoint>,
+    /// What a point of the body lives through while the contact rolls over it; absent unless it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub passage: Option<PassageSummary>,
+}
+
+/// The worst places of a passage of the contact in steady rolling. A place is a line along x; stresses belong to all of its history.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct PassageSummary {
+    /// Where Dang Van's stress is largest; absent without a slope.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub dang_van: Option<PassagePlace>,
+    /// Smallest yield stress in shear (von Mises) with which nothing yields although there is no residual stress.
+    pub yield_without_residual: PassagePlace,
+    /// Smallest yield stress in shear (von Mises) with which residual stresses can end yielding: the limit of elastic shakedown.
+    pub yield_with_residual: PassagePlace,
+}
+
+/// A stress and the line along x that it belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct PassagePlace {
+    /// Where: `[y, depth]` in mm.
+    pub at_mm: [f64; 2],
+    /// The stress.
+    pub stress_mpa: f64,
 }
 
 /// Temperatures of both surfaces in the contact in short; both bodies have one temperature there.

@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::BodyName;
 use crate::contact::post::subsurface::states::{STORED, points};
-use crate::contact::solution::maintenance::StressPoint;
+use crate::contact::solution::maintenance::{PassageSummary, StressPoint};
 use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::query::{Parameters, index, query, require_index};
 use crate::http::limits::holding_body::hold_while_sent;
@@ -53,6 +53,10 @@ pub struct SubsurfaceAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     worst: Option<StressPoint>,
+    /// What a point of the body lives through while the contact rolls over it; absent if the case did not want it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    passage: Option<PassageSummary>,
 }
 
 /// Stresses below the surface of a succeeded job.
@@ -107,6 +111,7 @@ async fn write(
             least_depth_mm: summary.least_depth_mm,
             points,
             worst: summary.worst,
+            passage: summary.passage,
         };
         serde_json::to_vec(&answer).map_err(|error| ApiError::internal(&error))
     };

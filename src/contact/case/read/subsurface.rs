@@ -6,11 +6,13 @@ use crate::contact::case::read::faults::Interval;
 use crate::contact::case::read::object::{Object, join, number, shown};
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::{
-    BodyName, DepthLineAt, FoundPlace, GridAxis, StressGrid, SubsurfaceWords,
+    BodyName, DepthLineAt, FoundPlace, GridAxis, PassageWords, StressGrid, SubsurfaceWords,
 };
 
 const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
 const DEPTH: Interval = Interval::closed(0.0, 1e6, "mm");
+/// Steels have a few tenths.
+const DANG_VAN_SLOPE: Interval = Interval::closed(0.0, 10.0, "");
 /// Most points of one list or axis, before the limit of the service.
 const COUNT_MAX: u32 = 1_000_000;
 const PLACES: [&str; 3] = ["points_mm", "along_depth_at_mm", "plane"];
@@ -31,6 +33,7 @@ pub(crate) fn read(
             plane: None,
             body: BodyName::Lower,
             worst: true,
+            passage: None,
         }));
     }
     if !wanted {
@@ -50,6 +53,7 @@ fn words(block: &mut Object) -> Option<SubsurfaceWords> {
         "plane",
         "body",
         "worst",
+        "passage",
     ];
     block.only(&names, &[]);
     let given: Vec<&str> = PLACES.into_iter().filter(|name| block.has(name)).collect();
@@ -65,6 +69,7 @@ fn words(block: &mut Object) -> Option<SubsurfaceWords> {
     let bodies = [("lower", BodyName::Lower), ("upper", BodyName::Upper)];
     let body = optional(block, "body", |block, name| block.word(name, &bodies, &[]));
     let worst = optional(block, "worst", flag);
+    let passage = optional(block, "passage", passage);
     match (block.has("along_depth_at_mm"), block.has("depths_mm")) {
         (true, false) => {
             block.required("depths_mm", "an array of depths in mm")?;
@@ -83,6 +88,18 @@ fn words(block: &mut Object) -> Option<SubsurfaceWords> {
         plane: plane?,
         body: body?.unwrap_or_default(),
         worst: worst?.unwrap_or(true),
+        passage: passage?,
+    })
+}
+
+fn passage(block: &mut Object, name: &str) -> Option<PassageWords> {
+    let mut block = block.child(name)?;
+    block.only(&["dang_van_slope"], &[]);
+    let dang_van_slope = optional(&mut block, "dang_van_slope", |block, name| {
+        block.number(name, DANG_VAN_SLOPE)
+    });
+    Some(PassageWords {
+        dang_van_slope: dang_van_slope?,
     })
 }
 

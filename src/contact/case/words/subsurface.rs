@@ -30,6 +30,20 @@ pub struct SubsurfaceWords {
     /// Find the point of every patch where von Mises' stress is largest; `true` when left out.
     #[schema(required = false)]
     pub worst: bool,
+    /// Judge what a point of the body lives through while the contact rolls over it: Dang Van's criterion and shakedown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub passage: Option<PassageWords>,
+}
+
+/// What is judged of a passage of the contact in steady rolling: shakedown always, Dang Van's criterion with its slope.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[schema(as = Passage)]
+pub struct PassageWords {
+    /// Weight of the hydrostatic stress in Dang Van's criterion, a property of the steel; without it the criterion is not evaluated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, minimum = 0, maximum = 10)]
+    pub dang_van_slope: Option<f64>,
 }
 
 /// Where a line of depths begins.

@@ -1,9 +1,12 @@
-//! Stresses below the surface: tensors at chosen points, and the worst point of a patch.
+//! Stresses below the surface: tensors at chosen points, the worst point of a patch, and what a passage of the contact does.
 
+pub mod enclosing_ball;
 pub mod lines;
 pub mod load_parts;
+pub mod passage;
 pub mod principal;
 pub mod states;
 pub mod surface_load;
 pub mod task;
 pub mod worst;
+pub mod worst_passage;

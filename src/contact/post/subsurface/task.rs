@@ -40,4 +40,13 @@ pub struct SubsurfaceTask {
     pub poisson_ratio: f64,
     /// Is the worst point of every patch to be found?
     pub worst: bool,
+    /// What is judged of a passage of the contact, if anything.
+    pub passage: Option<PassageTask>,
+}
+
+/// What is judged of a passage of the contact: shakedown always.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PassageTask {
+    /// Weight of the hydrostatic stress in Dang Van's criterion; not evaluated without.
+    pub dang_van_slope: Option<f64>,
 }

@@ -1,0 +1,212 @@
+//! The lines along x below a patch on which a passage of the contact is worst.
+//!
+//! A scan over y and depth with the loads resolved coarsely; from its worst place a search in `(y/b, ln depth)` with the loads
+//! resolved finely and more states beside those that decide.
+
+use std::ops::ControlFlow;
+
+use crate::contact::half_space::rectangle_stress::Stress;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::normal::footprint::Footprint;
+use crate::contact::post::subsurface::passage::{PassageMeasure, judge};
+use crate::contact::post::subsurface::states::von_mises;
+use crate::contact::post::subsurface::surface_load::{LoadResolution, LoadWorkspace, SurfaceLoad};
+use crate::contact::post::subsurface::task::PassageTask;
+use crate::contact::solution::maintenance::{PassagePlace, PassageSummary};
+
+// The numbers below are chosen by judgement; `cargo test --test physics -- shakes_down` holds what they give against closed forms.
+
+/// Places across, relative to the half width, and depths over the half-width of the patch.
+const ACROSS: [f64; 7] = [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9];
+const DEPTHS: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0];
+/// States: so many on each side of the middle up to 1.5 half-lengths, and these further out.
+const NEAR: usize = 16;
+const NEAR_REACH: f64 = 1.5;
+const FAR: [f64; 4] = [1.8, 2.3, 3.2, 5.0];
+/// How often the spaces beside states that decide are halved.
+const HALVINGS: usize = 4;
+/// First steps of the search in `y/b` and `ln depth`, and its evaluations.
+const STEPS: [f64; 2] = [0.15, 0.2];
+const EVALUATIONS: usize = 24;
+/// The outermost line.
+const OUTERMOST: f64 = 0.95;
+
+/// The loads, and the patch below which passages are judged.
+#[derive(Debug, Clone, Copy)]
+pub struct PassagesOf<'a> {
+    /// The loads on the body.
+    pub load: &'a SurfaceLoad<'a>,
+    /// Where they act.
+    pub footprint: &'a Footprint,
+    /// Number of the patch.
+    pub patch: usize,
+    /// Smallest depth in mm.
+    pub least: f64,
+}
+
+/// What passages below a patch amount to at their worst, with the worst point `[x, y, depth]` of von Mises' stress.
+///
+/// # Errors
+///
+/// The monitor wants an end.
+pub fn passage(
+    task: PassageTask,
+    of: PassagesOf,
+    worst: [f64; 3],
+    monitor: &dyn Monitor,
+) -> Result<PassageSummary, Stop> {
+    let mut measures = vec![PassageMeasure::Shakedown];
+    measures.extend(task.dang_van_slope.map(PassageMeasure::DangVan));
+    let lines = Lines::new(of);
+    let workspace = &mut of.load.workspace();
+    let mut starts = vec![(f64::NEG_INFINITY, [0.0; 2]); measures.len()];
+    for across in ACROSS {
+        for depth in DEPTHS {
+            if let ControlFlow::Break(stop) = monitor.tick(0.0) {
+                return Err(stop);
+            }
+            let at = [across, depth.ln()];
+            let states = lines.states(at, LoadResolution::COARSE, workspace);
+            let stresses: Vec<Stress> = states.into_iter().map(|(_, state)| state).collect();
+            for (start, measure) in starts.iter_mut().zip(&measures) {
+                let found = judge(*measure, &stresses).stress;
+                if found > start.0 {
+                    *start = (found, at);
+                }
+            }
+        }
+    }
+    let mut found = Vec::with_capacity(measures.len());
+    for (measure, (_, start)) in measures.into_iter().zip(starts) {
+        found.push(lines.search(measure, start, workspace, monitor)?);
+    }
+    let stress = of.load.stress(worst, LoadResolution::FINE, workspace);
+    Ok(PassageSummary {
+        yield_with_residual: found[0],
+        dang_van: found.get(1).copied(),
+        yield_without_residual: PassagePlace {
+            at_mm: [worst[1], worst[2]],
+            stress_mpa: von_mises(stress) / 3_f64.sqrt(),
+        },
+    })
+}
+
+/// The lines below a patch.
+struct Lines<'a> {
+    of: PassagesOf<'a>,
+    /// Middle and half width across in mm, half of the smaller extent.
+    middle: f64,
+    half: f64,
+    small: f64,
+    /// x of the states in mm.
+    stations: Vec<f64>,
+}
+
+impl<'a> Lines<'a> {
+    fn new(of: PassagesOf<'a>) -> Lines<'a> {
+        let patches = of.footprint.patches();
+        let [x_min, x_max, y_min, y_max] = patches[of.patch].extent;
+        let all = patches.iter().map(|patch| patch.extent);
+        let [first, last] = all.fold([x_min, x_max], |[first, last], extent| {
+            [first.min(extent[0]), last.max(extent[1])]
+        });
+        let (centre, reach) = (0.5 * (first + last), 0.5 * (last - first));
+        let inner = (1..=NEAR).map(|k| NEAR_REACH * k as f64 / NEAR as f64);
+        let one_side: Vec<f64> = inner.chain(FAR).collect();
+        let behind = one_side.iter().rev().map(|s| -s);
+        let all = behind.chain([0.0]).chain(one_side.iter().copied());
+        Lines {
+            middle: 0.5 * (y_min + y_max),
+            half: 0.5 * (y_max - y_min),
+            small: 0.5 * (x_max - x_min).min(y_max - y_min),
+            stations: all.map(|s| centre + reach * s).collect(),
+            of,
+        }
+    }
+
+    /// `[y, depth]` in mm.
+    fn place(&self, [across, depth]: [f64; 2]) -> [f64; 2] {
+        let across = across.clamp(-OUTERMOST, OUTERMOST);
+        let depth = (self.small * depth.exp()).max(self.of.least);
+        [self.middle + self.half * across, depth]
+    }
+
+    /// x and stress at every station.
+    fn states(
+        &self,
+        at: [f64; 2],
+        resolution: LoadResolution,
+        workspace: &mut LoadWorkspace,
+    ) -> Vec<(f64, Stress)> {
+        let [y, depth] = self.place(at);
+        let state = |x: &f64| {
+            (
+                *x,
+                self.of.load.stress([*x, y, depth], resolution, workspace),
+            )
+        };
+        self.stations.iter().map(state).collect()
+    }
+
+    /// The measure of one line, with states added beside those that decide.
+    fn value(&self, measure: PassageMeasure, at: [f64; 2], workspace: &mut LoadWorkspace) -> f64 {
+        let [y, depth] = self.place(at);
+        let mut states = self.states(at, LoadResolution::FINE, workspace);
+        let judged = |states: &[(f64, Stress)]| {
+            let stresses: Vec<Stress> = states.iter().map(|(_, state)| *state).collect();
+            judge(measure, &stresses)
+        };
+        for _ in 0..HALVINGS {
+            let deciding = judged(&states).deciding;
+            let before = deciding.iter().filter_map(|k| k.checked_sub(1));
+            let mut between: Vec<usize> = deciding.iter().copied().chain(before).collect();
+            between.retain(|k| k + 1 < states.len());
+            between.sort_unstable();
+            between.dedup();
+            for k in between {
+                let x = 0.5 * (states[k].0 + states[k + 1].0);
+                let stress = (self.of.load).stress([x, y, depth], LoadResolution::FINE, workspace);
+                states.push((x, stress));
+            }
+            states.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        judged(&states).stress
+    }
+
+    /// The worst line from a start: steps along both axes, halved where none is worse.
+    fn search(
+        &self,
+        measure: PassageMeasure,
+        start: [f64; 2],
+        workspace: &mut LoadWorkspace,
+        monitor: &dyn Monitor,
+    ) -> Result<PassagePlace, Stop> {
+        let (mut best, mut at) = (self.value(measure, start, workspace), start);
+        let (mut steps, mut used) = (STEPS, 1);
+        while used < EVALUATIONS {
+            let before = best;
+            for axis in 0..2 {
+                for sign in [1.0, -1.0] {
+                    if let ControlFlow::Break(stop) = monitor.tick(0.0) {
+                        return Err(stop);
+                    }
+                    let mut tried = at;
+                    tried[axis] += sign * steps[axis];
+                    let found = self.value(measure, tried, workspace);
+                    used += 1;
+                    if found > best {
+                        (best, at) = (found, tried);
+                        break;
+                    }
+                }
+            }
+            if best <= before {
+                steps = steps.map(|step| 0.5 * step);
+            }
+        }
+        Ok(PassagePlace {
+            at_mm: self.place(at),
+            stress_mpa: best,
+        })
+    }
+}
