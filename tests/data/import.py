@@ -433,6 +433,27 @@ def transient():
     write_lines("transient.json", records)
 
 
+def prescribed_forces():
+    """Steady rolling with prescribed forces over the friction limit (lower body): creepages and the moment that go with them."""
+    records = []
+    for record in json.loads((SOURCE / "reference/extended/force_prescribed.json").read_text()):
+        given, converged = record["input"], record["converged"]
+        found = lambda k, sign: {"value": sign * converged[k]["value"] + 0.0, "unc": converged[k]["unc"]}
+        records.append({
+            "id": record["id"],
+            "semi_axes_mm": [given["hertz"]["a"], given["hertz"]["b"]],
+            "normal_force_n": given["load"]["FN"],
+            "friction": given["mu"],
+            "shear_modulus_mpa": given["material"]["G"],
+            "poisson_ratio": given["material"]["nu"],
+            "forces": [flipped(given["load"][k]) for k in ("FXrel", "FYrel")],
+            "spin_per_mm": given["creepage"]["phi"],
+            "creepages": [found("xi", 1.0), found("eta", 1.0)],
+            "moment": found("Mz_rel", -1.0),
+        })
+    write_lines("prescribed_forces.json", records)
+
+
 for name in CLASSES:
     records = json.loads((SOURCE / f"reference/{name}.json").read_text())
     write_lines(f"{name}.json", [reference_case(r) for r in records])
@@ -447,3 +468,4 @@ friction()
 unlike()
 cylinders()
 transient()
+prescribed_forces()

@@ -18,6 +18,7 @@ mod damaged_trials;
 mod equations;
 mod fastsim;
 mod forces;
+mod forces_reference;
 mod friction;
 mod friction_laws;
 mod friction_passage;
