@@ -2,10 +2,10 @@
 
 use std::f64::consts::LN_2;
 
-/// Largest relative rounding of the slip of [`BoundFall::resolvent`].
+use crate::contact::numerics::monotone_root::{CloseEnough, Course, find};
+
+/// Rounding of the slip of [`BoundFall::resolvent`], relative to that of a cell without traction.
 const ROUNDING: f64 = 1e-14;
-/// Steps of its Newton iteration, which is quadratic and needs about four, and of the bisection that would replace it.
-const STEPS_MAX: u32 = 60;
 
 /// Largest slip that a unit of traction over G on one cell takes from it: `max |M_ii|` of the three-point rule on ellipses with a/b from
 /// 0.5 to 1.2, meshes from 6 × 12 to 12 × 24, is 1.5 to 1.8 (`cargo test --test physics -- friction_as_it_is --nocapture` prints it).
@@ -171,28 +171,15 @@ impl BoundFall {
     /// that; with it `g(σ)` and `g′(σ)`. There is one such σ if r exceeds the largest `|g′|`.
     #[must_use]
     pub fn resolvent(&self, rest: f64, r: f64, length: f64) -> Slipping {
-        let (mut low, mut high) = ((length - rest) / r, length / r);
-        let mut slip = low;
-        for _ in 0..STEPS_MAX {
+        let ends = [(length - rest) / r, length / r];
+        let close = CloseEnough {
+            value: 0.0,
+            place: ROUNDING * ends[1],
+        };
+        let slip = find(ends, ends[0], Course::Rising, close, |slip| {
             let (share, slope) = self.at(slip);
-            let excess = rest * share + r * slip - length;
-            if excess > 0.0 {
-                high = slip;
-            } else {
-                low = slip;
-            }
-            let newton = slip - excess / (r + rest * slope);
-            let next = if (low..=high).contains(&newton) {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
-            let change = (next - slip).abs();
-            slip = next;
-            if change <= ROUNDING * slip {
-                break;
-            }
-        }
+            [rest * share + r * slip - length, r + rest * slope]
+        });
         let (share, slope) = self.at(slip);
         Slipping {
             slip,

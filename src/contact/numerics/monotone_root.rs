@@ -30,7 +30,7 @@ pub(crate) fn find(
     f: impl Fn(f64) -> [f64; 2],
 ) -> f64 {
     let inside = |at: f64, low: f64, high: f64| at > low && at < high;
-    let mut at = if inside(start, low, high) {
+    let mut at = if (low..=high).contains(&start) {
         start
     } else {
         0.5 * (low + high)
