@@ -127,3 +127,29 @@ fn a_looser_target_costs_fewer_cells() {
         cells(0.002)
     );
 }
+
+#[test]
+fn a_pole_on_the_edge_of_two_strips_counts() {
+    // An even number of strips has the pole of pure spin between the two in the middle, which rounding leaves apart.
+    let solved = |ratio: f64, target: f64| {
+        let (solution, _) = solve(&json!({
+            "material": { "shear_modulus_mpa": 8345.9, "poisson_ratio": 0.494 },
+            "friction": { "coefficient": 0.003646 },
+            "contact": { "type": "ellipse", "a_mm": ratio * 0.0654, "b_mm": 0.0654 },
+            "load": { "normal_force_n": 633_000.0 },
+            "motion": { "spin_per_mm": 5.7386 },
+            "solver": { "target_error": target },
+            "outputs": ["resultants"],
+        }));
+        let point = &solution.patches[0].points[0];
+        let limit = 0.003646 * 633_000.0;
+        let estimate = point.error_estimate.expect("an estimate").force_y_n;
+        (point.force_y_n / limit, estimate / limit)
+    };
+    for ratio in [20.0, 46.18, 55.0] {
+        let (rough, estimate) = solved(ratio, 0.02);
+        let (fine, _) = solved(ratio, 0.005);
+        let error = (rough - fine).abs();
+        assert!(error <= estimate + 0.005, "{ratio}: {error} for {estimate}");
+    }
+}

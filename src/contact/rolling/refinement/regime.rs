@@ -14,6 +14,10 @@ const POLE_INSIDE: f64 = 0.9;
 /// Cells gather no farther out than here. Chosen by judgement; how much it matters was not measured.
 const POLE_OUTMOST: f64 = 0.95;
 
+/// Gap between neighbouring strips and cells, relative to their size, into which a pole on their common edge may fall by rounding. Strips of
+/// slender ellipses are up to 2e-9 apart.
+const EDGE_ROUNDING: f64 = 1e-6;
+
 /// The regime that the next level should be made for, judged by this one.
 #[must_use]
 pub fn regime(level: &StripMesh, answer: &LevelAnswer, spinning: bool) -> Regime {
@@ -91,11 +95,13 @@ pub(crate) fn pole_error(task: &RollingTask, level: &StripMesh, answer: &LevelAn
     let uncertain =
         level.plan.regime == Regime::Unknown && stick_share(level, answer) < STICK_UNCERTAIN;
     for (segment, here) in level.mesh.segments.iter().zip(&level.normalised.segments) {
-        if (here.chord.y - y).abs() > 0.5 * here.chord.dy {
+        if (here.chord.y - y).abs() > (0.5 + EDGE_ROUNDING) * here.chord.dy {
             continue;
         }
         for i in segment.cells.clone() {
-            let holds = level.normalised.left[i] <= x && x <= level.normalised.right[i];
+            let (left, right) = (level.normalised.left[i], level.normalised.right[i]);
+            let beyond = EDGE_ROUNDING * (right - left);
+            let holds = left - beyond <= x && x <= right + beyond;
             if holds && (answer.slips[i] || uncertain) {
                 let longer = (level.mesh.right[i] - level.mesh.left[i]).max(segment.chord.dy);
                 return POLE * level.pressure[i] * longer * longer / load;
