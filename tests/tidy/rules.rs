@@ -114,7 +114,7 @@ fn circles(sources: &Sources) -> Findings {
                 return true;
             }
             if seen.insert(module) {
-                next.extend(&uses[module]);
+                next.extend(uses.get(module).into_iter().flatten());
             }
         }
         false
@@ -340,6 +340,8 @@ mod tests {
             ("src/f.rs", "use crate::e::E;"),
         ]);
         assert_eq!(names(&circles(&planted)), ["a", "b", "c", "e", "f"]);
+        let rootless = Sources::planted(&[("src/a.rs", "use crate::absent::B;")]);
+        assert_eq!(circles(&rootless), Findings::new());
     }
 
     #[test]

@@ -101,7 +101,7 @@ fn paths(tree: &str) -> Vec<String> {
         .collect()
 }
 
-/// Which modules each module uses: the longest module that a path of a `use crate::` statement begins with.
+/// Which modules each module uses: the longest module that a path of a `use crate::` statement begins with, at last the crate root.
 pub fn uses(modules: &BTreeMap<String, String>) -> BTreeMap<String, BTreeSet<String>> {
     let target = |path: String| {
         // The shared statements are compiled below each database.
@@ -110,7 +110,8 @@ pub fn uses(modules: &BTreeMap<String, String>) -> BTreeMap<String, BTreeSet<Str
             path.replace(&copy, "jobs::store::sql::")
         });
         let mut module = path.as_str();
-        while !modules.contains_key(module) {
+        // Planted sources need not contain the root or all ancestors of a module.
+        while !module.is_empty() && !modules.contains_key(module) {
             module = module.rsplit_once("::").map_or("", |(before, _)| before);
         }
         module.to_owned()
@@ -155,4 +156,11 @@ fn modules_are_named_by_their_files_and_tests_do_not_count() {
         uses["c"],
         BTreeSet::from(["a".to_owned(), "a::b".to_owned()])
     );
+}
+
+#[test]
+fn a_path_without_a_module_of_its_own_counts_for_the_root() {
+    let sources = Sources::planted(&[("src/a.rs", "use crate::absent::deeper::B;")]);
+    let uses = uses(&sources.modules());
+    assert_eq!(uses["a"], BTreeSet::from([String::new()]));
 }
