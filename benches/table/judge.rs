@@ -177,14 +177,30 @@ impl Law {
         self.factor * f64::from(indicator).max(self.floor).powf(self.power)
     }
 
-    /// The factor with which the bound holds for this part of the motions.
-    pub fn fitted(
-        floor: f64,
-        power: f64,
+    /// The law whose bound holds for this part of the motions and has the smallest median of bound over error.
+    pub fn sharpest(
+        floors: &[f64],
+        powers: &[f64],
         part: f64,
         motions: &[&Judged],
         indicators: &[f32],
     ) -> Law {
+        let laws = floors.iter().flat_map(|floor| {
+            let fitted = |power: &f64| Law::fitted(*floor, *power, part, motions, indicators);
+            powers.iter().map(fitted)
+        });
+        let times = |law: &Law| {
+            let ratios = motions
+                .iter()
+                .map(|j| law.of(indicators[j.cell]) / j.largest());
+            at(&sorted(ratios), 0.5)
+        };
+        laws.min_by(|one, other| times(one).total_cmp(&times(other)))
+            .expect("a law")
+    }
+
+    /// The factor with which the bound holds for this part of the motions.
+    fn fitted(floor: f64, power: f64, part: f64, motions: &[&Judged], indicators: &[f32]) -> Law {
         let unit = Law {
             floor,
             power,

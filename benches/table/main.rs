@@ -28,9 +28,9 @@ use serde_json::json;
 
 /// Bounds are fitted for this part of half of the contacts, so that they hold for 99 % of the others.
 const HELD: f64 = 0.993;
-/// Floor and power of the bounds by indicators: of floors 0.0003 to 0.0015 and powers 0.25 to 1, those with the smallest median of bound
-/// over error; the others are up to 20 % larger.
-const LAW: (f64, f64) = (0.0015, 0.7);
+/// Floors and powers of the bounds by indicators: those with the smallest median of bound over error on that half are taken.
+const FLOORS: [f64; 7] = [0.0001, 0.0002, 0.0003, 0.0005, 0.0007, 0.001, 0.0015];
+const POWERS: [f64; 5] = [0.25, 0.5, 0.7, 0.85, 1.0];
 
 fn main() {
     let arguments: Vec<String> = std::env::args()
@@ -63,7 +63,7 @@ fn write() {
     let indicators = bound::indicators(&values);
     let without = judge::all(&CreepTable::new(&values, &vec![0.0; CELLS]));
     let half: Vec<_> = without.iter().filter(|j| j.contact % 2 == 0).collect();
-    let law = judge::Law::fitted(LAW.0, LAW.1, HELD, &half, &indicators);
+    let law = judge::Law::sharpest(&FLOORS, &POWERS, HELD, &half, &indicators);
     let bounds: Vec<f32> = indicators.iter().map(|i| law.of(*i) as f32).collect();
     let about = json!({
         "solver_revision": SOLVER_REVISION,

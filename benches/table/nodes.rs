@@ -25,9 +25,9 @@ const THREADS: usize = 2;
 /// Target of the nodes of an a/b: long ellipses cost most, those of a/b 10 at ν = 1/2 a hundred times as much as a circle.
 pub fn target(ratio: usize) -> f64 {
     match ratio {
-        8 => 0.0125,
-        7 => 0.0075,
-        _ => 0.005,
+        10 => 0.006,
+        9 => 0.004,
+        _ => 0.002,
     }
 }
 
@@ -99,7 +99,7 @@ pub fn column_of(node: [usize; 2], chi: usize) -> Option<Vec<Answer>> {
 pub fn solve_all() {
     let mut missing = Vec::new();
     for odd in [false, true] {
-        for ratio in [4, 6, 2, 5, 3, 7, 1, 8, 0] {
+        for ratio in [5, 7, 3, 6, 4, 8, 2, 9, 1, 10, 0] {
             for poisson in [1, 0, 2] {
                 for chi in (0..DIRECTIONS).filter(|chi| (chi % 2 == 1) == odd) {
                     if read(&name([ratio, poisson], chi)).is_none() {

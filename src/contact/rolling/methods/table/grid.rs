@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 /// Nodes in ln(a/b), uniform from 1/10 to 10.
-pub const RATIOS: usize = 9;
+pub const RATIOS: usize = 11;
 /// Nodes in Poisson's ratio, between which values are parabolas.
 pub const POISSON_RATIOS: [f64; 3] = [0.0, 0.25, 0.5];
 /// Nodes in the place of the spin pole, uniform from no spin (θ = 0) to spin alone (θ = π/2).
