@@ -226,7 +226,8 @@ fn prescribed_forces_follow_the_target() {
         let solution = answer(&case);
         let missed = (solution.total[0].force_x_n - 0.5 * limit).abs() / limit;
         let remarks = &solution.remarks;
-        assert!(missed <= 0.01 * target, "{target}: {missed:e}, {remarks:?}");
+        // `SHARE_OF_TARGET` of the search.
+        assert!(missed <= 0.02 * target, "{target}: {missed:e}, {remarks:?}");
         assert!(!codes(remarks).contains(&"iteration-inexact"));
     }
 }
