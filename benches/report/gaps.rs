@@ -65,7 +65,7 @@ fn table<'a>(cases: impl Iterator<Item = &'a Value>, lu: f64) -> String {
         let press = || {
             let _ = black_box(normal_stage::solve(&checked, &Unmonitored));
         };
-        let pressing = median((0..REPEATS).map(|_| seconds_of(press).0).collect());
+        let normal_seconds = median((0..REPEATS).map(|_| seconds_of(press).0).collect());
         let solution = solution.expect("an answer");
         let patches = &solution.patches;
         let area: f64 = patches.iter().map(|p| p.area_mm2).sum();
@@ -78,13 +78,13 @@ fn table<'a>(cases: impl Iterator<Item = &'a Value>, lu: f64) -> String {
             "| {} | {:.2} | {:.2} | {error:.4} | {estimate:.4} | {:+.5} | {:+.4} | {:+.4} |",
             case["id"].as_str().unwrap_or_default(),
             seconds / lu,
-            pressing / lu,
+            normal_seconds / lu,
             off("approach_mm", patches[0].approach_mm.unwrap_or(f64::NAN)),
             off("area_mm2", area),
             off("pressure_max_mpa", peak),
         );
         whole.push(seconds / lu);
-        normal.push(pressing / lu);
+        normal.push(normal_seconds / lu);
         errors.push(error);
     }
     for (name, share) in [("median", 0.5), ("largest", 1.0)] {

@@ -38,7 +38,7 @@ pub fn print() {
     println!("table, one ellipse, with derivatives: {ns:.0} ns");
     assert_eq!(inputs.len(), CONTACTS * MOTIONS);
     for (name, radii) in [("radii of their own", true), ("the same radii", false)] {
-        let [by_table, by_fastsim] = ["table", "fastsim"].map(|method| rows(method, radii));
+        let [by_table, by_fastsim] = ["table", "fastsim"].map(|method| ns_of_row(method, radii));
         println!(
             "rows with {name}: table {by_table:.0} ns a row, Hertz and bound included, fastsim {by_fastsim:.0} ns ({:.1} times)",
             by_fastsim / by_table
@@ -47,7 +47,7 @@ pub fn print() {
 }
 
 /// Time in ns of a row with load, creepages and spin of its own.
-fn rows(method: &str, radii: bool) -> f64 {
+fn ns_of_row(method: &str, radii: bool) -> f64 {
     let random = &mut Random(7);
     let mut column = |pointer: &str, low: f64, high: f64| Column {
         pointer: pointer.to_owned(),

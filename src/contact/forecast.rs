@@ -5,7 +5,7 @@ use crate::contact::friction::on_rail::in_frame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
 use crate::contact::normal::load_across::LoadAcross;
-use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
+use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::problem::physics::Problem;
 use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::table::solve::{forces, tells};
@@ -26,7 +26,7 @@ pub(crate) fn can_forecast(problem: &Problem) -> bool {
 pub(crate) fn forecast(
     problem: &Problem,
     geometry: &WheelRail,
-    wheel: &PressedWheel,
+    wheel: &WheelContact,
 ) -> Option<f64> {
     let mut lifted = 0.0;
     for gap in &wheel.patches {
@@ -57,7 +57,7 @@ pub(crate) fn forecast(
 /// # Errors
 /// Rail or wheel have no point over the load centre of a patch.
 pub(crate) fn motion_in(
-    gap: &PressedGap,
+    gap: &GapContact,
     geometry: &WheelRail,
     centre: f64,
     wheelset: &WheelsetMotion,

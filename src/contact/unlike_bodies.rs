@@ -14,7 +14,7 @@ use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::pilot::PilotOnce;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal_stage;
 use crate::contact::normal_stage::SolvedFootprint;
@@ -112,13 +112,13 @@ fn gap_task(case: &CheckedCase) -> GapTask {
         }
     };
     let load = case.label.asked.load;
-    let pressing = match load.and_then(|load| load.approach_mm) {
-        Some(approach) => Pressing::Approach(approach),
-        None => Pressing::Force(ellipse.normal_force),
+    let loading = match load.and_then(|load| load.approach_mm) {
+        Some(approach) => NormalLoad::Approach(approach),
+        None => NormalLoad::Force(ellipse.normal_force),
     };
     GapTask {
         gap: paraboloid(&ellipse, modulus),
-        pressing,
+        loading,
         contact_modulus: modulus,
         pilot: PilotOnce::default(),
     }

@@ -12,9 +12,9 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::normal::wheel_height::search::{Accuracy, HeightStart, NormalPass};
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
+use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::run::Run;
@@ -98,10 +98,10 @@ pub(crate) trait Judge {
     ///
     /// # Errors
     /// There is none, and why.
-    fn before(&self, wheel: &PressedWheel) -> Result<(), SolveError>;
+    fn before(&self, wheel: &WheelContact) -> Result<(), SolveError>;
 
     /// The error of a motion that was not solved, with what the wheel at rest says of its cause.
-    fn explain(&self, wheel: &PressedWheel, error: SolveError) -> SolveError;
+    fn explain(&self, wheel: &WheelContact, error: SolveError) -> SolveError;
 }
 
 /// One wheel on its rail.
@@ -208,7 +208,7 @@ impl WheelSolve<'_> {
         workspace: &mut GridWorkspace<f32>,
     ) -> Result<(RestingWheel, bool), SolveError> {
         let WheelSolve { case, contact, .. } = *self;
-        let share = |wheel: &PressedWheel| forecast(&case.problem, &contact.geometry, wheel);
+        let share = |wheel: &WheelContact| forecast(&case.problem, &contact.geometry, wheel);
         if can_forecast(&case.problem) {
             let start = HeightStart {
                 before: None,
@@ -286,7 +286,7 @@ impl BalanceExit {
         last: Option<A>,
         tolerance: f64,
         share: f64,
-        wheel: &mut PressedWheel,
+        wheel: &mut WheelContact,
     ) -> Result<A, SolveError> {
         match (self, last) {
             (BalanceExit::Balanced, Some(answers)) => Ok(answers),
@@ -329,7 +329,7 @@ fn tolerance(resolution: Resolution) -> f64 {
 }
 
 /// The same error with the place of the gap whose coordinates it speaks of.
-fn of_gap(error: SolveError, gap: &PressedGap, geometry: &WheelRail) -> SolveError {
+fn of_gap(error: SolveError, gap: &GapContact, geometry: &WheelRail) -> SolveError {
     match error {
         SolveError::NotConverged {
             method,
@@ -354,8 +354,8 @@ fn of_gap(error: SolveError, gap: &PressedGap, geometry: &WheelRail) -> SolveErr
 }
 
 /// Vertical part of the tangential forces on the wheel, relative to that of the normal ones.
-fn friction_share(wheel: &PressedWheel, answers: &[(Solution, Fields)]) -> f64 {
-    let lifted = |(gap, (answer, _)): (&PressedGap, &(Solution, Fields))| {
+fn friction_share(wheel: &WheelContact, answers: &[(Solution, Fields)]) -> f64 {
+    let lifted = |(gap, (answer, _)): (&GapContact, &(Solution, Fields))| {
         -answer.total[0].force_y_n * gap.frame.angle.sin()
     };
     let lifted: f64 = wheel.patches.iter().zip(answers).map(lifted).sum();
@@ -365,7 +365,7 @@ fn friction_share(wheel: &PressedWheel, answers: &[(Solution, Fields)]) -> f64 {
 /// The wheel at rest with the answers for all its patches.
 pub(crate) struct SolvedWheel {
     /// The wheel.
-    pub(crate) wheel: PressedWheel,
+    pub(crate) wheel: WheelContact,
     /// The answer.
     pub(crate) solution: Solution,
     /// The values per cell.
@@ -374,7 +374,7 @@ pub(crate) struct SolvedWheel {
 
 /// The wheel at rest, and the time that took.
 struct RestingWheel {
-    wheel: PressedWheel,
+    wheel: WheelContact,
     seconds: f64,
     /// By which part of it friction may leave a vertical force unbalanced.
     unbalanced: f64,

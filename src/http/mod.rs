@@ -219,7 +219,7 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(tenant_events::follow))
         .route_layer(from_fn(query::refuse_parameters));
     v1.merge(parts)
-        .merge(rows())
+        .merge(profiles_and_runs())
         .routes(routes!(batch_results::results))
         .routes(routes!(evaluate::evaluate))
         .merge(events)
@@ -228,7 +228,7 @@ fn resources() -> OpenApiRouter<AppState> {
 }
 
 /// Profiles and runs.
-fn rows() -> OpenApiRouter<AppState> {
+fn profiles_and_runs() -> OpenApiRouter<AppState> {
     let changing = OpenApiRouter::new()
         .routes(routes!(runs::get, runs::delete))
         .route_layer(from_fn(query::refuse_parameters));

@@ -125,7 +125,7 @@ impl Blobs {
     ///
     /// # Errors
     /// They cannot be read.
-    pub async fn rows(&self, folder: &str) -> Result<Bytes, JobsError> {
+    pub async fn chunk_answers(&self, folder: &str) -> Result<Bytes, JobsError> {
         let path = Path::from(folder).join(ROWS);
         Ok(self.objects.get(&path).await?.bytes().await?)
     }

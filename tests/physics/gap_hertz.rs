@@ -1,6 +1,6 @@
 //! Hertz's contact given as a gap is Hertz's contact again.
 
-use railhead::contact::normal::hertz::{Ellipse, Pressing};
+use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead::contact::solution::words::Solution;
 use serde_json::{Value, json};
 
@@ -22,7 +22,7 @@ const CONTACTS: [(f64, f64, f64); 8] = [
 ];
 
 fn hertz(rolling: f64, lateral: f64, force: f64) -> Ellipse {
-    Ellipse::of_radii(rolling, lateral, Pressing::Force(force), CONTACT_MODULUS)
+    Ellipse::of_radii(rolling, lateral, NormalLoad::Force(force), CONTACT_MODULUS)
 }
 
 fn by_profile(rolling: f64, lateral: f64, ellipse: &Ellipse, points: usize) -> Value {

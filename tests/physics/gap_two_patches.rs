@@ -1,6 +1,6 @@
 //! Two patches of different size in one gap: both are resolved, whatever their sizes, or the answer says that one is not.
 
-use railhead::contact::normal::hertz::{Ellipse, Pressing};
+use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::solution::words::Solution;
 use serde_json::json;
@@ -54,7 +54,7 @@ impl Neighbours {
 fn hertz(curvatures: [[f64; 2]; 2], forces: [f64; 2]) -> [Ellipse; 2] {
     [0, 1].map(|k| {
         let [along, across] = curvatures[k].map(|curvature| 1.0 / curvature);
-        Ellipse::of_radii(along, across, Pressing::Force(forces[k]), MODULUS)
+        Ellipse::of_radii(along, across, NormalLoad::Force(forces[k]), MODULUS)
     })
 }
 

@@ -2,7 +2,7 @@
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
-use railhead::contact::normal::hertz::{Ellipse, Pressing};
+use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
 use serde_json::json;
 
 /// One worked case: bodies, load, and what comes out.
@@ -70,7 +70,7 @@ fn worked_cases_come_out() {
         let ellipse = Ellipse::of_radii(
             rolling,
             lateral,
-            Pressing::Force(case.force),
+            NormalLoad::Force(case.force),
             case.contact_modulus,
         );
         let within = 1e-4; // The inputs A and B of the first case are printed with four digits.
@@ -93,7 +93,7 @@ fn the_ellipse_fits_the_gap_it_was_made_from() {
     // here, independently of the elliptic integrals.
     for (rolling, lateral) in [(460.0, 300.0), (300.0, 300.0), (100.0, 3000.0)] {
         let modulus = 1.0e5;
-        let ellipse = Ellipse::of_radii(rolling, lateral, Pressing::Force(1e5), modulus);
+        let ellipse = Ellipse::of_radii(rolling, lateral, NormalLoad::Force(1e5), modulus);
         let (a, b) = (ellipse.a, ellipse.b);
         // u(x, y) = p0 ab/(2E*) ∫_0^∞ (1 − x²/(a²+w) − y²/(b²+w)) dw/√((a²+w)(b²+w)w)   (Johnson 1985, eq. 3.57)
         let integral = |f: &dyn Fn(f64) -> f64| -> f64 {
@@ -124,12 +124,12 @@ fn the_ellipse_fits_the_gap_it_was_made_from() {
 fn force_and_approach_are_inverse_to_each_other() {
     for exponent in -6..=6 {
         let lateral = 300.0 * 10.0_f64.powi(exponent);
-        let forward = Ellipse::of_radii(300.0, lateral, Pressing::Force(1e5), 1e5);
-        let back = Ellipse::of_radii(300.0, lateral, Pressing::Approach(forward.approach), 1e5);
+        let forward = Ellipse::of_radii(300.0, lateral, NormalLoad::Force(1e5), 1e5);
+        let back = Ellipse::of_radii(300.0, lateral, NormalLoad::Approach(forward.approach), 1e5);
         let again = Ellipse::of_semi_axes(
             forward.a,
             forward.b,
-            Pressing::Approach(forward.approach),
+            NormalLoad::Approach(forward.approach),
             1e5,
         );
         assert!(close(back.patch().normal_force, 1e5, 1e-12));
@@ -140,7 +140,7 @@ fn force_and_approach_are_inverse_to_each_other() {
 
 #[test]
 fn lengths_and_pressure_grow_with_the_cube_root_of_the_load() {
-    let at = |force| Ellipse::of_radii(460.0, 300.0, Pressing::Force(force), 1.1e5);
+    let at = |force| Ellipse::of_radii(460.0, 300.0, NormalLoad::Force(force), 1.1e5);
     let (one, eight) = (at(1e4), at(8e4));
     assert!(close(eight.a, 2.0 * one.a, 1e-13) && close(eight.b, 2.0 * one.b, 1e-13));
     assert!(close(eight.pressure_max, 2.0 * one.pressure_max, 1e-13));
@@ -149,16 +149,16 @@ fn lengths_and_pressure_grow_with_the_cube_root_of_the_load() {
 
 #[test]
 fn doubling_all_lengths_at_fixed_pressure_takes_four_times_the_force() {
-    let one = Ellipse::of_radii(460.0, 300.0, Pressing::Force(1e5), 1.1e5);
-    let two = Ellipse::of_radii(920.0, 600.0, Pressing::Force(4e5), 1.1e5);
+    let one = Ellipse::of_radii(460.0, 300.0, NormalLoad::Force(1e5), 1.1e5);
+    let two = Ellipse::of_radii(920.0, 600.0, NormalLoad::Force(4e5), 1.1e5);
     assert!(close(two.pressure_max, one.pressure_max, 1e-13));
     assert!(close(two.a, 2.0 * one.a, 1e-13) && close(two.approach, 2.0 * one.approach, 1e-13));
 }
 
 #[test]
 fn exchanging_the_radii_exchanges_the_semi_axes() {
-    let one = Ellipse::of_radii(460.0, 80.0, Pressing::Force(1e5), 1.1e5);
-    let other = Ellipse::of_radii(80.0, 460.0, Pressing::Force(1e5), 1.1e5);
+    let one = Ellipse::of_radii(460.0, 80.0, NormalLoad::Force(1e5), 1.1e5);
+    let other = Ellipse::of_radii(80.0, 460.0, NormalLoad::Force(1e5), 1.1e5);
     assert_eq!(
         [one.a, one.b, one.approach],
         [other.b, other.a, other.approach]
@@ -169,7 +169,7 @@ fn exchanging_the_radii_exchanges_the_semi_axes() {
 #[test]
 fn a_slender_contact_tends_to_the_line_contact() {
     // a = 1, R = 500, G = 82000, ν = 0.28: 178.90 N/mm and p0 = 113.89 MPa (CONTACT user guide, Carter's example).
-    let ellipse = Ellipse::of_radii(500.0, 5e8, Pressing::Force(1e5), 82_000.0 / 0.72);
+    let ellipse = Ellipse::of_radii(500.0, 5e8, NormalLoad::Force(1e5), 82_000.0 / 0.72);
     let per_width = std::f64::consts::PI * ellipse.a.powi(2) * 82_000.0 / (4.0 * 500.0 * 0.72);
     let at_centre = ellipse.pressure_max * std::f64::consts::PI * ellipse.a / 2.0;
     assert!(close(at_centre, per_width, 1e-4), "{at_centre} {per_width}");

@@ -3,7 +3,7 @@
 use railhead::contact::geometry::contact_locus::ContactLocus;
 use railhead::contact::geometry::formats::format as formats;
 use railhead::contact::geometry::formats::format::Format;
-use railhead::contact::geometry::local_gap::{Detail, LocalGap};
+use railhead::contact::geometry::local_gap::{GapSampling, LocalGap};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::geometry::wheel_rail::{Placement, Side, WheelRail};
 
@@ -117,7 +117,7 @@ fn manchester(profiles: &[Profile; 2], cant: f64) -> Vec<(f64, f64, f64)> {
         let search = ContactLocus::new(&geometry).unwrap();
         let touching = search.frames(1e-3).unwrap()[0];
         let lowering = approach / touching.angle.cos();
-        let gaps = search.gaps(lowering, Detail::Fine).unwrap();
+        let gaps = search.gaps(lowering, GapSampling::Fine).unwrap();
         found.push((shift, place, -centre_of_overlap(&gaps) - RAIL_ORIGIN));
     }
     found
@@ -168,7 +168,7 @@ fn left_and_right_are_mirror_images() {
     let [left, right] = [&left, &right].map(|geometry| {
         ContactLocus::new(geometry)
             .unwrap()
-            .gaps(0.03, Detail::Fine)
+            .gaps(0.03, GapSampling::Fine)
             .unwrap()
     });
     assert_eq!((left.len(), right.len()), (1, 1));
@@ -212,7 +212,7 @@ fn the_gap_of_a_cone_on_an_arc_has_the_closed_form() {
     let lowering = 0.05;
     let gaps = ContactLocus::new(&geometry)
         .unwrap()
-        .gaps(lowering, Detail::Fine)
+        .gaps(lowering, GapSampling::Fine)
         .unwrap();
     assert_eq!(gaps.len(), 1);
     let (gap, angle) = (&gaps[0], 0.05_f64.atan());

@@ -1,6 +1,6 @@
 //! What must hold for a wheel on a rail, whatever the shapes: closed forms, balance, mirror images.
 
-use railhead::contact::normal::hertz::{Ellipse, Pressing};
+use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead::contact::solution::words::{PatchSolution, Position, Solution};
 use serde_json::{Value, json};
 
@@ -61,7 +61,7 @@ fn a_cone_on_an_arc_is_hertzs_contact_at_its_angle() {
         let rolling = found.rolling_radius_mm / angle.cos();
         let normal = force / angle.cos();
         let modulus = 82_000.0 / 0.72;
-        let hertz = Ellipse::of_radii(rolling, 300.0, Pressing::Force(normal), modulus);
+        let hertz = Ellipse::of_radii(rolling, 300.0, NormalLoad::Force(normal), modulus);
         let close = |found: f64, expected: f64, allowed: f64| {
             assert!(
                 (found / expected - 1.0).abs() < allowed,

@@ -112,7 +112,7 @@ impl Contact {
         let mesh = Mesh::new(&region.chords(strips), grading);
         let differences =
             StripOperator::new(&mesh, NU, false, Precision::Double, &Unmonitored).unwrap();
-        let (x, y) = (mesh.node.clone(), mesh.rows());
+        let (x, y) = (mesh.node.clone(), mesh.cell_load_y());
         let mut bound: Vec<f64> = x
             .iter()
             .zip(&y)

@@ -2,7 +2,7 @@
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::normal::hertz::{Ellipse, Pressing};
+use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead::contact::solution::words::Solution;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -218,7 +218,7 @@ fn an_ellipse_has_the_curvatures_of_its_radii() {
         (300.0, 300.0),
         (50.0, 4000.0),
     ] {
-        let ellipse = Ellipse::of_radii(rolling, lateral, Pressing::Force(8e4), 1.1e5);
+        let ellipse = Ellipse::of_radii(rolling, lateral, NormalLoad::Force(8e4), 1.1e5);
         let [a, b] = ellipse.curvatures(1.1e5);
         assert!(
             (2.0 * rolling * a - 1.0).abs() < 1e-12,

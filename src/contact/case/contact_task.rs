@@ -5,7 +5,7 @@ use crate::contact::error::Fault;
 use crate::contact::normal::gap::pilot::PilotOnce;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
@@ -31,14 +31,14 @@ pub(crate) fn hertz(
     load: &Load,
     contact_modulus: f64,
 ) -> Result<NormalTask, Fault> {
-    let pressing = pressing(load);
+    let loading = loading(load);
     let ellipse = match *contact {
         Contact::Radii {
             rolling_mm,
             lateral_mm,
-        } => Ellipse::of_radii(rolling_mm, lateral_mm, pressing, contact_modulus),
+        } => Ellipse::of_radii(rolling_mm, lateral_mm, loading, contact_modulus),
         Contact::Ellipse { a_mm, b_mm } => {
-            Ellipse::of_semi_axes(a_mm, b_mm, pressing, contact_modulus)
+            Ellipse::of_semi_axes(a_mm, b_mm, loading, contact_modulus)
         }
         Contact::GapProfile { .. }
         | Contact::GapGrid { .. }
@@ -112,7 +112,7 @@ pub(crate) fn gap(
     }
     let contact = GapTask {
         gap,
-        pressing: pressing(load),
+        loading: loading(load),
         contact_modulus,
         pilot: PilotOnce::default(),
     };
@@ -164,10 +164,10 @@ fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> {
     Ok(())
 }
 
-fn pressing(load: &Load) -> Pressing {
+fn loading(load: &Load) -> NormalLoad {
     match (load.normal_force_n, load.approach_mm) {
-        (Some(force), _) => Pressing::Force(force),
-        (None, approach) => Pressing::Approach(approach.unwrap_or(f64::NAN)),
+        (Some(force), _) => NormalLoad::Force(force),
+        (None, approach) => NormalLoad::Approach(approach.unwrap_or(f64::NAN)),
     }
 }
 

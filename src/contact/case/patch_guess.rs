@@ -5,7 +5,7 @@ use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::gap::pilot::PilotPatch;
 use crate::contact::normal::gap::summits::GapOutlook;
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::rolling::motion::Motion;
@@ -144,10 +144,10 @@ impl PatchGuess {
 
     pub(crate) fn of_gap(task: &GapTask, outlook: &GapOutlook) -> PatchGuess {
         let area = std::f64::consts::PI * outlook.half[0] * outlook.half[1];
-        let force = match task.pressing {
-            Pressing::Force(force) => force,
+        let force = match task.loading {
+            NormalLoad::Force(force) => force,
             // A paraboloid's, see `search_box`.
-            Pressing::Approach(_) => {
+            NormalLoad::Approach(_) => {
                 let radius = (area / std::f64::consts::PI).sqrt();
                 4.0 / 3.0 * task.contact_modulus * radius * outlook.depth
             }
@@ -169,12 +169,12 @@ impl PatchGuess {
     }
 
     pub(crate) fn of_wheel(task: &WheelTask) -> PatchGuess {
-        let pressing = match task.loading {
-            WheelLoad::Vertical(force) | WheelLoad::Normal(force) => Pressing::Force(force),
-            WheelLoad::Lowering(lowering) => Pressing::Approach(lowering),
+        let loading = match task.loading {
+            WheelLoad::Vertical(force) | WheelLoad::Normal(force) => NormalLoad::Force(force),
+            WheelLoad::Lowering(lowering) => NormalLoad::Approach(lowering),
         };
         let radius = task.geometry.placement.rolling_radius;
-        let ellipse = Ellipse::of_radii(radius, RAIL_RADIUS, pressing, task.contact_modulus);
+        let ellipse = Ellipse::of_radii(radius, RAIL_RADIUS, loading, task.contact_modulus);
         PatchGuess::of_ellipse(&ellipse)
     }
 

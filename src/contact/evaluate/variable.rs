@@ -1,6 +1,6 @@
 //! The numbers of a case that may differ from row to row.
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 
 /// A number of a case that a column can hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,66 +35,66 @@ pub enum Variable {
 pub type Row = [f64; VARIABLES.len()];
 
 /// Every variable with its place in the case and the numbers that it may have.
-const VARIABLES: [(Variable, &str, Interval); 12] = [
+const VARIABLES: [(Variable, &str, AllowedRange); 12] = [
     (
         Variable::ShearModulus,
         "/material/shear_modulus_mpa",
-        Interval::positive(1e12, "MPa"),
+        AllowedRange::positive(1e12, "MPa"),
     ),
     (
         Variable::YoungModulus,
         "/material/young_modulus_mpa",
-        Interval::positive(1e12, "MPa"),
+        AllowedRange::positive(1e12, "MPa"),
     ),
     (
         Variable::PoissonRatio,
         "/material/poisson_ratio",
-        Interval::closed(0.0, 0.5, ""),
+        AllowedRange::closed(0.0, 0.5, ""),
     ),
     (
         Variable::Friction,
         "/friction/coefficient",
-        Interval::closed(0.0, 100.0, ""),
+        AllowedRange::closed(0.0, 100.0, ""),
     ),
     (
         Variable::Rolling,
         "/contact/rolling_mm",
-        Interval::positive(1e9, "mm"),
+        AllowedRange::positive(1e9, "mm"),
     ),
     (
         Variable::Lateral,
         "/contact/lateral_mm",
-        Interval::positive(1e9, "mm"),
+        AllowedRange::positive(1e9, "mm"),
     ),
     (
         Variable::SemiAxisA,
         "/contact/a_mm",
-        Interval::positive(1e6, "mm"),
+        AllowedRange::positive(1e6, "mm"),
     ),
     (
         Variable::SemiAxisB,
         "/contact/b_mm",
-        Interval::positive(1e6, "mm"),
+        AllowedRange::positive(1e6, "mm"),
     ),
     (
         Variable::NormalForce,
         "/load/normal_force_n",
-        Interval::positive(1e12, "N"),
+        AllowedRange::positive(1e12, "N"),
     ),
     (
         Variable::CreepageX,
         "/motion/creepage_x",
-        Interval::closed(-1e6, 1e6, ""),
+        AllowedRange::closed(-1e6, 1e6, ""),
     ),
     (
         Variable::CreepageY,
         "/motion/creepage_y",
-        Interval::closed(-1e6, 1e6, ""),
+        AllowedRange::closed(-1e6, 1e6, ""),
     ),
     (
         Variable::Spin,
         "/motion/spin_per_mm",
-        Interval::closed(-1e6, 1e6, "1/mm"),
+        AllowedRange::closed(-1e6, 1e6, "1/mm"),
     ),
 ];
 
@@ -127,7 +127,7 @@ impl Variable {
     }
 
     /// The numbers that it may have.
-    pub(crate) fn allowed(self) -> Interval {
+    pub(crate) fn allowed(self) -> AllowedRange {
         VARIABLES[self as usize].2
     }
 }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::grouping::{Grouping, Overlap};
-use crate::contact::geometry::local_gap::{Detail, LocalGap};
+use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
 use crate::contact::geometry::locus_lines::{LocusLines, LocusPoint};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::numerics::bisection::bisect;
@@ -152,7 +152,7 @@ impl<'g> ContactLocus<'g> {
     ///
     /// # Errors
     /// A sentence, if an overlap reaches the end of a profile.
-    pub fn gaps(&self, lowering: f64, detail: Detail) -> Result<Vec<LocalGap>, String> {
+    pub fn gaps(&self, lowering: f64, detail: GapSampling) -> Result<Vec<LocalGap>, String> {
         self.overlaps(lowering)?
             .into_iter()
             .map(|overlap| self.gap(overlap, lowering, detail))
@@ -223,7 +223,12 @@ impl<'g> ContactLocus<'g> {
             .unwrap_or_else(|| inclination(self.geometry, line.rail))
     }
 
-    fn gap(&self, overlap: Overlap, lowering: f64, detail: Detail) -> Result<LocalGap, String> {
+    fn gap(
+        &self,
+        overlap: Overlap,
+        lowering: f64,
+        detail: GapSampling,
+    ) -> Result<LocalGap, String> {
         let lines = self.around(overlap.ends);
         let frame = self.frame(lines, lowering);
         let plane = frame.plane();

@@ -9,19 +9,19 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 /// How closely a gap is sampled: along x, where it is as smooth as the wheel is round, less closely than across, where it has the detail
 /// of the profiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Detail {
+pub enum GapSampling {
     /// Enough for the force at a height of the wheel, to some tenths of a per cent.
     Coarse,
     /// Enough for the answer.
     Fine,
 }
 
-impl Detail {
+impl GapSampling {
     /// Samples along and across.
     fn samples(self) -> [usize; 2] {
         match self {
-            Detail::Coarse => [17, 81],
-            Detail::Fine => [17, 161],
+            GapSampling::Coarse => [17, 81],
+            GapSampling::Fine => [17, 161],
         }
     }
 }
@@ -54,7 +54,7 @@ impl LocalGap {
         frame: Frame,
         centre: f64,
         window: [[f64; 2]; 2],
-        detail: Detail,
+        detail: GapSampling,
     ) -> Result<LocalGap, String> {
         let [columns, rows] = detail.samples();
         let [x, y] = [(window[0], columns), (window[1], rows)].map(|([low, high], count)| {

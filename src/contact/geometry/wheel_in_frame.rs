@@ -36,15 +36,15 @@ struct OriginProducts {
 
 /// A point of the wheel: height over the plane, and parameter of the wheel's curve.
 #[derive(Clone, Copy)]
-pub(crate) struct Guess {
+pub(crate) struct WheelPoint {
     pub(crate) height: f64,
     pub(crate) wheel: f64,
 }
 
-impl Guess {
+impl WheelPoint {
     /// The next of a row that continues in a straight line from `before` over this one.
-    fn beyond(self, before: Guess) -> Guess {
-        Guess {
+    fn beyond(self, before: WheelPoint) -> WheelPoint {
+        WheelPoint {
             height: 2.0 * self.height - before.height,
             wheel: 2.0 * self.wheel - before.wheel,
         }
@@ -87,18 +87,18 @@ impl<'g> WheelInFrame<'g> {
         let mirrored = images && self.mirrored;
         let mut rows = vec![vec![f64::NAN; x.len()]; y.len()];
         let mut missed = Vec::new();
-        let mut found_or_open = |at: [f64; 2], start: Guess| -> Guess {
+        let mut found_or_open = |at: [f64; 2], start: WheelPoint| -> WheelPoint {
             self.height(at[0], at[1], start).unwrap_or_else(|miss| {
                 if miss.exit == SurfaceExit::StepsUsedUp {
                     missed.push(at);
                 }
-                Guess {
+                WheelPoint {
                     height: start.height + OPEN,
                     wheel: start.wheel,
                 }
             })
         };
-        let mut fill = |j: usize, start: Guess| -> Guess {
+        let mut fill = |j: usize, start: WheelPoint| -> WheelPoint {
             let first = found_or_open([x[middle[0]], y[j]], start);
             rows[j][middle[0]] = first.height;
             let (right, left) = outward(middle[0], x.len());
@@ -119,7 +119,7 @@ impl<'g> WheelInFrame<'g> {
         };
         let start = fill(
             middle[1],
-            Guess {
+            WheelPoint {
                 height: 0.0,
                 wheel: self.wheel,
             },
@@ -137,7 +137,7 @@ impl<'g> WheelInFrame<'g> {
 
     /// Where the normal through (u, v) meets the wheel, by Newton's method in the height and the parameter of the
     /// wheel's curve.
-    fn height(&self, u: f64, v: f64, start: Guess) -> Result<Guess, SurfaceMissed> {
+    fn height(&self, u: f64, v: f64, start: WheelPoint) -> Result<WheelPoint, SurfaceMissed> {
         const STEP_MAX: f64 = 1.0;
         /// The error falls with the square of the step, to about 1e-9 mm after this one.
         const STEP_LAST: f64 = 1e-4;
@@ -177,10 +177,10 @@ impl<'g> WheelInFrame<'g> {
     }
 
     /// The same from the origin of the frame, in steps that Newton's method can follow.
-    pub(crate) fn height_from_origin(&self, [u, v]: [f64; 2]) -> Result<Guess, SurfaceMissed> {
+    pub(crate) fn height_from_origin(&self, [u, v]: [f64; 2]) -> Result<WheelPoint, SurfaceMissed> {
         /// Length of a step in mm; the sides of the windows, where rows follow each other like this, are as long.
         const STRIDE: f64 = 2.0;
-        let mut before = Guess {
+        let mut before = WheelPoint {
             height: 0.0,
             wheel: self.wheel,
         };

@@ -7,7 +7,7 @@ use std::f32::consts::FRAC_PI_2;
 use pulp::{Arch, NullaryFnOnce};
 
 use crate::contact::half_space::rectangle_stress::Stress;
-use crate::contact::numerics::simd_ln::Number;
+use crate::contact::numerics::simd_ln::Float;
 
 /// Corners that are summed side by side.
 const WIDTH: usize = 16;
@@ -123,7 +123,7 @@ fn corner(p: f32, q: f32, z: f32, nu: f32, weights: [f32; 3]) -> [f32; 6] {
     let (q_near, p_near) = ((pp + zz) / q_far, (qq + zz) / p_far);
     let q_r = if q >= 0.0 { q_far } else { q_near };
     let p_r = if p >= 0.0 { p_far } else { p_near };
-    let (ln_q, ln_p, ln_z) = (Number::ln(q_r), Number::ln(p_r), Number::ln(r + z));
+    let (ln_q, ln_p, ln_z) = (Float::ln(q_r), Float::ln(p_r), Float::ln(r + z));
     let theta = atan(p * q / (z * r));
     let ahead = p * q * (pp + qq) * r_z;
     let turn_p = atan(ahead / (pp * r + qq * z + TINY));

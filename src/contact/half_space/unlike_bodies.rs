@@ -138,10 +138,10 @@ mod tests {
         };
         let chords: Vec<Chord> = (0..4).map(chord).collect();
         let mesh = Mesh::new(&chords, &Grading::cosine(6));
-        let rows = mesh.rows();
+        let y = mesh.cell_load_y();
         let pressure: Vec<f64> = (0..mesh.cells())
             .map(|i| {
-                let a = half(rows[i]);
+                let a = half(y[i]);
                 let below = |x: f64| {
                     let s = (x / a).clamp(-1.0, 1.0);
                     0.5 * a * a * (s * (1.0 - s * s).sqrt() + s.asin())

@@ -177,8 +177,8 @@ pub struct Mesh {
     pub right: Vec<f64>,
     /// Node of each cell, in mm: where displacement is evaluated and where its traction acts.
     pub node: Vec<f64>,
-    /// y in mm at which the rigid slip of each segment is evaluated: the mid-line of the strip unless a more accurate y is known.
-    pub arm: Vec<f64>,
+    /// y in mm at which each segment's tractions act and its rigid slip is evaluated: the mid-line of the strip unless a more accurate y is known.
+    pub load_y: Vec<f64>,
 }
 
 impl Mesh {
@@ -191,7 +191,7 @@ impl Mesh {
             left: Vec::with_capacity(chords.len() * n),
             right: Vec::with_capacity(chords.len() * n),
             node: Vec::with_capacity(chords.len() * n),
-            arm: chords.iter().map(|chord| chord.y).collect(),
+            load_y: chords.iter().map(|chord| chord.y).collect(),
         };
         for chord in chords {
             let start = mesh.node.len();
@@ -233,12 +233,12 @@ impl Mesh {
 
     /// y in mm at which every cell's traction acts.
     #[must_use]
-    pub fn rows(&self) -> Vec<f64> {
-        let mut rows = Vec::with_capacity(self.cells());
-        for (segment, y) in self.segments.iter().zip(&self.arm) {
-            rows.resize(segment.cells.end, *y);
+    pub fn cell_load_y(&self) -> Vec<f64> {
+        let mut ys = Vec::with_capacity(self.cells());
+        for (segment, y) in self.segments.iter().zip(&self.load_y) {
+            ys.resize(segment.cells.end, *y);
         }
-        rows
+        ys
     }
 
     /// The same mesh, moved so that `origin` becomes `(0, 0)`, then with all lengths multiplied by `factor`.
@@ -260,7 +260,11 @@ impl Mesh {
             left: along(&self.left),
             right: along(&self.right),
             node: along(&self.node),
-            arm: self.arm.iter().map(|y| (y - origin[1]) * factor).collect(),
+            load_y: self
+                .load_y
+                .iter()
+                .map(|y| (y - origin[1]) * factor)
+                .collect(),
         }
     }
 
@@ -271,7 +275,7 @@ impl Mesh {
             &mut self.left,
             &mut self.right,
             &mut self.node,
-            &mut self.arm,
+            &mut self.load_y,
         ];
         places.into_iter().flatten().for_each(round);
         for segment in &mut self.segments {

@@ -22,7 +22,7 @@ pub struct Ellipse {
 
 /// How two bodies are pressed together.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Pressing {
+pub enum NormalLoad {
     /// Normal force in N.
     Force(f64),
     /// Approach of distant points in mm.
@@ -41,7 +41,7 @@ impl Ellipse {
     pub fn of_radii(
         rolling: f64,
         lateral: f64,
-        pressing: Pressing,
+        loading: NormalLoad,
         contact_modulus: f64,
     ) -> Ellipse {
         // The larger semi-axis lies along the larger radius, where the gap opens more slowly.
@@ -49,11 +49,11 @@ impl Ellipse {
         let ratio = axis_ratio(radius_small / radius_large);
         let (k_integral, d_integral) = complete_integrals(ratio);
         let curvature = 0.5 / radius_large;
-        let large = match pressing {
-            Pressing::Force(force) => {
+        let large = match loading {
+            NormalLoad::Force(force) => {
                 (1.5 * force * d_integral / (PI * contact_modulus * curvature)).cbrt()
             }
-            Pressing::Approach(approach) => {
+            NormalLoad::Approach(approach) => {
                 (approach * d_integral / (curvature * k_integral)).sqrt()
             }
         };
@@ -63,31 +63,31 @@ impl Ellipse {
         } else {
             (small, large)
         };
-        Ellipse::of_semi_axes(a, b, pressing, contact_modulus)
+        Ellipse::of_semi_axes(a, b, loading, contact_modulus)
     }
 
     /// The contact with semi-axes `a` along and `b` across rolling in mm, and contact modulus `E*` in MPa:
     /// `p0 = 3N/(2πab)`, approach `p0 l K(k)/E*` with l the smaller semi-axis and k the ratio of smaller to larger.
     #[must_use]
-    pub fn of_semi_axes(a: f64, b: f64, pressing: Pressing, contact_modulus: f64) -> Ellipse {
+    pub fn of_semi_axes(a: f64, b: f64, loading: NormalLoad, contact_modulus: f64) -> Ellipse {
         let (small, large) = (a.min(b), a.max(b));
         let (k_integral, _) = complete_integrals(small / large);
         let depth = small * k_integral / contact_modulus;
-        let (pressure_max, approach) = match pressing {
-            Pressing::Force(force) => {
+        let (pressure_max, approach) = match loading {
+            NormalLoad::Force(force) => {
                 let pressure_max = 1.5 * (force / a) / (PI * b);
                 (pressure_max, pressure_max * depth)
             }
-            Pressing::Approach(approach) => (approach / depth, approach),
+            NormalLoad::Approach(approach) => (approach / depth, approach),
         };
         Ellipse {
             a,
             b,
             pressure_max,
             approach,
-            normal_force: match pressing {
-                Pressing::Force(force) => force,
-                Pressing::Approach(_) => PI * a * b * pressure_max * 2.0 / 3.0,
+            normal_force: match loading {
+                NormalLoad::Force(force) => force,
+                NormalLoad::Approach(_) => PI * a * b * pressure_max * 2.0 / 3.0,
             },
         }
     }
@@ -374,7 +374,7 @@ mod tests {
         for exponent in -90..=90 {
             let lateral = 300.0 * 10.0_f64.powf(f64::from(exponent) / 15.0);
             let [a, b] = HertzShape::of_radii(300.0, lateral).semi_axes(9e4, 1.1e5);
-            let ellipse = Ellipse::of_radii(300.0, lateral, Pressing::Force(9e4), 1.1e5);
+            let ellipse = Ellipse::of_radii(300.0, lateral, NormalLoad::Force(9e4), 1.1e5);
             for (found, known) in [(a, ellipse.a), (b, ellipse.b)] {
                 let error = (found / known - 1.0).abs();
                 assert!(error < 1e-10, "{lateral}: {found} {known}");
@@ -384,7 +384,7 @@ mod tests {
 
     #[test]
     fn cells_of_a_chord_add_up_to_its_load() {
-        let ellipse = Ellipse::of_semi_axes(3.0, 2.0, Pressing::Force(1000.0), 1e5);
+        let ellipse = Ellipse::of_semi_axes(3.0, 2.0, NormalLoad::Force(1000.0), 1e5);
         let chord = ellipse.chords(&[(1.2, 0.1)])[0];
         let half = 3.0 * (1.0_f64 - 0.36).sqrt();
         assert!((chord.right - half).abs() < 1e-15 && (chord.left + half).abs() < 1e-15);
@@ -405,7 +405,7 @@ mod tests {
 
     #[test]
     fn small_cells_at_the_edge_keep_their_digits() {
-        let ellipse = Ellipse::of_semi_axes(1.0, 1.0, Pressing::Force(1.0), 1.0);
+        let ellipse = Ellipse::of_semi_axes(1.0, 1.0, NormalLoad::Force(1.0), 1.0);
         let chord = ellipse.chords(&[(0.0, 0.1)])[0];
         // Over the last ε of the chord √(1−x²) has the mean ⅔√(2ε)(1 − 3ε/20 + …).
         for epsilon in [1e-3_f64, 1e-6, 1e-9] {
@@ -421,7 +421,7 @@ mod tests {
 
     #[test]
     fn pressure_is_zero_outside_and_pointwise_for_an_empty_interval() {
-        let ellipse = Ellipse::of_semi_axes(2.0, 1.0, Pressing::Force(10.0), 1.0);
+        let ellipse = Ellipse::of_semi_axes(2.0, 1.0, NormalLoad::Force(10.0), 1.0);
         let chord = ellipse.chords(&[(0.6, 0.1)])[0];
         assert!(
             (ellipse.mean_pressure(&chord, 0.0, 0.0) / ellipse.pressure_max - 0.8).abs() < 1e-14
@@ -435,7 +435,7 @@ mod tests {
 
     #[test]
     fn strips_beside_the_ellipse_have_no_chord() {
-        let ellipse = Ellipse::of_semi_axes(2.0, 1.0, Pressing::Force(10.0), 1.0);
+        let ellipse = Ellipse::of_semi_axes(2.0, 1.0, NormalLoad::Force(10.0), 1.0);
         let chords = ellipse.chords(&[
             (-1.5, 0.1),
             (-1.0, 0.1),

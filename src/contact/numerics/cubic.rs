@@ -155,13 +155,13 @@ pub(crate) fn interval(axis: &[f64], x: f64) -> usize {
         - 1
 }
 
-/// Slopes at the nodes of a curve through at least 2 values.
+/// Slopes at the nodes of a curve through at least 2 values, limited where the values jump or have a kink.
 ///
-/// A slope is that of the parabola through the node and its neighbours, unless this parabola is curved more than a fixed
-/// number of times as strongly as those of both neighbouring nodes. That indicates a jump or a kink; the slope then changes
-/// over to a mean that favours the flatter side, which keeps the curve from overshooting the values. At the ends the
-/// parabola of the adjacent node is used.
-pub(crate) fn sober_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
+/// A slope is that of the parabola through the node and its two neighbours, unless this parabola is curved more than a fixed
+/// number of times as strongly as those of both neighbouring nodes. There the slope is blended with the harmonic mean of the
+/// adjoining chords' slopes, 0 where these differ in sign (the limiter of van Leer 1974), which keeps the curve from overshooting
+/// the values. At the ends the parabola of the adjacent node is used.
+pub(crate) fn limited_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
     /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
     const SLOPE_LIMIT: f64 = 8.0;
     let n = axis.len();

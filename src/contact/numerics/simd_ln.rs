@@ -3,7 +3,7 @@
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// A floating-point number of the kernels.
-pub trait Number:
+pub trait Float:
     Copy
     + PartialOrd
     + Add<Output = Self>
@@ -38,7 +38,7 @@ macro_rules! number {
         $float:ty, $bits:ty, tiny $tiny:expr, sqrt_half $sqrt_half:expr, mantissa $mantissa:expr, bias $bias:expr,
         magic $magic:expr, $magic_value:expr, series $series:expr, $error:literal
     ) => {
-        impl Number for $float {
+        impl Float for $float {
             const ZERO: Self = 0.0;
             const TINY: Self = $tiny;
 
@@ -105,14 +105,14 @@ number!(
 
 #[cfg(test)]
 mod tests {
-    use super::Number;
+    use super::Float;
 
     #[test]
     fn it_agrees_with_the_standard_library_over_the_whole_range() {
         let mut x: f64 = 1e-300;
         while x < 1e300 {
             let expected = x.ln();
-            let found = Number::ln(x);
+            let found = Float::ln(x);
             assert!(
                 (found - expected).abs() <= 5e-16 * expected.abs().max(0.5),
                 "{x}: {found} {expected}"
@@ -122,7 +122,7 @@ mod tests {
         let mut x: f32 = 1e-35;
         while x < 1e35 {
             let expected = f64::from(x).ln();
-            let found = f64::from(Number::ln(x));
+            let found = f64::from(Float::ln(x));
             assert!(
                 (found - expected).abs() <= 2e-7 * expected.abs().max(0.5),
                 "{x}: {found} {expected}"
@@ -133,11 +133,11 @@ mod tests {
 
     #[test]
     fn it_is_exact_at_one_and_smooth_around_it() {
-        assert_eq!(Number::ln(1.0_f64), 0.0);
-        assert_eq!(Number::ln(1.0_f32), 0.0);
+        assert_eq!(Float::ln(1.0_f64), 0.0);
+        assert_eq!(Float::ln(1.0_f32), 0.0);
         for k in 1..40 {
             let h = 0.5_f64.powi(k);
-            let found = Number::ln(1.0 + h);
+            let found = Float::ln(1.0 + h);
             assert!(
                 (found - h.ln_1p()).abs() <= 4e-16 * h.max(f64::EPSILON),
                 "{h}"

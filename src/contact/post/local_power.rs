@@ -14,7 +14,7 @@ use crate::contact::half_space::strip_operator::assembly::{CellEdges, SegmentRow
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::mesh::strips::{Mesh, Segment};
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::simd_ln::Number;
+use crate::contact::numerics::simd_ln::Float;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
 use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
@@ -166,9 +166,9 @@ fn add_layer_powers(mesh: &Mesh, flexibility: f64, traction: &[Vec<f64>; 2], pow
 /// `A T·w` of a motion.
 fn rigid_powers(mesh: &Mesh, motion: &Motion, traction: &[Vec<f64>; 2]) -> Vec<f64> {
     let mut power = Vec::with_capacity(mesh.cells());
-    for (segment, arm) in mesh.segments.iter().zip(&mesh.arm) {
-        // The arm that the moment is summed with.
-        let y = 0.5 * (segment.chord.y + arm);
+    for (segment, load_y) in mesh.segments.iter().zip(&mesh.load_y) {
+        // The lever arm that the resultants sum the moment with.
+        let y = 0.5 * (segment.chord.y + load_y);
         for i in segment.cells.clone() {
             let x = 0.5 * (mesh.left[i] + mesh.right[i]);
             let area = (mesh.right[i] - mesh.left[i]) * segment.chord.dy;
@@ -188,7 +188,7 @@ struct Differences {
 
 impl Differences {
     /// The rows of `D` are computed strip by strip and used at once; none is kept.
-    fn of<T: Number + Into<f64>>(
+    fn of<T: Float + Into<f64>>(
         mesh: &Mesh,
         nu: f64,
         traction: &[Vec<f64>; 2],
@@ -234,7 +234,7 @@ impl Differences {
         }
     }
 
-    fn add<T: Number + Into<f64>>(
+    fn add<T: Float + Into<f64>>(
         &mut self,
         segment: &Segment,
         rows: &[T],

@@ -9,7 +9,7 @@ use crate::contact::geometry::profile_quality::points::{
 use crate::contact::geometry::profile_quality::shape;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::wheel_height::pressed::PressedGap;
+use crate::contact::normal::wheel_height::wheel_contact::GapContact;
 use crate::contact::profile_trust::finding::{AMBIGUOUS, Cause, Finding};
 use crate::contact::solution::profile_quality::{PatchQuality, ProfileQuality};
 
@@ -40,7 +40,7 @@ const BEYOND: f64 = 5.0;
 #[derive(Debug, Clone, Copy)]
 pub struct FoundPatch<'a> {
     /// The gap it belongs to.
-    pub gap: &'a PressedGap,
+    pub gap: &'a GapContact,
     /// Height of the wheel's centre in mm.
     pub centre: f64,
     /// Extent across in mm, in the coordinates of the gap.

@@ -8,8 +8,8 @@ use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::holes::{Hole, holes};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_trust::finding::{Cause, Finding};
 use crate::contact::profile_trust::judge::{FoundPatch, judge};
@@ -128,7 +128,7 @@ type WheelAtRest = (f64, Vec<f64>);
 impl Judge for Judgement<'_> {
     /// Fails before the tangential problem is solved if the answer would mislead: on the ridge under an outlier, for example, that
     /// solve would fail with an error that does not mention the outlier.
-    fn before(&self, wheel: &PressedWheel) -> Result<(), SolveError> {
+    fn before(&self, wheel: &WheelContact) -> Result<(), SolveError> {
         if self.contact.trust.accept_rough {
             return Ok(());
         }
@@ -137,7 +137,7 @@ impl Judge for Judgement<'_> {
         refused.map_or(Ok(()), |finding| Err(rough(finding, ACCEPT)))
     }
 
-    fn explain(&self, wheel: &PressedWheel, error: SolveError) -> SolveError {
+    fn explain(&self, wheel: &WheelContact, error: SolveError) -> SolveError {
         if !matches!(
             error,
             SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }
@@ -184,8 +184,8 @@ impl<'a> Judgement<'a> {
     }
 
     /// The quality of the profiles under every patch, and the findings.
-    fn of(&self, wheel: &PressedWheel) -> Result<Assessed, SolveError> {
-        let forces = wheel.patches.iter().map(PressedGap::normal_force).collect();
+    fn of(&self, wheel: &WheelContact) -> Result<Assessed, SolveError> {
+        let forces = wheel.patches.iter().map(GapContact::normal_force).collect();
         let asked = (wheel.lowering, forces);
         if let Some((known, assessed)) = &*self.last.borrow()
             && *known == asked
@@ -197,11 +197,11 @@ impl<'a> Judgement<'a> {
         Ok(assessed)
     }
 
-    fn assess(&self, wheel: &PressedWheel) -> Result<Assessed, SolveError> {
+    fn assess(&self, wheel: &WheelContact) -> Result<Assessed, SolveError> {
         let contact = self.contact;
         let (mut qualities, mut findings) = (Vec::new(), Vec::new());
         let mut width: f64 = 0.0;
-        let load: f64 = wheel.patches.iter().map(PressedGap::normal_force).sum();
+        let load: f64 = wheel.patches.iter().map(GapContact::normal_force).sum();
         for gap in &wheel.patches {
             for patch in gap.field.patches() {
                 let [.., from, to] = patch.extent;
@@ -228,7 +228,7 @@ impl<'a> Judgement<'a> {
     /// patch.
     fn hidden(
         &self,
-        wheel: &PressedWheel,
+        wheel: &WheelContact,
         width: f64,
         qualities: &mut [PatchQuality],
     ) -> Vec<Finding> {

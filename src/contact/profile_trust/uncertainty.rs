@@ -13,8 +13,8 @@ use crate::contact::geometry::profile::Profile;
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::points::SMOOTHING_ADVISED;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::wheel_height::pressed::PressedWheel;
 use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::normal::wheel_height::wheel_contact::WheelContact;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -66,11 +66,11 @@ impl Monitor for Afterwards<'_> {
 struct NoJudge;
 
 impl Judge for NoJudge {
-    fn before(&self, _wheel: &PressedWheel) -> Result<(), SolveError> {
+    fn before(&self, _wheel: &WheelContact) -> Result<(), SolveError> {
         Ok(())
     }
 
-    fn explain(&self, _wheel: &PressedWheel, error: SolveError) -> SolveError {
+    fn explain(&self, _wheel: &WheelContact, error: SolveError) -> SolveError {
         error
     }
 }

@@ -6,7 +6,7 @@
 
 use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::pressure_field::field::PressureField;
 
 /// Strips over a patch, and parts of each chord: moments and misplaced load change by less than 0.002 with twice as many.
@@ -116,7 +116,7 @@ fn parts(footprint: &Footprint, patch: usize) -> Vec<EllipsePart> {
 
 /// The share of the load that is elsewhere than on the ellipse.
 fn misplaced(parts: &[EllipsePart], load: f64, centre: [f64; 2], [a, b]: [f64; 2]) -> f64 {
-    let ellipse = Ellipse::of_semi_axes(a, b, Pressing::Force(load), 1.0);
+    let ellipse = Ellipse::of_semi_axes(a, b, NormalLoad::Force(load), 1.0);
     let (mut apart, mut inside) = (0.0, 0.0);
     for part in parts {
         let y = part.y - centre[1];

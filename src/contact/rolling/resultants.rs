@@ -24,9 +24,9 @@ impl Resultants {
     pub fn of_patch(level: &StripMesh, traction: &[Vec<f64>; 2], patch: usize) -> Resultants {
         let mut sum = Resultants::default();
         let mesh = &level.mesh;
-        let segments = mesh.segments.iter().zip(&mesh.arm);
-        for (segment, arm) in segments.filter(|(s, _)| s.chord.patch == patch) {
-            let arm = 0.5 * (segment.chord.y + arm);
+        let segments = mesh.segments.iter().zip(&mesh.load_y);
+        for (segment, load_y) in segments.filter(|(s, _)| s.chord.patch == patch) {
+            let arm = 0.5 * (segment.chord.y + load_y);
             for i in segment.cells.clone() {
                 let weight = level.area[i] * level.scale.traction;
                 let (x, y) = (weight * traction[0][i], weight * traction[1][i]);

@@ -96,7 +96,7 @@ impl<'a> SlipEquations<'a> {
             row_count: 0,
             y: Vec::with_capacity(count),
         };
-        for (segment, y) in segments.iter().zip(&mesh.arm) {
+        for (segment, y) in segments.iter().zip(&mesh.load_y) {
             let rows = rows_of(segment.cells.len());
             equations.rows.push(row..row + rows);
             row += rows;
@@ -278,7 +278,7 @@ impl<'a> SlipEquations<'a> {
             self.segments() - 1 - j
         };
         let (rows, cells) = (
-            self.differences.rows(stored),
+            self.differences.segment_rows(stored),
             self.differences.cells(stored),
         );
         let [xx, yy] = blocks;

@@ -134,10 +134,10 @@ impl StripLoad {
 mod tests {
     use super::*;
     use crate::contact::mesh::strips::equal_strips;
-    use crate::contact::normal::hertz::{Ellipse, Pressing};
+    use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 
     fn circle() -> Footprint {
-        let force = Pressing::Force(2.0 * std::f64::consts::PI / 3.0);
+        let force = NormalLoad::Force(2.0 * std::f64::consts::PI / 3.0);
         Footprint::hertz(Ellipse::of_semi_axes(1.0, 1.0, force, 1.0))
     }
 

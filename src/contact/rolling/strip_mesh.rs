@@ -157,7 +157,7 @@ impl StripMesh {
         if plan.pole().is_some() {
             // Where everything slips, the traction of a strip follows the slip at the centre of its load; sticking strips
             // follow their mid-lines.
-            mesh.arm = fitted.iter().map(|f| f.load_y).collect();
+            mesh.load_y = fitted.iter().map(|f| f.load_y).collect();
         }
         let area = mesh.areas();
         let pressure = cell_pressures(footprint, &fitted, &mesh, &area);

@@ -10,7 +10,7 @@
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::{WheelsetMotion, creepages};
-use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
+use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::resolution::Resolution;
@@ -52,7 +52,7 @@ impl PlaneError {
 pub(crate) fn of_wheel(
     case: &CheckedCase,
     geometry: &WheelRail,
-    wheel: &PressedWheel,
+    wheel: &WheelContact,
     answers: &[(Solution, Fields)],
 ) -> Option<PlaneError> {
     let wheelset = case.problem.wheelset.as_ref()?;
@@ -89,7 +89,7 @@ struct GapPlace<'a> {
     /// Shear modulus in MPa.
     modulus: f64,
     geometry: &'a WheelRail,
-    gap: &'a PressedGap,
+    gap: &'a GapContact,
     centre: f64,
 }
 

@@ -3,7 +3,7 @@
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
+use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
@@ -32,10 +32,10 @@ const FRAME: &str = "every patch in its own axes: x along rolling (leading edge 
 pub fn in_track(
     case: &CheckedCase,
     geometry: &WheelRail,
-    wheel: &PressedWheel,
+    wheel: &WheelContact,
     answers: Vec<(Solution, Fields)>,
 ) -> Result<(Solution, Fields), SurfaceMissed> {
-    let parts: Vec<Part> = wheel.patches.iter().map(Part::new).collect();
+    let parts: Vec<FramedLoad> = wheel.patches.iter().map(FramedLoad::new).collect();
     let origin = load_centre(&parts);
     let plane = plane_error::of_wheel(case, geometry, wheel, &answers);
     let total = totals(&parts, origin, &answers);
@@ -89,11 +89,11 @@ pub fn in_track(
 }
 
 /// The totals of all motions in track axes.
-fn totals(parts: &[Part], origin: [f64; 2], answers: &[(Solution, Fields)]) -> Vec<Total> {
+fn totals(parts: &[FramedLoad], origin: [f64; 2], answers: &[(Solution, Fields)]) -> Vec<Total> {
     let motions = answers.first().map_or(0, |(first, _)| first.total.len());
     (0..motions)
         .map(|motion| {
-            let part = |(part, (answer, _)): (&Part, &(Solution, Fields))| {
+            let part = |(part, (answer, _)): (&FramedLoad, &(Solution, Fields))| {
                 part.in_track(&answer.total[motion], origin)
             };
             parts.iter().zip(answers).map(part).fold(None, sum)
@@ -116,7 +116,7 @@ fn in_wheel(remark: &RemarkEntry, first: usize, alone: bool) -> RemarkEntry {
 }
 
 /// Change of the rail's inclination over a patch, in rad.
-fn turn(geometry: &WheelRail, gap: &PressedGap, across: [f64; 2]) -> Result<f64, SurfaceMissed> {
+fn turn(geometry: &WheelRail, gap: &GapContact, across: [f64; 2]) -> Result<f64, SurfaceMissed> {
     let inclination = |y: f64| {
         let rail = geometry.rail_over(&gap.frame, y)?;
         let [y, z] = geometry.rail_at(rail).tangent();
@@ -127,14 +127,14 @@ fn turn(geometry: &WheelRail, gap: &PressedGap, across: [f64; 2]) -> Result<f64,
 }
 
 /// A part of the contact in track axes.
-struct Part {
+struct FramedLoad {
     frame: Frame,
     normal_force: f64,
 }
 
-impl Part {
-    fn new(gap: &PressedGap) -> Part {
-        Part {
+impl FramedLoad {
+    fn new(gap: &GapContact) -> FramedLoad {
+        FramedLoad {
             frame: gap.frame,
             normal_force: gap.normal_force(),
         }
@@ -166,7 +166,7 @@ impl Part {
 }
 
 /// Mean position of the parts in track axes, weighted with their normal forces.
-fn load_centre(parts: &[Part]) -> [f64; 2] {
+fn load_centre(parts: &[FramedLoad]) -> [f64; 2] {
     let force: f64 = parts.iter().map(|part| part.normal_force).sum();
     [0, 1].map(|k| {
         let weighted = parts

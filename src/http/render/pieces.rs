@@ -16,7 +16,7 @@ const PIECE_BYTES: usize = 32 << 10;
 const ROWS: usize = 256;
 
 /// A part of a JSON text.
-enum Part {
+enum JsonPart {
     Text(String),
     /// Values of a column, parted by commas.
     Values(ColumnName, Range<usize>),
@@ -46,8 +46,8 @@ pub fn csv_body(table: Table) -> Body {
 pub fn json_body(table: Table, members: &str) -> Body {
     let parts = parts(&table, members);
     let texts = parts.into_iter().map(move |part| match part {
-        Part::Text(text) => Ok::<_, std::convert::Infallible>(text.into_bytes()),
-        Part::Values(column, rows) => Ok(values(&table, column, rows).into_bytes()),
+        JsonPart::Text(text) => Ok::<_, std::convert::Infallible>(text.into_bytes()),
+        JsonPart::Values(column, rows) => Ok(values(&table, column, rows).into_bytes()),
     });
     body(texts)
 }
@@ -71,13 +71,13 @@ where
     Body::from_stream(stream::iter(pieces))
 }
 
-fn parts(table: &Table, members: &str) -> Vec<Part> {
+fn parts(table: &Table, members: &str) -> Vec<JsonPart> {
     let mut parts = Vec::new();
     let open = match table.rows {
         Rows::Cells { .. } => ",\"cells\":{",
         Rows::Grid { .. } => ",",
     };
-    parts.push(Part::Text(format!("{{{members}{open}")));
+    parts.push(JsonPart::Text(format!("{{{members}{open}")));
     let close = match &table.rows {
         Rows::Cells { .. } => {
             for (number, name) in PLACES.iter().enumerate() {
@@ -98,35 +98,35 @@ fn parts(table: &Table, members: &str) -> Vec<Part> {
             Rows::Cells { .. } => array(&mut parts, column.name, values, table.len()),
             Rows::Grid { x_mm, y_mm } => {
                 let nx = x_mm.len();
-                parts.push(Part::Text(format!("\"{}\":[", column.name)));
+                parts.push(JsonPart::Text(format!("\"{}\":[", column.name)));
                 for iy in 0..y_mm.len() {
                     let open = if iy == 0 { "[" } else { ",[" };
-                    parts.push(Part::Text(open.to_owned()));
-                    parts.push(Part::Values(values, iy * nx..(iy + 1) * nx));
-                    parts.push(Part::Text("]".to_owned()));
+                    parts.push(JsonPart::Text(open.to_owned()));
+                    parts.push(JsonPart::Values(values, iy * nx..(iy + 1) * nx));
+                    parts.push(JsonPart::Text("]".to_owned()));
                 }
-                parts.push(Part::Text("],".to_owned()));
+                parts.push(JsonPart::Text("],".to_owned()));
             }
         }
     }
     // The comma after the last array makes way.
-    if let Some(Part::Text(last)) = parts.last_mut() {
+    if let Some(JsonPart::Text(last)) = parts.last_mut() {
         last.pop();
     }
-    parts.push(Part::Text(close.to_owned()));
+    parts.push(JsonPart::Text(close.to_owned()));
     parts
 }
 
 /// `"name":[…],`
-fn array(parts: &mut Vec<Part>, name: &str, column: ColumnName, count: usize) {
-    parts.push(Part::Text(format!("\"{name}\":[")));
+fn array(parts: &mut Vec<JsonPart>, name: &str, column: ColumnName, count: usize) {
+    parts.push(JsonPart::Text(format!("\"{name}\":[")));
     for start in (0..count).step_by(ROWS) {
         if start > 0 {
-            parts.push(Part::Text(",".to_owned()));
+            parts.push(JsonPart::Text(",".to_owned()));
         }
-        parts.push(Part::Values(column, start..(start + ROWS).min(count)));
+        parts.push(JsonPart::Values(column, start..(start + ROWS).min(count)));
     }
-    parts.push(Part::Text("],".to_owned()));
+    parts.push(JsonPart::Text("],".to_owned()));
 }
 
 fn values(table: &Table, column: ColumnName, rows: Range<usize>) -> String {

@@ -102,10 +102,11 @@ impl RowWriter {
 }
 
 fn csv_lines(table: &RowTable) -> Result<Vec<u8>, WriteError> {
-    let mut writer =
-        csv::Writer::from_writer(Vec::with_capacity(16 * table.rows() * table.columns.len()));
+    let mut writer = csv::Writer::from_writer(Vec::with_capacity(
+        16 * table.row_count() * table.columns.len(),
+    ));
     let mut field = String::new();
-    for row in 0..table.rows() {
+    for row in 0..table.row_count() {
         for (_, column) in &table.columns {
             field.clear();
             match column {
@@ -124,8 +125,8 @@ fn json_lines(table: &RowTable) -> Result<String, WriteError> {
     let names = table.columns.iter();
     let names = names.map(|(name, _)| serde_json::to_string(name));
     let names: Vec<String> = names.collect::<Result<_, _>>()?;
-    let mut text = String::with_capacity(32 * table.rows() * names.len());
-    for row in 0..table.rows() {
+    let mut text = String::with_capacity(32 * table.row_count() * names.len());
+    for row in 0..table.row_count() {
         for (place, (name, (_, column))) in names.iter().zip(&table.columns).enumerate() {
             let before = if place == 0 { '{' } else { ',' };
             write!(text, "{before}{name}:")?;

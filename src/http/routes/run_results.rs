@@ -45,14 +45,14 @@ query! {
         });
         /// Only the rows from the first number on and before the second, such as `1000:2000`; either may be left out
         #[param(pattern = "^[0-9]*:[0-9]*$", example = "1000:2000")]
-        rows: Range<u64> as String = reader("two row numbers with a colon between, such as `1000:2000`; either may be left out", rows);
+        rows: Range<u64> as String = reader("two row numbers with a colon between, such as `1000:2000`; either may be left out", row_range);
         /// `ndjson`, `csv`, `arrow` or `parquet`; overrides `Accept`
         #[param(pattern = "^(ndjson|csv|arrow|parquet)$", example = "parquet")]
         format: Format as String = one_of(FORMATS);
     }
 }
 
-fn rows(text: &str) -> Option<Range<u64>> {
+fn row_range(text: &str) -> Option<Range<u64>> {
     let (begin, end) = text.split_once(':')?;
     let number = |text: &str, none| match text {
         "" => Some(none),

@@ -336,7 +336,7 @@ mod tests {
         let reader = TableReader::new(Bytes::from(file)).unwrap();
         assert_eq!(reader.groups(), 2);
         let cut = reader.read(1, |_| true).unwrap().cut(&(2..3));
-        assert_eq!((cut.rows(), cut.columns.len()), (1, 3));
+        assert_eq!((cut.row_count(), cut.columns.len()), (1, 3));
         assert!(TableReader::new(Bytes::from_static(b"PAR1 is no file")).is_err());
     }
 

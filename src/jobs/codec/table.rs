@@ -58,7 +58,7 @@ impl TableColumn {
 
     /// Only these rows.
     #[must_use]
-    pub fn rows(self, range: std::ops::Range<usize>) -> TableColumn {
+    pub fn slice(self, range: std::ops::Range<usize>) -> TableColumn {
         fn cut<T>(mut values: Vec<T>, range: std::ops::Range<usize>) -> Vec<T> {
             values.truncate(range.end);
             values.drain(..range.start);
@@ -87,7 +87,7 @@ impl TableKind {
 impl RowTable {
     /// Number of rows.
     #[must_use]
-    pub fn rows(&self) -> usize {
+    pub fn row_count(&self) -> usize {
         self.columns.first().map_or(0, |(_, column)| column.len())
     }
 
@@ -106,7 +106,7 @@ impl RowTable {
         let columns = self.columns.into_iter();
         RowTable {
             columns: columns
-                .map(|(name, column)| (name, column.rows(range.clone())))
+                .map(|(name, column)| (name, column.slice(range.clone())))
                 .collect(),
         }
     }

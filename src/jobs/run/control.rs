@@ -13,7 +13,7 @@ use crate::jobs::store::list::{BatchFilter, Page};
 impl Jobs {
     /// The lane of the tenant in which the chunks of its runs are jobs.
     #[must_use]
-    pub(crate) fn rows(&self) -> Jobs {
+    pub(crate) fn in_rows_lane(&self) -> Jobs {
         Jobs {
             tenant: rows_lane(&self.tenant),
             ..self.clone()
@@ -25,7 +25,7 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::RunNotFound`], [`JobsError::Expired`], or a failed database.
     pub async fn run(&self, id: Uuid) -> Result<Run, JobsError> {
-        let batch = self.rows().batch(id).await.map_err(of_run)?;
+        let batch = self.in_rows_lane().batch(id).await.map_err(of_run)?;
         self.with_head(batch).await
     }
 
@@ -51,7 +51,7 @@ impl Jobs {
         cursor: Option<&str>,
         limit: u32,
     ) -> Result<Page<Run>, JobsError> {
-        let page = self.rows().batches(filter, cursor, limit).await?;
+        let page = self.in_rows_lane().batches(filter, cursor, limit).await?;
         let mut runs = Vec::with_capacity(page.entries.len());
         for batch in page.entries {
             match self.with_head(batch).await {
@@ -77,7 +77,7 @@ impl Jobs {
         id: Uuid,
         seen: Option<&str>,
     ) -> Result<Option<Run>, JobsError> {
-        let changed = self.rows().batch_changed_since(id, seen).await;
+        let changed = self.in_rows_lane().batch_changed_since(id, seen).await;
         match changed.map_err(of_run)? {
             Some(batch) => self.with_head(batch).await.map(Some),
             None => Ok(None),
@@ -89,7 +89,7 @@ impl Jobs {
     /// # Errors
     /// As [`Jobs::run`].
     pub async fn cancel_run(&self, id: Uuid) -> Result<Run, JobsError> {
-        let batch = self.rows().cancel_batch(id).await.map_err(of_run)?;
+        let batch = self.in_rows_lane().cancel_batch(id).await.map_err(of_run)?;
         self.with_head(batch).await
     }
 
@@ -98,7 +98,7 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::RunNotEnded`], else as [`Jobs::run`].
     pub async fn delete_run(&self, id: Uuid) -> Result<(), JobsError> {
-        self.rows().delete_batch(id).await.map_err(of_run)
+        self.in_rows_lane().delete_batch(id).await.map_err(of_run)
     }
 }
 

@@ -88,7 +88,7 @@ impl Jobs {
         }
         let mut profiles = KnownSections::new();
         let template = self.with_profiles_here(template, &mut profiles)?;
-        let lane = self.rows();
+        let lane = self.in_rows_lane();
         Ok(RunDraft {
             profiles: KnownSections::new(),
             profile_bytes: 0,
@@ -139,7 +139,7 @@ impl Jobs {
             bypass_cache: true,
             ..options.submit
         };
-        let lane = self.rows();
+        let lane = self.in_rows_lane();
         let (batch, replayed) = lane.submit_batch(upload, options.idempotency_key).await?;
         Ok((self.run(batch.id).await?, replayed))
     }
@@ -154,7 +154,7 @@ impl RunDraft {
 
     /// Rows that were added so far.
     #[must_use]
-    pub fn rows(&self) -> u64 {
+    pub fn row_count(&self) -> u64 {
         self.rows
     }
 

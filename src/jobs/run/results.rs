@@ -44,7 +44,7 @@ impl Jobs {
         run: Uuid,
         after: Option<Uuid>,
     ) -> Result<Vec<ChunkRef>, JobsError> {
-        let lane = self.rows();
+        let lane = self.in_rows_lane();
         let store = &self.shared.store;
         let items = store.batch_items(&lane.tenant, run, after, AT_ONCE, usize::MAX);
         let items = items.await.map_err(|error| of_run(error.into()))?;
@@ -115,7 +115,7 @@ impl Jobs {
         let Some(key) = &chunk.key else {
             return self.without_answers(head, chunk, wanted.as_deref()).await;
         };
-        let file = self.shared.blobs.rows(key).await?;
+        let file = self.shared.blobs.chunk_answers(key).await?;
         let read = tokio::task::spawn_blocking(move || read_answers(file, wanted.as_deref()));
         read.await
             .map_err(|error| JobsError::Damaged(error.to_string()))?
@@ -156,7 +156,7 @@ impl Jobs {
     /// # Errors
     /// A failed database, or the run has gone.
     pub async fn chunk_rows(&self, head: &RunHead, job: Uuid) -> Result<RunChunk, JobsError> {
-        let lane = self.rows();
+        let lane = self.in_rows_lane();
         let case = self.shared.store.case(&lane.tenant, job).await?;
         RunChunk::read(&case.ok_or(JobsError::Expired)?.body, &head.columns)
     }

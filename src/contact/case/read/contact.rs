@@ -2,29 +2,29 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, shown};
 use crate::contact::case::read::samples::{SampleQuantity, axis, line, samples};
 use crate::contact::case::read::wheel_rail;
 use crate::contact::case::read::wheelset;
 use crate::contact::case::words::contact::{Contact, Load};
 
-const RADIUS: Interval = Interval::positive(1e9, "mm");
-const SEMI_AXIS: Interval = Interval::positive(1e6, "mm");
-const FORCE: Interval = Interval::positive(1e12, "N");
-const APPROACH: Interval = Interval::positive(1e6, "mm");
-const APPROACH_OF_GAP: Interval = Interval::closed(-1e6, 1e6, "mm");
+const RADIUS: AllowedRange = AllowedRange::positive(1e9, "mm");
+const SEMI_AXIS: AllowedRange = AllowedRange::positive(1e6, "mm");
+const FORCE: AllowedRange = AllowedRange::positive(1e12, "N");
+const APPROACH: AllowedRange = AllowedRange::positive(1e6, "mm");
+const APPROACH_OF_GAP: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 /// Members of a load; the first is for profiles only.
 const LOADS: [&str; 3] = ["vertical_force_n", "normal_force_n", "approach_mm"];
 const PRESSURE: SampleQuantity = SampleQuantity {
     member: "pressure_mpa",
     word: "pressure",
-    allowed: Interval::closed(0.0, 1e12, "MPa"),
+    allowed: AllowedRange::closed(0.0, 1e12, "MPa"),
 };
 const GAP: SampleQuantity = SampleQuantity {
     member: "gap_mm",
     word: "gap",
-    allowed: Interval::closed(-1e6, 1e6, "mm"),
+    allowed: AllowedRange::closed(-1e6, 1e6, "mm"),
 };
 
 #[derive(Clone, Copy)]

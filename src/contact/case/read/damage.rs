@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, number, shown, word};
 use crate::contact::case::read::subsurface::{flag, optional};
 use crate::contact::case::words::damage::{
@@ -22,9 +22,9 @@ const MODELS: [(&str, DamageModel); 6] = [
 /// Evaluated where none is named: those whose figures are confirmed.
 const DEFAULT_MODELS: [DamageModel; 2] = [DamageModel::TGamma, DamageModel::UsfdWear];
 const SETS: [(&str, DamageSetName); 1] = [("900a-r8t-1", DamageSetName::Rail900aWheelR8t)];
-const DENSITY: Interval = Interval::positive(1e5, "kg/m³");
-const STRESS: Interval = Interval::positive(1e6, "MPa");
-const FIGURE: Interval = Interval::positive(1e12, "");
+const DENSITY: AllowedRange = AllowedRange::positive(1e5, "kg/m³");
+const STRESS: AllowedRange = AllowedRange::positive(1e6, "MPa");
+const FIGURE: AllowedRange = AllowedRange::positive(1e12, "");
 
 /// Reads the member `damage` of a case, which belongs to the output of that name; left out, it has the default models.
 ///

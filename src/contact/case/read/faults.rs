@@ -55,17 +55,17 @@ impl Faults {
 
 /// The numbers a member may have.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Interval {
+pub(crate) struct AllowedRange {
     low: f64,
     low_excluded: bool,
     high: f64,
     unit: &'static str,
 }
 
-impl Interval {
+impl AllowedRange {
     /// `low <= value <= high`.
     pub(crate) const fn closed(low: f64, high: f64, unit: &'static str) -> Self {
-        Interval {
+        AllowedRange {
             low,
             low_excluded: false,
             high,
@@ -75,7 +75,7 @@ impl Interval {
 
     /// `0 < value <= high`.
     pub(crate) const fn positive(high: f64, unit: &'static str) -> Self {
-        Interval {
+        AllowedRange {
             low: 0.0,
             low_excluded: true,
             high,
@@ -105,7 +105,7 @@ impl Interval {
     }
 }
 
-impl fmt::Display for Interval {
+impl fmt::Display for AllowedRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (low, high) = (plain(self.low), plain(self.high));
         if self.low_excluded {

@@ -2,26 +2,26 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, shown};
 use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::words::friction::{
     AcrossWords, ByTemperatureWords, FallName, FallTermWords, Friction, LayerWords,
 };
 
-const COEFFICIENT: Interval = Interval::closed(0.0, 100.0, "");
+const COEFFICIENT: AllowedRange = AllowedRange::closed(0.0, 100.0, "");
 /// A smaller friction coefficient is refused unless it is 0: dimensionless motions would overflow.
 const COEFFICIENT_LEAST: f64 = 1e-12;
-const ACROSS: Interval = Interval::closed(COEFFICIENT_LEAST, 100.0, "");
-const SPEED: Interval = Interval::positive(1e9, "mm/s");
-const PLACE: Interval = Interval::closed(-1e6, 1e6, "mm");
-const ANGLE: Interval = Interval::closed(-1.6, 1.6, "rad");
-const MODULUS: Interval = Interval::positive(1e12, "MPa");
-const THICKNESS: Interval = Interval::positive(1e3, "mm");
-const REDUCTION: Interval = Interval::positive(1.0, "");
-const TEMPERATURE: Interval = Interval::closed(-273.15, 1e5, "°C");
-const YIELD: Interval = Interval::positive(1e9, "MPa");
-const HARDENING: Interval = Interval::closed(0.0, 1e9, "MPa/mm");
+const ACROSS: AllowedRange = AllowedRange::closed(COEFFICIENT_LEAST, 100.0, "");
+const SPEED: AllowedRange = AllowedRange::positive(1e9, "mm/s");
+const PLACE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
+const ANGLE: AllowedRange = AllowedRange::closed(-1.6, 1.6, "rad");
+const MODULUS: AllowedRange = AllowedRange::positive(1e12, "MPa");
+const THICKNESS: AllowedRange = AllowedRange::positive(1e3, "mm");
+const REDUCTION: AllowedRange = AllowedRange::positive(1.0, "");
+const TEMPERATURE: AllowedRange = AllowedRange::closed(-273.15, 1e5, "°C");
+const YIELD: AllowedRange = AllowedRange::positive(1e9, "MPa");
+const HARDENING: AllowedRange = AllowedRange::closed(0.0, 1e9, "MPa/mm");
 /// Points of a coefficient across, or by temperature.
 const POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// The ways to give a coefficient.
@@ -237,7 +237,7 @@ fn by_temperature(block: &mut Object) -> Option<ByTemperatureWords> {
     })
 }
 
-fn list(block: &mut Object, name: &str, allowed: Interval) -> Option<Vec<f64>> {
+fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
     let what = format!("an array of {} to {} numbers", POINTS.start(), POINTS.end());
     let value = block.required(name, &what)?;
     let elements = value.as_array().filter(|all| POINTS.contains(&all.len()));
@@ -252,7 +252,7 @@ fn numbers_of(
     block: &mut Object,
     name: &str,
     elements: &[Value],
-    allowed: Interval,
+    allowed: AllowedRange,
 ) -> Option<Vec<f64>> {
     let pointer = block.pointer_to(name);
     let mut refused = 0;

@@ -2,23 +2,23 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, shown};
 use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::words::history::{History, HistoryCourse, HistoryStartName};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::range::Range;
 
-const DISTANCE: Interval = Interval::closed(0.0, 1e9, "mm");
-const CREEPAGE: Interval = Interval::closed(-1e6, 1e6, "");
-const SPIN: Interval = Interval::closed(-1e6, 1e6, "1/mm");
-const FORCE: Interval = Interval::closed(-1e15, 1e15, "N");
-const SHIFT: Interval = Interval::closed(-1e6, 1e6, "mm");
-const TURN: Interval = Interval::closed(-10.0, 10.0, "rad");
+const DISTANCE: AllowedRange = AllowedRange::closed(0.0, 1e9, "mm");
+const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");
+const SPIN: AllowedRange = AllowedRange::closed(-1e6, 1e6, "1/mm");
+const FORCE: AllowedRange = AllowedRange::closed(-1e15, 1e15, "N");
+const SHIFT: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
+const TURN: AllowedRange = AllowedRange::closed(-10.0, 10.0, "rad");
 /// Most points, before the limit of the service.
 const POINTS_MAX: u32 = 1_000_000;
 /// Components along x, across and about z; each force excludes its creepage and its shift.
-const COMPONENTS: [(&str, Interval); 8] = [
+const COMPONENTS: [(&str, AllowedRange); 8] = [
     ("creepage_x", CREEPAGE),
     ("creepage_y", CREEPAGE),
     ("spin_per_mm", SPIN),
@@ -162,7 +162,7 @@ fn shifted_at_rest(
 fn course(
     block: &mut Object,
     name: &str,
-    allowed: Interval,
+    allowed: AllowedRange,
     points: Option<usize>,
 ) -> Option<HistoryCourse> {
     let pointer = block.pointer_to(name);

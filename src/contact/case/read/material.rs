@@ -1,11 +1,11 @@
 //! Reads `material`: one set of elastic constants, or one for each body.
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::Object;
 use crate::contact::case::words::material::{Elastic, Material};
 
-const MODULUS: Interval = Interval::positive(1e12, "MPa");
-const POISSON_RATIO: Interval = Interval::closed(0.0, 0.5, "");
+const MODULUS: AllowedRange = AllowedRange::positive(1e12, "MPa");
+const POISSON_RATIO: AllowedRange = AllowedRange::closed(0.0, 0.5, "");
 
 /// Reads the required member `material` of a case.
 pub(crate) fn read(case: &mut Object) -> Option<Material> {

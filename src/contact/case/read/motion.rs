@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::{Faults, Interval};
+use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::history;
 use crate::contact::case::read::object::{Object, join, shown};
 use crate::contact::case::read::samples::{count_rest, numbers};
@@ -11,16 +11,16 @@ use crate::contact::case::words::motion::{
 };
 use crate::contact::case::words::range::Range;
 
-const CREEPAGE: Interval = Interval::closed(-1e6, 1e6, "");
-const SPIN: Interval = Interval::closed(-1e6, 1e6, "1/mm");
-const SPEED: Interval = Interval::positive(1e9, "mm/s");
-const VELOCITY: Interval = Interval::closed(-1e9, 1e9, "mm/s");
-const RATE: Interval = Interval::closed(-1e6, 1e6, "rad/s");
-const RADIUS: Interval = Interval::positive(1e9, "mm");
-const TORQUE: Interval = Interval::closed(-1e15, 1e15, "N mm");
+const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");
+const SPIN: AllowedRange = AllowedRange::closed(-1e6, 1e6, "1/mm");
+const SPEED: AllowedRange = AllowedRange::positive(1e9, "mm/s");
+const VELOCITY: AllowedRange = AllowedRange::closed(-1e9, 1e9, "mm/s");
+const RATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "rad/s");
+const RADIUS: AllowedRange = AllowedRange::positive(1e9, "mm");
+const TORQUE: AllowedRange = AllowedRange::closed(-1e15, 1e15, "N mm");
 /// Most motions of a sweep, before the limit of the service.
 const POINTS_MAX: u32 = 1_000_000;
-const FORCE: Interval = Interval::closed(-1e15, 1e15, "N");
+const FORCE: AllowedRange = AllowedRange::closed(-1e15, 1e15, "N");
 /// The forces stand in the order of the creepages they replace.
 const COMPONENTS: [&str; 5] = [
     "creepage_x",
@@ -128,9 +128,9 @@ fn speed(block: &mut Object) -> Option<Option<f64>> {
 
 /// The motion of a wheelset; on both rails a torque can be balanced, on one a longitudinal force.
 fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
-    const TORQUE_NAME: (&str, Interval) = ("drive_torque_n_mm", TORQUE);
-    const FORCE_NAME: (&str, Interval) = ("force_x_n", FORCE);
-    const RATES: [(&str, Interval); 3] = [
+    const TORQUE_NAME: (&str, AllowedRange) = ("drive_torque_n_mm", TORQUE);
+    const FORCE_NAME: (&str, AllowedRange) = ("force_x_n", FORCE);
+    const RATES: [(&str, AllowedRange); 3] = [
         ("lateral_velocity_mm_per_s", VELOCITY),
         ("yaw_rate_rad_per_s", RATE),
         ("roll_rate_rad_per_s", RATE),
@@ -288,7 +288,7 @@ fn components(
 }
 
 /// A number, `{"from": …, "to": …, "points": …}` or `{"values": […]}`.
-pub(crate) fn swept(block: &mut Object, name: &str, allowed: Interval) -> Option<Swept> {
+pub(crate) fn swept(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Swept> {
     let what = "a number, {\"from\": …, \"to\": …, \"points\": …} or {\"values\": […]}";
     match block.value(name)? {
         Value::Number(_) => block.number(name, allowed).map(Swept::Constant),
@@ -303,7 +303,7 @@ pub(crate) fn swept(block: &mut Object, name: &str, allowed: Interval) -> Option
     }
 }
 
-fn list(block: &mut Object, name: &str, allowed: Interval) -> Option<ValueList> {
+fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<ValueList> {
     let mut block = block.child(name)?;
     block.only(&["values"], &[]);
     let value = block.value("values")?;
@@ -325,7 +325,7 @@ fn list(block: &mut Object, name: &str, allowed: Interval) -> Option<ValueList> 
     Some(ValueList { values: values? })
 }
 
-fn range(block: &mut Object, name: &str, allowed: Interval) -> Option<Range> {
+fn range(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Range> {
     let mut block = block.child(name)?;
     block.only(&["from", "to", "points"], &[]);
     let from = block.required_number("from", allowed);
@@ -342,7 +342,7 @@ fn range(block: &mut Object, name: &str, allowed: Interval) -> Option<Range> {
     Some(Range { from, to, points })
 }
 
-fn interval(component: usize) -> Interval {
+fn interval(component: usize) -> AllowedRange {
     match component {
         SPIN_AT => SPIN,
         FORCES_FROM.. => FORCE,

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde_json::{Map, Value};
 
-use crate::contact::case::read::faults::{Faults, Interval, SHOWN_MAX, code_of, figures};
+use crate::contact::case::read::faults::{AllowedRange, Faults, SHOWN_MAX, code_of, figures};
 use crate::contact::error::{FaultCode, FaultFigures};
 
 /// An object, where it stands in the case, and the list its faults go to.
@@ -108,14 +108,14 @@ impl<'v, 'f> Object<'v, 'f> {
     }
 
     /// A number that may be left out.
-    pub(crate) fn number(&mut self, name: &str, allowed: Interval) -> Option<f64> {
+    pub(crate) fn number(&mut self, name: &str, allowed: AllowedRange) -> Option<f64> {
         let value = self.members.get(name)?;
         let pointer = self.pointer_to(name);
         number(value, &pointer, allowed, self.faults)
     }
 
     /// A number that has to be there.
-    pub(crate) fn required_number(&mut self, name: &str, allowed: Interval) -> Option<f64> {
+    pub(crate) fn required_number(&mut self, name: &str, allowed: AllowedRange) -> Option<f64> {
         if !self.has(name) {
             let detail = format!("missing; {allowed} is needed");
             self.fault_with(name, detail, allowed.figures(FaultCode::Missing, None));
@@ -132,7 +132,7 @@ impl<'v, 'f> Object<'v, 'f> {
             Some(n) if f64::from(low) <= n && n <= f64::from(high) => Some(n as u32),
             _ => {
                 let detail = format!("{} given; {what} is needed", shown(value));
-                let allowed = Interval::closed(low.into(), high.into(), "");
+                let allowed = AllowedRange::closed(low.into(), high.into(), "");
                 let code = code_of(value, Value::is_number);
                 self.fault_with(name, detail, allowed.figures(code, Some(value)));
                 None
@@ -201,7 +201,7 @@ impl<'v, 'f> Object<'v, 'f> {
 pub(crate) fn number(
     value: &Value,
     pointer: &str,
-    allowed: Interval,
+    allowed: AllowedRange,
     faults: &mut Faults,
 ) -> Option<f64> {
     match value.as_f64() {
@@ -306,8 +306,8 @@ mod tests {
 
     #[test]
     fn both_sides_of_an_interval_are_kept() {
-        let open = Interval::positive(2.0, "mm");
-        let closed = Interval::closed(0.0, 0.5, "");
+        let open = AllowedRange::positive(2.0, "mm");
+        let closed = AllowedRange::closed(0.0, 0.5, "");
         assert!(!open.contains(0.0) && open.contains(f64::MIN_POSITIVE) && open.contains(2.0));
         assert!(
             !open.contains(2.0_f64.next_up()) && !open.contains(-1.0) && !open.contains(f64::NAN)
@@ -317,7 +317,7 @@ mod tests {
         );
         assert_eq!(open.to_string(), "a number more than 0 and at most 2 mm");
         assert_eq!(
-            Interval::closed(-1e6, 1e6, "").to_string(),
+            AllowedRange::closed(-1e6, 1e6, "").to_string(),
             "a number from -1e6 to 1e6"
         );
     }

@@ -2,10 +2,10 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::{Faults, Interval};
+use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::object::{Object, join, number, shown};
 
-const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
+const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 /// Points of one axis of a grid.
 const AXIS_POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// Least distance of neighbouring coordinates of an axis, relative to the length of the axis: closer ones cannot be told apart in the
@@ -76,7 +76,7 @@ pub(crate) struct SampleQuantity {
     pub(crate) member: &'static str,
     /// One of them in words.
     pub(crate) word: &'static str,
-    pub(crate) allowed: Interval,
+    pub(crate) allowed: AllowedRange,
 }
 
 /// The samples of a line with `n` points, where the axis is known.
@@ -179,7 +179,7 @@ pub(crate) fn samples(
 pub(crate) fn numbers(
     elements: &[Value],
     pointer: &str,
-    allowed: Interval,
+    allowed: AllowedRange,
     refused: &mut usize,
     faults: &mut Faults,
 ) -> Option<Vec<f64>> {
@@ -199,7 +199,12 @@ pub(crate) fn numbers(
 }
 
 /// Says how many faulty numbers were not listed.
-pub(crate) fn count_rest(pointer: &str, allowed: Interval, refused: usize, faults: &mut Faults) {
+pub(crate) fn count_rest(
+    pointer: &str,
+    allowed: AllowedRange,
+    refused: usize,
+    faults: &mut Faults,
+) {
     if refused > GRID_FAULTS_MAX {
         faults.add(
             pointer,

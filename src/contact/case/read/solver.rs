@@ -1,14 +1,14 @@
 //! Reads `solver` and `outputs`: how to solve, how exactly, and what to answer.
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, shown, word};
 use crate::contact::case::resolution::TARGET_ERROR_DEFAULT;
 use crate::contact::case::words::solver::{
     MeshSizeWords, MethodName, Output, Solver, TractionBoundName,
 };
 
-const TARGET_ERROR: Interval = Interval::closed(1e-4, 0.5, "");
-const TIME_LIMIT: Interval = Interval::positive(86_400.0, "s");
+const TARGET_ERROR: AllowedRange = AllowedRange::closed(1e-4, 0.5, "");
+const TIME_LIMIT: AllowedRange = AllowedRange::positive(86_400.0, "s");
 /// Most strips, and cells in one, of an explicit mesh.
 const MESH_SIDE_MAX: u32 = 1000;
 

@@ -2,17 +2,17 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, number, shown};
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::{
     BodyName, DepthLineAt, FoundPlace, GridAxis, PassageWords, StressGrid, SubsurfaceWords,
 };
 
-const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
-const DEPTH: Interval = Interval::closed(0.0, 1e6, "mm");
+const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
+const DEPTH: AllowedRange = AllowedRange::closed(0.0, 1e6, "mm");
 /// Steels have a few tenths.
-const DANG_VAN_SLOPE: Interval = Interval::closed(0.0, 10.0, "");
+const DANG_VAN_SLOPE: AllowedRange = AllowedRange::closed(0.0, 10.0, "");
 /// Most points of one list or axis, before the limit of the service.
 const COUNT_MAX: u32 = 1_000_000;
 const PLACES: [&str; 3] = ["points_mm", "along_depth_at_mm", "plane"];
@@ -193,7 +193,7 @@ fn line_at(block: &mut Object, name: &str) -> Option<DepthLineAt> {
     None
 }
 
-fn list(block: &mut Object, name: &str, allowed: Interval) -> Option<Vec<f64>> {
+fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
     let value = block.value(name)?;
     let elements = value.as_array().filter(|elements| !elements.is_empty());
     let Some(elements) = elements else {
@@ -211,7 +211,7 @@ fn list(block: &mut Object, name: &str, allowed: Interval) -> Option<Vec<f64>> {
     read.into_iter().collect()
 }
 
-fn axis(block: &mut Object, name: &str, allowed: Interval) -> Option<GridAxis> {
+fn axis(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<GridAxis> {
     let what = "a number, an array of numbers or {\"from\", \"to\", \"points\"}";
     match block.required(name, what)? {
         Value::Array(_) => list(block, name, allowed).map(GridAxis::List),

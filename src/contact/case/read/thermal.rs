@@ -1,15 +1,15 @@
 //! Reads `thermal`: what the bodies do with heat.
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::Object;
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::thermal::{ThermalBodyWords, ThermalWords};
 
-const CONDUCTIVITY: Interval = Interval::positive(1e6, "W/(m K)");
-const DENSITY: Interval = Interval::positive(1e6, "kg/m³");
-const SPECIFIC_HEAT: Interval = Interval::positive(1e6, "J/(kg K)");
-const BULK: Interval = Interval::closed(-273.15, 1e5, "°C");
+const CONDUCTIVITY: AllowedRange = AllowedRange::positive(1e6, "W/(m K)");
+const DENSITY: AllowedRange = AllowedRange::positive(1e6, "kg/m³");
+const SPECIFIC_HEAT: AllowedRange = AllowedRange::positive(1e6, "J/(kg K)");
+const BULK: AllowedRange = AllowedRange::closed(-273.15, 1e5, "°C");
 
 /// Reads the member `thermal` of a case, which belongs to the output `temperature` and to friction that falls with temperature.
 ///

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, number, shown};
 use crate::contact::case::words::contact::{
     Contact, CrossSection, FormatName, SideName, Smoothing, SmoothingWord,
@@ -15,14 +15,14 @@ const FORMATS: [(&str, FormatName); 3] = [
     ("simpack", FormatName::Simpack),
     ("miniprof", FormatName::Miniprof),
 ];
-pub(crate) const ROLLING_RADIUS: Interval = Interval::positive(1e5, "mm");
-pub(crate) const DISTANCE: Interval = Interval::positive(1e5, "mm");
-pub(crate) const PLACE: Interval = Interval::closed(-1e3, 1e3, "mm");
-pub(crate) const DEPTH: Interval = Interval::closed(0.0, 100.0, "mm");
-pub(crate) const CANT: Interval = Interval::closed(-0.5, 0.5, "rad");
-pub(crate) const ANGLE: Interval = Interval::closed(-0.3, 0.3, "rad");
-const COORDINATE: Interval = Interval::closed(-1e6, 1e6, "mm");
-const SMOOTHING: Interval = Interval::closed(0.0, 50.0, "mm");
+pub(crate) const ROLLING_RADIUS: AllowedRange = AllowedRange::positive(1e5, "mm");
+pub(crate) const DISTANCE: AllowedRange = AllowedRange::positive(1e5, "mm");
+pub(crate) const PLACE: AllowedRange = AllowedRange::closed(-1e3, 1e3, "mm");
+pub(crate) const DEPTH: AllowedRange = AllowedRange::closed(0.0, 100.0, "mm");
+pub(crate) const CANT: AllowedRange = AllowedRange::closed(-0.5, 0.5, "rad");
+pub(crate) const ANGLE: AllowedRange = AllowedRange::closed(-0.3, 0.3, "rad");
+const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
+const SMOOTHING: AllowedRange = AllowedRange::closed(0.0, 50.0, "mm");
 /// Characters of a file.
 const TEXT_MAX: usize = 4_000_000;
 /// Faulty points of one cross-section that are listed one by one.
@@ -54,7 +54,7 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
         .required("side", what)
         .and_then(|_| block.word("side", &SIDES, &[]));
     let rolling_radius_mm = block.required_number("rolling_radius_mm", ROLLING_RADIUS);
-    let mut or = |name: &str, allowed: Interval, default: f64| {
+    let mut or = |name: &str, allowed: AllowedRange, default: f64| {
         if block.has(name) {
             block.number(name, allowed)
         } else {

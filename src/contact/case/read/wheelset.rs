@@ -1,6 +1,6 @@
 //! Reads a contact of the type `wheelset`, and the load that goes with it.
 
-use crate::contact::case::read::faults::Interval;
+use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::motion::swept;
 use crate::contact::case::read::object::{Object, shown};
 use crate::contact::case::read::samples::{count_rest, numbers};
@@ -10,9 +10,9 @@ use crate::contact::case::read::wheel_rail::{
 use crate::contact::case::words::contact::{Contact, KinematicsWords, Load, RightSide};
 use crate::contact::case::words::motion::{Combine, Swept};
 
-const SHARE: Interval = Interval::closed(0.01, 0.99, "");
-const REACH: Interval = Interval::positive(50.0, "mm");
-const STEP: Interval = Interval::positive(5.0, "mm");
+const SHARE: AllowedRange = AllowedRange::closed(0.01, 0.99, "");
+const REACH: AllowedRange = AllowedRange::positive(50.0, "mm");
+const STEP: AllowedRange = AllowedRange::positive(5.0, "mm");
 /// Most shifts to one side, and most amplitudes.
 const SHIFTS_MAX: f64 = 1000.0;
 const AMPLITUDES_MAX: usize = 100;
@@ -44,7 +44,7 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
     let wheel = section(block, "wheel");
     let right = right(block);
     let rolling_radius_mm = block.required_number("rolling_radius_mm", ROLLING_RADIUS);
-    let mut or = |name: &str, allowed: Interval, default: f64| {
+    let mut or = |name: &str, allowed: AllowedRange, default: f64| {
         if block.has(name) {
             block.number(name, allowed)
         } else {
@@ -79,7 +79,7 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
 
 /// Shifts, yaws, and how they are combined.
 fn poses(block: &mut Object) -> Option<(Swept, Swept, Combine)> {
-    let mut values = |name: &str, allowed: Interval| {
+    let mut values = |name: &str, allowed: AllowedRange| {
         if block.has(name) {
             swept(block, name, allowed)
         } else {
@@ -144,7 +144,7 @@ fn kinematics(block: &mut Object) -> Option<Option<KinematicsWords>> {
     }
     let mut asked = block.child("kinematics")?;
     asked.only(&["reach_mm", "step_mm", "amplitudes_mm"], &[]);
-    let mut or = |name: &str, allowed: Interval, default: f64| {
+    let mut or = |name: &str, allowed: AllowedRange, default: f64| {
         if asked.has(name) {
             asked.number(name, allowed)
         } else {
@@ -191,7 +191,7 @@ fn amplitudes(asked: &mut Object) -> Option<Vec<f64>> {
 }
 
 /// Reads the load of a wheelset: the vertical force of both wheels, and the part of the left one.
-pub(crate) fn read_load(case: &mut Object, force: Interval) -> Option<Load> {
+pub(crate) fn read_load(case: &mut Object, force: AllowedRange) -> Option<Load> {
     let what = "{\"vertical_force_n\": …}, the force of both wheels";
     case.required("load", what)?;
     let mut block = case.child("load")?;

@@ -7,7 +7,7 @@ use pulp::{Arch, NullaryFnOnce};
 use crate::contact::mesh::observation::observe;
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::simd_ln::Number;
+use crate::contact::numerics::simd_ln::Float;
 
 /// All cell edges of a mesh, as seen from the mid-line of one strip.
 pub(crate) struct CellEdges<T> {
@@ -25,7 +25,7 @@ pub(crate) struct CellEdges<T> {
     row: [Vec<T>; 3],
 }
 
-impl<T: Number> CellEdges<T> {
+impl<T: Float> CellEdges<T> {
     pub(crate) fn new(mesh: &Mesh) -> CellEdges<T> {
         let mut x: Vec<T> = Vec::with_capacity(mesh.cells() + mesh.segments.len());
         for segment in &mesh.segments {
@@ -151,7 +151,7 @@ pub(crate) struct OperatorAssembly<'a> {
 
 impl OperatorAssembly<'_> {
     /// All rows, one after the other.
-    pub(crate) fn rows<T: Number>(&self, monitor: &dyn Monitor) -> Result<Vec<T>, Stop> {
+    pub(crate) fn matrix<T: Float>(&self, monitor: &dyn Monitor) -> Result<Vec<T>, Stop> {
         let rows = self.first_row[self.first_row.len() - 1];
         let mut matrix = vec![T::ZERO; rows * self.row_length];
         let mut edges = CellEdges::new(self.mesh);
@@ -188,7 +188,7 @@ pub(crate) struct SegmentRows<'a, T> {
     pub(crate) target: &'a mut [T],
 }
 
-impl<T: Number> NullaryFnOnce for SegmentRows<'_, T> {
+impl<T: Float> NullaryFnOnce for SegmentRows<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -224,7 +224,7 @@ impl<T: Number> NullaryFnOnce for SegmentRows<'_, T> {
 
 /// Adds and subtracts the value of the mirrored cell for the first half of the segments.
 #[inline(always)]
-fn fold<T: Number>(mesh: &Mesh, values: &[T], plus: &mut [T], minus: &mut [T]) {
+fn fold<T: Float>(mesh: &Mesh, values: &[T], plus: &mut [T], minus: &mut [T]) {
     let m = mesh.segments.len();
     for (here, there) in mesh.segments[..m / 2]
         .iter()

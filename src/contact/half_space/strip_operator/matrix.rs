@@ -25,8 +25,8 @@ impl Matrix {
         monitor: &dyn Monitor,
     ) -> Result<Matrix, Stop> {
         match precision {
-            Precision::Single => assembly.rows(monitor).map(Matrix::Single),
-            Precision::Double => assembly.rows(monitor).map(Matrix::Double),
+            Precision::Single => assembly.matrix(monitor).map(Matrix::Single),
+            Precision::Double => assembly.matrix(monitor).map(Matrix::Double),
         }
     }
 

@@ -142,7 +142,7 @@ impl StripOperator {
 
     /// Rows of segment `j`.
     #[must_use]
-    pub fn rows(&self, j: usize) -> std::ops::Range<usize> {
+    pub fn segment_rows(&self, j: usize) -> std::ops::Range<usize> {
         self.first_row[j]..self.first_row[j + 1]
     }
 
@@ -345,7 +345,7 @@ impl StripOperator {
     fn join(&self, same: &[f64], opposite: &[f64], out: &mut [f64]) {
         let total = 2 * self.row_count();
         for j in 0..self.segments() {
-            let rows = self.rows(j);
+            let rows = self.segment_rows(j);
             let image = total - rows.end;
             for (k, i) in rows.enumerate() {
                 // The part of opposite parity changes its sign in the mirrored half.

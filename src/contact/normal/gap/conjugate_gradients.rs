@@ -7,7 +7,7 @@
 use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::contact::half_space::transforms::FftFloat;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::hertz::Pressing;
+use crate::contact::normal::hertz::NormalLoad;
 
 /// Displacements that pressures on cells cause, cells of one size or of several.
 pub(crate) trait PressureInfluence {
@@ -62,7 +62,7 @@ const ITERATIONS_MAX: u32 = 500;
 
 /// Pressures, distances and approach of two bodies pressed together, and how well they meet the contact conditions.
 #[derive(Debug, Clone)]
-pub(crate) struct Pressed {
+pub(crate) struct GridPressure {
     /// Pressure of every cell in MPa.
     pub(crate) pressure: Vec<f64>,
     /// Distance of the deformed surfaces at every cell in mm; about 0 in contact.
@@ -76,7 +76,7 @@ pub(crate) struct Pressed {
     pub(crate) residual: f64,
 }
 
-impl Pressed {
+impl GridPressure {
     /// The largest pressure in MPa.
     pub(crate) fn largest(&self) -> f64 {
         self.pressure.iter().copied().fold(0.0, f64::max)
@@ -98,8 +98,8 @@ pub(crate) struct PressureTask<'a> {
     pub(crate) gap: &'a [f64],
     /// Area of the first cell in mm².
     pub(crate) cell: f64,
-    pub(crate) pressing: Pressing,
-    /// Violation of the contact conditions to reach, see [`Pressed::residual`].
+    pub(crate) loading: NormalLoad,
+    /// Violation of the contact conditions to reach, see [`GridPressure::residual`].
     pub(crate) tolerance: f64,
 }
 
@@ -112,11 +112,11 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
     start: Vec<f64>,
     workspace: &mut I::Workspace,
     monitor: &dyn Monitor,
-) -> Result<Pressed, PressureFailure> {
+) -> Result<GridPressure, PressureFailure> {
     let PressureTask {
         gap,
         cell,
-        pressing,
+        loading,
         tolerance,
     } = *task;
     let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
@@ -129,7 +129,7 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
         r: vec![0.0; n],
         changes: Vec::new(),
     };
-    work.scale_to(influence, pressing, cell);
+    work.scale_to(influence, loading, cell);
     influence.apply(&work.p, &mut work.u, workspace);
     let (mut follow, mut last) = (false, 1.0);
     let mut residual = f64::INFINITY;
@@ -137,11 +137,11 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(PressureFailure::Stopped(stop));
         }
-        let approach = work.distances(influence, gap, pressing);
+        let approach = work.distances(influence, gap, loading);
         let (violation, square) = work.part_from(influence, approach);
         residual = violation / (approach - least);
         if residual <= tolerance && approach > least {
-            return Ok(Pressed {
+            return Ok(GridPressure {
                 pressure: work.p,
                 distance: work.g,
                 approach,
@@ -153,14 +153,14 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
         last = square;
         work.direction(influence, factor);
         influence.apply(&work.t, &mut work.r, workspace);
-        let step = work.step(influence, pressing);
+        let step = work.step(influence, loading);
         follow = work.advance(influence, step);
         if work.changes.len() <= I::CHANGES_MAX {
             influence.add(&work.changes, &mut work.u);
-            let scale = work.scale_to(influence, pressing, cell);
+            let scale = work.scale_to(influence, loading, cell);
             work.u.iter_mut().for_each(|u| *u *= scale);
         } else {
-            work.scale_to(influence, pressing, cell);
+            work.scale_to(influence, loading, cell);
             influence.apply(&work.p, &mut work.u, workspace);
         }
     }
@@ -185,10 +185,10 @@ impl PressureIterate {
     fn scale_to(
         &mut self,
         influence: &impl PressureInfluence,
-        pressing: Pressing,
+        loading: NormalLoad,
         cell: f64,
     ) -> f64 {
-        let Pressing::Force(force) = pressing else {
+        let NormalLoad::Force(force) = loading else {
             return 1.0;
         };
         let [sum] = sums(self.p.len(), |k| [influence.area(k) * self.p[k]]);
@@ -202,20 +202,20 @@ impl PressureIterate {
         &mut self,
         influence: &impl PressureInfluence,
         gap: &[f64],
-        pressing: Pressing,
+        loading: NormalLoad,
     ) -> f64 {
         for ((g, u), h) in self.g.iter_mut().zip(&self.u).zip(gap) {
             *g = u + h;
         }
-        match pressing {
-            Pressing::Force(_) => {
+        match loading {
+            NormalLoad::Force(_) => {
                 let [sum, count] = self.inside(|k| {
                     let weight = influence.area(k) * influence.yielding(k);
                     [weight * self.g[k], weight]
                 });
                 sum / count
             }
-            Pressing::Approach(approach) => approach,
+            NormalLoad::Approach(approach) => approach,
         }
     }
 
@@ -242,7 +242,7 @@ impl PressureIterate {
     }
 
     /// Length of the step that leaves no distance along the direction.
-    fn step(&self, influence: &impl PressureInfluence, pressing: Pressing) -> f64 {
+    fn step(&self, influence: &impl PressureInfluence, loading: NormalLoad) -> f64 {
         let (g, t, r) = (&self.g, &self.t, &self.r);
         let [above, product, along, sum, count] = self.inside(|k| {
             let area = influence.area(k);
@@ -255,9 +255,9 @@ impl PressureIterate {
                 weight,
             ]
         });
-        let below = match pressing {
-            Pressing::Force(_) => product - sum / count * along,
-            Pressing::Approach(_) => product,
+        let below = match loading {
+            NormalLoad::Force(_) => product - sum / count * along,
+            NormalLoad::Approach(_) => product,
         };
         // A single cell under a force leaves nothing to minimise; a step by its own stiffness lets other cells in.
         if below > 0.0 && above > 0.0 {
@@ -340,13 +340,13 @@ mod tests {
             .collect()
     }
 
-    fn solved(pressing: Pressing, start: Vec<f64>) -> Pressed {
+    fn solved(loading: NormalLoad, start: Vec<f64>) -> GridPressure {
         let mut workspace = GridWorkspace::<f64>::default();
         let influence = GridOperator::new([CELLS; 2], [STEP; 2], MODULUS, &mut workspace);
         let task = PressureTask {
             gap: &paraboloid(),
             cell: STEP * STEP,
-            pressing,
+            loading,
             tolerance: 1e-9,
         };
         solve_pressure(&task, &influence, start, &mut workspace, &Unmonitored).unwrap()
@@ -359,7 +359,7 @@ mod tests {
         let task = PressureTask {
             gap: &paraboloid(),
             cell: STEP * STEP,
-            pressing: Pressing::Force(5e4),
+            loading: NormalLoad::Force(5e4),
             tolerance: -1.0,
         };
         let start = vec![1.0; CELLS * CELLS];
@@ -372,10 +372,10 @@ mod tests {
 
     #[test]
     fn the_start_does_not_decide_the_pressure() {
-        let even = solved(Pressing::Force(5e4), vec![1.0; CELLS * CELLS]);
+        let even = solved(NormalLoad::Force(5e4), vec![1.0; CELLS * CELLS]);
         let mut corner = vec![0.0; CELLS * CELLS];
         corner[3] = 7.0;
-        let far = solved(Pressing::Force(5e4), corner);
+        let far = solved(NormalLoad::Force(5e4), corner);
         let largest = even.pressure.iter().copied().fold(0.0, f64::max);
         for (a, b) in even.pressure.iter().zip(&far.pressure) {
             assert!((a - b).abs() < 1e-5 * largest, "{a} {b}");
@@ -385,16 +385,16 @@ mod tests {
 
     #[test]
     fn force_and_approach_are_two_names_for_one_contact() {
-        let by_force = solved(Pressing::Force(5e4), vec![1.0; CELLS * CELLS]);
-        let approach = Pressing::Approach(by_force.approach);
+        let by_force = solved(NormalLoad::Force(5e4), vec![1.0; CELLS * CELLS]);
+        let approach = NormalLoad::Approach(by_force.approach);
         let by_approach = solved(approach, vec![1.0; CELLS * CELLS]);
-        let sum = |pressed: &Pressed| pressed.pressure.iter().sum::<f64>();
+        let sum = |pressed: &GridPressure| pressed.pressure.iter().sum::<f64>();
         assert!((sum(&by_approach) / sum(&by_force) - 1.0).abs() < 1e-6);
     }
 
     #[test]
     fn nothing_overlaps_and_only_touching_cells_press() {
-        let pressed = solved(Pressing::Force(5e4), vec![1.0; CELLS * CELLS]);
+        let pressed = solved(NormalLoad::Force(5e4), vec![1.0; CELLS * CELLS]);
         let depth = pressed.approach;
         for (p, g) in pressed.pressure.iter().zip(&pressed.distance) {
             assert!(*p >= 0.0 && *g >= -1e-8 * depth);

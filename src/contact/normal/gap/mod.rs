@@ -1,6 +1,5 @@
 //! Region and pressure of a given gap.
 
-pub mod coarse_look;
 pub mod conjugate_gradients;
 pub mod constants;
 pub mod coupling;
@@ -8,6 +7,7 @@ pub mod edges;
 pub mod grid;
 pub mod outcome;
 pub mod pilot;
+pub mod pilot_solve;
 pub mod search_box;
 pub mod solve;
 pub mod summits;

@@ -135,8 +135,8 @@ fn coarse(tiles: &[Tile]) -> Vec<Coarse> {
 
 /// The pressures of the grids as a field with edges between their cells.
 fn field(tiles: &[Tile]) -> Result<PressureField, String> {
-    let pressing = tiles.iter().filter(|tile| tile.largest() > 0.0);
-    let grids = pressing.map(|Tile { grid, pressed }| {
+    let loaded = tiles.iter().filter(|tile| tile.largest() > 0.0);
+    let grids = loaded.map(|Tile { grid, pressed }| {
         GridPressure::of_solution(
             &grid.centres(0),
             &grid.centres(1),

@@ -1,7 +1,7 @@
 //! The box in which a contact can be: it holds every point at which the bodies could touch, and is found before anything is solved.
 
 use crate::contact::normal::gap::surface::{GapSurface, Window};
-use crate::contact::normal::hertz::Pressing;
+use crate::contact::normal::hertz::NormalLoad;
 
 /// Points of a box along each axis when it is looked through.
 const POINTS: usize = 48;
@@ -36,7 +36,7 @@ struct GapSamples {
 /// Contact lies where the gap is smaller than the approach, whatever the pressure. The approach belonging to a force is
 /// estimated as if the region overlapping by half of it were a circle of the same area pressed by a sphere, which is
 /// exact for a paraboloid: `N = 4/3 E* √(A/π) δ` with A the area where the gap is less than `δ/2` above its least value.
-pub(crate) fn reach(gap: &GapSurface, pressing: Pressing, contact_modulus: f64) -> SearchBox {
+pub(crate) fn reach(gap: &GapSurface, loading: NormalLoad, contact_modulus: f64) -> SearchBox {
     let limits = gap.window();
     let mut window = first_box(gap);
     let mut level = f64::INFINITY;
@@ -44,9 +44,9 @@ pub(crate) fn reach(gap: &GapSurface, pressing: Pressing, contact_modulus: f64) 
     for _ in 0..LOOKS_MAX {
         let look = GapSamples::new(gap, window);
         least = look.least;
-        level = match pressing {
-            Pressing::Approach(approach) => approach,
-            Pressing::Force(force) => look.least + MARGIN * look.depth(force / contact_modulus),
+        level = match loading {
+            NormalLoad::Approach(approach) => approach,
+            NormalLoad::Force(force) => look.least + MARGIN * look.depth(force / contact_modulus),
         };
         let mut next = look.below(level, limits);
         if let Some(rolling) = gap.rolling_radius()
@@ -70,7 +70,7 @@ pub(crate) fn reach(gap: &GapSurface, pressing: Pressing, contact_modulus: f64) 
 
 /// The box in which the gap is less than `level`.
 pub(crate) fn reach_of_level(gap: &GapSurface, level: f64) -> SearchBox {
-    reach(gap, Pressing::Approach(level), f64::NAN)
+    reach(gap, NormalLoad::Approach(level), f64::NAN)
 }
 
 fn length(range: [f64; 2]) -> f64 {
@@ -208,14 +208,10 @@ mod tests {
         let modulus = 115_000.0;
         for (rolling, lateral) in [(300.0, 300.0), (460.0, 40.0), (100.0, 3000.0)] {
             for force in [1.0, 1e3, 1e5] {
-                let pressing = Pressing::Force(force);
-                let hertz = Ellipse::of_radii(rolling, lateral, pressing, modulus);
+                let loading = NormalLoad::Force(force);
+                let hertz = Ellipse::of_radii(rolling, lateral, loading, modulus);
                 let (y, values) = parabola(lateral, 40.0 * hertz.b);
-                let reach = reach(
-                    &GapSurface::profile(rolling, &y, &values),
-                    pressing,
-                    modulus,
-                );
+                let reach = reach(&GapSurface::profile(rolling, &y, &values), loading, modulus);
                 assert!(
                     reach.level > hertz.approach,
                     "{} {}",
@@ -242,7 +238,7 @@ mod tests {
         let (y, values) = parabola(300.0, 2.0);
         let reach = reach(
             &GapSurface::profile(460.0, &y, &values),
-            Pressing::Force(1e6),
+            NormalLoad::Force(1e6),
             1e5,
         );
         assert_eq!(reach.window[1], [-2.0, 2.0]);

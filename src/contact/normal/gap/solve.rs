@@ -7,7 +7,9 @@
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalAnswer, NormalError, edge_reached, no_touch};
-use crate::contact::normal::gap::conjugate_gradients::{Pressed, PressureTask, solve_pressure};
+use crate::contact::normal::gap::conjugate_gradients::{
+    GridPressure, PressureTask, solve_pressure,
+};
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, NEAR, PRESSURE_CHANGE,
     REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL, TOLERANCE,
@@ -17,7 +19,7 @@ use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
 use crate::contact::normal::gap::search_box::{SearchBox, reach, reach_of_level};
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
-use crate::contact::normal::hertz::Pressing;
+use crate::contact::normal::hertz::NormalLoad;
 
 impl GapTask {
     /// What is wrong with the gap, as far as its samples tell without solving.
@@ -38,8 +40,8 @@ impl GapTask {
                 "the least gap, {least} mm, lies at the edge of the data, at {place}; a least gap inside is needed"
             ));
         }
-        match self.pressing {
-            Pressing::Approach(approach) if approach <= least => {
+        match self.loading {
+            NormalLoad::Approach(approach) if approach <= least => {
                 Err(("/load/approach_mm", no_touch(approach, least)))
             }
             _ => Ok(()),
@@ -81,8 +83,8 @@ impl GapTask {
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
-        let mut reach = reach(&self.gap, self.pressing, self.contact_modulus);
-        if let Pressing::Approach(approach) = self.pressing
+        let mut reach = reach(&self.gap, self.loading, self.contact_modulus);
+        if let NormalLoad::Approach(approach) = self.loading
             && approach <= reach.least
         {
             return Err(NormalError::NoAnswer(no_touch(approach, reach.least)));
@@ -91,7 +93,7 @@ impl GapTask {
             PressureGrid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored())
         };
         let mut grid = first(&reach);
-        let mut solved: Option<(PressureGrid, Pressed)> = None;
+        let mut solved: Option<(PressureGrid, GridPressure)> = None;
         let (mut iterations, mut pressure_change) = (0, 0.0);
         let (mut exit, mut capped) = (GridsExit::GridsUsedUp, false);
         for _ in 0..GRIDS_MAX {
@@ -144,11 +146,11 @@ impl GapTask {
     pub(crate) fn pressure_on(
         &self,
         grid: &PressureGrid,
-        before: Option<&(PressureGrid, Pressed)>,
+        before: Option<&(PressureGrid, GridPressure)>,
         reach: &SearchBox,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<Pressed, NormalError> {
+    ) -> Result<GridPressure, NormalError> {
         let gap = grid.gap(&self.gap);
         let (start, tolerance) = match before {
             Some((coarse, pressed)) => {
@@ -163,7 +165,7 @@ impl GapTask {
         let task = PressureTask {
             gap: &gap,
             cell: grid.step[0] * grid.step[1],
-            pressing: self.pressing,
+            loading: self.loading,
             tolerance,
         };
         let mut pressed = solve_pressure(&task, &influence, start, workspace, monitor)?;
@@ -175,8 +177,8 @@ impl GapTask {
     fn next_grid(
         &self,
         grid: &PressureGrid,
-        pressed: &Pressed,
-        before: Option<&(PressureGrid, Pressed)>,
+        pressed: &GridPressure,
+        before: Option<&(PressureGrid, GridPressure)>,
         depth: f64,
         resolution: GridFineness,
     ) -> Result<NextStep, NormalError> {

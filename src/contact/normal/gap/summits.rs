@@ -33,7 +33,7 @@ impl GapTask {
     /// What the contact will be like: its size, and how many summits touch, with valleys between them that are not pressed flat.
     #[must_use]
     pub fn outlook(&self) -> GapOutlook {
-        let reach = reach(&self.gap, self.pressing, self.contact_modulus);
+        let reach = reach(&self.gap, self.loading, self.contact_modulus);
         let depth = reach.level - reach.least;
         let samples = self.gap.samples();
         let within = |k: usize| -> Vec<f64> {

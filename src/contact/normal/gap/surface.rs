@@ -1,6 +1,6 @@
 //! The gap between the undeformed bodies: samples, and a smooth surface through them.
 
-use crate::contact::numerics::cubic::{Cubic, interval, sober_slopes};
+use crate::contact::numerics::cubic::{Cubic, interval, limited_slopes};
 
 /// Distance of the undeformed surfaces in mm, both bodies together, over the contact plane.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,13 +13,13 @@ pub enum GapSurface {
         across: GapCurve,
     },
     /// Any surface, given on a rectangular grid.
-    Grid(Surface),
+    Grid(SampledSurface),
     /// Another gap with a small change, which is constant beyond its grid.
     Changed {
         /// The other gap.
         gap: Box<GapSurface>,
         /// What is added to it.
-        change: Surface,
+        change: SampledSurface,
     },
 }
 
@@ -35,7 +35,7 @@ pub struct GapCurve {
 
 /// A surface with continuous derivatives through samples on a rectangular grid.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Surface {
+pub struct SampledSurface {
     x: Vec<f64>,
     y: Vec<f64>,
     /// Sample (i, j) at `j * x.len() + i`.
@@ -60,7 +60,7 @@ impl GapSurface {
     /// The gap `gap[j][i]` at `(x[i], y[j])`; at least 2 samples along either axis, axes increasing.
     #[must_use]
     pub fn grid(x: &[f64], y: &[f64], gap: &[Vec<f64>]) -> GapSurface {
-        GapSurface::Grid(Surface::new(x, y, gap))
+        GapSurface::Grid(SampledSurface::new(x, y, gap))
     }
 
     /// The same gap with `change[j][i]` added at `(x[i], y[j])`; axes as of [`GapSurface::grid`].
@@ -68,7 +68,7 @@ impl GapSurface {
     pub fn changed(&self, x: &[f64], y: &[f64], change: &[Vec<f64>]) -> GapSurface {
         GapSurface::Changed {
             gap: Box::new(self.clone()),
-            change: Surface::new(x, y, change),
+            change: SampledSurface::new(x, y, change),
         }
     }
 
@@ -160,7 +160,7 @@ impl GapSurface {
                 let at = if across.values[0] <= least { 0 } else { last };
                 (!inside).then(|| place("y", across.axis[at]))
             }
-            GapSurface::Grid(Surface { x, y, values, .. }) => {
+            GapSurface::Grid(SampledSurface { x, y, values, .. }) => {
                 let low = |k: usize| values[k] <= least;
                 let at_edge = |k: usize, n: usize| k == 0 || k + 1 == n;
                 let cell = |k: usize| (k % x.len(), k / x.len());
@@ -204,7 +204,7 @@ impl GapSurface {
 impl GapCurve {
     fn new(axis: &[f64], values: &[f64]) -> GapCurve {
         GapCurve {
-            slopes: sober_slopes(axis, values),
+            slopes: limited_slopes(axis, values),
             axis: axis.to_vec(),
             values: values.to_vec(),
         }
@@ -215,16 +215,16 @@ impl GapCurve {
     }
 }
 
-impl Surface {
-    fn new(x: &[f64], y: &[f64], samples: &[Vec<f64>]) -> Surface {
+impl SampledSurface {
+    fn new(x: &[f64], y: &[f64], samples: &[Vec<f64>]) -> SampledSurface {
         let mut slopes = vec![0.0; x.len() * y.len()];
         for i in 0..x.len() {
             let column: Vec<f64> = samples.iter().map(|row| row[i]).collect();
-            for (j, slope) in sober_slopes(y, &column).into_iter().enumerate() {
+            for (j, slope) in limited_slopes(y, &column).into_iter().enumerate() {
                 slopes[j * x.len() + i] = slope;
             }
         }
-        Surface {
+        SampledSurface {
             x: x.to_vec(),
             y: y.to_vec(),
             values: samples.concat(),
@@ -245,7 +245,7 @@ impl Surface {
                     Cubic::with_slopes(&self.y, j, values, slopes).at(*y)
                 })
                 .collect();
-            let slopes = sober_slopes(&self.x, &line);
+            let slopes = limited_slopes(&self.x, &line);
             out.extend(x.iter().map(|x| value_on(&self.x, &line, &slopes, *x)));
         }
         out

@@ -2,7 +2,7 @@
 
 use crate::contact::normal::gap::pilot::PilotOnce;
 use crate::contact::normal::gap::surface::GapSurface;
-use crate::contact::normal::hertz::Pressing;
+use crate::contact::normal::hertz::NormalLoad;
 
 /// Two bodies with a gap between them, pressed together.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,7 +10,7 @@ pub struct GapTask {
     /// The gap of the undeformed bodies.
     pub gap: GapSurface,
     /// Force, or approach counted from gap = 0.
-    pub pressing: Pressing,
+    pub loading: NormalLoad,
     /// Contact modulus `E* = G/(1−ν)` in MPa.
     pub contact_modulus: f64,
     /// A first look at the contact, kept once it was taken; starts empty.

@@ -10,7 +10,9 @@ use std::ops::Range;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, edge_reached};
-use crate::contact::normal::gap::conjugate_gradients::{Pressed, PressureTask, solve_pressure};
+use crate::contact::normal::gap::conjugate_gradients::{
+    GridPressure, PressureTask, solve_pressure,
+};
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
 };
@@ -127,7 +129,7 @@ impl GapTask {
         let task = PressureTask {
             gap: &gap,
             cell: grids[0].step[0] * grids[0].step[1],
-            pressing: self.pressing,
+            loading: self.loading,
             tolerance: TOLERANCE,
         };
         let pressed = solve_pressure(&task, &influence, start, workspace, monitor)?;
@@ -135,7 +137,7 @@ impl GapTask {
         let tile = |(grid, range): (PressureGrid, Range<usize>)| {
             let mut pressure = pressed.pressure[range.clone()].to_vec();
             grid.symmetrise(&mut pressure);
-            let pressed = Pressed {
+            let pressed = GridPressure {
                 pressure,
                 distance: pressed.distance[range].to_vec(),
                 ..pressed
@@ -272,8 +274,8 @@ fn point_loads(tile: &Tile) -> Vec<[f64; 3]> {
         let sum = &mut sums[part];
         *sum = [sum[0] + force * x[i], sum[1] + force * y[j], sum[2] + force];
     }
-    let pressing = sums.into_iter().filter(|sum| sum[2] > 0.0);
-    pressing
+    let loaded = sums.into_iter().filter(|sum| sum[2] > 0.0);
+    loaded
         .map(|[x, y, force]| [x / force, y / force, force])
         .collect()
 }

@@ -2,7 +2,7 @@
 
 pub mod bracket;
 pub mod gap_remarks;
-pub mod pressed;
 pub mod search;
 pub mod task;
+pub mod wheel_contact;
 pub mod wheelset_task;

@@ -6,19 +6,19 @@
 //! and solved coarsely.
 
 use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::local_gap::{Detail, LocalGap};
+use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::NormalError;
 use crate::contact::normal::gap::pilot::PilotOnce;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::hertz::Pressing;
+use crate::contact::normal::hertz::NormalLoad;
 use crate::contact::normal::neighbours::{Neighbour, neglected};
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
 use crate::contact::normal::wheel_height::gap_remarks::{cut_patches, missed_beside};
-use crate::contact::normal::wheel_height::pressed::{PressedGap, PressedWheel};
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
+use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::remark::list::Remark;
 
 /// Heights after which the search is given up. Keeps the numbers safe; not tuned.
@@ -40,13 +40,13 @@ pub struct NormalPass {
 }
 
 /// Tells from a wheel at some height what friction will carry, see [`NormalPass::friction_share`]; nothing where it cannot be told.
-pub type ShareForecast<'a> = dyn Fn(&PressedWheel) -> Option<f64> + 'a;
+pub type ShareForecast<'a> = dyn Fn(&WheelContact) -> Option<f64> + 'a;
 
 /// What is known before the search for a height begins.
 #[derive(Clone, Copy, Default)]
 pub struct HeightStart<'a> {
     /// An earlier rest under a similar load.
-    pub before: Option<&'a PressedWheel>,
+    pub before: Option<&'a WheelContact>,
     /// Asked at coarse heights, in place of [`NormalPass::friction_share`].
     pub forecast: Option<&'a ShareForecast<'a>>,
 }
@@ -73,7 +73,7 @@ impl Accuracy {
 /// How finely the wheel is solved at one height.
 #[derive(Debug, Clone, Copy)]
 struct Fineness {
-    detail: Detail,
+    detail: GapSampling,
     /// Target of the resultants' error relative to μN.
     target: f64,
 }
@@ -85,7 +85,7 @@ impl Fineness {
             Accuracy::For(target) => target,
         };
         Fineness {
-            detail: Detail::Fine,
+            detail: GapSampling::Fine,
             target,
         }
     }
@@ -136,7 +136,7 @@ impl WheelTask {
         start: HeightStart,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<PressedWheel, NormalError> {
+    ) -> Result<WheelContact, NormalError> {
         if let WheelLoad::Lowering(lowering) = self.loading {
             let fineness = Fineness::fine(wanted);
             return self.lowered(search, lowering, fineness, workspace, monitor);
@@ -147,7 +147,7 @@ impl WheelTask {
             .before
             .and_then(|wheel| wheel.carrying(force, tolerance));
         match (corrected, wanted.accuracy) {
-            (Some(wheel), Accuracy::For(_)) => Ok(PressedWheel {
+            (Some(wheel), Accuracy::For(_)) => Ok(WheelContact {
                 friction_share: wanted.friction_share,
                 ..wheel
             }),
@@ -163,7 +163,7 @@ impl WheelTask {
         HeightStart { before, forecast }: HeightStart,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<PressedWheel, NormalError> {
+    ) -> Result<WheelContact, NormalError> {
         let target = |friction_share: f64| self.target(friction_share).unwrap_or_default();
         let mut friction_share = wanted.friction_share;
         let mut force = target(friction_share);
@@ -172,7 +172,7 @@ impl WheelTask {
         let (mut bracket, mut fineness) = (Bracket::default(), Fineness::fine(wanted));
         let starts_near = before.is_some_and(|before| before.is_near(force));
         if !(exact && starts_near) {
-            fineness.detail = Detail::Coarse;
+            fineness.detail = GapSampling::Coarse;
         }
         let mut lowering = match before.map(|before| (before.lowering, before.found)) {
             Some((height, [carried, slope])) => bracket.next(height, carried, force, slope),
@@ -191,7 +191,7 @@ impl WheelTask {
             };
             let [carried, slope] = found.found;
             let known = bracket.slope;
-            let fine = fineness.detail == Detail::Fine;
+            let fine = fineness.detail == GapSampling::Fine;
             if let Some(share) = forecast.filter(|_| !fine).and_then(|told| told(&found)) {
                 friction_share = share;
                 force = target(share);
@@ -218,7 +218,7 @@ impl WheelTask {
             lowering = if closed { found.lowering } else { next };
             if closed || !fine && found.is_near(force) {
                 // Forces of coarse gaps are too inexact as ends of the bracket; their slope is exact enough.
-                fineness.detail = Detail::Fine;
+                fineness.detail = GapSampling::Fine;
                 bracket = bracket.opened(found.found[1]);
             }
         }
@@ -235,11 +235,11 @@ impl WheelTask {
         fineness: Fineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<PressedWheel, NormalError> {
+    ) -> Result<WheelContact, NormalError> {
         match self.lowered(search, lowering, fineness, workspace, monitor) {
-            Err(NormalError::NoAnswer(_)) if fineness.detail == Detail::Coarse => {
+            Err(NormalError::NoAnswer(_)) if fineness.detail == GapSampling::Coarse => {
                 let fine = Fineness {
-                    detail: Detail::Fine,
+                    detail: GapSampling::Fine,
                     ..fineness
                 };
                 self.lowered(search, lowering, fine, workspace, monitor)
@@ -256,7 +256,7 @@ impl WheelTask {
         fineness: Fineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<PressedWheel, NormalError> {
+    ) -> Result<WheelContact, NormalError> {
         let centre = search.touch - lowering;
         let gaps = search
             .gaps(lowering, fineness.detail)
@@ -272,7 +272,7 @@ impl WheelTask {
                 "wheel and rail do not overlap at this height of the wheel".to_owned(),
             ));
         }
-        let mut wheel = PressedWheel {
+        let mut wheel = WheelContact {
             lowering,
             found: [0.0; 2],
             load_error: 0.0,
@@ -298,7 +298,7 @@ impl WheelTask {
         fineness: Fineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<PressedGap, NormalError> {
+    ) -> Result<GapContact, NormalError> {
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(NormalError::Stopped(stop));
         }
@@ -309,17 +309,17 @@ impl WheelTask {
             .collect();
         let contact = GapTask {
             gap: GapSurface::grid(&gap.x, &gap.y, &above),
-            pressing: Pressing::Approach(depth),
+            loading: NormalLoad::Approach(depth),
             contact_modulus: self.contact_modulus,
             pilot: PilotOnce::default(),
         };
         let found = match fineness.detail {
-            Detail::Coarse => contact.estimate(workspace, monitor)?,
-            Detail::Fine => contact.solve_for(fineness.target, workspace, monitor)?,
+            GapSampling::Coarse => contact.estimate(workspace, monitor)?,
+            GapSampling::Fine => contact.solve_for(fineness.target, workspace, monitor)?,
         };
         let mut remarks = found.remarks;
         remarks.extend(missed_beside(gap, &found.field));
-        if fineness.detail == Detail::Fine {
+        if fineness.detail == GapSampling::Fine {
             let cut = cut_patches(&self.geometry, gap, &found.field);
             remarks.extend(cut.map_err(|miss| NormalError::NoAnswer(miss.to_string()))?);
         }
@@ -327,13 +327,13 @@ impl WheelTask {
             let place = self.geometry.moved(&gap.frame, to, centre);
             place.map_err(|miss| NormalError::NoAnswer(miss.to_string()))
         };
-        if fineness.detail == Detail::Fine {
+        if fineness.detail == GapSampling::Fine {
             for patch in 0..found.field.patches().len() {
                 moved(found.field.load_centre(Some(patch)))?;
             }
         }
         let middle = found.field.load_centre(None);
-        Ok(PressedGap {
+        Ok(GapContact {
             frame: moved(middle)?,
             approach: depth,
             field: found.field.from_origin(middle),
@@ -344,7 +344,7 @@ impl WheelTask {
 
     /// A remark if the patches in gaps of their own would change each other's forces by more than a part of the load.
     #[must_use]
-    pub fn uncoupled(&self, wheel: &PressedWheel, part: f64) -> Option<Remark> {
+    pub fn uncoupled(&self, wheel: &WheelContact, part: f64) -> Option<Remark> {
         let gaps = wheel.patches.iter().map(|gap| Neighbour {
             frame: gap.frame,
             force: gap.normal_force(),
@@ -357,18 +357,18 @@ impl WheelTask {
     }
 
     /// The force that is prescribed, as it came out.
-    fn carried(&self, found: &PressedWheel) -> f64 {
+    fn carried(&self, found: &WheelContact) -> f64 {
         match self.loading {
             WheelLoad::Vertical(_) => found.vertical_force(),
             WheelLoad::Normal(_) | WheelLoad::Lowering(_) => {
-                found.patches.iter().map(PressedGap::normal_force).sum()
+                found.patches.iter().map(GapContact::normal_force).sum()
             }
         }
     }
 
     /// Estimated derivative of that force by the lowering.
-    fn slope(&self, found: &PressedWheel, carried: f64) -> f64 {
-        let part = |gap: &PressedGap| {
+    fn slope(&self, found: &WheelContact, carried: f64) -> f64 {
+        let part = |gap: &GapContact| {
             let cos = gap.frame.angle.cos();
             let own = 2.0 * self.contact_modulus * gap.stiffness() * cos;
             match self.loading {

@@ -14,7 +14,7 @@ use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::mesh::strips::Segment;
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::hertz::{Ellipse, Pressing};
+use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::patch::Patch;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::linear_theory;
@@ -105,7 +105,7 @@ impl EllipseMesh {
     /// # Errors
     /// It has no strip.
     pub fn new(size: MeshSize, bound: TractionBound) -> Result<EllipseMesh, SolveError> {
-        let circle = Ellipse::of_semi_axes(1.0, 1.0, Pressing::Force(1.0), 1.0);
+        let circle = Ellipse::of_semi_axes(1.0, 1.0, NormalLoad::Force(1.0), 1.0);
         let footprint = Footprint::hertz(circle);
         let task = RollingTask {
             footprint: &footprint,
@@ -157,8 +157,8 @@ impl EllipseMesh {
         let brush = SimplifiedTheory::new(&ellipse, poisson_ratio, &motion);
         let mesh = &self.level.normalised;
         let (mut force, mut stick, mut whole) = ([0.0; 3], 0.0, 0.0);
-        for (segment, arm) in mesh.segments.iter().zip(&mesh.arm) {
-            let arm = 0.5 * b * (segment.chord.y + arm);
+        for (segment, load_y) in mesh.segments.iter().zip(&mesh.load_y) {
+            let arm = 0.5 * b * (segment.chord.y + load_y);
             let across = brush.growth[0] - brush.turning * b * segment.chord.y;
             let mut ahead = a * segment.chord.right;
             let mut traction = [0.0; 2];

@@ -20,8 +20,10 @@ pub fn along_rigid_slip(level: &StripMesh, motion: &Motion) -> [Vec<f64>; 2] {
 
 fn rigid_slip(level: &StripMesh, motion: &Motion) -> [Vec<f64>; 2] {
     let normalised = &level.normalised;
-    let x = normalised.rows();
-    let x = x.iter().map(|y| motion.creepage_x - motion.spin_per_mm * y);
+    let load_y = normalised.cell_load_y();
+    let x = load_y
+        .iter()
+        .map(|y| motion.creepage_x - motion.spin_per_mm * y);
     let y = normalised.node.iter();
     let y = y.map(|x| motion.creepage_y + motion.spin_per_mm * x);
     [x.collect(), y.collect()]
@@ -81,13 +83,14 @@ pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
 #[must_use]
 pub fn frictionless_answer(level: &StripMesh, motion: &Motion) -> LevelAnswer {
     let cells = level.mesh.cells();
-    let rows = level.mesh.rows();
+    let load_y = level.mesh.cell_load_y();
     let still = motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0;
     LevelAnswer {
         traction: [vec![0.0; cells], vec![0.0; cells]],
         second: None,
         slip: [
-            rows.iter()
+            load_y
+                .iter()
                 .map(|y| motion.creepage_x - motion.spin_per_mm * y)
                 .collect(),
             level

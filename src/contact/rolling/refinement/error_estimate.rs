@@ -272,13 +272,13 @@ fn data_errors(patches: &[Patch], levels: [&StripMesh; 2]) -> Vec<f64> {
         let [x0, x1, y0, y1] = patches[k].extent;
         let (a, b) = (0.5 * (x1 - x0), 0.5 * (y1 - y0));
         let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
-        let rows = level.mesh.rows();
+        let load_y = level.mesh.cell_load_y();
         let mut sums = [0.0; 2];
         for i in level.patch_cells(k) {
             let load = level.pressure[i] * level.area[i] / patches[k].normal_force;
             let centre = 0.5 * (level.mesh.left[i] + level.mesh.right[i]);
             sums[0] += load * (centre - x).abs() / a;
-            sums[1] += load * ((rows[i] - y) / b).powi(2);
+            sums[1] += load * ((load_y[i] - y) / b).powi(2);
         }
         sums
     };

@@ -88,11 +88,11 @@ mod tests {
         let values: Vec<f64> = coarse
             .node
             .iter()
-            .zip(coarse.rows())
+            .zip(coarse.cell_load_y())
             .map(|(x, y)| function(*x, y))
             .collect();
         let found = interpolate(&coarse, &values, &fine);
-        for (i, (x, y)) in fine.node.iter().zip(fine.rows()).enumerate() {
+        for (i, (x, y)) in fine.node.iter().zip(fine.cell_load_y()).enumerate() {
             let inside = x.abs() <= coarse.node[7] && y.abs() <= coarse.segments[5].chord.y;
             assert!(
                 !inside || (found[i] - function(*x, y)).abs() < 1e-12,

@@ -67,7 +67,7 @@ fn place_inside(level: &StripMesh, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
 
 /// Centre of the traction vortex, in the level's dimensionless coordinates.
 fn pole(level: &StripMesh, answer: &LevelAnswer) -> Option<[f64; 2]> {
-    let rows = level.normalised.rows();
+    let y = level.normalised.cell_load_y();
     let load = |i: usize| {
         if answer.slips[i] {
             level.pressure[i] * level.area[i]
@@ -75,9 +75,9 @@ fn pole(level: &StripMesh, answer: &LevelAnswer) -> Option<[f64; 2]> {
             0.0
         }
     };
-    let weight: Vec<f64> = (0..rows.len()).map(load).collect();
+    let weight: Vec<f64> = (0..y.len()).map(load).collect();
     let t: Vec<f64> = answer.traction.concat();
-    vortex_centre(&t, &level.normalised.node, &rows, &weight)
+    vortex_centre(&t, &level.normalised.node, &y, &weight)
 }
 
 /// Error of sampling the vortex, relative to the whole load; 0 where the cell that holds the centre surely

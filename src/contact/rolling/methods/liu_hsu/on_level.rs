@@ -118,7 +118,7 @@ impl<'a> DenseParts<'a> {
         DenseParts {
             bound: resized(level.bound.clone()),
             area: resized(level.normalised.areas()),
-            y: level.normalised.rows(),
+            y: level.normalised.cell_load_y(),
             scale: (largest * compliance).min(1.0),
             motion: *motion,
             level,

@@ -1,4 +1,4 @@
-//! A first look at the contact of a gap: one solve on a coarse grid, which takes 0.3 ms. The time of a solve is estimated from it.
+//! The pilot solve of a gap: one solve on a coarse grid, which takes 0.3 ms. The time of a solve is estimated from it.
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Unmonitored;
@@ -9,19 +9,19 @@ use crate::contact::normal::gap::search_box::{reach, reach_of_level};
 use crate::contact::normal::gap::task::GapTask;
 
 /// Boxes tried: each is larger than the one before. A product on the coarse grid takes 20 µs, and an iteration one or two of them,
-/// so that the worst look of 500 iterations in each box ends within 50 ms.
+/// so that the worst pilot of 500 iterations in each box ends within 50 ms.
 const BOXES_MAX: usize = 3;
 
 impl GapTask {
     /// The contact on a coarse grid, solved at the first call; none if that has no answer.
     pub fn pilot(&self) -> Option<&GapPilot> {
-        self.pilot.get_or_make(|| self.press_coarsely())
+        self.pilot.get_or_make(|| self.solve_coarsely())
     }
 
-    fn press_coarsely(&self) -> Option<GapPilot> {
+    fn solve_coarsely(&self) -> Option<GapPilot> {
         let limits = self.gap.window();
         let mut workspace = GridWorkspace::default();
-        let mut reach = reach(&self.gap, self.pressing, self.contact_modulus);
+        let mut reach = reach(&self.gap, self.loading, self.contact_modulus);
         for _ in 0..BOXES_MAX {
             let grid = PressureGrid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored());
             let pressed = self
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use crate::contact::normal::gap::pilot::PilotOnce;
     use crate::contact::normal::gap::surface::GapSurface;
-    use crate::contact::normal::hertz::Pressing;
+    use crate::contact::normal::hertz::NormalLoad;
 
     #[test]
     fn two_bumps_are_two_patches_that_carry_the_load() {
@@ -66,7 +66,7 @@ mod tests {
         let gap: Vec<f64> = y.iter().map(gap).collect();
         let task = GapTask {
             gap: GapSurface::profile(460.0, &y, &gap),
-            pressing: Pressing::Force(30_000.0),
+            loading: NormalLoad::Force(30_000.0),
             contact_modulus: 115_000.0,
             pilot: PilotOnce::default(),
         };
@@ -75,7 +75,7 @@ mod tests {
             cells_needed,
         }) = task.pilot()
         else {
-            panic!("no look")
+            panic!("no pilot")
         };
         assert_eq!(patches.len(), 2);
         let sum: f64 = patches.iter().map(|patch| patch.force).sum();

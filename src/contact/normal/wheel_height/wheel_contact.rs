@@ -18,7 +18,7 @@ const NEAR_SINGLE: f64 = 0.1;
 
 /// The wheel at rest on its rail.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PressedWheel {
+pub struct WheelContact {
     /// How far the wheel is below first touch, in mm.
     pub lowering: f64,
     /// The force that is prescribed, in N, as it came out at the last height, and its derivative by the lowering.
@@ -36,14 +36,14 @@ pub struct PressedWheel {
     /// Was the force met by fine gaps? Then the contact may be corrected to another force nearby.
     pub(crate) met: bool,
     /// The gaps in contact, from smaller to larger y of the track; never empty.
-    pub patches: Vec<PressedGap>,
+    pub patches: Vec<GapContact>,
     /// Remarks for the answer.
     pub remarks: Vec<RemarkEntry>,
 }
 
 /// The contact in one gap: usually one patch, several where they lie near each other.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PressedGap {
+pub struct GapContact {
     /// Frame of the coordinates, with its origin at the load centre.
     pub frame: Frame,
     /// Deepest overlap of the undeformed bodies in mm.
@@ -56,7 +56,7 @@ pub struct PressedGap {
     pub remarks: Vec<RemarkEntry>,
 }
 
-impl PressedGap {
+impl GapContact {
     /// Sum of the normal forces in N.
     #[must_use]
     pub fn normal_force(&self) -> f64 {
@@ -71,9 +71,9 @@ impl PressedGap {
     }
 }
 
-impl PressedWheel {
+impl WheelContact {
     /// The wheel at the height where the search ended, corrected to the force that was wanted.
-    pub(crate) fn at_rest(mut self, exit: HeightExit, wanted: f64) -> PressedWheel {
+    pub(crate) fn at_rest(mut self, exit: HeightExit, wanted: f64) -> WheelContact {
         let [carried, slope] = self.found;
         // Where the force jumps, its slope says nothing of the height.
         let lower = if exit.converged() {
@@ -93,12 +93,12 @@ impl PressedWheel {
     }
 
     /// The same wheel under another force, where both together miss what was solved by no more than the tolerance.
-    pub(crate) fn carrying(&self, wanted: f64, tolerance: f64) -> Option<PressedWheel> {
+    pub(crate) fn carrying(&self, wanted: f64, tolerance: f64) -> Option<WheelContact> {
         let [carried, slope] = self.found;
         let factor = wanted / carried;
         let missed = self.force_residual + (factor - 1.0).abs();
         (self.met && missed <= tolerance).then(|| {
-            let mut wheel = PressedWheel {
+            let mut wheel = WheelContact {
                 force_residual: missed,
                 load_error: CORRECTED * missed,
                 heights: 0,
@@ -131,7 +131,7 @@ impl PressedWheel {
     /// Vertical part of the normal forces in N.
     #[must_use]
     pub fn vertical_force(&self) -> f64 {
-        let part = |gap: &PressedGap| gap.normal_force() * gap.frame.angle.cos();
+        let part = |gap: &GapContact| gap.normal_force() * gap.frame.angle.cos();
         self.patches.iter().map(part).sum()
     }
 }
