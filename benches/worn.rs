@@ -11,7 +11,7 @@ use std::process::ExitCode;
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -21,7 +21,7 @@
 //!    ([`contact::mesh`]) and takes their operators ([`contact::half_space`]); a [method](contact::rolling::methods) solves each under
 //!    the law of [`friction`](contact::friction) until the estimate of the error meets the target.
 //! 4. [`contact::solution`]: resultants, zones and fields ([`contact::post`]) become a
-//!    [`Solution`](contact::solution::words::Solution) in the words a client reads.
+//!    [`Solution`](contact::solution::words::answer::Solution) in the words a client reads.
 //!
 //! Files are named after what a user can choose: a method, a route, a command, a store is a file of that name.
 

@@ -25,7 +25,7 @@ fn estimates(case: &Value) -> Vec<(f64, u32)> {
     let problem = contact::check(case, &Limits::default()).expect("a sound case");
     let (solution, _) = contact::solve(&problem, &Unmonitored).expect("an answer");
     let points = solution.patches[0].points.iter();
-    let of = |point: &contact::solution::words::PointSolution| {
+    let of = |point: &contact::solution::words::answer::PointSolution| {
         let mesh = point.solver.mesh.expect("a mesh");
         (
             point.error_estimate.expect("an estimate").force_x_n,

@@ -17,7 +17,7 @@ use railhead::contact::rolling::refinement::regime::regime;
 use railhead::contact::rolling::refinement::state::RefinementState;
 use railhead::contact::rolling::resolution::Resolution;
 use railhead::contact::rolling::resultants::Resultants;
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::population::Class;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use railhead::contact::rolling::resultants::Resultants;
-use railhead::contact::solution::words::{PointSolution, Solution};
+use railhead::contact::solution::words::answer::{PointSolution, Solution};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

@@ -13,7 +13,8 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::post::smooth::sheet::Sheet;
 use railhead::contact::rolling::motion::Motion;
-use railhead::contact::solution::words::{Fields, Solution};
+use railhead::contact::solution::words::answer::Solution;
+use railhead::contact::solution::words::fields::Fields;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -10,7 +10,7 @@ use railhead::contact::normal::normal_task::NormalTask;
 use railhead::contact::normal::wheel_height::search::{Accuracy, HeightStart, NormalPass};
 use railhead::contact::normal_stage;
 use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::machine::{median, quantile, seconds_of};

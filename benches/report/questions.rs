@@ -3,7 +3,7 @@
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::solution::words::{Solution, Total};
+use railhead::contact::solution::words::answer::{Solution, Total};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

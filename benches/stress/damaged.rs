@@ -6,7 +6,7 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::geometry::formats::format::{Format, read};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

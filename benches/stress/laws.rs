@@ -1,10 +1,9 @@
 //! What every answer must obey, whatever the case.
 
 use railhead::contact::rolling::resultants::Resultants;
-use railhead::contact::solution::words::{
-    Fields, PatchCells, PatchFields, PatchSolution, PointFields, Solution,
-};
-use railhead::contact::solution::zone::Zone;
+use railhead::contact::solution::words::answer::{PatchSolution, Solution};
+use railhead::contact::solution::words::fields::{Fields, PatchCells, PatchFields, PointFields};
+use railhead::contact::solution::words::zone::Zone;
 use serde_json::Value;
 
 /// Rounding, relative to the largest value of its kind.

@@ -109,7 +109,7 @@ pub fn with_zones() -> String {
             "pressure",
             "slip"
         ]));
-        let met = |solution: &railhead::contact::solution::words::Solution| {
+        let met = |solution: &railhead::contact::solution::words::answer::Solution| {
             let points = solution.patches[0].points.iter();
             points.filter(|p| p.target_met == Some(true)).count()
         };

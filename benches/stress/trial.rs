@@ -8,7 +8,8 @@ use cpu_time::ThreadTime;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::{Monitor, Stop};
-use railhead::contact::solution::words::{Fields, Solution};
+use railhead::contact::solution::words::answer::Solution;
+use railhead::contact::solution::words::fields::Fields;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -15,7 +15,8 @@ use crate::cli::commands::SolveArgs;
 use crate::cli::output::{print, print_error};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::post::subsurface::states::points;
-use crate::contact::solution::words::{Fields, PatchCells, PatchFields, PointFields, Solution};
+use crate::contact::solution::words::answer::Solution;
+use crate::contact::solution::words::fields::{Fields, PatchCells, PatchFields, PointFields};
 use crate::contact::{check, solve_with};
 
 /// Exit code for a faulty case.

@@ -3,8 +3,8 @@
 use serde_json::{Number, Value};
 use thiserror::Error;
 
+use crate::contact::method::Method;
 use crate::contact::monitor::Stop;
-use crate::contact::rolling::methods::method::Method;
 
 /// One fault of a case: where it is, what was given, what is allowed.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -21,6 +21,7 @@ pub mod friction;
 pub mod geometry;
 pub mod half_space;
 pub mod mesh;
+pub mod method;
 pub mod monitor;
 pub mod normal;
 pub mod normal_stage;
@@ -54,7 +55,8 @@ use crate::contact::profile_trust::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::slices::slices;
 use crate::contact::solution::finish::finish;
-use crate::contact::solution::words::{Fields, Solution};
+use crate::contact::solution::words::answer::Solution;
+use crate::contact::solution::words::fields::Fields;
 use crate::contact::time_limit::TimeLimit;
 
 /// Reads and checks a case.

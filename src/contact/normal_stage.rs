@@ -9,7 +9,7 @@ use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::NormalReport;
+use crate::contact::solution::words::answer::NormalReport;
 
 /// The solved normal problem of one frame.
 #[derive(Debug, Clone)]

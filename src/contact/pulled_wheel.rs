@@ -18,7 +18,8 @@ use crate::contact::rolling::cubic_law::CubicLaw;
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::solution::words::{Fields, PatchSolution, Solution};
+use crate::contact::solution::words::answer::{PatchSolution, Solution};
+use crate::contact::solution::words::fields::Fields;
 use crate::contact::wheel_on_rail::SolvedWheel;
 
 /// A force may be missed by this part of the target, and by this part of μN at least: what the normal problem leaves open from trial to

@@ -12,7 +12,8 @@ use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::solution::assemble::Assembly;
 use crate::contact::solution::finish::share_seconds;
-use crate::contact::solution::words::{Fields, Solution};
+use crate::contact::solution::words::answer::Solution;
+use crate::contact::solution::words::fields::Fields;
 use crate::contact::time_limit::TimeLimit;
 
 /// Solves every motion of a problem on a footprint.

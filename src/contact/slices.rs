@@ -8,7 +8,8 @@ use std::ops::Range;
 use crate::contact::case::solve_time::SolveTime;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::merged;
-use crate::contact::solution::words::{Fields, Solution};
+use crate::contact::solution::words::answer::Solution;
+use crate::contact::solution::words::fields::Fields;
 
 /// Estimated time of a slice in s: short for those who wait behind it, long beside what a cut costs (a first motion without a start,
 /// and region and pressure once more).

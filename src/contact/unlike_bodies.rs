@@ -24,7 +24,7 @@ use crate::contact::rolling::force_control;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resultants::Resultants;
-use crate::contact::solution::words::NormalReport;
+use crate::contact::solution::words::answer::NormalReport;
 use crate::contact::time_limit::TimeLimit;
 
 /// Allowed error of the resultants in the rounds, relative to μN: the opening follows from tractions, whose error counts K times. Chosen on the 12

@@ -24,7 +24,8 @@ use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling_stage;
 use crate::contact::solution::track_axes::in_track;
-use crate::contact::solution::words::{Fields, NormalReport, Solution};
+use crate::contact::solution::words::answer::{NormalReport, Solution};
+use crate::contact::solution::words::fields::Fields;
 use crate::contact::time_limit::TimeLimit;
 
 /// The vertical force may be missed by this fraction; it bounds the change of friction's share in one round. Chosen by judgement; how much it
@@ -62,7 +63,7 @@ pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     contact: &WheelTask,
-    judge: &dyn Judge,
+    judge: &mut dyn Judge,
     monitor: &dyn Monitor,
 ) -> Result<SolvedWheel, SolveError> {
     let search = contact
@@ -70,7 +71,7 @@ pub(crate) fn solve(
         .map_err(|reason| SolveError::NormalProblem { reason })?;
     let vertical = matches!(contact.loading, WheelLoad::Vertical(_))
         && !case.problem.friction.is_frictionless();
-    let solve = WheelSolve {
+    let mut solve = WheelSolve {
         operators,
         case,
         contact,
@@ -98,7 +99,7 @@ pub(crate) trait Judge {
     ///
     /// # Errors
     /// There is none, and why.
-    fn before(&self, wheel: &WheelContact) -> Result<(), SolveError>;
+    fn before(&mut self, wheel: &WheelContact) -> Result<(), SolveError>;
 
     /// The error of a motion that was not solved, with what the wheel at rest says of its cause.
     fn explain(&self, wheel: &WheelContact, error: SolveError) -> SolveError;
@@ -111,7 +112,7 @@ struct WheelSolve<'a> {
     contact: &'a WheelTask,
     search: ContactLocus<'a>,
     balanced: bool,
-    judge: &'a dyn Judge,
+    judge: &'a mut dyn Judge,
     monitor: &'a dyn Monitor,
 }
 
@@ -124,7 +125,7 @@ impl WheelSolve<'_> {
     }
 
     fn rest(
-        &self,
+        &mut self,
         wanted: NormalPass,
         start: HeightStart,
         workspace: &mut GridWorkspace<f32>,
@@ -204,7 +205,7 @@ impl WheelSolve<'_> {
     /// The first rest with friction's share in it, and whether it is an exact one: the share is forecast while the height is sought, or
     /// found on a coarse mesh at about the right height.
     fn first_rest(
-        &self,
+        &mut self,
         workspace: &mut GridWorkspace<f32>,
     ) -> Result<(RestingWheel, bool), SolveError> {
         let WheelSolve { case, contact, .. } = *self;
@@ -228,7 +229,7 @@ impl WheelSolve<'_> {
     }
 
     /// Brings normal and tangential forces to balance the vertical force together.
-    fn balance(&self, workspace: &mut GridWorkspace<f32>) -> Result<SolvedWheel, SolveError> {
+    fn balance(&mut self, workspace: &mut GridWorkspace<f32>) -> Result<SolvedWheel, SolveError> {
         let WheelSolve { case, contact, .. } = *self;
         let (mut at_rest, mut exact) = self.first_rest(workspace)?;
         let mut counted = at_rest.wheel.friction_share;

@@ -13,7 +13,8 @@ use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::slices::slices;
-use crate::contact::solution::words::{Fields, Solution};
+use crate::contact::solution::words::answer::Solution;
+use crate::contact::solution::words::fields::Fields;
 use crate::contact::solve_slice;
 
 /// Checks a case against limits.

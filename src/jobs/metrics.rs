@@ -11,7 +11,7 @@ use prometheus_client::registry::Registry;
 
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::evaluate::many_answer::ManyAnswer;
-use crate::contact::solution::words::Solution;
+use crate::contact::solution::words::answer::Solution;
 use crate::jobs::model::{FailureKind, State};
 use crate::jobs::store::ending::Ending;
 

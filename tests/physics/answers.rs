@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::remark::entry::RemarkEntry;
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -114,7 +114,7 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
     for (i, zone) in zones.iter().enumerate() {
         // The last cell of a strip may stick on the whole and slip at its trailing end.
         let last = i % n as usize == 0;
-        if last && *zone == contact::solution::zone::Zone::Stick {
+        if last && *zone == contact::solution::words::zone::Zone::Stick {
             slip.iter_mut().for_each(|slip| slip[i] = 0.0);
         }
     }
@@ -130,7 +130,7 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
             .as_ref()
             .expect("was asked for")
             .iter()
-            .map(|z| *z == contact::solution::zone::Zone::Slip)
+            .map(|z| *z == contact::solution::words::zone::Zone::Slip)
             .collect(),
         largest: [
             vx.hypot(vy) + phi.abs() * contact.a_mm.max(contact.b_mm),

@@ -4,8 +4,8 @@ use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::{PatchSolution, PointSolution};
-use railhead::contact::solution::zone::Zone;
+use railhead::contact::solution::words::answer::{PatchSolution, PointSolution};
+use railhead::contact::solution::words::zone::Zone;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

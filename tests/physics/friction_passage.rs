@@ -1,7 +1,8 @@
 //! Friction that depends on what a point has met in the contact: a coefficient that falls with temperature, and a layer that yields.
 
-use railhead::contact::solution::words::{Fields, Solution};
-use railhead::contact::solution::zone::Zone;
+use railhead::contact::solution::words::answer::Solution;
+use railhead::contact::solution::words::fields::Fields;
+use railhead::contact::solution::words::zone::Zone;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, with};

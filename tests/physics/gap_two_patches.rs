@@ -2,7 +2,7 @@
 
 use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead::contact::remark::entry::RemarkEntry;
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
 use serde_json::json;
 
 use crate::gap_samples::{profile, spread, steel};

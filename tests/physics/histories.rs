@@ -13,7 +13,7 @@ use railhead::contact::rolling::history::level_run::LevelRun;
 use railhead::contact::rolling::history::record::PointRecord;
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::strip_mesh::StripMesh;
-use railhead::contact::solution::words::{HistoryPoint, PointSolution, Solution};
+use railhead::contact::solution::words::answer::{HistoryPoint, PointSolution, Solution};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

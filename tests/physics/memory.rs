@@ -6,7 +6,7 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::operator_store::OperatorStore;
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::{check, solve_with};
 use serde_json::{Value, json};
 

@@ -1,8 +1,9 @@
 //! The examples that redraw the figures of Liu and Hsu's paper show what the paper says, on a patch without symmetry.
 
 use railhead::contact::post::outlines::outline::outlines;
-use railhead::contact::solution::words::{Fields, Solution};
-use railhead::contact::solution::zone::Zone;
+use railhead::contact::solution::words::answer::Solution;
+use railhead::contact::solution::words::fields::Fields;
+use railhead::contact::solution::words::zone::Zone;
 use serde_json::{Value, json};
 
 use crate::reference::solve;

@@ -1,7 +1,8 @@
 //! Energy cell by cell: tractions times slips add up to the friction power of the patch, and no cell gains power.
 
-use railhead::contact::solution::words::{Fields, Solution};
-use railhead::contact::solution::zone::Zone;
+use railhead::contact::solution::words::answer::Solution;
+use railhead::contact::solution::words::fields::Fields;
+use railhead::contact::solution::words::zone::Zone;
 use serde_json::{Value, json};
 
 use crate::laws::{MOTIONS, shapes};

@@ -5,7 +5,7 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
 use railhead::contact::geometry::wheel_rail::WheelRail;
 use railhead::contact::normal::normal_task::NormalTask;
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::profile_cases::{generated, put};

@@ -4,7 +4,7 @@ use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::cases::assert_fault;

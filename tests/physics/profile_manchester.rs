@@ -1,6 +1,6 @@
 //! The Manchester contact benchmark, case, through the case: 10 kN, profiles generated from their definitions.
 
-use railhead::contact::solution::words::{PatchSolution, Position};
+use railhead::contact::solution::words::answer::{PatchSolution, Position};
 use serde_json::json;
 
 use crate::profile_cases::{generated, put};

@@ -2,7 +2,7 @@
 //! reference files, and where the plane leaves nothing open.
 
 use railhead::contact::remark::figure::Figure;
-use railhead::contact::solution::words::{Solution, Total};
+use railhead::contact::solution::words::answer::{Solution, Total};
 use serde_json::{Value, json};
 
 use crate::profile_cases::{generated, put, wheel_on_rail};

@@ -15,7 +15,7 @@ use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWork
 use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
 use railhead::contact::rolling::strip_mesh::StripMesh;
-use railhead::contact::solution::words::PointSolution;
+use railhead::contact::solution::words::answer::PointSolution;
 
 use crate::reference::{Ellipse, solve};
 

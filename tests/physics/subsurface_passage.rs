@@ -2,7 +2,7 @@
 
 use railhead::contact::half_space::rectangle_stress::Stress;
 use railhead::contact::post::subsurface::passage::{PassageMeasure, judge};
-use railhead::contact::solution::maintenance::{PassageSummary, SubsurfaceSummary};
+use railhead::contact::solution::words::maintenance::{PassageSummary, SubsurfaceSummary};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, good, with};

@@ -9,7 +9,8 @@ use railhead::contact::monitor::Unmonitored;
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::slices::slices;
-use railhead::contact::solution::words::{Fields, Solution};
+use railhead::contact::solution::words::answer::Solution;
+use railhead::contact::solution::words::fields::Fields;
 use railhead::contact::solve_slice;
 use serde_json::{Value, json};
 

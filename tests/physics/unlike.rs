@@ -3,7 +3,7 @@
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -1,7 +1,7 @@
 //! What must hold for a wheelset on both rails: mirror images, balance, closed forms of the conicity, and the single wheel in its place.
 
-use railhead::contact::solution::wheelset::{Kinematics, WheelsetAnswer};
-use railhead::contact::solution::words::Solution;
+use railhead::contact::solution::words::answer::Solution;
+use railhead::contact::solution::words::wheelset::{Kinematics, WheelsetAnswer};
 use serde_json::{Value, json};
 
 use crate::profile_cases::put;

@@ -6,8 +6,8 @@ use std::sync::mpsc::channel;
 use std::time::Duration;
 
 use railhead::contact::error::SolveError;
+use railhead::contact::method::Method as SolverMethod;
 use railhead::contact::monitor::Stop;
-use railhead::contact::rolling::methods::method::Method as SolverMethod;
 use reqwest::Method;
 use serde_json::{Value, json};
 

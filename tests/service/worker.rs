@@ -4,7 +4,7 @@ use std::sync::{Mutex, mpsc};
 use std::time::Duration;
 
 use railhead::contact::error::SolveError;
-use railhead::contact::rolling::methods::method::Method;
+use railhead::contact::method::Method;
 use railhead::contact::solve;
 use railhead::jobs::submit_options::SubmitOptions;
 use railhead::jobs::{FailureKind, JobsError, Options, State};

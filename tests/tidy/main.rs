@@ -3,6 +3,7 @@
 //! Rules that hold everywhere are tests below. Those that some files still break are in `rules.rs`; `exceptions.rs` holds them to their list.
 
 mod exceptions;
+mod folders;
 mod lengths;
 mod order;
 mod rules;

@@ -18,7 +18,7 @@ use crate::contact::problem::plausibility;
 use crate::contact::problem::run::Run;
 use crate::contact::remark::entry::merged;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
-use crate::contact::solution::words::Asked;
+use crate::contact::solution::words::answer::Asked;
 
 impl CheckedCase {
     /// Checks a case against the limits and prepares its numbers.

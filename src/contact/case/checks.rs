@@ -15,6 +15,7 @@ use crate::contact::case::{contact_task, history, motions, wheel_task, wheelsets
 use crate::contact::error::Fault;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::method::Method;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::problem::memory::{
@@ -23,7 +24,6 @@ use crate::contact::problem::memory::{
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::history::task::HistoryTask;
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::table::solve as table;
 
 /// Friction coefficient above which the answer carries a remark.

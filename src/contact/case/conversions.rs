@@ -13,8 +13,8 @@ use crate::contact::friction::passage::HeatedLaw;
 use crate::contact::geometry::formats::format::Format;
 use crate::contact::geometry::wheel_rail::Side;
 use crate::contact::mesh::size::MeshSize;
+use crate::contact::method::{Method, TractionBound};
 use crate::contact::post::heat::ThermalTask;
-use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::Motion;
 
 impl From<SideName> for Side {

@@ -3,8 +3,8 @@
 use crate::contact::case::words::material::{Elastic, Material};
 use crate::contact::error::Fault;
 use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::method::Method;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::methods::method::Method;
 
 /// Largest |K| that methods which solve pressure and traction one after the other take.
 const DIFFERENCE_UNCOUPLED: f64 = 0.05;

@@ -3,7 +3,7 @@
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::profile_points;
-use crate::contact::solution::profile_quality::PairQuality;
+use crate::contact::solution::words::profile_quality::PairQuality;
 
 impl CheckedCase {
     /// How far the points of the profiles can be trusted, as far as that is known without the contact; only of a wheel on a rail.

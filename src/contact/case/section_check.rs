@@ -11,7 +11,7 @@ use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
 use crate::contact::geometry::profile_quality::shape::{Looks, looks_like};
 use crate::contact::problem::profile_points;
-use crate::contact::solution::profile_quality::SectionQuality;
+use crate::contact::solution::words::profile_quality::SectionQuality;
 
 /// Contact modulus G/(1 − ν) of steel on steel in MPa, for the smoothing that is suggested.
 const STEEL_MPA: f64 = 82_000.0 / (1.0 - 0.28);

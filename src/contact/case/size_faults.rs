@@ -2,8 +2,8 @@
 
 use crate::contact::case::limits::Limits;
 use crate::contact::error::Fault;
+use crate::contact::method::Method;
 use crate::contact::problem::memory::SizeInput;
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::resolution::Resolution;
 
 /// Largest length over width of a patch for the fast solver. Its preconditioner treats every strip by itself, so that linear systems no

@@ -11,13 +11,13 @@
 
 use crate::contact::case::patch_guess::{PatchGuess, TARGET_LEAST, TARGET_USUAL, Tractions};
 use crate::contact::half_space::strip_operator::kind::Precision;
+use crate::contact::method::Method;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::profile_points;
 use crate::contact::rolling::history::solve::usual_work;
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_MAX;
 use crate::contact::rolling::resolution::Resolution;

@@ -7,7 +7,7 @@ use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::solution::understanding::{
+use crate::contact::solution::words::understanding::{
     FirstTouch, KnownPatch, PlacedProfiles, Understanding,
 };
 

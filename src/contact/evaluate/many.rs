@@ -24,7 +24,7 @@ use crate::contact::evaluate::rows::Rows;
 use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::solution::words::Solution;
+use crate::contact::solution::words::answer::Solution;
 
 /// Solves a checked case of one motion.
 pub type RowSolver<'a> = dyn Fn(&CheckedCase, &dyn Monitor) -> Result<Solution, SolveError> + 'a;

@@ -3,7 +3,7 @@
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::error::SolveError;
 use crate::contact::evaluate::answer::GRADIENT_NAMES;
-use crate::contact::solution::words::{PatchSolution, Solution};
+use crate::contact::solution::words::answer::{PatchSolution, Solution};
 
 /// What became of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

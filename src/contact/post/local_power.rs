@@ -13,10 +13,10 @@ use pulp::Arch;
 use crate::contact::half_space::strip_operator::assembly::{CellEdges, SegmentRows};
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::method::Method;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd_ln::Float;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::StripMesh;
 

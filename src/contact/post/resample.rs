@@ -1,8 +1,8 @@
 //! Interpolates cell values onto a regular grid, for pictures and for programs that read arrays.
 
 use crate::contact::post::strip_segments::{StoredSegment, Strips};
-use crate::contact::solution::words::PatchCells;
-use crate::contact::solution::zone::Zone;
+use crate::contact::solution::words::fields::PatchCells;
+use crate::contact::solution::words::zone::Zone;
 
 /// Values on a regular grid; `None` outside the patch.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Recovers strips and their segments from stored cells, and finds the neighbours that continue a segment.
 
 use crate::contact::numerics::lagrange;
-use crate::contact::solution::words::PatchCells;
+use crate::contact::solution::words::fields::PatchCells;
 
 /// Distance between cells, as a fraction of a cell's width, below which they count as adjacent.
 pub(crate) const JOIN: f64 = 1e-9;
@@ -182,7 +182,7 @@ pub(crate) fn join_tolerance(coordinate: f64, width: f64) -> f64 {
 pub(crate) mod samples {
     use std::f64::consts::PI;
 
-    use crate::contact::solution::words::PatchCells;
+    use crate::contact::solution::words::fields::PatchCells;
 
     /// Adds a segment with the given cell edges to a patch.
     pub(crate) fn push_segment(

@@ -8,7 +8,7 @@ use crate::contact::problem::physics::{MotionPart, Problem};
 use crate::contact::problem::run::Run;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::rolling::task::RollingTask;
-use crate::contact::solution::words::Asked;
+use crate::contact::solution::words::answer::Asked;
 
 /// A case that can be solved.
 #[derive(Debug, Clone, PartialEq)]

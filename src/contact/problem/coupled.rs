@@ -1,10 +1,10 @@
 //! How far pressure and traction of bodies that differ are solved together.
 
+use crate::contact::method::Method;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::problem::physics::Problem;
 use crate::contact::problem::run::Run;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::methods::method::Method;
 
 /// Error of forces relative to μN over |K| μ, where tractions feel the pressure but the pressure does not feel them: 0.09 to 0.55 in nine
 /// contacts with |K| from 0.05 to 0.25 and μ of 0.3 and 0.6, on 10 × 20 cells against CONTACT.

@@ -8,7 +8,7 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
-use crate::contact::solution::profile_quality::{PairQuality, SectionQuality};
+use crate::contact::solution::words::profile_quality::{PairQuality, SectionQuality};
 
 /// Pressure in MPa assumed for assessing profiles before their contact is known.
 pub(crate) const PRESSURE_USUAL: f64 = 1200.0;

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use crate::contact::case::words::solver::{MethodName, Output};
+use crate::contact::method::{Method, TractionBound};
 use crate::contact::problem::after_tasks::AfterTasks;
-use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::resolution::Resolution;
 
 /// How a case is to be solved: nothing of it changes what is asked.

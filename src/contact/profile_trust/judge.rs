@@ -11,7 +11,7 @@ use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::wheel_contact::GapContact;
 use crate::contact::profile_trust::finding::{AMBIGUOUS, Cause, Finding};
-use crate::contact::solution::profile_quality::{PatchQuality, ProfileQuality};
+use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileQuality};
 
 /// Share of the roughness of both bodies from which that of one body is reported.
 const BLAMED: f64 = 0.6;

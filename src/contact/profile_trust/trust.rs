@@ -1,6 +1,5 @@
 //! Solves a wheel on a rail and assesses its profiles.
 
-use std::cell::RefCell;
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
@@ -15,8 +14,9 @@ use crate::contact::profile_trust::finding::{Cause, Finding};
 use crate::contact::profile_trust::judge::{FoundPatch, judge};
 use crate::contact::profile_trust::{settle, uncertainty};
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::solution::profile_quality::{PatchQuality, ProfileQuality};
-use crate::contact::solution::words::{Fields, Solution};
+use crate::contact::solution::words::answer::Solution;
+use crate::contact::solution::words::fields::Fields;
+use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileQuality};
 use crate::contact::wheel_on_rail;
 use crate::contact::wheel_on_rail::{Judge, SolvedWheel};
 
@@ -33,8 +33,8 @@ pub(crate) fn solve(
 ) -> Result<(Solution, Fields), SolveError> {
     let settled = settle::settled(case, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
-    let judgement = Judgement::new(contact);
-    let found = wheel_on_rail::solve(operators, case, contact, &judgement, monitor)?;
+    let mut judgement = Judgement::new(contact);
+    let found = wheel_on_rail::solve(operators, case, contact, &mut judgement, monitor)?;
     let found = assessed(operators, case, &judgement, found, monitor)?;
     Ok((found.solution, found.fields))
 }
@@ -49,7 +49,13 @@ pub(crate) fn judged(
     contact: &WheelTask,
     monitor: &dyn Monitor,
 ) -> Result<SolvedWheel, SolveError> {
-    wheel_on_rail::solve(operators, case, contact, &Judgement::new(contact), monitor)
+    wheel_on_rail::solve(
+        operators,
+        case,
+        contact,
+        &mut Judgement::new(contact),
+        monitor,
+    )
 }
 
 /// Assesses the profiles under the patches of a wheel that was solved.
@@ -116,7 +122,7 @@ fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
 struct Judgement<'a> {
     contact: &'a WheelTask,
     /// The last wheel that was assessed and what was found: it is asked about before and after its motions are solved.
-    last: RefCell<Option<(WheelAtRest, Assessed)>>,
+    last: Option<(WheelAtRest, Assessed)>,
 }
 
 /// The quality of the profiles under every patch, and the findings.
@@ -125,14 +131,20 @@ type Assessed = (Vec<PatchQuality>, Vec<Finding>);
 /// What tells one wheel at rest of a contact from another: its lowering, and the normal forces of its gaps.
 type WheelAtRest = (f64, Vec<f64>);
 
+fn at_rest(wheel: &WheelContact) -> WheelAtRest {
+    let forces = wheel.patches.iter().map(GapContact::normal_force);
+    (wheel.lowering, forces.collect())
+}
+
 impl Judge for Judgement<'_> {
     /// Fails before the tangential problem is solved if the answer would mislead: on the ridge under an outlier, for example, that
     /// solve would fail with an error that does not mention the outlier.
-    fn before(&self, wheel: &WheelContact) -> Result<(), SolveError> {
+    fn before(&mut self, wheel: &WheelContact) -> Result<(), SolveError> {
         if self.contact.trust.accept_rough {
             return Ok(());
         }
-        let (_, findings) = self.of(wheel)?;
+        let assessed = self.of(wheel)?;
+        let (_, (_, findings)) = self.last.insert((at_rest(wheel), assessed));
         let refused = findings.iter().find(|finding| finding.refused);
         refused.map_or(Ok(()), |finding| Err(rough(finding, ACCEPT)))
     }
@@ -179,22 +191,16 @@ impl<'a> Judgement<'a> {
     fn new(contact: &'a WheelTask) -> Judgement<'a> {
         Judgement {
             contact,
-            last: RefCell::default(),
+            last: None,
         }
     }
 
-    /// The quality of the profiles under every patch, and the findings.
+    /// The quality of the profiles under every patch, and the findings; not assessed again if this wheel was the last one.
     fn of(&self, wheel: &WheelContact) -> Result<Assessed, SolveError> {
-        let forces = wheel.patches.iter().map(GapContact::normal_force).collect();
-        let asked = (wheel.lowering, forces);
-        if let Some((known, assessed)) = &*self.last.borrow()
-            && *known == asked
-        {
-            return Ok(assessed.clone());
+        match &self.last {
+            Some((known, assessed)) if *known == at_rest(wheel) => Ok(assessed.clone()),
+            _ => self.assess(wheel),
         }
-        let assessed = self.assess(wheel)?;
-        self.last.replace(Some((asked, assessed.clone())));
-        Ok(assessed)
     }
 
     fn assess(&self, wheel: &WheelContact) -> Result<Assessed, SolveError> {

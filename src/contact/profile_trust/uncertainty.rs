@@ -20,8 +20,8 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::resolution::Resolution;
-use crate::contact::solution::profile_quality::{ProfileQuality, ProfileUncertainty};
-use crate::contact::solution::words::{PatchSolution, Solution};
+use crate::contact::solution::words::answer::{PatchSolution, Solution};
+use crate::contact::solution::words::profile_quality::{ProfileQuality, ProfileUncertainty};
 use crate::contact::wheel_on_rail;
 use crate::contact::wheel_on_rail::Judge;
 
@@ -66,7 +66,7 @@ impl Monitor for Afterwards<'_> {
 struct NoJudge;
 
 impl Judge for NoJudge {
-    fn before(&self, _wheel: &WheelContact) -> Result<(), SolveError> {
+    fn before(&mut self, _wheel: &WheelContact) -> Result<(), SolveError> {
         Ok(())
     }
 
@@ -104,7 +104,7 @@ pub(crate) fn add(
                 operators,
                 &companion(case, &chosen),
                 &other,
-                &NoJudge,
+                &mut NoJudge,
                 &Afterwards(monitor),
             ) {
                 Ok(found) => companions.push(found.solution),

@@ -7,13 +7,13 @@
 use std::time::Duration;
 
 use crate::contact::error::SolveError;
+use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::numerics::bracketed_root::{RootExit, find_root};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::force_places::{ForcePlaces, total};
 use crate::contact::rolling::mesh_plan::MeshPlan;
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::level_solve::MotionTask;

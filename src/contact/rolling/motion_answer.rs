@@ -1,8 +1,8 @@
 //! The tangential answer for one motion: resultants, and the fields they come from where the method has any.
 
+use crate::contact::method::Method;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::{LevelAnswer, Work};
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::skip::Skip;

@@ -6,8 +6,8 @@ use crate::contact::friction::law::FrictionLaw;
 use crate::contact::friction::passage::PassageLaws;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::Precision;
+use crate::contact::method::{Method, TractionBound};
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::rolling::methods::method::{Method, TractionBound};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::resolution::Resolution;
 

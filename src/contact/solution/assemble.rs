@@ -17,10 +17,11 @@ use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::cell_values::{patch_cells, point_fields, traction_max};
 use crate::contact::solution::maintain;
 use crate::contact::solution::maintain::SolvedMotion;
-use crate::contact::solution::words::{
-    CombinedMaterial, ErrorEstimate, Fields, Gradients, HistoryPoint, MeshReport, NormalisedMotion,
-    Origin, PatchFields, PatchSolution, PointFields, PointSolution, Solution, SolverReport, Total,
+use crate::contact::solution::words::answer::{
+    CombinedMaterial, ErrorEstimate, Gradients, HistoryPoint, MeshReport, NormalisedMotion, Origin,
+    PatchSolution, PointSolution, Solution, SolverReport, Total,
 };
+use crate::contact::solution::words::fields::{Fields, PatchFields, PointFields};
 
 /// Remarks collected before repetitions are merged.
 const REMARKS_AT_ONCE: usize = 1000;

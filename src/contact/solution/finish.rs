@@ -10,7 +10,8 @@ use crate::contact::problem::plausibility;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::finite;
-use crate::contact::solution::words::{Fields, PatchSolution, PointSolution, Solution};
+use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
+use crate::contact::solution::words::fields::Fields;
 
 /// Values below this fraction of their scale are rounding residues and reported as 0.
 const DUST: f64 = 1e-14;

@@ -8,7 +8,8 @@ use serde::ser::{
 };
 
 use crate::contact::error::SolveError;
-use crate::contact::solution::words::{Fields, PatchCells, PatchFields, PointFields, Solution};
+use crate::contact::solution::words::answer::Solution;
+use crate::contact::solution::words::fields::{Fields, PatchCells, PatchFields, PointFields};
 
 /// Refuses an answer that holds a number that is not finite.
 ///

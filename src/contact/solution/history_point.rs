@@ -1,7 +1,7 @@
 //! A point of a history in the words of the answer.
 
 use crate::contact::rolling::motion_answer::HistoryAnswer;
-use crate::contact::solution::words::HistoryPoint;
+use crate::contact::solution::words::answer::HistoryPoint;
 
 impl HistoryPoint {
     /// What a history says of a patch at a point.

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::BodyName;
+use crate::contact::method::Method;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::patch::Patch;
@@ -19,12 +20,12 @@ use crate::contact::post::subsurface::worst::worst_place;
 use crate::contact::post::subsurface::worst_passage::{PassagesOf, passage};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::answer::LevelAnswer;
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::solution::damage::WearAcross;
-use crate::contact::solution::maintenance::{SubsurfaceSummary, TemperatureSummary};
-use crate::contact::solution::words::{PointFields, PointSolution};
+use crate::contact::solution::words::answer::PointSolution;
+use crate::contact::solution::words::damage::WearAcross;
+use crate::contact::solution::words::fields::PointFields;
+use crate::contact::solution::words::maintenance::{SubsurfaceSummary, TemperatureSummary};
 
 /// Stresses are answered from this part of the half-width of the smaller patch on: nearer to the surface the steps of the traction from cell
 /// to cell would show, whose stresses grow without bound. There the largest error in the reference contacts is 0.6 % of the largest pressure

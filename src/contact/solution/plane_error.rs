@@ -14,7 +14,8 @@ use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelConta
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::resolution::Resolution;
-use crate::contact::solution::words::{Fields, PatchSolution, Solution};
+use crate::contact::solution::words::answer::{PatchSolution, Solution};
+use crate::contact::solution::words::fields::Fields;
 
 /// Strips of a patch.
 const STRIPS: usize = 9;

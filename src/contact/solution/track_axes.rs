@@ -8,9 +8,10 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::plane_error;
-use crate::contact::solution::words::{
-    ErrorEstimate, Fields, NormalReport, Origin, Position, Solution, Total,
+use crate::contact::solution::words::answer::{
+    ErrorEstimate, NormalReport, Origin, Position, Solution, Total,
 };
+use crate::contact::solution::words::fields::Fields;
 
 /// A patch over which the rail turns by more than this, in rad, is remarked on.
 const TURN_USUAL_MAX: f64 = 0.35;

@@ -16,7 +16,7 @@ use crate::contact::numerics::bracketed_root::find_root;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_trust::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::solution::words::{PatchSolution, Solution};
+use crate::contact::solution::words::answer::{PatchSolution, Solution};
 use crate::contact::wheel_on_rail::SolvedWheel;
 
 /// The heights of the centre by both wheels may differ by so much in mm. It leaves a roll of 2e-7 rad, which moves a contact by 1e-4 mm.

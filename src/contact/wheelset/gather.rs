@@ -3,13 +3,14 @@
 use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::solution::profile_quality::ProfileUncertainty;
 use crate::contact::solution::track_axes::both;
-use crate::contact::solution::wheelset::{
-    Kinematics, WheelOnRail, WheelsetAnswer, WheelsetPosition,
+use crate::contact::solution::words::answer::{
+    ErrorEstimate, Origin, PatchSolution, Solution, Total,
 };
-use crate::contact::solution::words::{
-    ErrorEstimate, Fields, Origin, PatchSolution, Solution, Total,
+use crate::contact::solution::words::fields::Fields;
+use crate::contact::solution::words::profile_quality::ProfileUncertainty;
+use crate::contact::solution::words::wheelset::{
+    Kinematics, WheelOnRail, WheelsetAnswer, WheelsetPosition,
 };
 use crate::contact::wheelset::balance::AtRest;
 

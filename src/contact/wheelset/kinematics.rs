@@ -15,7 +15,7 @@ use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::normal::wheel_height::wheelset_task::KinematicsTask;
 use crate::contact::problem::profile_points;
 use crate::contact::problem::profile_points::PRESSURE_USUAL;
-use crate::contact::solution::wheelset::{EquivalentConicity, Kinematics, TouchLine};
+use crate::contact::solution::words::wheelset::{EquivalentConicity, Kinematics, TouchLine};
 
 /// The other reading of a cross-section has its smoothing times this, or one of so many chords.
 const OTHER_TIMES: f64 = 2.0;

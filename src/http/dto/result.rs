@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::Solution;
+use crate::contact::solution::words::answer::Solution;
 use crate::http::problem::error::ApiError;
 
 /// The result of a job: the solution without its fields, and where to get those.

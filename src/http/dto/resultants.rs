@@ -4,8 +4,10 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::motion::MotionWords;
-use crate::contact::solution::profile_quality::ProfileUncertainty;
-use crate::contact::solution::words::{ErrorEstimate, HistoryPoint, Origin, Solution, Total};
+use crate::contact::solution::words::answer::{
+    ErrorEstimate, HistoryPoint, Origin, Solution, Total,
+};
+use crate::contact::solution::words::profile_quality::ProfileUncertainty;
 
 /// Forces and moments.
 #[derive(Debug, Serialize, ToSchema)]

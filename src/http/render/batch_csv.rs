@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::{PatchSolution, PointSolution, Solution};
+use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
 use crate::http::render::csv::{finish, number};
 use crate::http::render::forces::Forces;
 use crate::jobs::batch::model::BatchItem;

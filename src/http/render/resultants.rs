@@ -5,7 +5,7 @@ use std::ops::Range;
 use axum::body::Body;
 use serde::Serialize;
 
-use crate::contact::solution::words::HistoryPoint;
+use crate::contact::solution::words::answer::HistoryPoint;
 use crate::http::dto::resultants::{PatchResultants, Resultants, Sum};
 use crate::http::render::csv::{finish, number};
 use crate::http::render::forces::Forces;
@@ -205,7 +205,7 @@ mod tests {
 
     use super::*;
     use crate::contact::case::words::motion::MotionWords;
-    use crate::contact::solution::words::{Origin, Total};
+    use crate::contact::solution::words::answer::{Origin, Total};
     use crate::http::dto::resultants::PointResultants;
 
     fn resultants(patches: usize, points: usize) -> Resultants {

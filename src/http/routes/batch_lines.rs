@@ -12,7 +12,7 @@ use tokio::time::Instant;
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::Solution;
+use crate::contact::solution::words::answer::Solution;
 use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
 use crate::http::limits::memory::Memory;

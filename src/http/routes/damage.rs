@@ -6,7 +6,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::damage::{Damage, DamageFiguresUsed};
+use crate::contact::solution::words::damage::{Damage, DamageFiguresUsed};
 use crate::http::extract::accept::Format;
 use crate::http::extract::query::{Parameters, index, query, require_index};
 use crate::http::problem::error::ApiError;

@@ -4,7 +4,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::PointSolution;
+use crate::contact::solution::words::answer::PointSolution;
 
 /// What a picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]

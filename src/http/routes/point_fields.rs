@@ -4,7 +4,7 @@ use axum::response::Response;
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::{PatchCells, PointFields};
+use crate::contact::solution::words::fields::{PatchCells, PointFields};
 use crate::http::dto::result::name_of;
 use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::query::{Parameters, Reader, index, query, reader};

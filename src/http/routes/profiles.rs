@@ -10,7 +10,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::contact::CrossSection;
-use crate::contact::solution::profile_quality::SectionQuality;
+use crate::contact::solution::words::profile_quality::SectionQuality;
 use crate::http::dto::job::rfc3339;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;

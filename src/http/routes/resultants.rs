@@ -3,7 +3,7 @@
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
-use crate::contact::solution::words::Solution;
+use crate::contact::solution::words::answer::Solution;
 use crate::http::dto::resultants::{Resultants, sums};
 use crate::http::extract::accept::{Format, choose, one_of};
 use crate::http::extract::query::{Parameters, index, query, require_index};

@@ -345,11 +345,11 @@ mod tests {
 
     #[test]
     fn ranges_of_rows_are_open_where_a_number_is_left_out() {
-        assert_eq!(rows("5:9"), Some(5..9));
-        assert_eq!(rows(":9"), Some(0..9));
-        assert_eq!(rows("5:"), Some(5..u64::MAX));
+        assert_eq!(row_range("5:9"), Some(5..9));
+        assert_eq!(row_range(":9"), Some(0..9));
+        assert_eq!(row_range("5:"), Some(5..u64::MAX));
         for bad in ["", "5", "9:5", "a:b", "-1:2"] {
-            assert_eq!(rows(bad), None, "{bad}");
+            assert_eq!(row_range(bad), None, "{bad}");
         }
     }
 }

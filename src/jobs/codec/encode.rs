@@ -2,8 +2,8 @@
 
 use std::io::{Cursor, Error, Result, Write};
 
-use crate::contact::solution::words::Fields;
-use crate::contact::solution::zone::Zone;
+use crate::contact::solution::words::fields::Fields;
+use crate::contact::solution::words::zone::Zone;
 use crate::jobs::codec::fields::{Block, Header, Kind, MAGIC, PREFIX_BYTES};
 
 const ZSTD_LEVEL: i32 = 3;

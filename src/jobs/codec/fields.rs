@@ -17,8 +17,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::solution::words::{PatchCells, PatchFields, PointFields};
-use crate::contact::solution::zone::Zone;
+use crate::contact::solution::words::fields::{PatchCells, PatchFields, PointFields};
+use crate::contact::solution::words::zone::Zone;
 
 pub(crate) const MAGIC: &[u8; 8] = b"RHFIELD2";
 
@@ -264,7 +264,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::contact::solution::words::Fields;
+    use crate::contact::solution::words::fields::Fields;
 
     /// Any bit pattern: NaN payloads, infinities and negative zero have to survive too.
     fn values(count: usize) -> impl Strategy<Value = Vec<f64>> {

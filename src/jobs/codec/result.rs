@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 
-use crate::contact::solution::words::PatchFields;
+use crate::contact::solution::words::fields::PatchFields;
 use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
 use crate::jobs::codec::parquet;
 use crate::jobs::error::JobsError;

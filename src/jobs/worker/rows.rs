@@ -10,7 +10,7 @@ use crate::contact::evaluate::many::{ManyTask, solve_many};
 use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::solution::words::Solution;
+use crate::contact::solution::words::answer::Solution;
 use crate::jobs::codec::parquet::encode;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::codec::table::{RowTable, TableColumn};

@@ -8,7 +8,8 @@ use bytes::Bytes;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
-use crate::contact::solution::words::{Fields, PatchFields, Solution};
+use crate::contact::solution::words::answer::Solution;
+use crate::contact::solution::words::fields::{Fields, PatchFields};
 use crate::jobs::codec::encode::encode;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;

@@ -2,7 +2,8 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use railhead::contact::solution::words::{Fields, PatchFields, PointSolution, Solution};
+use railhead::contact::solution::words::answer::{PointSolution, Solution};
+use railhead::contact::solution::words::fields::{Fields, PatchFields};
 
 /// How a change of a quantity is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -25,7 +25,7 @@ use crate::contact::case::words::solver::{Output, Solver};
 use crate::contact::case::words::subsurface::SubsurfaceWords;
 use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::rolling::methods::method::Method;
+use crate::contact::method::Method;
 
 /// Most characters of the name of a case.
 const NAME_LENGTH_MAX: usize = 200;

@@ -62,7 +62,7 @@ const ITERATIONS_MAX: u32 = 500;
 
 /// Pressures, distances and approach of two bodies pressed together, and how well they meet the contact conditions.
 #[derive(Debug, Clone)]
-pub(crate) struct GridPressure {
+pub(crate) struct PressureAnswer {
     /// Pressure of every cell in MPa.
     pub(crate) pressure: Vec<f64>,
     /// Distance of the deformed surfaces at every cell in mm; about 0 in contact.
@@ -76,7 +76,7 @@ pub(crate) struct GridPressure {
     pub(crate) residual: f64,
 }
 
-impl GridPressure {
+impl PressureAnswer {
     /// The largest pressure in MPa.
     pub(crate) fn largest(&self) -> f64 {
         self.pressure.iter().copied().fold(0.0, f64::max)
@@ -99,7 +99,7 @@ pub(crate) struct PressureTask<'a> {
     /// Area of the first cell in mm².
     pub(crate) cell: f64,
     pub(crate) loading: NormalLoad,
-    /// Violation of the contact conditions to reach, see [`GridPressure::residual`].
+    /// Violation of the contact conditions to reach, see [`PressureAnswer::residual`].
     pub(crate) tolerance: f64,
 }
 
@@ -112,7 +112,7 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
     start: Vec<f64>,
     workspace: &mut I::Workspace,
     monitor: &dyn Monitor,
-) -> Result<GridPressure, PressureFailure> {
+) -> Result<PressureAnswer, PressureFailure> {
     let PressureTask {
         gap,
         cell,
@@ -141,7 +141,7 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
         let (violation, square) = work.part_from(influence, approach);
         residual = violation / (approach - least);
         if residual <= tolerance && approach > least {
-            return Ok(GridPressure {
+            return Ok(PressureAnswer {
                 pressure: work.p,
                 distance: work.g,
                 approach,
@@ -340,7 +340,7 @@ mod tests {
             .collect()
     }
 
-    fn solved(loading: NormalLoad, start: Vec<f64>) -> GridPressure {
+    fn solved(loading: NormalLoad, start: Vec<f64>) -> PressureAnswer {
         let mut workspace = GridWorkspace::<f64>::default();
         let influence = GridOperator::new([CELLS; 2], [STEP; 2], MODULUS, &mut workspace);
         let task = PressureTask {
@@ -388,7 +388,7 @@ mod tests {
         let by_force = solved(NormalLoad::Force(5e4), vec![1.0; CELLS * CELLS]);
         let approach = NormalLoad::Approach(by_force.approach);
         let by_approach = solved(approach, vec![1.0; CELLS * CELLS]);
-        let sum = |pressed: &GridPressure| pressed.pressure.iter().sum::<f64>();
+        let sum = |pressed: &PressureAnswer| pressed.pressure.iter().sum::<f64>();
         assert!((sum(&by_approach) / sum(&by_force) - 1.0).abs() < 1e-6);
     }
 

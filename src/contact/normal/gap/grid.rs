@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
-use crate::contact::normal::gap::conjugate_gradients::GridPressure;
+use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
 use crate::contact::normal::gap::edges;
 use crate::contact::normal::gap::search_box::SearchBox;
 use crate::contact::normal::gap::surface::{GapSurface, Window};
@@ -244,7 +244,7 @@ impl PressureGrid {
     /// The box around all cells that touch or nearly do (closer than `near`), and the cells that resolve what is in it.
     pub(crate) fn wanted(
         &self,
-        pressed: &GridPressure,
+        pressed: &PressureAnswer,
         near: f64,
         resolution: GridFineness,
         limits: Window,

@@ -8,7 +8,7 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalAnswer, NormalError, edge_reached, no_touch};
 use crate::contact::normal::gap::conjugate_gradients::{
-    GridPressure, PressureTask, solve_pressure,
+    PressureAnswer, PressureTask, solve_pressure,
 };
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, NEAR, PRESSURE_CHANGE,
@@ -93,7 +93,7 @@ impl GapTask {
             PressureGrid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored())
         };
         let mut grid = first(&reach);
-        let mut solved: Option<(PressureGrid, GridPressure)> = None;
+        let mut solved: Option<(PressureGrid, PressureAnswer)> = None;
         let (mut iterations, mut pressure_change) = (0, 0.0);
         let (mut exit, mut capped) = (GridsExit::GridsUsedUp, false);
         for _ in 0..GRIDS_MAX {
@@ -146,11 +146,11 @@ impl GapTask {
     pub(crate) fn pressure_on(
         &self,
         grid: &PressureGrid,
-        before: Option<&(PressureGrid, GridPressure)>,
+        before: Option<&(PressureGrid, PressureAnswer)>,
         reach: &SearchBox,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<GridPressure, NormalError> {
+    ) -> Result<PressureAnswer, NormalError> {
         let gap = grid.gap(&self.gap);
         let (start, tolerance) = match before {
             Some((coarse, pressed)) => {
@@ -177,8 +177,8 @@ impl GapTask {
     fn next_grid(
         &self,
         grid: &PressureGrid,
-        pressed: &GridPressure,
-        before: Option<&(PressureGrid, GridPressure)>,
+        pressed: &PressureAnswer,
+        before: Option<&(PressureGrid, PressureAnswer)>,
         depth: f64,
         resolution: GridFineness,
     ) -> Result<NextStep, NormalError> {

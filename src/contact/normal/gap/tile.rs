@@ -1,13 +1,13 @@
 //! A grid of the normal problem with its pressure.
 
-use crate::contact::normal::gap::conjugate_gradients::GridPressure;
+use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
 use crate::contact::normal::gap::grid::PressureGrid;
 
 /// A grid with its part of the solution: distances and pressures are its own, the rest is common to all tiles.
 #[derive(Debug, Clone)]
 pub(crate) struct Tile {
     pub(crate) grid: PressureGrid,
-    pub(crate) pressed: GridPressure,
+    pub(crate) pressed: PressureAnswer,
 }
 
 impl Tile {

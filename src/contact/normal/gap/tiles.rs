@@ -11,7 +11,7 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::{NormalError, edge_reached};
 use crate::contact::normal::gap::conjugate_gradients::{
-    GridPressure, PressureTask, solve_pressure,
+    PressureAnswer, PressureTask, solve_pressure,
 };
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
@@ -137,7 +137,7 @@ impl GapTask {
         let tile = |(grid, range): (PressureGrid, Range<usize>)| {
             let mut pressure = pressed.pressure[range.clone()].to_vec();
             grid.symmetrise(&mut pressure);
-            let pressed = GridPressure {
+            let pressed = PressureAnswer {
                 pressure,
                 distance: pressed.distance[range].to_vec(),
                 ..pressed

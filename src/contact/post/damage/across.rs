@@ -5,7 +5,7 @@ use crate::contact::post::damage::figures::DamageTask;
 use crate::contact::post::damage::models::{archard_coefficient, usfd_rate};
 use crate::contact::post::units::{METRES, NANOMETRES};
 use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::solution::damage::WearAcross;
+use crate::contact::solution::words::damage::WearAcross;
 
 /// The power of every cell over the rolling speed in N, and the size of its slip.
 #[derive(Debug, Clone, Copy)]

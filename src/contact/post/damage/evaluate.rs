@@ -7,10 +7,10 @@ use crate::contact::post::damage::models::{
     about, archard_coefficient, over, times, usfd_rate, usfd_regime, wlrm_damage,
 };
 use crate::contact::post::units::{METRES, NANOMETRES};
-use crate::contact::solution::damage::{
+use crate::contact::solution::words::answer::PointSolution;
+use crate::contact::solution::words::damage::{
     ArchardWear, Damage, RailFatigue, Ranged, ShakedownPlace, SurfaceFatigue, TGamma, UsfdWear,
 };
-use crate::contact::solution::words::PointSolution;
 
 /// A patch and its answer for one motion.
 #[derive(Debug, Clone, Copy)]

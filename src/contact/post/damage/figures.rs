@@ -4,7 +4,7 @@ use crate::contact::case::words::damage::{
     ArchardFigures, DamageModel, DamageParameterWords, DamageSetName, DamageWords, UsfdFigures,
     WlrmFigures,
 };
-use crate::contact::solution::damage::DamageFiguresUsed;
+use crate::contact::solution::words::damage::DamageFiguresUsed;
 
 /// The models that are evaluated where none is named: those whose figures are confirmed.
 pub const DEFAULT_MODELS: [DamageModel; 2] = [DamageModel::TGamma, DamageModel::UsfdWear];

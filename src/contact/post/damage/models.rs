@@ -1,7 +1,7 @@
 //! The damage models as functions of one number, and of an interval of it.
 
 use crate::contact::case::words::damage::{ArchardFigures, UsfdFigures, WlrmFigures};
-use crate::contact::solution::damage::{Ranged, WearRegime};
+use crate::contact::solution::words::damage::{Ranged, WearRegime};
 
 /// Wear rate in µg per m rolled and mm² of contact, for a power per area `x` in N/mm².
 #[must_use]

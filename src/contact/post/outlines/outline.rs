@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use crate::contact::post::outlines::loops::{Corner, chain, straighten};
 use crate::contact::post::strip_segments::{Strips, join_tolerance};
-use crate::contact::solution::words::PatchCells;
-use crate::contact::solution::zone::Zone;
+use crate::contact::solution::words::fields::PatchCells;
+use crate::contact::solution::words::zone::Zone;
 
 /// Outlines of the union of the cells of one zone, or of all cells when `which` is `None`, in mm.
 ///

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use crate::contact::post::smooth::contour::{CurvedGrid, contours};
 use crate::contact::post::smooth::monotone::monotone;
 use crate::contact::post::strip_segments::Strips;
-use crate::contact::solution::words::PatchCells;
+use crate::contact::solution::words::fields::PatchCells;
 
 /// SheetNodes of the grid along one axis, at least and at most; between them four per cell or strip.
 const NODES: [usize; 2] = [65, 257];

@@ -3,7 +3,7 @@
 use crate::contact::half_space::rectangle_stress::Stress;
 use crate::contact::post::subsurface::principal::{Principal, principal};
 use crate::contact::post::subsurface::task::LoadedBody;
-use crate::contact::solution::maintenance::{StressPoint, StressTensor};
+use crate::contact::solution::words::maintenance::{StressPoint, StressTensor};
 
 /// Numbers that a stored point has: `x, y, depth`, then the stress in axes of the patch.
 pub const STORED: usize = 9;

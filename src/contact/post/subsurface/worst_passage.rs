@@ -12,7 +12,7 @@ use crate::contact::post::subsurface::passage::{PassageMeasure, judge};
 use crate::contact::post::subsurface::states::von_mises;
 use crate::contact::post::subsurface::surface_load::{LoadResolution, LoadWorkspace, SurfaceLoad};
 use crate::contact::post::subsurface::task::PassageTask;
-use crate::contact::solution::maintenance::{PassagePlace, PassageSummary};
+use crate::contact::solution::words::maintenance::{PassagePlace, PassageSummary};
 
 // The numbers below are chosen by judgement; `cargo test --test physics -- shakes_down` holds what they give against closed forms.
 

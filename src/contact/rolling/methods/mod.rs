@@ -4,5 +4,4 @@ pub mod boundary_element;
 pub mod fastsim;
 pub mod full_slip;
 pub mod liu_hsu;
-pub mod method;
 pub mod table;

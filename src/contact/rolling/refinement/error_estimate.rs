@@ -1,10 +1,10 @@
 //! The error of the resultants, estimated from two rules, two companion meshes, the level before and the cell that holds the centre of
 //! the vortex.
 
+use crate::contact::method::Method;
 use crate::contact::normal::patch::Patch;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
 use crate::contact::rolling::mesh_plan::Regime;
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::RelativeErrors;

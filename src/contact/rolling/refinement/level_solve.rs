@@ -2,6 +2,7 @@
 
 use crate::contact::error::SolveError;
 use crate::contact::mesh::size::MeshSize;
+use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work};
 use crate::contact::rolling::mesh_plan::MeshPlan;
@@ -9,7 +10,6 @@ use crate::contact::rolling::methods::boundary_element::solve as boundary_elemen
 use crate::contact::rolling::methods::boundary_element::task::LevelTask;
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::methods::liu_hsu::on_level;
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{MotionAnswer, RelativeErrors, SolvedFields};

@@ -2,10 +2,10 @@
 //! refinements done so far is read from the size of the mesh.
 
 use crate::contact::mesh::size::MeshSize;
+use crate::contact::method::Method;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
 use crate::contact::rolling::methods::fastsim;
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::refinement::constants::{MARGIN, SLACK, SLACK_POLE};
 use crate::contact::rolling::resolution::Resolution;
 

@@ -2,10 +2,10 @@
 
 use crate::contact::error::SolveError;
 use crate::contact::mesh::size::MeshSize;
+use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
-use crate::contact::rolling::methods::method::Method;
 use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::post::resample::resample;
-use crate::contact::solution::words::PatchCells;
+use crate::contact::solution::words::fields::PatchCells;
 use crate::http::render::picture::colour::{SLIP, STICK};
 use crate::http::render::picture::frame::{Frame, ticks};
 use crate::http::render::picture::scene::{Scene, extent, zones_present};

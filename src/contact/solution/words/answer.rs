@@ -1,4 +1,4 @@
-//! The answer as the client reads it: everything small in [`Solution`], the values per cell in [`Fields`].
+//! The answer as the client reads it: everything small. The values per cell are in [`fields`](crate::contact::solution::words::fields).
 //!
 //! Forces and tractions act on the lower body (body 2, the rail). Frame: x along rolling (the leading edge is at the
 //! larger x), y to the left, z up; moments and spin refer to [`Solution::origin`].
@@ -10,11 +10,10 @@ use crate::contact::case::words::contact::Load;
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::damage::{Damage, DamageFiguresUsed};
-use crate::contact::solution::maintenance::{SubsurfaceSummary, TemperatureSummary};
-use crate::contact::solution::profile_quality::{PatchQuality, ProfileUncertainty};
-use crate::contact::solution::wheelset::WheelsetAnswer;
-use crate::contact::solution::zone::Zone;
+use crate::contact::solution::words::damage::{Damage, DamageFiguresUsed};
+use crate::contact::solution::words::maintenance::{SubsurfaceSummary, TemperatureSummary};
+use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileUncertainty};
+use crate::contact::solution::words::wheelset::WheelsetAnswer;
 
 /// The answer to one case, without fields.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -383,68 +382,4 @@ pub struct Total {
     /// What the measurement of the profiles leaves open; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub profile_uncertainty: Option<ProfileUncertainty>,
-}
-
-/// The values per cell of all patches: what was asked for, nothing else.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Fields {
-    /// One entry per patch, in the order of [`Solution::patches`].
-    pub patches: Vec<PatchFields>,
-}
-
-/// The values per cell of one patch, motion by motion, each on the mesh that served it.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct PatchFields {
-    /// The meshes that the motions were solved on; several motions may share one.
-    pub meshes: Vec<PatchCells>,
-    /// One entry per motion.
-    pub points: Vec<PointFields>,
-}
-
-impl PatchFields {
-    /// The cells that the values of a motion belong to.
-    #[must_use]
-    pub fn cells(&self, point: usize) -> &PatchCells {
-        &self.meshes[self.points[point].mesh]
-    }
-}
-
-/// Cells of one patch, strip by strip from smaller to larger y, in each strip from smaller to larger x.
-/// All vectors have one value per cell.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct PatchCells {
-    /// Centre of the cell along x in mm.
-    pub x_mm: Vec<f64>,
-    /// Centre of the cell across in mm.
-    pub y_mm: Vec<f64>,
-    /// Width of the cell along x in mm.
-    pub dx_mm: Vec<f64>,
-    /// Width of the cell across in mm.
-    pub dy_mm: Vec<f64>,
-    /// Number of the strip, counted from 0; segments of one strip share it.
-    pub strip: Vec<u32>,
-    /// Pressure in MPa, if asked for.
-    pub pressure_mpa: Option<Vec<f64>>,
-}
-
-/// Values per cell for one motion; absent where not asked for.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct PointFields {
-    /// Which of the patch's meshes they belong to.
-    pub mesh: usize,
-    /// Stick or slip.
-    pub zone: Option<Vec<Zone>>,
-    /// Traction on the lower body along x in MPa.
-    pub traction_x_mpa: Option<Vec<f64>>,
-    /// Traction on the lower body across in MPa.
-    pub traction_y_mpa: Option<Vec<f64>>,
-    /// Mean slip of the cell, upper body relative to the lower, along x, divided by rolling speed: along the traction, and such that the
-    /// power of the cells adds up to that of the patch (see [`local_power`](crate::contact::post::local_power)).
-    pub slip_x: Option<Vec<f64>>,
-    /// Slip across, divided by rolling speed.
-    pub slip_y: Option<Vec<f64>>,
-    /// Temperature of both surfaces at the middle of the cell in °C.
-    pub temperature_c: Option<Vec<f64>>,
-    /// Stresses at the requested points, as [`stored`](crate::contact::post::subsurface::states::stored).
-    pub subsurface: Option<Vec<f64>>,
 }

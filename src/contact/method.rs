@@ -1,6 +1,6 @@
 //! Which method solves a motion.
 
-/// A method; each is a file or folder of this name beside this file.
+/// A method; each is a file or folder of this name in [`rolling::methods`](crate::contact::rolling::methods).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Semismooth Newton iteration with strip-preconditioned GMRES.
