@@ -25,6 +25,7 @@
 //!
 //! Files are named after what a user can choose: a method, a route, a command, a store is a file of that name.
 
+#![warn(unreachable_pub)]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 

@@ -14,6 +14,6 @@ pub(super) fn run(args: &BackupArgs) -> anyhow::Result<ExitCode> {
         .enable_all()
         .build()
         .context("the async runtime could not be started")?
-        .block_on(backup(&args.data_dir, &args.to))?;
+        .block_on(backup(&args.folder.data_dir, &args.to))?;
     print(&args.to.display().to_string())
 }

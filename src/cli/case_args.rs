@@ -7,7 +7,7 @@ use crate::contact::rolling::operator_store::{BYTES_DEFAULT, OperatorStore};
 
 /// What one case may use.
 #[derive(Debug, Clone, Copy, Args)]
-pub struct CaseArgs {
+pub(super) struct CaseArgs {
     /// Estimated memory beyond which a case is refused, in MiB.
     #[arg(long, env = "RAILHEAD_MEMORY_LIMIT_MB", default_value_t = 2048, value_name = "MIB",
           value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
@@ -21,7 +21,7 @@ pub struct CaseArgs {
 impl CaseArgs {
     /// The limits that cases are checked against.
     #[must_use]
-    pub fn limits(self) -> Limits {
+    pub(super) fn limits(self) -> Limits {
         Limits {
             memory_bytes: self.memory_limit_mb << 20,
             operator_store_bytes: self.operator_store_mb << 20,
@@ -31,7 +31,7 @@ impl CaseArgs {
 
     /// The store of operators that all solves share.
     #[must_use]
-    pub fn operators(self) -> OperatorStore {
+    pub(super) fn operators(self) -> OperatorStore {
         OperatorStore::new(self.operator_store_mb << 20)
     }
 }

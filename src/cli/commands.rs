@@ -6,21 +6,24 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::cli::case_args::CaseArgs;
-use crate::cli::database_args::{DatabaseArgs, DatabaseUrlArgs, DoctorArgs, ResultsArgs};
+use crate::cli::database_args::{
+    DATA_DIR_DEFAULT, DATA_DIR_VARIABLE, DataFolderArgs, DatabaseArgs, DatabaseUrlArgs, DoctorArgs,
+    ResultsArgs,
+};
 use crate::cli::serve_args::ServeArgs;
 use crate::cli::values::{address, bound_label};
 
 /// Rolling-contact stress service: tractions, stick and slip zones and forces between wheel and rail.
 #[derive(Debug, Parser)]
 #[command(name = "railhead", version, about)]
-pub struct Cli {
+pub(super) struct Cli {
     #[command(subcommand)]
     pub command: Command,
 }
 
 /// What can be started.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(super) enum Command {
     /// Serve the HTTP API and solve what is submitted.
     Serve(ServeArgs),
     /// Solve what is submitted to other nodes of the same database; takes the flags of `serve` and answers probes only.
@@ -51,28 +54,22 @@ pub enum Command {
 
 /// Settings of `backup`.
 #[derive(Debug, Clone, Args)]
-pub struct BackupArgs {
+pub(super) struct BackupArgs {
     /// Folder to make; it must not be there yet.
     #[arg(long, value_name = "FOLDER")]
     pub to: PathBuf,
-    /// Data folder of the service.
-    #[arg(
-        long,
-        env = "RAILHEAD_DATA_DIR",
-        default_value = "./railhead-data",
-        value_name = "FOLDER"
-    )]
-    pub data_dir: PathBuf,
+    #[command(flatten)]
+    pub folder: DataFolderArgs,
 }
 
 /// Settings of `move`.
 #[derive(Debug, Clone, Args)]
-pub struct MoveArgs {
+pub(super) struct MoveArgs {
     /// Data folder to move.
     #[arg(
         long,
-        env = "RAILHEAD_DATA_DIR",
-        default_value = "./railhead-data",
+        env = DATA_DIR_VARIABLE,
+        default_value = DATA_DIR_DEFAULT,
         value_name = "FOLDER"
     )]
     pub data_dir: PathBuf,
@@ -84,7 +81,7 @@ pub struct MoveArgs {
 
 /// Settings of `move-results`.
 #[derive(Debug, Clone, Args)]
-pub struct MoveResultsArgs {
+pub(super) struct MoveResultsArgs {
     #[command(flatten)]
     pub database: DatabaseUrlArgs,
     #[command(flatten)]
@@ -93,14 +90,14 @@ pub struct MoveResultsArgs {
 
 /// Settings of `keys`.
 #[derive(Debug, Clone, Args)]
-pub struct KeysArgs {
+pub(super) struct KeysArgs {
     #[command(subcommand)]
     pub action: KeysAction,
 }
 
 /// What can be done with API keys.
 #[derive(Debug, Clone, Subcommand)]
-pub enum KeysAction {
+pub(super) enum KeysAction {
     /// Make a key and print it, this one time.
     Create {
         /// Whose jobs the key opens; keys of the tenant `operator` may also read `/metrics`.
@@ -115,27 +112,15 @@ pub enum KeysAction {
         /// The key opens only jobs and batches with this label, and what it makes gets it; may be given up to 8 times.
         #[arg(long = "label", value_name = "KEY:VALUE", value_parser = bound_label)]
         labels: Vec<(String, String)>,
-        /// Data folder of the service.
-        #[arg(
-            long,
-            env = "RAILHEAD_DATA_DIR",
-            default_value = "./railhead-data",
-            value_name = "FOLDER"
-        )]
-        data_dir: PathBuf,
+        #[command(flatten)]
+        folder: DataFolderArgs,
         #[command(flatten)]
         database: DatabaseArgs,
     },
     /// List all keys without their secrets.
     List {
-        /// Data folder of the service.
-        #[arg(
-            long,
-            env = "RAILHEAD_DATA_DIR",
-            default_value = "./railhead-data",
-            value_name = "FOLDER"
-        )]
-        data_dir: PathBuf,
+        #[command(flatten)]
+        folder: DataFolderArgs,
         #[command(flatten)]
         database: DatabaseArgs,
     },
@@ -144,14 +129,8 @@ pub enum KeysAction {
         /// Id of the key, as `list` shows it.
         #[arg(value_name = "ID")]
         id: String,
-        /// Data folder of the service.
-        #[arg(
-            long,
-            env = "RAILHEAD_DATA_DIR",
-            default_value = "./railhead-data",
-            value_name = "FOLDER"
-        )]
-        data_dir: PathBuf,
+        #[command(flatten)]
+        folder: DataFolderArgs,
         #[command(flatten)]
         database: DatabaseArgs,
     },
@@ -159,7 +138,7 @@ pub enum KeysAction {
 
 /// Settings of `solve`.
 #[derive(Debug, Clone, Args)]
-pub struct SolveArgs {
+pub(super) struct SolveArgs {
     /// File with the case as JSON, or `-` for standard input.
     #[arg(value_name = "CASE.JSON")]
     pub file: PathBuf,
@@ -169,7 +148,7 @@ pub struct SolveArgs {
 
 /// Settings of `healthcheck`.
 #[derive(Debug, Clone, Args)]
-pub struct HealthcheckArgs {
+pub(super) struct HealthcheckArgs {
     /// What to ask; only plain `http://` is possible [default: `/readyz` at the address that RAILHEAD_PROBE_LISTEN or
     /// RAILHEAD_LISTEN says, else at 127.0.0.1:8080].
     #[arg(long, env = "RAILHEAD_HEALTHCHECK_URL", value_name = "URL")]
@@ -190,7 +169,7 @@ pub struct HealthcheckArgs {
 
 /// Variables named `RAILHEAD_…` that no command reads: most likely misspelt.
 #[must_use]
-pub fn unknown_variables() -> Vec<String> {
+pub(super) fn unknown_variables() -> Vec<String> {
     let command = Cli::command();
     let mut known = Vec::new();
     let mut commands = vec![&command];

@@ -1,13 +1,33 @@
-//! The flags that name the database which several nodes share.
+//! The flags that name where jobs and results are: the data folder, or the database which several nodes share.
+
+use std::path::PathBuf;
 
 use clap::{ArgAction, Args};
 
 use crate::jobs::options::{Bells, Database};
 use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
 
+/// The variable of the data folder.
+pub(super) const DATA_DIR_VARIABLE: &str = "RAILHEAD_DATA_DIR";
+/// The data folder where none is named.
+pub(super) const DATA_DIR_DEFAULT: &str = "./railhead-data";
+
+/// The data folder of a command that works beside the service.
+#[derive(Debug, Clone, Args)]
+pub(super) struct DataFolderArgs {
+    /// Data folder of the service.
+    #[arg(
+        long,
+        env = DATA_DIR_VARIABLE,
+        default_value = DATA_DIR_DEFAULT,
+        value_name = "FOLDER"
+    )]
+    pub(crate) data_dir: PathBuf,
+}
+
 /// The database of several nodes.
 #[derive(Debug, Clone, Args)]
-pub struct DatabaseArgs {
+pub(super) struct DatabaseArgs {
     /// PostgreSQL 15 or later, in which jobs and results are kept and which any number of nodes share, such as
     /// `postgres://user:password@host/database`; without it they are kept in the data folder.
     #[arg(
@@ -36,7 +56,7 @@ pub struct DatabaseArgs {
 
 /// The place of large results beside a database.
 #[derive(Debug, Clone, Args)]
-pub struct ResultsArgs {
+pub(super) struct ResultsArgs {
     /// Where results above 32 KiB are kept beside a database: `s3://bucket/prefix` (keys, region and address by the usual `AWS_…`
     /// variables) or `file:///folder`; without it in the database. Every node of a database names the same place.
     #[arg(long, env = "RAILHEAD_RESULTS_URL", value_name = "URL")]
@@ -57,7 +77,7 @@ pub struct ResultsArgs {
 impl ResultsArgs {
     /// The place, if one is named.
     #[must_use]
-    pub fn place(&self) -> Option<ResultsPlace> {
+    pub(super) fn place(&self) -> Option<ResultsPlace> {
         Some(ResultsPlace {
             url: self.results_url.clone()?,
             shared: self.results_shared,
@@ -68,7 +88,7 @@ impl ResultsArgs {
 impl DatabaseArgs {
     /// The database, if one is named.
     #[must_use]
-    pub fn database(&self) -> Option<Database> {
+    pub(super) fn database(&self) -> Option<Database> {
         Some(Database {
             url: self.database_url.clone()?,
             connections: self.database_connections,
@@ -83,7 +103,7 @@ impl DatabaseArgs {
 
 /// The database that a command is about.
 #[derive(Debug, Clone, Args)]
-pub struct DatabaseUrlArgs {
+pub(super) struct DatabaseUrlArgs {
     /// PostgreSQL 15 or later, such as `postgres://user:password@host/database`.
     #[arg(
         long,
@@ -96,7 +116,7 @@ pub struct DatabaseUrlArgs {
 
 /// What `doctor` looks at.
 #[derive(Debug, Clone, Args)]
-pub struct DoctorArgs {
+pub(super) struct DoctorArgs {
     #[command(flatten)]
     pub database: DatabaseUrlArgs,
     #[command(flatten)]

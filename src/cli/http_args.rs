@@ -11,7 +11,7 @@ use crate::http::HttpOptions;
 
 /// Limits of requests and connections.
 #[derive(Debug, Clone, Args)]
-pub struct HttpArgs {
+pub(super) struct HttpArgs {
     /// Address and port of a second listener that answers `/healthz`, `/readyz` and `/metrics` only; without it they are
     /// answered on the first one alone, where a few places are kept for them.
     #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]

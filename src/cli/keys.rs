@@ -21,12 +21,13 @@ pub(super) fn run(args: &KeysArgs) -> anyhow::Result<ExitCode> {
 
 async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
     let (KeysAction::Create {
-        data_dir, database, ..
+        folder, database, ..
     }
-    | KeysAction::List { data_dir, database }
+    | KeysAction::List { folder, database }
     | KeysAction::Revoke {
-        data_dir, database, ..
+        folder, database, ..
     }) = &args.action;
+    let data_dir = &folder.data_dir;
     let creates = matches!(args.action, KeysAction::Create { .. });
     let (keys, place) = match &database.database_url {
         Some(url) => (Keyring::open_shared(url).await?, "the database".to_owned()),

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 /// Writes to standard output. A closed pipe is not an error: the reader has seen enough.
-pub fn print(text: &str) -> anyhow::Result<ExitCode> {
+pub(super) fn print(text: &str) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
@@ -13,7 +13,7 @@ pub fn print(text: &str) -> anyhow::Result<ExitCode> {
 }
 
 /// An error and its causes in one line; a cause that the text already contains is left out.
-pub fn reasons(error: &anyhow::Error) -> String {
+pub(super) fn reasons(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain() {
         let cause = cause.to_string();
@@ -27,7 +27,7 @@ pub fn reasons(error: &anyhow::Error) -> String {
 }
 
 /// Writes one line to standard error.
-pub fn print_error(text: &str) {
+pub(super) fn print_error(text: &str) {
     // If standard error is closed as well, there is nowhere left to report to.
     let _ = writeln!(std::io::stderr(), "railhead: {text}");
 }

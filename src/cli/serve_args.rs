@@ -8,7 +8,7 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::cli::case_args::CaseArgs;
-use crate::cli::database_args::DatabaseArgs;
+use crate::cli::database_args::{DATA_DIR_DEFAULT, DATA_DIR_VARIABLE, DatabaseArgs};
 use crate::cli::http_args::HttpArgs;
 use crate::cli::values::{Anonymous, Retention, address, origin, retention};
 use crate::cli::worker_args::WorkerArgs;
@@ -16,7 +16,7 @@ use crate::telemetry::{Endpoint, LogFormat};
 
 /// Settings of `serve`.
 #[derive(Debug, Clone, Args)]
-pub struct ServeArgs {
+pub(super) struct ServeArgs {
     /// Address and port to listen on; port 0 takes a free one, which the log event `listening` names.
     #[arg(
         long,
@@ -30,8 +30,8 @@ pub struct ServeArgs {
     /// not there. One process at a time.
     #[arg(
         long,
-        env = "RAILHEAD_DATA_DIR",
-        default_value = "./railhead-data",
+        env = DATA_DIR_VARIABLE,
+        default_value = DATA_DIR_DEFAULT,
         value_name = "FOLDER"
     )]
     pub data_dir: PathBuf,
@@ -118,7 +118,7 @@ pub struct ServeArgs {
 
 /// How to log.
 #[derive(Debug, Clone, Args)]
-pub struct LogArgs {
+pub(super) struct LogArgs {
     /// How a log line looks.
     #[arg(long, env = "RAILHEAD_LOG_FORMAT", value_enum, default_value = "text")]
     pub log_format: LogFormat,
@@ -135,7 +135,7 @@ pub struct LogArgs {
 impl ServeArgs {
     /// Workers as asked for, or one less than there are cores.
     #[must_use]
-    pub fn worker_count(&self) -> usize {
+    pub(super) fn worker_count(&self) -> usize {
         self.workers.map_or_else(
             || available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1)),
             usize::from,
@@ -144,14 +144,14 @@ impl ServeArgs {
 
     /// How long running jobs may go on after the signal.
     #[must_use]
-    pub fn shutdown_grace(&self) -> Duration {
+    pub(super) fn shutdown_grace(&self) -> Duration {
         Duration::from_secs(u64::from(self.shutdown_grace_s))
     }
 
     /// How long connections are still accepted after a signal: whoever stops a service at a terminal does not want to
     /// wait for a load balancer.
     #[must_use]
-    pub fn drain_delay(&self, signal: &str) -> Duration {
+    pub(super) fn drain_delay(&self, signal: &str) -> Duration {
         match signal {
             "SIGTERM" => Duration::from_secs(u64::from(self.drain_delay_s)),
             _ => Duration::ZERO,

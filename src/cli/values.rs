@@ -8,10 +8,10 @@ use crate::http::extract::query::ReadTexts;
 
 /// How long ended jobs are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Retention(pub Option<Duration>);
+pub(super) struct Retention(pub Option<Duration>);
 
 /// Reads a time such as `30d`, `1w` or `90m`, or `forever`.
-pub fn retention(text: &str) -> Result<Retention, String> {
+pub(super) fn retention(text: &str) -> Result<Retention, String> {
     if text == "forever" {
         return Ok(Retention(None));
     }
@@ -31,7 +31,7 @@ pub fn retention(text: &str) -> Result<Retention, String> {
 
 /// When requests without an API key are answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Anonymous {
+pub(super) enum Anonymous {
     /// While the service listens on a loopback address.
     Loopback,
     /// On every address: whoever reaches the port may use the service.
@@ -43,7 +43,7 @@ pub enum Anonymous {
 impl Anonymous {
     /// Are requests without a key answered on this address?
     #[must_use]
-    pub fn on(self, address: SocketAddr) -> bool {
+    pub(super) fn on(self, address: SocketAddr) -> bool {
         match self {
             Anonymous::Loopback => address.ip().is_loopback(),
             Anonymous::Always => true,
@@ -53,7 +53,7 @@ impl Anonymous {
 }
 
 /// Reads an origin: scheme and authority, nothing else.
-pub fn origin(text: &str) -> Result<String, String> {
+pub(super) fn origin(text: &str) -> Result<String, String> {
     let rest = text
         .strip_prefix("https://")
         .or_else(|| text.strip_prefix("http://"));
@@ -73,7 +73,7 @@ pub fn origin(text: &str) -> Result<String, String> {
 }
 
 /// Reads an address to listen on.
-pub fn address(text: &str) -> Result<SocketAddr, String> {
+pub(super) fn address(text: &str) -> Result<SocketAddr, String> {
     text.parse().map_err(|_| {
         "allowed is an IP address with a port, such as `127.0.0.1:8080`, `0.0.0.0:8080` or `[::1]:8080`; names are not looked up"
             .to_owned()
@@ -81,7 +81,7 @@ pub fn address(text: &str) -> Result<SocketAddr, String> {
 }
 
 /// Reads a label of a key, by the rule for labels of cases.
-pub fn bound_label(text: &str) -> Result<(String, String), String> {
+pub(super) fn bound_label(text: &str) -> Result<(String, String), String> {
     let label = labels::new_label();
     label
         .read(&[text])
@@ -89,7 +89,7 @@ pub fn bound_label(text: &str) -> Result<(String, String), String> {
 }
 
 /// Reads a time of at least a millisecond, and not above a day, in s.
-pub fn positive(text: &str) -> Result<f64, String> {
+pub(super) fn positive(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(seconds) if (0.001..=86_400.0).contains(&seconds) => Ok(seconds),
         _ => Err("a number of seconds from 0.001 to 86400".to_owned()),

@@ -10,7 +10,7 @@ use crate::jobs::quota::StagingBounds;
 
 /// Settings of workers and of batches that are being received.
 #[derive(Debug, Clone, Args)]
-pub struct WorkerArgs {
+pub(super) struct WorkerArgs {
     /// Most solver seconds of a case: for those that name no `time_limit_s`, and the most that one may name.
     #[arg(long, env = "RAILHEAD_TIME_LIMIT_S", default_value_t = 86_400, value_name = "SECONDS",
           value_parser = clap::value_parser!(u32).range(1..))]
@@ -68,7 +68,7 @@ pub struct WorkerArgs {
 impl WorkerArgs {
     /// The options with these settings.
     #[must_use]
-    pub fn apply(&self, options: Options) -> Options {
+    pub(super) fn apply(&self, options: Options) -> Options {
         let bytes = |mb: u32| u64::from(mb) << 20;
         Options {
             lease: Duration::from_secs(self.lease_s.into()),

@@ -41,12 +41,12 @@ use crate::http::problem::kinds::ProblemKind;
 struct Head;
 
 /// The part of the document that no route carries.
-pub fn head() -> utoipa::openapi::OpenApi {
+pub(super) fn head() -> utoipa::openapi::OpenApi {
     Head::openapi()
 }
 
 /// Documents that every `GET` of these routes answers conditional requests.
-pub fn conditional<S: Clone + Send + Sync + 'static>(
+pub(super) fn conditional<S: Clone + Send + Sync + 'static>(
     mut routes: OpenApiRouter<S>,
 ) -> OpenApiRouter<S> {
     let text = || Some(ObjectBuilder::new().schema_type(Type::String).build());
@@ -78,7 +78,7 @@ pub fn conditional<S: Clone + Send + Sync + 'static>(
 }
 
 /// The contract as JSON text, ending with a line break, made from what the routes say of themselves.
-pub fn text(mut document: utoipa::openapi::OpenApi) -> String {
+pub(super) fn text(mut document: utoipa::openapi::OpenApi) -> String {
     for path in ["/v1/jobs", "/v1/cases/check"] {
         add_examples(&mut document, path);
     }
@@ -205,7 +205,7 @@ fn add_example(
     operation_id = "get_contract",
     responses((status = 200, description = "The contract in OpenAPI 3.1", body = Value))
 )]
-pub async fn contract(State(Document(text)): State<Document>) -> Response {
+pub(super) async fn contract(State(Document(text)): State<Document>) -> Response {
     // The newline at the end is that of every answer.
     let text = text().trim_end();
     ([(header::CONTENT_TYPE, "application/json")], text).into_response()

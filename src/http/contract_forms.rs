@@ -79,7 +79,7 @@ const TUPLES: [(&str, &str, usize); 31] = [
 ];
 
 /// Says all of it.
-pub fn complete(document: &mut OpenApi) {
+pub(super) fn complete(document: &mut OpenApi) {
     let components = document.components.get_or_insert_default();
     name_forms(components);
     for (name, member) in TOLD_BY {

@@ -1,7 +1,7 @@
 //! Cases to begin with: those of `api/examples`, which the contract shows and `/v1/examples` answers.
 
 /// Name, summary and text of each.
-pub const EXAMPLES: [(&str, &str, &str); 17] = [
+pub(super) const EXAMPLES: [(&str, &str, &str); 17] = [
     (
         "hertz-steel",
         "A wheel on a rail by its radii, with both creepages and spin",

@@ -19,7 +19,7 @@ use crate::jobs::submit_options::Priority;
     dead_code,
     reason = "the form of a body that is cut into cases while it arrives"
 )]
-pub struct Cases(Vec<BatchElement>);
+pub(crate) struct Cases(Vec<BatchElement>);
 
 /// A case, alone or with options of its own.
 #[derive(ToSchema)]
@@ -28,7 +28,7 @@ pub struct Cases(Vec<BatchElement>);
     dead_code,
     reason = "the form of a body that is cut into cases while it arrives"
 )]
-pub enum BatchElement {
+pub(crate) enum BatchElement {
     /// The case alone.
     Case(Case),
     /// The case with options in place of those of the batch.
@@ -41,7 +41,7 @@ pub enum BatchElement {
     dead_code,
     reason = "the form of a body that is cut into cases while it arrives"
 )]
-pub struct CaseWithOptions {
+pub(crate) struct CaseWithOptions {
     /// The case.
     case: Case,
     /// Which of the queued jobs of the tenant are solved first.
@@ -54,7 +54,7 @@ pub struct CaseWithOptions {
 
 /// A batch that was accepted.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct BatchReceipt {
+pub(crate) struct BatchReceipt {
     /// Identifier of the batch.
     #[schema(value_type = String, format = "uuid")]
     pub id: String,
@@ -71,7 +71,7 @@ pub struct BatchReceipt {
 /// A batch: how far it is.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Batch)]
-pub struct BatchAnswer {
+pub(crate) struct BatchAnswer {
     /// Identifier of the batch.
     #[schema(value_type = String, format = "uuid")]
     id: String,
@@ -105,7 +105,7 @@ pub struct BatchAnswer {
 /// Where a batch stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum BatchState {
+pub(crate) enum BatchState {
     /// No job has begun.
     Queued,
     /// Some jobs have begun, and not all have ended.
@@ -116,7 +116,7 @@ pub enum BatchState {
 
 /// Number of jobs in each state.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct BatchStates {
+pub(crate) struct BatchStates {
     queued: u64,
     running: u64,
     succeeded: u64,
@@ -162,7 +162,7 @@ impl From<Batch> for BatchAnswer {
     }
 }
 
-pub fn links(batch: &Batch) -> BTreeMap<String, String> {
+pub(crate) fn links(batch: &Batch) -> BTreeMap<String, String> {
     let own = format!("/v1/batches/{}", batch.id);
     BTreeMap::from([
         ("results".to_owned(), format!("{own}/results")),

@@ -112,7 +112,7 @@ pub struct GriddedField {
 }
 
 /// The cells with the values of these outputs.
-pub fn per_cell(fields: PatchCells, point: PointFields, outputs: &[Output]) -> Cells {
+pub(crate) fn per_cell(fields: PatchCells, point: PointFields, outputs: &[Output]) -> Cells {
     let mut cells = Cells {
         x_mm: fields.x_mm,
         y_mm: fields.y_mm,
@@ -142,7 +142,7 @@ pub fn per_cell(fields: PatchCells, point: PointFields, outputs: &[Output]) -> C
 }
 
 /// The values of these outputs on a grid of `nx × ny` samples; neither patch, point nor outlines are filled in.
-pub fn gridded(
+pub(crate) fn gridded(
     fields: &PatchCells,
     point: &PointFields,
     outputs: &[Output],

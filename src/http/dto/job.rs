@@ -14,7 +14,7 @@ use crate::jobs::submit_options::Priority;
 /// A job as the client sees it. Times are RFC 3339 in UTC with milliseconds.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Job)]
-pub struct JobAnswer {
+pub(crate) struct JobAnswer {
     /// Identifier; sorts by time of submission.
     #[schema(value_type = String, format = "uuid")]
     id: String,
@@ -71,7 +71,7 @@ pub struct JobAnswer {
 impl JobAnswer {
     /// Shows a job.
     #[must_use]
-    pub fn new(job: Job) -> Self {
+    pub(crate) fn new(job: Job) -> Self {
         let error = job
             .failure
             .as_ref()
@@ -117,7 +117,7 @@ fn links(job: &Job) -> BTreeMap<String, String> {
 }
 
 /// Milliseconds since 1970 as RFC 3339 in UTC, for example `2026-01-31T09:30:00.000Z`.
-pub fn rfc3339(epoch_ms: i64) -> String {
+pub(crate) fn rfc3339(epoch_ms: i64) -> String {
     jiff::Timestamp::from_millisecond(epoch_ms)
         .map_or_else(|_| epoch_ms.to_string(), |time| format!("{time:.3}"))
 }

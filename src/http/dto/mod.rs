@@ -1,10 +1,10 @@
 //! What clients read, as types of the contract.
 
-pub mod batch;
-pub mod cells;
-pub mod job;
-pub mod problem;
-pub mod result;
-pub mod resultants;
-pub mod run;
-pub mod tenant_limits;
+pub(super) mod batch;
+pub(super) mod cells;
+pub(super) mod job;
+pub(super) mod problem;
+pub(super) mod result;
+pub(super) mod resultants;
+pub(super) mod run;
+pub(super) mod tenant_limits;

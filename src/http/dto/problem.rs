@@ -13,7 +13,7 @@ use crate::jobs::model::{Failure, FailureKind, Job};
 /// A failure as the client reads it (RFC 9457).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = Problem)]
-pub struct ProblemBody {
+pub(crate) struct ProblemBody {
     /// Address of the kind of problem, relative to this service; it answers with an explanation.
     #[serde(rename = "type")]
     #[schema(example = "/problems/faulty-case")]
@@ -135,7 +135,7 @@ impl From<CaseFault> for Fault {
 impl ProblemBody {
     /// A problem of this kind with a sentence about this occurrence.
     #[must_use]
-    pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
+    pub(crate) fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
         ProblemBody {
             kind: format!("/problems/{}", kind.slug()),
             title: kind.title().to_owned(),
@@ -152,7 +152,7 @@ impl ProblemBody {
 
     /// The reason why a job failed, as the job shows it.
     #[must_use]
-    pub fn of_job(job: &Job, failure: &Failure) -> Self {
+    pub(crate) fn of_job(job: &Job, failure: &Failure) -> Self {
         let kind = match failure.kind {
             FailureKind::NotConverged => ProblemKind::NotConverged,
             FailureKind::Unsolvable => ProblemKind::Unsolvable,

@@ -12,7 +12,7 @@ use crate::http::problem::error::ApiError;
 
 /// The result of a job: the solution without its fields, and where to get those.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct JobResult {
+pub(crate) struct JobResult {
     #[serde(flatten)]
     solution: Solution,
     /// The result was computed for an identical case before; `seconds` are those of that solve.
@@ -26,7 +26,7 @@ impl JobResult {
     ///
     /// # Errors
     /// It cannot be written as JSON.
-    pub fn tail(id: Uuid, cached: bool, outputs: &[Output]) -> Result<String, ApiError> {
+    pub(crate) fn tail(id: Uuid, cached: bool, outputs: &[Output]) -> Result<String, ApiError> {
         let outputs: Vec<&str> = outputs.iter().copied().map(name_of).collect();
         let links = serde_json::to_string(&JobResult::links(id, &outputs));
         let links = links.map_err(|error| ApiError::internal(&error))?;
@@ -35,7 +35,7 @@ impl JobResult {
 
     /// The links of the result of a job whose case asked for these outputs.
     #[must_use]
-    pub fn links(id: Uuid, outputs: &[impl AsRef<str>]) -> BTreeMap<String, String> {
+    pub(crate) fn links(id: Uuid, outputs: &[impl AsRef<str>]) -> BTreeMap<String, String> {
         let own = format!("/v1/jobs/{id}");
         let mut links = BTreeMap::from([("resultants".to_owned(), format!("{own}/resultants"))]);
         // Derivatives stand beside the resultants.
@@ -54,7 +54,7 @@ impl JobResult {
 
 /// The word of an output, in `outputs` and as the last part of its path.
 #[must_use]
-pub fn name_of(output: Output) -> &'static str {
+pub(crate) fn name_of(output: Output) -> &'static str {
     match output {
         Output::Resultants => "resultants",
         Output::Zones => "zones",

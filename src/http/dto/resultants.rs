@@ -11,7 +11,7 @@ use crate::contact::solution::words::profile_quality::ProfileUncertainty;
 
 /// Forces and moments.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct Resultants {
+pub(crate) struct Resultants {
     /// One entry per contact patch, or the one that was asked for.
     pub patches: Vec<PatchResultants>,
     /// One entry per motion, or the one that was asked for: plain sums over all patches.
@@ -22,7 +22,7 @@ pub struct Resultants {
 
 /// Forces and moments of one patch.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct PatchResultants {
+pub(crate) struct PatchResultants {
     /// Number of the patch, counted from 0.
     pub patch: usize,
     /// Normal force in N.
@@ -33,7 +33,7 @@ pub struct PatchResultants {
 
 /// Forces and moment of one patch for one motion; on the lower body.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct PointResultants {
+pub(crate) struct PointResultants {
     /// Number of the motion, counted from 0.
     pub point: usize,
     /// The motion.
@@ -65,7 +65,11 @@ pub struct PointResultants {
 impl Resultants {
     /// Forces and moments of a solution: of one patch or all of them, for one motion or all of them.
     #[must_use]
-    pub fn select(solution: Solution, point: Option<usize>, patch: Option<usize>) -> Resultants {
+    pub(crate) fn select(
+        solution: Solution,
+        point: Option<usize>,
+        patch: Option<usize>,
+    ) -> Resultants {
         let chosen =
             |choice: Option<usize>, index: usize| choice.is_none_or(|choice| choice == index);
         let patches = solution.patches.into_iter().enumerate();
@@ -111,7 +115,7 @@ impl Resultants {
 
     /// What it takes in memory, in bytes.
     #[must_use]
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         let points = self.patches.iter().map(|patch| patch.points.len());
         points.sum::<usize>() * size_of::<PointResultants>() + self.total.len() * size_of::<Total>()
     }
@@ -119,7 +123,7 @@ impl Resultants {
 
 /// What a line of CSV holds besides forces and their errors.
 #[derive(Debug, Clone, Copy)]
-pub struct Sum {
+pub(crate) struct Sum {
     /// The motion.
     pub motion: MotionWords,
     /// Normal force in N.
@@ -136,7 +140,7 @@ pub struct Sum {
 
 /// Sums over all patches for each motion, of what `total` does not have.
 #[must_use]
-pub fn sums(solution: &Solution) -> Vec<Sum> {
+pub(crate) fn sums(solution: &Solution) -> Vec<Sum> {
     let load = solution.patches.iter().map(|patch| patch.normal_force_n);
     let normal_force_n = load.sum();
     let motions = solution

@@ -19,7 +19,7 @@ use crate::jobs::run::model::Run;
     dead_code,
     reason = "the contract; bodies are read straight into columns"
 )]
-pub struct RunRequest {
+pub(crate) struct RunRequest {
     /// A case with one motion. Members that a column holds may be left out. Of `outputs` only `resultants`, `zones` and `gradients` are
     /// allowed.
     #[schema(value_type = Object)]
@@ -36,7 +36,7 @@ pub struct RunRequest {
     dead_code,
     reason = "the contract; bodies are read straight into columns"
 )]
-pub enum CellValue {
+pub(crate) enum CellValue {
     /// A number.
     Number(f64),
     /// A text.
@@ -46,7 +46,7 @@ pub enum CellValue {
 /// A run: how far it is.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Run)]
-pub struct RunAnswer {
+pub(crate) struct RunAnswer {
     /// Identifier of the run.
     #[schema(value_type = String, format = "uuid")]
     id: String,
@@ -85,7 +85,7 @@ pub struct RunAnswer {
 
 /// The pieces of a run.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct RunChunks {
+pub(crate) struct RunChunks {
     /// Number of pieces.
     count: u32,
     /// Rows of each but the last.
@@ -99,7 +99,7 @@ pub struct RunChunks {
 
 /// A column that was sent.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct SentColumn {
+pub(crate) struct SentColumn {
     /// Its name.
     name: String,
     /// The place in the case that it varies; null if it is carried along to the answers.
@@ -108,7 +108,7 @@ pub struct SentColumn {
 
 /// A column of the answers.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct AnswerColumn {
+pub(crate) struct AnswerColumn {
     /// Its name.
     name: String,
     /// What it holds.
@@ -118,7 +118,7 @@ pub struct AnswerColumn {
 /// What a column of answers holds.
 #[derive(Debug, Clone, Copy, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum AnswerColumnKind {
+pub(crate) enum AnswerColumnKind {
     /// Whole numbers.
     Integer,
     /// Numbers, null where a row has none.
@@ -130,14 +130,14 @@ pub enum AnswerColumnKind {
 impl RunAnswer {
     /// Nothing more will change.
     #[must_use]
-    pub fn ended(&self) -> bool {
+    pub(crate) fn ended(&self) -> bool {
         self.state.ended()
     }
 }
 
 /// The columns of the answers of a run.
 #[must_use]
-pub fn answer_columns(run: &Run) -> Vec<AnswerColumn> {
+pub(crate) fn answer_columns(run: &Run) -> Vec<AnswerColumn> {
     let columns = run.head.answers().into_iter();
     columns
         .map(|(name, kind)| AnswerColumn {

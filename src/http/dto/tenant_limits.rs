@@ -7,7 +7,7 @@ use crate::http::options::HttpOptions;
 
 /// Limits of the requests of the tenant.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct TenantLimits {
+pub(crate) struct TenantLimits {
     /// Most requests of the tenant under way, streams of events and waits aside.
     requests_max: usize,
     /// Most streams of events of the tenant.
@@ -21,7 +21,7 @@ pub struct TenantLimits {
 impl TenantLimits {
     /// The limits that every tenant has.
     #[must_use]
-    pub fn of(options: &HttpOptions) -> TenantLimits {
+    pub(crate) fn of(options: &HttpOptions) -> TenantLimits {
         TenantLimits {
             requests_max: options.tenant_requests_max,
             streams_max: options.tenant_streams_max,

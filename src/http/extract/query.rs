@@ -160,7 +160,7 @@ macro_rules! query {
     ) => {
         $(#[doc = $about])*
         #[derive(Debug)]
-        pub struct $name {
+        pub(crate) struct $name {
             $($(#[doc = $doc])* pub $parameter: Option<$value>,)*
         }
 

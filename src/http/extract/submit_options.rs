@@ -25,7 +25,7 @@ query! {
 impl SubmitQuery {
     /// The options of a submission with these headers.
     #[must_use]
-    pub fn options(self, headers: &HeaderMap) -> SubmitOptions {
+    pub(crate) fn options(self, headers: &HeaderMap) -> SubmitOptions {
         SubmitOptions {
             priority: self.priority.unwrap_or_default(),
             ends_within: self

@@ -28,19 +28,19 @@ const ACCEPTED: HeaderValue = HeaderValue::from_static("gzip, zstd");
 
 /// Bytes of a packed body that have arrived; in the extensions of its request.
 #[derive(Debug, Clone, Default)]
-pub struct PackedLength(Arc<AtomicU64>);
+pub(crate) struct PackedLength(Arc<AtomicU64>);
 
 impl PackedLength {
     /// Has a body that unpacked to so many bytes so far grown more than any honest one does?
     #[must_use]
-    pub fn is_bomb(&self, unpacked: u64) -> bool {
+    pub(crate) fn is_bomb(&self, unpacked: u64) -> bool {
         let packed = self.0.load(Ordering::Relaxed);
         unpacked > UNPACKED_FREE.saturating_add(packed.saturating_mul(UNPACKED_PER_BYTE))
     }
 
     /// Why such a body is refused.
     #[must_use]
-    pub fn refusal() -> ApiError {
+    pub(crate) fn refusal() -> ApiError {
         ApiError::new(
             ProblemKind::BodyTooLarge,
             format!(
@@ -51,7 +51,7 @@ impl PackedLength {
 }
 
 /// Refuses codings that cannot be unpacked, and limits a packed body before it is; layer around the unpacking.
-pub async fn limit_packed(
+pub(crate) async fn limit_packed(
     State(options): State<HttpOptions>,
     request: Request,
     next: Next,
@@ -110,7 +110,7 @@ pub async fn limit_packed(
 
 /// Did reading a body fail because it passed a limit?
 #[must_use]
-pub fn too_long(error: &(dyn std::error::Error + 'static)) -> bool {
+pub(crate) fn too_long(error: &(dyn std::error::Error + 'static)) -> bool {
     let mut next = Some(error);
     while let Some(error) = next {
         if error.is::<LengthLimitError>() {

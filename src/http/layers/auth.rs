@@ -99,7 +99,7 @@ fn unauthorized(detail: &str) -> ApiError {
 }
 
 /// The credentials of `Bearer …`; the scheme's case does not matter (RFC 9110, section 11.1).
-pub fn bearer(header: &str) -> Option<&str> {
+pub(crate) fn bearer(header: &str) -> Option<&str> {
     let (scheme, key) = header.split_once(' ')?;
     let key = key.trim();
     (scheme.eq_ignore_ascii_case("bearer") && !key.is_empty()).then_some(key)

@@ -7,7 +7,7 @@ use axum::response::{IntoResponse, Response};
 use crate::http::problem::error::ApiError;
 
 /// Turns a panic of a handler into an answer; the service lives on.
-pub fn answer_panic(panic: Box<dyn Any + Send + 'static>) -> Response {
+pub(crate) fn answer_panic(panic: Box<dyn Any + Send + 'static>) -> Response {
     let text = panic
         .downcast_ref::<&str>()
         .map(ToString::to_string)

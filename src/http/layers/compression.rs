@@ -9,10 +9,10 @@ const SMALLEST: u64 = 256;
 
 /// Marks an answer whose lines have to be sent at once; compression would delay them.
 #[derive(Debug, Clone, Copy)]
-pub struct StreamedUnbuffered;
+pub(crate) struct StreamedUnbuffered;
 
 /// Compresses answers for clients that accept it, except formats that are compressed already and answers marked [`StreamedUnbuffered`].
-pub fn compression_layer() -> CompressionLayer<impl Predicate> {
+pub(crate) fn compression_layer() -> CompressionLayer<impl Predicate> {
     let not_live = |_: StatusCode, _: Version, _: &HeaderMap, extensions: &Extensions| {
         extensions.get::<StreamedUnbuffered>().is_none()
     };

@@ -28,18 +28,18 @@ const NO_STORE: HeaderValue = HeaderValue::from_static("no-store");
 const CODINGS: [&str; 2] = ["-gzip", "-zstd"];
 
 /// Layer around resources that never change once they are there.
-pub async fn immutable(request: Request, next: Next) -> Response {
+pub(crate) async fn immutable(request: Request, next: Next) -> Response {
     tag(request, next, IMMUTABLE).await
 }
 
 /// Layer around resources that change.
-pub async fn revalidate(request: Request, next: Next) -> Response {
+pub(crate) async fn revalidate(request: Request, next: Next) -> Response {
     tag(request, next, REVALIDATE).await
 }
 
 /// The outer layer, around compression: an answer without a policy of its own must not be stored, and the tag of a compressed body
 /// names its coding.
-pub async fn complete(request: Request, next: Next) -> Response {
+pub(crate) async fn complete(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
     if !headers.contains_key(header::CACHE_CONTROL) && !headers.contains_key(header::ETAG) {
@@ -61,7 +61,7 @@ pub async fn complete(request: Request, next: Next) -> Response {
 
 /// The tag of a result or a part of it, or the answer if the client has it already.
 #[derive(Debug)]
-pub enum Known {
+pub(crate) enum Known {
     /// The client has it already; this is the answer.
     Unchanged(Response),
     /// It has to be computed, and gets this tag.
@@ -75,7 +75,7 @@ impl Known {
     ///
     /// # Errors
     /// There is no such job.
-    pub async fn of(
+    pub(crate) async fn of(
         jobs: &Jobs,
         id: Uuid,
         uri: &Uri,
@@ -107,7 +107,7 @@ impl Known {
 }
 
 /// The answer with its tag.
-pub fn tagged(tag: &str, mut response: Response) -> Response {
+pub(crate) fn tagged(tag: &str, mut response: Response) -> Response {
     if let Ok(tag) = HeaderValue::from_str(&format!("\"{tag}\"")) {
         response.headers_mut().insert(header::ETAG, tag);
     }

@@ -10,7 +10,7 @@ use axum::response::Response;
 use futures_util::{StreamExt, TryStreamExt, stream};
 
 /// Layer around everything that answers JSON, within compression.
-pub async fn end_line(request: Request, next: Next) -> Response {
+pub(crate) async fn end_line(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     let media_type = response.headers().get(header::CONTENT_TYPE);
     let is_json = media_type.and_then(|value| value.to_str().ok());

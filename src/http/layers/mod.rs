@@ -1,17 +1,17 @@
 //! What stands around every request; one layer is one file. `mod.rs` of the room says in which order.
 
-pub mod admission;
-pub mod auth;
-pub mod catch_panic;
-pub mod compression;
-pub mod cors;
-pub mod etag;
-pub mod final_newline;
-pub mod metrics;
-pub mod origin_guard;
-pub mod otel;
-pub mod process_metrics;
-pub mod rate_limit;
-pub mod request_id;
-pub mod request_log;
-pub mod security_headers;
+pub(super) mod admission;
+pub(super) mod auth;
+pub(super) mod catch_panic;
+pub(super) mod compression;
+pub(super) mod cors;
+pub(super) mod etag;
+pub(super) mod final_newline;
+pub(super) mod metrics;
+pub(super) mod origin_guard;
+pub(super) mod otel;
+pub(super) mod process_metrics;
+pub(super) mod rate_limit;
+pub(super) mod request_id;
+pub(super) mod request_log;
+pub(super) mod security_headers;

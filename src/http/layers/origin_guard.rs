@@ -35,7 +35,7 @@ const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 
 /// Conditions for requests without a key.
 #[derive(Debug, Clone)]
-pub struct Guard {
+pub(crate) struct Guard {
     hosts: Arc<[String]>,
     origins: Arc<[String]>,
     proxied: bool,
@@ -44,7 +44,7 @@ pub struct Guard {
 impl Guard {
     /// The rules of these options.
     #[must_use]
-    pub fn new(options: &HttpOptions) -> Guard {
+    pub(crate) fn new(options: &HttpOptions) -> Guard {
         Guard {
             hosts: options.allowed_hosts.clone(),
             origins: options.origins.clone(),
@@ -56,7 +56,7 @@ impl Guard {
     ///
     /// # Errors
     /// `host-not-allowed`, `cross-site` or `unauthorized`, with what to do.
-    pub fn require_direct(&self, parts: &Parts) -> Result<(), ApiError> {
+    pub(crate) fn require_direct(&self, parts: &Parts) -> Result<(), ApiError> {
         self.require_host(parts)?;
         self.require_own_page(parts)?;
         let told = FORWARDED
@@ -142,7 +142,7 @@ fn single<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
 
 /// Layer around everything: a request of HTTP/1.1 says its host once (RFC 9112, section 3.2), and a connection without a
 /// place of its own may ask for the probes only.
-pub async fn admit(request: Request, next: Next) -> Response {
+pub(crate) async fn admit(request: Request, next: Next) -> Response {
     let mut hosts = request.headers().get_all(header::HOST).iter();
     let readable = |value: &axum::http::HeaderValue| {
         let text = value.to_str().ok();

@@ -15,7 +15,7 @@ use crate::jobs::trace::Tracer;
 const UNTRACED: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 
 /// Makes spans of requests, if there is something to make them with; else the router stays as it is.
-pub fn trace<S: Clone + Send + Sync + 'static>(
+pub(crate) fn trace<S: Clone + Send + Sync + 'static>(
     router: Router<S>,
     tracer: Option<&Tracer>,
 ) -> Router<S> {

@@ -7,7 +7,7 @@ use prometheus_client::metrics::gauge::ConstGauge;
 
 /// Reads the values when the metrics are scraped.
 #[derive(Debug)]
-pub struct Process {
+pub(crate) struct Process {
     /// How many lines of the log were dropped.
     pub dropped_lines: fn() -> u64,
     /// Start of the process in epoch seconds.

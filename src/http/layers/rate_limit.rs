@@ -35,7 +35,7 @@ const FAILURES_WITHIN: Duration = Duration::from_secs(10);
 
 /// Requests with the same value are counted together.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum RateKey {
+pub(crate) enum RateKey {
     Key(String),
     Address(IpAddr),
 }
@@ -43,7 +43,7 @@ pub enum RateKey {
 impl RateKey {
     /// The sender of a request without a key. Requests over loopback are not counted: they may come from a proxy on behalf of many
     /// clients.
-    pub fn at(peer: Peer) -> Option<RateKey> {
+    pub(crate) fn at(peer: Peer) -> Option<RateKey> {
         let address = network(peer.0);
         (!address.is_loopback()).then_some(RateKey::Address(address))
     }
@@ -54,7 +54,7 @@ type Limiter =
 
 /// What is left of the rate of the sender of a request; in its extensions, so that its answer can say so.
 #[derive(Debug, Clone, Default)]
-pub struct RateLeft(Arc<Mutex<Option<u32>>>);
+pub(crate) struct RateLeft(Arc<Mutex<Option<u32>>>);
 
 impl RateLeft {
     fn note(&self, requests: u32) {
@@ -67,7 +67,7 @@ const LEFT: HeaderName = HeaderName::from_static("ratelimit");
 
 /// Layer in which answers say how many requests the sender may still make, as the fields `RateLimit-Policy` and `RateLimit` of
 /// draft-ietf-httpapi-ratelimit-headers-10 do. Without a limit, or for senders that are not counted, they are absent.
-pub async fn tell_left(per_second: u32, mut request: Request, next: Next) -> Response {
+pub(crate) async fn tell_left(per_second: u32, mut request: Request, next: Next) -> Response {
     let left = RateLeft::default();
     request.extensions_mut().insert(left.clone());
     let mut response = next.run(request).await;
@@ -91,7 +91,7 @@ pub async fn tell_left(per_second: u32, mut request: Request, next: Next) -> Res
 
 /// How often senders may ask; clones share it.
 #[derive(Debug, Clone)]
-pub struct RateLimit {
+pub(crate) struct RateLimit {
     per_second: u32,
     limiter: Option<Arc<Limiter>>,
     forgotten: Arc<Mutex<Instant>>,
@@ -108,7 +108,7 @@ struct Failures {
 impl RateLimit {
     /// The limits of these options.
     #[must_use]
-    pub fn new(options: &HttpOptions) -> RateLimit {
+    pub(crate) fn new(options: &HttpOptions) -> RateLimit {
         let per_second = NonZeroU32::new(options.requests_per_second);
         let limiter = per_second.map(|rate| {
             let burst = rate.saturating_mul(BURST_SECONDS.try_into().unwrap_or(NonZeroU32::MIN));
@@ -127,7 +127,7 @@ impl RateLimit {
     ///
     /// # Errors
     /// `too-many-requests`, with the seconds after which to try again.
-    pub fn require_turn(
+    pub(crate) fn require_turn(
         &self,
         sender: RateKey,
         who: &str,
@@ -178,7 +178,7 @@ impl RateLimit {
     ///
     /// # Errors
     /// `too-many-requests`, with the seconds after which to try again.
-    pub fn require_few_failures(&self, address: Option<IpAddr>) -> Result<(), ApiError> {
+    pub(crate) fn require_few_failures(&self, address: Option<IpAddr>) -> Result<(), ApiError> {
         let failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
         let of_address = address.and_then(|address| failures.get(&address));
         let left = of_address
@@ -202,7 +202,7 @@ impl RateLimit {
     }
 
     /// Counts a wrong key.
-    pub fn count_failure(&self, address: Option<IpAddr>) {
+    pub(crate) fn count_failure(&self, address: Option<IpAddr>) {
         let Some(address) = address else { return };
         let mut failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
         if failures.len() > SENDERS_KEPT {

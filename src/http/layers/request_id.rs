@@ -7,14 +7,14 @@ use axum::response::Response;
 use uuid::Uuid;
 
 /// Header that carries the request id in both directions.
-pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+pub(crate) const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
 /// Longest request id taken over from a client.
 const REQUEST_ID_MAX_CHARS: usize = 128;
 
 /// Takes over the client's request id, or makes one, and repeats it in the answer. An id that is empty, too long or
 /// not made of visible ASCII characters is replaced, because it goes into the log.
-pub async fn carry_request_id(mut request: Request, next: Next) -> Response {
+pub(crate) async fn carry_request_id(mut request: Request, next: Next) -> Response {
     let given = request
         .headers()
         .get(&REQUEST_ID)

@@ -12,7 +12,7 @@ use tracing::{Span, field};
 use crate::http::layers::request_id::REQUEST_ID;
 
 /// One span per request, closed by one line with status and time.
-pub fn span_layer()
+pub(crate) fn span_layer()
 -> TraceLayer<SharedClassifier<ServerErrorsAsFailures>, RequestSpan, DefaultOnRequest, LogResponse>
 {
     TraceLayer::new_for_http()
@@ -23,7 +23,7 @@ pub fn span_layer()
 
 /// Makes the span of a request.
 #[derive(Debug, Clone, Copy)]
-pub struct RequestSpan;
+pub(crate) struct RequestSpan;
 
 impl MakeSpan<Body> for RequestSpan {
     fn make_span(&mut self, request: &axum::http::Request<Body>) -> Span {
@@ -51,7 +51,7 @@ impl MakeSpan<Body> for RequestSpan {
 
 /// Writes the line at the end of a request.
 #[derive(Debug, Clone, Copy)]
-pub struct LogResponse;
+pub(crate) struct LogResponse;
 
 impl OnResponse<Body> for LogResponse {
     fn on_response(self, response: &Response, latency: Duration, _span: &Span) {

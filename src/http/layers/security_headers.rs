@@ -16,7 +16,7 @@ const FIXED: [(HeaderName, &str); 4] = [
 ];
 
 /// Adds the fixed headers to every answer that does not have its own.
-pub fn secure<S: Clone + Send + Sync + 'static>(router: Router<S>) -> Router<S> {
+pub(crate) fn secure<S: Clone + Send + Sync + 'static>(router: Router<S>) -> Router<S> {
     FIXED.into_iter().fold(router, |router, (name, value)| {
         let value = HeaderValue::from_static(value);
         router.layer(SetResponseHeaderLayer::if_not_present(name, value))

@@ -16,7 +16,7 @@ use crate::http::limits::shares::Share;
 struct HoldingBody<T>(Body, T);
 
 /// The same answer; `held` is dropped when its body has been sent.
-pub fn hold_while_sent<T: Send + Unpin + 'static>(response: Response, held: T) -> Response {
+pub(crate) fn hold_while_sent<T: Send + Unpin + 'static>(response: Response, held: T) -> Response {
     response.map(|body| Body::new(HoldingBody(body, held)))
 }
 
@@ -42,11 +42,11 @@ impl<T: Unpin> HttpBody for HoldingBody<T> {
 
 /// Shares that a request holds until its answer has been sent; in its extensions.
 #[derive(Debug, Clone, Default)]
-pub struct HeldShares(Arc<Mutex<Vec<Share>>>);
+pub(crate) struct HeldShares(Arc<Mutex<Vec<Share>>>);
 
 impl HeldShares {
     /// Holds one more share.
-    pub fn add(&self, share: Share) {
+    pub(crate) fn add(&self, share: Share) {
         self.0
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -54,7 +54,7 @@ impl HeldShares {
     }
 
     /// Gives all shares back; the caller counts the rest of the request elsewhere.
-    pub fn release(&self) {
+    pub(crate) fn release(&self) {
         self.0
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -63,7 +63,7 @@ impl HeldShares {
 }
 
 /// Layer in which requests can hold shares.
-pub async fn hold(mut request: Request, next: Next) -> Response {
+pub(crate) async fn hold(mut request: Request, next: Next) -> Response {
     let held = HeldShares::default();
     request.extensions_mut().insert(held.clone());
     hold_while_sent(next.run(request).await, held)

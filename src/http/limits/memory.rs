@@ -15,7 +15,7 @@ use crate::http::problem::kinds::ProblemKind;
 /// Bytes of one unit, in which shares are counted.
 const UNIT: usize = 1 << 10;
 /// Smaller amounts are not counted: even the largest number of requests takes little memory with them.
-pub const SMALL_BYTES: usize = 64 << 10;
+pub(crate) const SMALL_BYTES: usize = 64 << 10;
 /// How long a request waits for memory or for a turn to compute.
 const WITHIN: Duration = Duration::from_secs(20);
 /// The word for the memory of answers in refusals.

@@ -9,7 +9,7 @@ use tokio::time::timeout;
 
 /// A number of places, bytes or turns; clones share it.
 #[derive(Debug, Clone)]
-pub struct Shares {
+pub(crate) struct Shares {
     all: Arc<Semaphore>,
     of_tenant: usize,
     /// Tenants are made by the operator, so their number is small.
@@ -26,7 +26,7 @@ pub struct Share {
 impl Shares {
     /// So many in all, and of one tenant.
     #[must_use]
-    pub fn new(all: usize, of_tenant: usize) -> Shares {
+    pub(crate) fn new(all: usize, of_tenant: usize) -> Shares {
         Shares {
             all: Arc::new(Semaphore::new(all.min(Semaphore::MAX_PERMITS))),
             of_tenant: of_tenant.min(all).min(Semaphore::MAX_PERMITS),
@@ -36,20 +36,20 @@ impl Shares {
 
     /// The most that one tenant may hold.
     #[must_use]
-    pub fn of_one(&self) -> usize {
+    pub(crate) fn of_one(&self) -> usize {
         self.of_tenant
     }
 
     /// Takes so many at once if they are free.
     #[must_use]
-    pub fn try_take(&self, tenant: &str, many: u32) -> Option<Share> {
+    pub(crate) fn try_take(&self, tenant: &str, many: u32) -> Option<Share> {
         let of_tenant = self.of(tenant).try_acquire_many_owned(many).ok()?;
         let of_all = self.all.clone().try_acquire_many_owned(many).ok()?;
         Some(Share { of_tenant, of_all })
     }
 
     /// Waits for so many, first come, first served; `None` if they are not free in time, or never.
-    pub async fn take(&self, tenant: &str, many: u32, within: Duration) -> Option<Share> {
+    pub(crate) async fn take(&self, tenant: &str, many: u32, within: Duration) -> Option<Share> {
         if many as usize > self.of_tenant {
             return None;
         }

@@ -32,7 +32,7 @@ const BASE: &str = "/page/-/";
 type Folder = Option<Arc<Path>>;
 
 /// The routes of the page.
-pub fn routes<S: Clone + Send + Sync + 'static>(folder: Folder) -> Router<S> {
+pub(crate) fn routes<S: Clone + Send + Sync + 'static>(folder: Folder) -> Router<S> {
     Router::new()
         .route("/", get(index).route_layer(from_fn(etag::revalidate)))
         .route("/page/{digest}/{*path}", get(file))

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 /// A file of the page.
 #[derive(Debug, Clone, Copy)]
-pub struct PageFile {
+pub(crate) struct PageFile {
     /// Its path below the page, with `/`.
     pub path: &'static str,
     /// What it holds.
@@ -21,7 +21,7 @@ macro_rules! files {
 }
 
 /// Every file of the page.
-pub const FILES: &[PageFile] = files!(
+pub(crate) const FILES: &[PageFile] = files!(
     "icon.svg",
     "index.html",
     "js/adopt.js",
@@ -89,12 +89,12 @@ pub const FILES: &[PageFile] = files!(
 
 /// The file at a path below the page.
 #[must_use]
-pub fn find(path: &str) -> Option<&'static PageFile> {
+pub(crate) fn find(path: &str) -> Option<&'static PageFile> {
     FILES.iter().find(|file| file.path == path)
 }
 
 /// Digest of all files: it changes with any of them, so that addresses with it may be kept for good.
-pub static DIGEST: LazyLock<String> = LazyLock::new(|| {
+pub(crate) static DIGEST: LazyLock<String> = LazyLock::new(|| {
     let mut hasher = blake3::Hasher::new();
     for file in FILES {
         hasher.update(file.path.as_bytes());

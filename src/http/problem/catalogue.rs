@@ -15,7 +15,7 @@ use crate::http::problem::kinds::ProblemKind;
 /// A kind of problem, explained.
 #[derive(Debug, Clone, Copy, Serialize, ToSchema)]
 #[schema(as = ProblemKind)]
-pub struct ProblemMeaning {
+pub(crate) struct ProblemMeaning {
     /// The `type` that problems of this kind carry.
     #[serde(rename = "type")]
     #[schema(value_type = String, example = "/problems/faulty-case")]
@@ -53,7 +53,7 @@ impl From<ProblemKind> for ProblemMeaning {
 macro_rules! problems {
     ($(#[$meta:meta])* $name:ident: $($kind:ident),* $(,)?) => {
         $(#[$meta])*
-        pub struct $name;
+        pub(crate) struct $name;
 
         impl utoipa::IntoResponses for $name {
             fn responses() -> std::collections::BTreeMap<
@@ -73,7 +73,10 @@ problems! {
 }
 
 /// Adds problems that many operations can answer to the responses of one.
-pub fn describe_also(responses: &mut BTreeMap<String, RefOr<Response>>, kinds: &[ProblemKind]) {
+pub(crate) fn describe_also(
+    responses: &mut BTreeMap<String, RefOr<Response>>,
+    kinds: &[ProblemKind],
+) {
     for kind in kinds {
         let status = kind.status().to_string();
         let mut described = describe(&[*kind]);
@@ -94,7 +97,7 @@ pub fn describe_also(responses: &mut BTreeMap<String, RefOr<Response>>, kinds: &
 
 /// The responses of these kinds of problems and of those every route has, one per status code.
 #[must_use]
-pub fn describe(kinds: &[ProblemKind]) -> BTreeMap<String, RefOr<Response>> {
+pub(crate) fn describe(kinds: &[ProblemKind]) -> BTreeMap<String, RefOr<Response>> {
     let mut by_status = BTreeMap::<u16, Vec<ProblemKind>>::new();
     for kind in kinds
         .iter()

@@ -13,7 +13,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::model::{Job, State};
 
 /// Content type of every failure.
-pub const PROBLEM_JSON: &str = "application/problem+json";
+pub(crate) const PROBLEM_JSON: &str = "application/problem+json";
 
 /// Seconds after which a refused client may try again.
 const RETRY_SECONDS: u32 = 1;
@@ -312,7 +312,7 @@ impl IntoResponse for ApiError {
 }
 
 /// Completes every problem with the path it is about; layer around all routes.
-pub async fn name_instance(request: Request, next: Next) -> Response {
+pub(crate) async fn name_instance(request: Request, next: Next) -> Response {
     let path = request.uri().path().to_owned();
     let mut response = next.run(request).await;
     // The readable contract answers unknown files of its own with bare text.
@@ -333,7 +333,7 @@ pub async fn name_instance(request: Request, next: Next) -> Response {
 
 /// The answer for a path that names nothing.
 #[must_use]
-pub fn unknown_route(path: &str) -> ApiError {
+pub(crate) fn unknown_route(path: &str) -> ApiError {
     if path.len() > 1 && path.ends_with('/') {
         let detail = format!(
             "there is nothing at `{path}`; the paths of this service do not end with a slash"

@@ -50,7 +50,7 @@ const LABEL: &str = "label:";
 
 /// The columns of a table.
 #[derive(Debug, Clone)]
-pub struct Columns(Vec<String>);
+pub(crate) struct Columns(Vec<String>);
 
 impl Default for Columns {
     fn default() -> Self {
@@ -61,7 +61,7 @@ impl Default for Columns {
 impl Columns {
     /// Reads names with commas between.
     #[must_use]
-    pub fn read(text: &str) -> Option<Columns> {
+    pub(crate) fn read(text: &str) -> Option<Columns> {
         let known = |name: &str| {
             default_names().any(|own| own == name)
                 || MORE.contains(&name)
@@ -76,7 +76,7 @@ impl Columns {
 
     /// The names that there are, in words.
     #[must_use]
-    pub fn allowed() -> String {
+    pub(crate) fn allowed() -> String {
         let names: Vec<&str> = default_names().chain(MORE).collect();
         format!(
             "names with commas between, of {} and `label:KEY`",
@@ -88,7 +88,7 @@ impl Columns {
     ///
     /// # Errors
     /// None that memory does not have.
-    pub fn head(&self) -> Result<Vec<u8>, csv::Error> {
+    pub(crate) fn head(&self) -> Result<Vec<u8>, csv::Error> {
         let mut out = csv::Writer::from_writer(Vec::new());
         out.write_record(&self.0)?;
         finish(out)
@@ -98,7 +98,7 @@ impl Columns {
     ///
     /// # Errors
     /// None that memory does not have.
-    pub fn write_without_result(
+    pub(crate) fn write_without_result(
         &self,
         out: &mut csv::Writer<Vec<u8>>,
         item: &BatchItem,
@@ -114,7 +114,7 @@ impl Columns {
     ///
     /// # Errors
     /// None that memory does not have.
-    pub fn write(
+    pub(crate) fn write(
         &self,
         out: &mut csv::Writer<Vec<u8>>,
         item: &BatchItem,

@@ -8,7 +8,7 @@ use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table};
 ///
 /// # Errors
 /// None that memory does not have.
-pub fn head(table: &Table) -> Result<Vec<u8>, csv::Error> {
+pub(crate) fn head(table: &Table) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
     let places: &[&str] = match table.rows {
         Rows::Cells { .. } => &["strip"],
@@ -27,7 +27,7 @@ pub fn head(table: &Table) -> Result<Vec<u8>, csv::Error> {
 ///
 /// # Errors
 /// None that memory does not have.
-pub fn lines(table: &Table, rows: Range<usize>) -> Result<Vec<u8>, csv::Error> {
+pub(crate) fn lines(table: &Table, rows: Range<usize>) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
     let written = |value: f64| number_as(value, table.precision);
     for row in rows {
@@ -52,7 +52,7 @@ pub fn lines(table: &Table, rows: Range<usize>) -> Result<Vec<u8>, csv::Error> {
 ///
 /// # Errors
 /// None that memory does not have.
-pub fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
+pub(crate) fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
     out.into_inner()
         .map_err(|error| csv::Error::from(error.into_error()))
 }
@@ -73,7 +73,7 @@ fn end_row(out: &mut csv::Writer<Vec<u8>>, table: &Table, row: usize) -> Result<
 
 /// The shortest text that reads back as the same number; empty for NaN.
 #[must_use]
-pub fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     if value.is_nan() {
         String::new()
     } else {
@@ -83,7 +83,7 @@ pub fn number(value: f64) -> String {
 
 /// The same in this precision.
 #[must_use]
-pub fn number_as(value: f64, precision: Precision) -> String {
+pub(crate) fn number_as(value: f64, precision: Precision) -> String {
     match precision {
         Precision::Single if !value.is_nan() => format!("{:?}", single(value)),
         _ => number(value),
@@ -93,7 +93,7 @@ pub fn number_as(value: f64, precision: Precision) -> String {
 /// The nearest number of 32 bits; NaN stays NaN.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "that is what is asked for")]
-pub fn single(value: f64) -> f32 {
+pub(crate) fn single(value: f64) -> f32 {
     value as f32
 }
 

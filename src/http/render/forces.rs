@@ -5,7 +5,7 @@ use crate::contact::solution::words::answer::{ErrorEstimate, Total};
 
 /// The motion of a line, its forces and their errors.
 #[derive(Debug, Clone, Copy)]
-pub struct Forces {
+pub(crate) struct Forces {
     /// The motion.
     pub motion: Option<MotionWords>,
     /// Longitudinal and lateral force in N, and moment in N·mm.
@@ -16,7 +16,7 @@ pub struct Forces {
 
 impl Forces {
     /// The columns of these, in the order of a table that has all of them; `normal_force_n` stands between motion and forces.
-    pub const COLUMNS: [&'static str; 10] = [
+    pub(crate) const COLUMNS: [&'static str; 10] = [
         "creepage_x",
         "creepage_y",
         "spin_per_mm",
@@ -31,7 +31,7 @@ impl Forces {
 
     /// The sums over all patches.
     #[must_use]
-    pub fn of_total(motion: Option<MotionWords>, total: &Total) -> Forces {
+    pub(crate) fn of_total(motion: Option<MotionWords>, total: &Total) -> Forces {
         Forces {
             motion,
             resultants: [total.force_x_n, total.force_y_n, total.moment_z_n_mm],
@@ -41,7 +41,7 @@ impl Forces {
 
     /// The value of a column; nothing where there is none.
     #[must_use]
-    pub fn number(&self, name: &str) -> Option<f64> {
+    pub(crate) fn number(&self, name: &str) -> Option<f64> {
         let [x, y, moment] = self.resultants;
         let error = |of: fn(ErrorEstimate) -> f64| self.error.map(of);
         match name {

@@ -1,14 +1,14 @@
 //! The forms of an answer other than JSON; one format is one file.
 
-pub mod batch_csv;
-pub mod csv;
-pub mod forces;
-pub mod npz;
-pub mod picture;
-pub mod pieces;
-pub mod resultants;
-pub mod row_tables;
-pub mod rows;
-pub mod stresses;
-pub mod table;
-pub mod vtk;
+pub(super) mod batch_csv;
+pub(super) mod csv;
+pub(super) mod forces;
+pub(super) mod npz;
+pub(super) mod picture;
+pub(super) mod pieces;
+pub(super) mod resultants;
+pub(super) mod row_tables;
+pub(super) mod rows;
+pub(super) mod stresses;
+pub(super) mod table;
+pub(super) mod vtk;

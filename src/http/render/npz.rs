@@ -25,7 +25,7 @@ const BEFORE_HEADER: usize = 10;
 ///
 /// # Errors
 /// The archive would be larger than the format allows.
-pub fn write(table: &Table, outlines: &Outlines) -> ZipResult<Vec<u8>> {
+pub(crate) fn write(table: &Table, outlines: &Outlines) -> ZipResult<Vec<u8>> {
     let mut archive = Archive {
         zip: ZipWriter::new(Cursor::new(Vec::new())),
         precision: table.precision,
@@ -72,7 +72,7 @@ pub fn write(table: &Table, outlines: &Outlines) -> ZipResult<Vec<u8>> {
 ///
 /// # Errors
 /// The archive would be larger than the format allows.
-pub fn write_rows(answer: &RowsAnswer) -> ZipResult<Vec<u8>> {
+pub(crate) fn write_rows(answer: &RowsAnswer) -> ZipResult<Vec<u8>> {
     let mut archive = Archive {
         zip: ZipWriter::new(Cursor::new(Vec::new())),
         precision: Precision::Double,

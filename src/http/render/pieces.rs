@@ -32,7 +32,7 @@ enum ColumnName {
 }
 
 /// The table as CSV.
-pub fn csv_body(table: Table) -> Body {
+pub(crate) fn csv_body(table: Table) -> Body {
     let starts = (0..table.len()).step_by(ROWS);
     let head = csv::head(&table);
     let lines = starts.map(move |start| {
@@ -43,7 +43,7 @@ pub fn csv_body(table: Table) -> Body {
 }
 
 /// The table as the JSON of a field: members written before (`"patch":0,…`), then per cell inside `cells`, or on a grid.
-pub fn json_body(table: Table, members: &str) -> Body {
+pub(crate) fn json_body(table: Table, members: &str) -> Body {
     let parts = parts(&table, members);
     let texts = parts.into_iter().map(move |part| match part {
         JsonPart::Text(text) => Ok::<_, std::convert::Infallible>(text.into_bytes()),
@@ -53,7 +53,7 @@ pub fn json_body(table: Table, members: &str) -> Body {
 }
 
 /// The texts, gathered into pieces; each is made when the client has taken those before it.
-pub fn body<E>(mut texts: impl Iterator<Item = Result<Vec<u8>, E>> + Send + 'static) -> Body
+pub(crate) fn body<E>(mut texts: impl Iterator<Item = Result<Vec<u8>, E>> + Send + 'static) -> Body
 where
     E: std::error::Error + Send + Sync + 'static,
 {

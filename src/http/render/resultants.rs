@@ -27,7 +27,7 @@ enum Section {
 ///
 /// # Errors
 /// The origin cannot be written.
-pub fn json_body(resultants: Resultants) -> Result<Body, serde_json::Error> {
+pub(crate) fn json_body(resultants: Resultants) -> Result<Body, serde_json::Error> {
     let mut parts = Vec::new();
     for (place, patch) in resultants.patches.iter().enumerate() {
         let before = if place == 0 { "{\"patches\":[" } else { "]}," };
@@ -55,7 +55,7 @@ pub fn json_body(resultants: Resultants) -> Result<Body, serde_json::Error> {
 }
 
 /// One line per patch and motion, then one per motion with the sums over all patches.
-pub fn csv_body(resultants: Resultants, sums: Vec<Sum>) -> Body {
+pub(crate) fn csv_body(resultants: Resultants, sums: Vec<Sum>) -> Body {
     let with_history = sums.first().is_some_and(|sum| sum.history.is_some());
     let head = head(with_history);
     let mut parts = Vec::new();

@@ -9,10 +9,10 @@ use crate::jobs::codec::parquet::TableWriter;
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
 
 /// Why a table cannot be written.
-pub type WriteError = Box<dyn Error + Send + Sync>;
+pub(crate) type WriteError = Box<dyn Error + Send + Sync>;
 
 /// Writes tables with the same columns, one after the other.
-pub enum RowWriter {
+pub(crate) enum RowWriter {
     /// A line with the names of the columns, then one for each row.
     Csv(Vec<String>),
     /// An object for each row.
@@ -26,7 +26,7 @@ pub enum RowWriter {
 impl RowWriter {
     /// A line for each row under a header.
     #[must_use]
-    pub fn csv(columns: &[(String, TableKind)]) -> RowWriter {
+    pub(crate) fn csv(columns: &[(String, TableKind)]) -> RowWriter {
         RowWriter::Csv(columns.iter().map(|(name, _)| name.clone()).collect())
     }
 
@@ -34,7 +34,7 @@ impl RowWriter {
     ///
     /// # Errors
     /// It cannot be begun.
-    pub fn arrow(columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
+    pub(crate) fn arrow(columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
         let writer = ArrowWriter::new(Vec::new(), columns)?;
         Ok(RowWriter::Arrow(Box::new(writer)))
     }
@@ -43,7 +43,7 @@ impl RowWriter {
     ///
     /// # Errors
     /// It cannot be begun.
-    pub fn parquet(columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
+    pub(crate) fn parquet(columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
         let writer = TableWriter::new(Vec::new(), columns)?;
         Ok(RowWriter::Parquet(Box::new(writer)))
     }
@@ -52,7 +52,7 @@ impl RowWriter {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn head(&mut self) -> Result<Vec<u8>, WriteError> {
+    pub(crate) fn head(&mut self) -> Result<Vec<u8>, WriteError> {
         match self {
             RowWriter::Csv(names) => {
                 let mut writer = csv::Writer::from_writer(Vec::new());
@@ -67,7 +67,7 @@ impl RowWriter {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn write(&mut self, table: RowTable) -> Result<Vec<u8>, WriteError> {
+    pub(crate) fn write(&mut self, table: RowTable) -> Result<Vec<u8>, WriteError> {
         match self {
             RowWriter::Csv(_) => Ok(csv_lines(&table)?),
             RowWriter::Ndjson => Ok(json_lines(&table)?.into_bytes()),
@@ -86,7 +86,7 @@ impl RowWriter {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn finish(&mut self) -> Result<Vec<u8>, WriteError> {
+    pub(crate) fn finish(&mut self) -> Result<Vec<u8>, WriteError> {
         match self {
             RowWriter::Csv(_) | RowWriter::Ndjson => Ok(Vec::new()),
             RowWriter::Arrow(writer) => {

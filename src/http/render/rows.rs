@@ -27,7 +27,7 @@ enum RowsPart {
 }
 
 /// `{"rows": …, "columns": {"force_x_n": […], …, "status": […]}}`; null where a row has no number.
-pub fn json_body(answer: RowsAnswer) -> Body {
+pub(crate) fn json_body(answer: RowsAnswer) -> Body {
     let rows = answer.status.len();
     let mut parts = vec![RowsPart::Text(format!("{{\"rows\":{rows},\"columns\":{{"))];
     for (place, (name, _)) in answer.columns().iter().enumerate() {
@@ -49,7 +49,7 @@ pub fn json_body(answer: RowsAnswer) -> Body {
 }
 
 /// A line with the names of the columns, then one for each row; empty where a row has no number.
-pub fn csv_body(answer: RowsAnswer) -> Body {
+pub(crate) fn csv_body(answer: RowsAnswer) -> Body {
     let answer = Arc::new(answer);
     let names: Vec<&str> = answer.columns().iter().map(|(name, _)| *name).collect();
     let head = format!("{},status\n", names.join(",")).into_bytes();
@@ -70,7 +70,7 @@ pub fn csv_body(answer: RowsAnswer) -> Body {
 }
 
 /// An Arrow stream of the same columns; null where a row has no number.
-pub fn arrow_body(answer: RowsAnswer) -> Body {
+pub(crate) fn arrow_body(answer: RowsAnswer) -> Body {
     let names = answer.columns().into_iter();
     let columns: Vec<_> = names
         .map(|(name, _)| (name.to_owned(), TableKind::Numbers))
@@ -135,7 +135,7 @@ fn statuses(answer: &RowsAnswer, range: Range<usize>) -> String {
 }
 
 /// The shortest digits that are read as the same number.
-pub fn write_number(text: &mut String, number: f64, none: &str) {
+pub(crate) fn write_number(text: &mut String, number: f64, none: &str) {
     if number.is_finite() {
         let _ = write!(text, "{number:?}");
     } else {

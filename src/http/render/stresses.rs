@@ -26,7 +26,7 @@ const COLUMNS: [&str; 16] = [
 ///
 /// # Errors
 /// None that memory does not have.
-pub fn csv(points: &[StressPoint]) -> Result<Vec<u8>, csv::Error> {
+pub(crate) fn csv(points: &[StressPoint]) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
     out.write_record(COLUMNS)?;
     for point in points {

@@ -10,7 +10,7 @@ use crate::http::dto::cells::{Cells, GriddedField};
 #[derive(Debug, ToSchema)]
 #[schema(value_type = String, format = Binary)]
 #[expect(dead_code, reason = "names binary bodies in the contract")]
-pub struct File(Vec<u8>);
+pub(crate) struct File(Vec<u8>);
 
 /// Named columns of equal length.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,7 +75,7 @@ pub enum Rows {
 }
 
 /// The columns of [`Rows::Cells`] before `strip`.
-pub const PLACES: [&str; 4] = ["x_mm", "y_mm", "dx_mm", "dy_mm"];
+pub(crate) const PLACES: [&str; 4] = ["x_mm", "y_mm", "dx_mm", "dy_mm"];
 
 /// One value per row.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,7 +97,7 @@ pub enum ArrayData {
 
 /// The number of a zone where a format has no words: 0 stick, 1 slip, -1 outside the patch.
 #[must_use]
-pub fn zone_code(zone: Option<Zone>) -> i8 {
+pub(crate) fn zone_code(zone: Option<Zone>) -> i8 {
     match zone {
         Some(Zone::Stick) => 0,
         Some(Zone::Slip) => 1,

@@ -18,7 +18,7 @@ const VECTORS: [(&str, &str, &str); 2] = [
 
 /// Writes a table under a title; what is not printable ASCII in the title becomes `?`.
 #[must_use]
-pub fn write(table: &Table, title: &str) -> Vec<u8> {
+pub(crate) fn write(table: &Table, title: &str) -> Vec<u8> {
     let mut out = Vec::new();
     line(&mut out, "# vtk DataFile Version 3.0");
     let title = title.chars().take(TITLE_MAX);

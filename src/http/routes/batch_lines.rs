@@ -28,16 +28,16 @@ use crate::jobs::error::JobsError;
 use crate::jobs::model::State as JobState;
 
 /// What a reader holds of small results: those of a page, and the text written of them.
-pub const STREAM_BYTES: usize = 2 * PAGE_BYTES;
+pub(crate) const STREAM_BYTES: usize = 2 * PAGE_BYTES;
 /// How many jobs are read the first time.
-pub const FIRST_PAGE_JOBS: u32 = 50;
+pub(crate) const FIRST_PAGE_JOBS: u32 = 50;
 /// Most jobs read at once.
 const PAGE_JOBS: u32 = 500;
 /// Motions of a large result written at once.
 const POINTS: usize = 64;
 
 /// What lines are made from.
-pub struct Source {
+pub(crate) struct Source {
     pub jobs: Jobs,
     pub memory: Memory,
     /// Columns of the CSV; none for NDJSON.
@@ -45,7 +45,7 @@ pub struct Source {
 }
 
 /// The lines of a batch from some place on.
-pub struct Lines {
+pub(crate) struct Lines {
     pub source: Source,
     pub batch: Uuid,
     /// Until then jobs that have not ended are waited for.
@@ -64,7 +64,7 @@ pub struct Lines {
 
 impl Lines {
     /// The pieces. They break off once `revoked` ends, so that what was sent is not taken for all there is.
-    pub fn until(
+    pub(crate) fn until(
         self,
         revoked: impl Future<Output = ()> + Send,
     ) -> impl Stream<Item = Result<Bytes, BoxError>> + Send {

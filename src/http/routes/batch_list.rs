@@ -18,7 +18,7 @@ const LIST_LIMIT_DEFAULT: u32 = 20;
 
 /// A page of batches, newest first.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct BatchPage {
+pub(crate) struct BatchPage {
     /// The batches of this page.
     batches: Vec<BatchAnswer>,
     /// Give this as `cursor` for the next page; null on the last one.
@@ -47,7 +47,7 @@ list_query! {
         ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
     )), ListProblems)
 )]
-pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
+pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
     let query = BatchListQuery::read(&uri, &())?;
     let filter = BatchFilter {
         labels: query.label.unwrap_or_default(),

@@ -34,7 +34,7 @@ use crate::jobs::model::State as JobState;
 const WAIT_MAX_SECONDS: u32 = 3600;
 /// One line of the results of a batch.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct BatchLine {
+pub(crate) struct BatchLine {
     /// Place of the case in what was sent, counted from 0.
     index: u32,
     /// Identifier of the job.
@@ -97,7 +97,7 @@ problems! {
     ),
     responses((status = 200, description = "One line per job", content((BatchLine = "application/x-ndjson"), (String = "text/csv"))), BatchResultProblems)
 )]
-pub async fn results(
+pub(crate) async fn results(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
     uri: Uri,

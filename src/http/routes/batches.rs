@@ -83,7 +83,7 @@ query! {
         BatchProblems
     )
 )]
-pub async fn submit(
+pub(crate) async fn submit(
     Caller(jobs): Caller,
     State(options): State<HttpOptions>,
     State(memory): State<Memory>,
@@ -122,7 +122,9 @@ pub async fn submit(
 ///
 /// # Errors
 /// They are too many, or two have the same key.
-pub fn labels_of(given: Vec<(String, String)>) -> Result<BTreeMap<String, String>, ApiError> {
+pub(crate) fn labels_of(
+    given: Vec<(String, String)>,
+) -> Result<BTreeMap<String, String>, ApiError> {
     let number = given.len();
     let labels: BTreeMap<String, String> = given.into_iter().collect();
     if labels.len() < number || number > LABELS_MAX {
@@ -179,7 +181,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the batch", format = "uuid")),
     responses((status = 200, description = "The batch", body = BatchAnswer), GetBatchProblems)
 )]
-pub async fn get(
+pub(crate) async fn get(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
 ) -> Result<Json<BatchAnswer>, ApiError> {
@@ -199,7 +201,10 @@ pub async fn get(
         GetBatchProblems
     )
 )]
-pub async fn cancel(Caller(jobs): Caller, BatchId(id): BatchId) -> Result<Response, ApiError> {
+pub(crate) async fn cancel(
+    Caller(jobs): Caller,
+    BatchId(id): BatchId,
+) -> Result<Response, ApiError> {
     let batch: BatchAnswer = jobs.cancel_batch(id).await?.into();
     let status = if batch.ended {
         StatusCode::OK
@@ -223,7 +228,10 @@ problems! {
     params(("id" = String, Path, description = "Id of the batch", format = "uuid")),
     responses((status = 204, description = "The batch is gone"), DeleteBatchProblems)
 )]
-pub async fn delete(Caller(jobs): Caller, BatchId(id): BatchId) -> Result<StatusCode, ApiError> {
+pub(crate) async fn delete(
+    Caller(jobs): Caller,
+    BatchId(id): BatchId,
+) -> Result<StatusCode, ApiError> {
     jobs.delete_batch(id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

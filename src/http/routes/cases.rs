@@ -19,7 +19,7 @@ use crate::http::problem::error::ApiError;
 /// A case that can be solved, and its expected cost.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = CheckedCase)]
-pub struct CheckReport {
+pub(crate) struct CheckReport {
     /// Digest of everything that determines the answer; cases with equal digests have equal answers.
     digest: String,
     /// The method the case asks for.
@@ -44,7 +44,7 @@ pub struct CheckReport {
 
 /// Expected cost of a case, rough.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     /// Peak memory in bytes.
     bytes: u64,
     /// Of these, what stays in the store of operators that all workers share.
@@ -67,7 +67,7 @@ problems! {
     request_body(content = Case, description = "One case", content_type = "application/json"),
     responses((status = 200, description = "The case can be solved", body = CheckReport), CheckProblems)
 )]
-pub async fn check(
+pub(crate) async fn check(
     Caller(jobs): Caller,
     State(memory): State<Memory>,
     JsonBody { value, mut room }: JsonBody,

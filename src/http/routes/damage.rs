@@ -25,7 +25,7 @@ query! {
 
 /// Damage of one pass over one patch for one motion.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct PatchDamage {
+pub(crate) struct PatchDamage {
     /// Number of the patch, counted from 0.
     patch: usize,
     /// Number of the motion, counted from 0.
@@ -49,7 +49,7 @@ pub struct PatchDamage {
     ),
     responses((status = 200, description = "The models that the case asked for", body = PatchDamage), FieldProblems)
 )]
-pub async fn damage(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn damage(request: PartRequest) -> Result<Response, ApiError> {
     let query = DamageQuery::read(&request.uri, &())?;
     let (patch, point) = (query.patch.unwrap_or(0), query.point.unwrap_or(0));
     let answer = write(&request, patch, point);

@@ -49,7 +49,7 @@ const FORMATS: &[Format] = &[Format::Json, Format::Csv, Format::Arrow, Format::N
     dead_code,
     reason = "the contract; bodies are read straight into columns"
 )]
-pub struct EvaluateRequest {
+pub(crate) struct EvaluateRequest {
     /// A case of type `radii` or `ellipse` with one motion; `method` is `table`, `fastsim` or `auto`. Numbers that a column holds may be
     /// left out. Of `outputs` only `gradients` counts.
     #[schema(value_type = Object)]
@@ -65,7 +65,7 @@ pub struct EvaluateRequest {
     dead_code,
     reason = "the contract; answers are written column by column"
 )]
-pub struct EvaluateAnswer {
+pub(crate) struct EvaluateAnswer {
     /// Number of rows.
     rows: usize,
     /// The columns.
@@ -78,7 +78,7 @@ pub struct EvaluateAnswer {
     dead_code,
     reason = "the contract; answers are written column by column"
 )]
-pub struct EvaluateColumns {
+pub(crate) struct EvaluateColumns {
     /// Longitudinal force on the lower body in N.
     force_x_n: Vec<Option<f64>>,
     /// Lateral force on the lower body in N.
@@ -154,7 +154,7 @@ query! {
     request_body(content((EvaluateRequest = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/x-npz")), description = "At most 1 000 000 rows and 64 MiB"),
     responses((status = 200, description = "The rows' resultants", content((EvaluateAnswer = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/x-npz"))), EvaluateProblems)
 )]
-pub async fn evaluate(
+pub(crate) async fn evaluate(
     Caller(jobs): Caller,
     State(options): State<HttpOptions>,
     State(memory): State<Memory>,

@@ -27,7 +27,7 @@ const RETRY: Duration = Duration::from_secs(1);
 const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
 
 /// A client that asks for a stream of events.
-pub struct EventRequest {
+pub(crate) struct EventRequest {
     /// Its jobs.
     pub jobs: Jobs,
     /// The event that it saw last.
@@ -62,7 +62,7 @@ impl EventRequest {
     ///
     /// # Errors
     /// The tenant follows as much as it may already.
-    pub fn answer(
+    pub(crate) fn answer(
         self,
         events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static,
     ) -> Result<Response, ApiError> {
@@ -75,7 +75,7 @@ impl EventRequest {
 }
 
 /// The change, if there is one; a failure ends the stream, and the client connects again.
-pub fn changed<T>(change: Result<Option<T>, impl std::fmt::Display>) -> Option<T> {
+pub(crate) fn changed<T>(change: Result<Option<T>, impl std::fmt::Display>) -> Option<T> {
     change
         .inspect_err(|reason| tracing::debug!(%reason, "a stream of events ended early"))
         .ok()
@@ -83,7 +83,7 @@ pub fn changed<T>(change: Result<Option<T>, impl std::fmt::Display>) -> Option<T
 }
 
 /// An event of this name; `id` says what was seen with it.
-pub fn event<T: Serialize>(name: &str, id: &str, data: &T) -> Option<Event> {
+pub(crate) fn event<T: Serialize>(name: &str, id: &str, data: &T) -> Option<Event> {
     let event = Event::default().event(name).id(id).retry(RETRY);
     event.json_data(data).ok()
 }

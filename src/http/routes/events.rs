@@ -30,7 +30,7 @@ use crate::jobs::model::{Job, State as JobState};
 
 /// The data of an event of a job.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct JobEvent {
+pub(crate) struct JobEvent {
     /// Where the job stands.
     state: JobState,
     /// Rough progress.
@@ -41,10 +41,10 @@ pub struct JobEvent {
 }
 
 /// One event of the stream of a job, in the contract.
-pub struct JobEventSent;
+pub(crate) struct JobEventSent;
 
 /// One event of the stream of a batch, in the contract.
-pub struct BatchEventSent;
+pub(crate) struct BatchEventSent;
 
 impl PartialSchema for JobEventSent {
     fn schema() -> RefOr<Schema> {
@@ -69,7 +69,7 @@ impl PartialSchema for BatchEventSent {
 impl ToSchema for BatchEventSent {}
 
 /// One event of the stream of a run, in the contract.
-pub struct RunEventSent;
+pub(crate) struct RunEventSent;
 
 impl PartialSchema for RunEventSent {
     fn schema() -> RefOr<Schema> {
@@ -80,7 +80,7 @@ impl PartialSchema for RunEventSent {
 impl ToSchema for RunEventSent {}
 
 /// An event line by line, called so; its data is `T` as JSON text.
-pub fn event_schema<T: ToSchema>(names: &str) -> RefOr<Schema> {
+pub(crate) fn event_schema<T: ToSchema>(names: &str) -> RefOr<Schema> {
     let text = |what: &str| {
         let text = ObjectBuilder::new().schema_type(Type::String);
         text.description(Some(what))
@@ -135,7 +135,7 @@ impl JobEvent {
         GetProblems
     )
 )]
-pub async fn job(request: EventRequest, JobId(id): JobId) -> Result<Response, ApiError> {
+pub(crate) async fn job(request: EventRequest, JobId(id): JobId) -> Result<Response, ApiError> {
     let jobs = request.jobs.clone();
     let job = jobs.get(id).await?;
     let seen = request.seen.as_ref().and_then(|text| text.parse().ok());
@@ -179,7 +179,10 @@ async fn next_of_job(
         GetBatchProblems
     )
 )]
-pub async fn batch(request: EventRequest, BatchId(id): BatchId) -> Result<Response, ApiError> {
+pub(crate) async fn batch(
+    request: EventRequest,
+    BatchId(id): BatchId,
+) -> Result<Response, ApiError> {
     let jobs = request.jobs.clone();
     let batch = jobs.batch(id).await?;
     let seen = request.seen.clone();
@@ -223,7 +226,7 @@ async fn next_of_batch(
         GetRunProblems
     )
 )]
-pub async fn run(request: EventRequest, RunId(id): RunId) -> Result<Response, ApiError> {
+pub(crate) async fn run(request: EventRequest, RunId(id): RunId) -> Result<Response, ApiError> {
     let jobs = request.jobs.clone();
     let run = jobs.run(id).await?;
     let seen = request.seen.clone();

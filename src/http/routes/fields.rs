@@ -193,7 +193,7 @@ impl Selection {
 }
 
 /// How exactly numbers are written.
-pub fn precision() -> Reader<Precision> {
+pub(crate) fn precision() -> Reader<Precision> {
     reader("`single`, `double`", |text| match text {
         "single" => Some(Precision::Single),
         "double" => Some(Precision::Double),
@@ -202,7 +202,7 @@ pub fn precision() -> Reader<Precision> {
 }
 
 /// A regular grid of at most so many samples.
-pub fn grid(samples_max: usize) -> Reader<(usize, usize)> {
+pub(crate) fn grid(samples_max: usize) -> Reader<(usize, usize)> {
     let allowed = format!(
         "`NXxNY` such as `60x40`, each from 2 to 1000, and at most {samples_max} samples in all"
     );
@@ -233,7 +233,7 @@ pub fn grid(samples_max: usize) -> Reader<(usize, usize)> {
         (File = "image/png")
     )), FieldProblems)
 )]
-pub async fn tractions(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn tractions(request: PartRequest) -> Result<Response, ApiError> {
     answer(&request, Output::Tractions).await
 }
 
@@ -255,7 +255,7 @@ pub async fn tractions(request: PartRequest) -> Result<Response, ApiError> {
         (File = "image/png")
     )), FieldProblems)
 )]
-pub async fn pressure(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn pressure(request: PartRequest) -> Result<Response, ApiError> {
     answer(&request, Output::Pressure).await
 }
 
@@ -277,7 +277,7 @@ pub async fn pressure(request: PartRequest) -> Result<Response, ApiError> {
         (File = "image/png")
     )), FieldProblems)
 )]
-pub async fn slip(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn slip(request: PartRequest) -> Result<Response, ApiError> {
     answer(&request, Output::Slip).await
 }
 
@@ -299,7 +299,7 @@ pub async fn slip(request: PartRequest) -> Result<Response, ApiError> {
         (File = "image/png")
     )), FieldProblems)
 )]
-pub async fn temperature(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn temperature(request: PartRequest) -> Result<Response, ApiError> {
     answer(&request, Output::Temperature).await
 }
 
@@ -319,7 +319,7 @@ async fn answer(request: &PartRequest, output: Output) -> Result<Response, ApiEr
 }
 
 /// What an answer is written from.
-pub enum Written {
+pub(crate) enum Written {
     /// A table and its outlines, whose text is made when the client takes it.
     Table(Table, Outlines),
     /// The whole answer.
@@ -330,7 +330,7 @@ pub enum Written {
 ///
 /// # Errors
 /// `internal` if that fails.
-pub async fn write_as(
+pub(crate) async fn write_as(
     rendering: Rendering,
     selection: Selection,
     name: &'static str,
@@ -351,7 +351,7 @@ pub async fn write_as(
 ///
 /// # Errors
 /// `internal` if that fails.
-pub fn write_file(
+pub(crate) fn write_file(
     table: &Table,
     outlines: &Outlines,
     selection: Selection,
@@ -372,7 +372,7 @@ pub fn write_file(
 ///
 /// # Errors
 /// What making it fails with.
-pub async fn write(
+pub(crate) async fn write(
     rendering: Rendering,
     selection: Selection,
     name: &'static str,

@@ -45,7 +45,7 @@ const MEMBERS: [&str; 18] = [
 
 /// A page of jobs, newest first.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct JobPage {
+pub(crate) struct JobPage {
     /// The jobs of this page; with the members that `fields` names.
     #[schema(value_type = Vec<ListedJob>)]
     jobs: Vec<Value>,
@@ -57,7 +57,7 @@ pub struct JobPage {
 
 /// Number of entries of a list: one of the two is there.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct ListTotal {
+pub(crate) struct ListTotal {
     /// Number of entries of the whole list.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -82,7 +82,7 @@ impl From<Total> for ListTotal {
 }
 
 /// A job in a list, in the contract: any of its members may have been left out.
-pub struct ListedJob;
+pub(crate) struct ListedJob;
 
 impl PartialSchema for ListedJob {
     fn schema() -> RefOr<Schema> {
@@ -152,7 +152,7 @@ fn fields() -> Reader<Vec<&'static str>> {
         ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
     )), ListProblems)
 )]
-pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
+pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
     let query = ListQuery::read(&uri, &())?;
     let mut states = query.state.unwrap_or_default();
     states.sort_unstable();

@@ -72,7 +72,7 @@ problems! {
         SubmitProblems
     )
 )]
-pub async fn submit(
+pub(crate) async fn submit(
     Caller(jobs): Caller,
     uri: Uri,
     State(crowds): State<ConcurrencyLimits>,
@@ -143,7 +143,7 @@ async fn job_text(
 }
 
 /// Says that a response is about what an earlier request with the same idempotency key made.
-pub fn mark_replay(response: &mut Response, replayed: bool) {
+pub(crate) fn mark_replay(response: &mut Response, replayed: bool) {
     if replayed {
         response
             .headers_mut()
@@ -155,7 +155,7 @@ pub fn mark_replay(response: &mut Response, replayed: bool) {
 ///
 /// # Errors
 /// It is too long, empty, or given twice.
-pub fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
+pub(crate) fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
     let Some(value) = headers.get(&IDEMPOTENCY_KEY) else {
         return Ok(None);
     };
@@ -195,7 +195,7 @@ problems! {
         ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
     )), GetProblems)
 )]
-pub async fn get(awaited: Awaited) -> Result<Response, ApiError> {
+pub(crate) async fn get(awaited: Awaited) -> Result<Response, ApiError> {
     let job = awaited.jobs.get_with_queue_place(awaited.id).await?;
     let job = Json(JobAnswer::new(job));
     Ok(say_applied(job.into_response(), awaited.applied))
@@ -210,7 +210,7 @@ pub async fn get(awaited: Awaited) -> Result<Response, ApiError> {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The case", body = Case), GetProblems)
 )]
-pub async fn case(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
+pub(crate) async fn case(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
     let text = jobs.case(id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }
@@ -228,7 +228,7 @@ pub async fn case(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, Ap
         GetProblems
     )
 )]
-pub async fn cancel(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
+pub(crate) async fn cancel(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
     let job = jobs.cancel(id).await?;
     let status = if job.state.ended() {
         StatusCode::OK
@@ -252,7 +252,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 204, description = "The job is gone"), DeleteProblems)
 )]
-pub async fn delete(Caller(jobs): Caller, JobId(id): JobId) -> Result<StatusCode, ApiError> {
+pub(crate) async fn delete(Caller(jobs): Caller, JobId(id): JobId) -> Result<StatusCode, ApiError> {
     jobs.delete(id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

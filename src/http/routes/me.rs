@@ -16,7 +16,7 @@ use crate::jobs::model::State as JobState;
 
 /// Who asks, what it uses, and what it may use.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct Me {
+pub(crate) struct Me {
     /// The tenant that the key belongs to; `anonymous` without a key.
     tenant: String,
     /// Labels that the key is bound to: the key can access only resources with these labels, and resources created with it get them.
@@ -31,7 +31,7 @@ pub struct Me {
 
 /// What a tenant may use at most.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct Quota {
+pub(crate) struct Quota {
     /// Queued jobs, with those of batches that are being received.
     queued: u64,
     /// Bytes reserved for batches that are being received.
@@ -40,7 +40,7 @@ pub struct Quota {
 
 /// What a tenant uses at present.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct Used {
+pub(crate) struct Used {
     /// Queued jobs, with the places that are reserved for batches being received.
     queued: u64,
     /// Bytes reserved for batches that are being received.
@@ -58,7 +58,7 @@ pub struct Used {
     operation_id = "get_me",
     responses((status = 200, description = "The tenant with its use and its limits", body = Me), PlainProblems)
 )]
-pub async fn me(
+pub(crate) async fn me(
     Caller(jobs): Caller,
     State(options): State<HttpOptions>,
 ) -> Result<Json<Me>, ApiError> {

@@ -34,7 +34,7 @@ macro_rules! list_query {
 pub(crate) use list_query;
 
 /// A page as an answer, linked to the next one.
-pub fn answer(uri: &Uri, cursor: Option<&str>, page: impl Serialize) -> Response {
+pub(crate) fn answer(uri: &Uri, cursor: Option<&str>, page: impl Serialize) -> Response {
     link_next(uri, cursor, Json(page).into_response())
 }
 

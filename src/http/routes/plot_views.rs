@@ -18,13 +18,13 @@ use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 
 /// Draws when its turn has come.
-pub type Drawing = Box<dyn FnOnce(u32) -> Result<String, ApiError> + Send>;
+pub(crate) type Drawing = Box<dyn FnOnce(u32) -> Result<String, ApiError> + Send>;
 
 /// What draws this view.
 ///
 /// # Errors
 /// There is nothing of it to be drawn, or there is no result.
-pub async fn drawing(
+pub(crate) async fn drawing(
     request: &PartRequest,
     title: String,
     wish: PlotOptions,

@@ -9,7 +9,7 @@ use crate::contact::solution::words::answer::PointSolution;
 /// What a picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum View {
+pub(crate) enum View {
     /// One patch from above.
     Patch,
     /// Forces over the motions.
@@ -22,11 +22,11 @@ pub enum View {
 
 impl View {
     /// Every view.
-    pub const ALL: [View; 4] = [View::Patch, View::Curve, View::Section, View::Profiles];
+    pub(crate) const ALL: [View; 4] = [View::Patch, View::Curve, View::Section, View::Profiles];
 
     /// The word for it in the API.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             View::Patch => "patch",
             View::Curve => "curve",
@@ -37,14 +37,14 @@ impl View {
 
     /// The view of that name, if there is one.
     #[must_use]
-    pub fn from_name(name: &str) -> Option<View> {
+    pub(crate) fn from_name(name: &str) -> Option<View> {
         View::ALL.into_iter().find(|view| view.name() == name)
     }
 }
 
 /// What a picture shows, and how wide it is.
 #[derive(Debug, Clone, Copy)]
-pub struct PlotOptions {
+pub(crate) struct PlotOptions {
     /// What is drawn.
     pub view: View,
     /// The field.
@@ -60,7 +60,7 @@ pub struct PlotOptions {
 }
 
 /// Which patch and motion this is, where there are several.
-pub fn counted(wish: PlotOptions, patches: usize, points: usize) -> String {
+pub(crate) fn counted(wish: PlotOptions, patches: usize, points: usize) -> String {
     let mut text = String::new();
     if patches > 1 {
         text += &format!(", patch {} of 0 to {}", wish.patch, patches - 1);
@@ -72,7 +72,7 @@ pub fn counted(wish: PlotOptions, patches: usize, points: usize) -> String {
 }
 
 /// Motion and forces in two lines.
-pub fn remarks(point: &PointSolution, normal: f64, counted: &str) -> Vec<String> {
+pub(crate) fn remarks(point: &PointSolution, normal: f64, counted: &str) -> Vec<String> {
     let motion = point.motion;
     // What rounding leaves of a force that is nothing.
     let force = |value: f64| {
@@ -97,7 +97,7 @@ pub fn remarks(point: &PointSolution, normal: f64, counted: &str) -> Vec<String>
 }
 
 /// A number with four digits that count.
-pub fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     let size = value.abs();
     let text = if size == 0.0 {
         "0".to_owned()

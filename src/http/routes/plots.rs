@@ -18,7 +18,7 @@ use crate::http::routes::plot_words::{PlotOptions, View, counted, remarks};
 use crate::http::routes::stored_fields::{FieldProblems, stored};
 
 /// Width of a picture in pixels when nothing is said.
-pub const WIDTH_DEFAULT: u32 = 800;
+pub(crate) const WIDTH_DEFAULT: u32 = 800;
 /// Least width of the views other than `patch`: what is written on narrower ones cannot be read.
 const VIEW_WIDTH_MIN: u32 = 200;
 /// Limits of the width in pixels.
@@ -115,7 +115,7 @@ impl PlotOptions {
     params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
     responses((status = 200, description = "The picture", content((String = "image/svg+xml"))), FieldProblems)
 )]
-pub async fn svg(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn svg(request: PartRequest) -> Result<Response, ApiError> {
     plot(&request, Format::Svg).await
 }
 
@@ -128,7 +128,7 @@ pub async fn svg(request: PartRequest) -> Result<Response, ApiError> {
     params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
     responses((status = 200, description = "The picture", content((File = "image/png"))), FieldProblems)
 )]
-pub async fn png(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn png(request: PartRequest) -> Result<Response, ApiError> {
     plot(&request, Format::Png).await
 }
 
@@ -142,7 +142,7 @@ async fn plot(request: &PartRequest, format: Format) -> Result<Response, ApiErro
 ///
 /// # Errors
 /// The output was not asked for, there is no such patch or motion, or there is no result.
-pub async fn picture(
+pub(crate) async fn picture(
     request: &PartRequest,
     wish: PlotOptions,
     format: Format,

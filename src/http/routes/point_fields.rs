@@ -87,7 +87,7 @@ fn parts() -> Reader<Vec<Output>> {
         (File = "application/x-vtk")
     )), FieldProblems)
 )]
-pub async fn fields(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn fields(request: PartRequest) -> Result<Response, ApiError> {
     let query = FieldsQuery::read(&request.uri, &request.shared.options.grid_max_samples)?;
     let selection = Selection {
         patch: query.patch.unwrap_or(0),

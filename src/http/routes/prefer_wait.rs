@@ -17,14 +17,14 @@ use crate::http::problem::error::ApiError;
 use crate::jobs::Jobs;
 
 /// Longest time that `Prefer: wait` holds a request, in s.
-pub const WAIT_MAX_SECONDS: u32 = 60;
+pub(crate) const WAIT_MAX_SECONDS: u32 = 60;
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
 
 /// The wait that the client prefers, in s, capped. Preferences that are not understood are ignored (RFC 7240,
 /// section 2); the first `wait` counts.
-pub fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
+pub(crate) fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
     let values = headers
         .get_all(&PREFER)
         .iter()
@@ -41,7 +41,7 @@ pub fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
 }
 
 /// The job in the path, once it has ended or the wait that the client prefers is over.
-pub struct Awaited {
+pub(crate) struct Awaited {
     /// The jobs of the client.
     pub jobs: Jobs,
     /// The job in the path.
@@ -77,7 +77,7 @@ where
 }
 
 /// Says which wait was applied.
-pub fn say_applied(mut response: Response, seconds: Option<u32>) -> Response {
+pub(crate) fn say_applied(mut response: Response, seconds: Option<u32>) -> Response {
     let value = seconds.and_then(|seconds| HeaderValue::from_str(&format!("wait={seconds}")).ok());
     if let Some(value) = value {
         response.headers_mut().insert(PREFERENCE_APPLIED, value);

@@ -20,7 +20,7 @@ use crate::http::problem::kinds::ProblemKind;
 
 /// The digest in the path.
 #[derive(Debug, Clone)]
-pub struct Digest(String);
+pub(crate) struct Digest(String);
 
 impl<S: Send + Sync> FromRequestParts<S> for Digest {
     type Rejection = ApiError;
@@ -37,7 +37,7 @@ impl<S: Send + Sync> FromRequestParts<S> for Digest {
 
 /// A cross-section that is kept.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct KeptProfile {
+pub(crate) struct KeptProfile {
     /// What cases name it by: `{ "profile": "<digest>" }` in place of points or text.
     digest: String,
     /// `rail` or `wheel`: what the file says, or what the points look like.
@@ -71,7 +71,7 @@ problems! {
         KeepProfileProblems
     )
 )]
-pub async fn keep(
+pub(crate) async fn keep(
     Caller(jobs): Caller,
     JsonBody { value, room }: JsonBody,
 ) -> Result<Response, ApiError> {
@@ -94,7 +94,7 @@ pub async fn keep(
 
 /// A kept cross-section in a list.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct ProfileEntry {
+pub(crate) struct ProfileEntry {
     /// What cases name it by.
     digest: String,
     /// What it counts toward `--tenant-profiles-mb`.
@@ -106,7 +106,7 @@ pub struct ProfileEntry {
 
 /// What a tenant keeps.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct ProfileList {
+pub(crate) struct ProfileList {
     /// Newest first, at most 1000.
     profiles: Vec<ProfileEntry>,
     /// Bytes that may be kept in all.
@@ -121,7 +121,7 @@ pub struct ProfileList {
     operation_id = "list_profiles",
     responses((status = 200, description = "What is kept", body = ProfileList), PlainProblems)
 )]
-pub async fn list(Caller(jobs): Caller) -> Result<Json<ProfileList>, ApiError> {
+pub(crate) async fn list(Caller(jobs): Caller) -> Result<Json<ProfileList>, ApiError> {
     let entries = jobs.profiles().await?.into_iter();
     let entries = entries.map(|(digest, bytes, created_at)| ProfileEntry {
         digest,
@@ -148,7 +148,10 @@ problems! {
     params(("digest" = String, Path, description = "Digest of the profile")),
     responses((status = 200, description = "The cross-section", body = CrossSection), ProfileProblems)
 )]
-pub async fn get(Caller(jobs): Caller, Digest(digest): Digest) -> Result<Json<Value>, ApiError> {
+pub(crate) async fn get(
+    Caller(jobs): Caller,
+    Digest(digest): Digest,
+) -> Result<Json<Value>, ApiError> {
     let kept = jobs.profile(&digest).await?;
     let value = serde_json::from_slice(&kept.body);
     Ok(Json(value.map_err(|error| ApiError::internal(&error))?))
@@ -163,7 +166,10 @@ pub async fn get(Caller(jobs): Caller, Digest(digest): Digest) -> Result<Json<Va
     params(("digest" = String, Path, description = "Digest of the profile")),
     responses((status = 204, description = "It is gone"), ProfileProblems)
 )]
-pub async fn delete(Caller(jobs): Caller, Digest(digest): Digest) -> Result<StatusCode, ApiError> {
+pub(crate) async fn delete(
+    Caller(jobs): Caller,
+    Digest(digest): Digest,
+) -> Result<StatusCode, ApiError> {
     jobs.delete_profile(&digest).await?;
     Ok(StatusCode::NO_CONTENT)
 }

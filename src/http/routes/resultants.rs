@@ -46,7 +46,7 @@ query! {
     ),
     responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` as its patch", content((Resultants = "application/json"), (String = "text/csv"))), PartProblems)
 )]
-pub async fn resultants(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn resultants(request: PartRequest) -> Result<Response, ApiError> {
     let query = ResultantsQuery::read(&request.uri, &())?;
     let format = choose(&request.headers, query.format, FORMATS)?;
     let answer = write(&request, query.point, query.patch, format);

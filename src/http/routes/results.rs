@@ -37,7 +37,7 @@ problems! {
         ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
     )), ResultProblems)
 )]
-pub async fn result(
+pub(crate) async fn result(
     Awaited { jobs, id, applied }: Awaited,
     State(memory): State<Memory>,
     uri: Uri,
@@ -58,7 +58,7 @@ pub async fn result(
 ///
 /// # Errors
 /// The job is unknown, has not ended or has no result; or there is no memory.
-pub async fn result_text(
+pub(crate) async fn result_text(
     jobs: &Jobs,
     memory: &Memory,
     id: Uuid,

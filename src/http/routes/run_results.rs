@@ -70,7 +70,7 @@ problems! {
 /// One row of the results, in NDJSON. The other columns are those that `answers` of the run lists.
 #[derive(Debug, Serialize, ToSchema)]
 #[allow(dead_code, reason = "the contract; rows are written column by column")]
-pub struct RunRow {
+pub(crate) struct RunRow {
     /// Number of the row in what was sent, counted from 0.
     row: u64,
     /// What became of the row: `ok`; `target_missed`, the estimated error is above the target; `refused`, its case has faults; `not_covered`,
@@ -101,7 +101,7 @@ pub struct RunRow {
         (Vec<u8> = "application/vnd.apache.parquet")
     )), RunResultProblems)
 )]
-pub async fn results(
+pub(crate) async fn results(
     Caller(jobs): Caller,
     RunId(id): RunId,
     uri: Uri,
@@ -146,7 +146,7 @@ pub async fn results(
 }
 
 /// A run has answers once it has ended.
-pub fn require_ended(run: &Run) -> Result<(), ApiError> {
+pub(crate) fn require_ended(run: &Run) -> Result<(), ApiError> {
     match run.state() {
         state if state.ended() => Ok(()),
         state => Err(ApiError::new(
@@ -162,7 +162,7 @@ pub fn require_ended(run: &Run) -> Result<(), ApiError> {
 }
 
 /// The columns that are wanted, in the order of the answers.
-pub fn selected(
+pub(crate) fn selected(
     run: &Run,
     wanted: Option<Vec<String>>,
 ) -> Result<Vec<(String, TableKind)>, ApiError> {
@@ -197,7 +197,7 @@ fn writer(format: Format, columns: &[(String, TableKind)]) -> Result<RowWriter, 
 }
 
 /// The chunks of a run, one after the other.
-pub struct ChunkSource {
+pub(crate) struct ChunkSource {
     jobs: Jobs,
     /// The run.
     pub run: Run,
@@ -208,7 +208,7 @@ pub struct ChunkSource {
 
 impl ChunkSource {
     /// The chunks of a run from the first on.
-    pub fn new(jobs: Jobs, run: Run) -> ChunkSource {
+    pub(crate) fn new(jobs: Jobs, run: Run) -> ChunkSource {
         ChunkSource {
             jobs,
             run,
@@ -219,7 +219,7 @@ impl ChunkSource {
     }
 
     /// The next chunk.
-    pub async fn next(&mut self) -> Result<Option<ChunkRef>, JobsError> {
+    pub(crate) async fn next(&mut self) -> Result<Option<ChunkRef>, JobsError> {
         if self.read.is_empty() && !self.over {
             let more = self.jobs.run_chunks(self.run.chunks.id, self.last).await?;
             self.last = more.last().map(|chunk| chunk.job);
@@ -230,7 +230,7 @@ impl ChunkSource {
     }
 
     /// The answers of a chunk.
-    pub async fn answers(
+    pub(crate) async fn answers(
         &self,
         chunk: &ChunkRef,
         wanted: Vec<String>,
@@ -276,7 +276,7 @@ impl Answers {
 
 /// The files of an ended run, for programs that read them in place.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct RunManifest {
+pub(crate) struct RunManifest {
     /// Identifier of the run.
     #[schema(format = "uuid")]
     id: String,
@@ -290,7 +290,7 @@ pub struct RunManifest {
 
 /// A file of answers.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct RunFile {
+pub(crate) struct RunFile {
     /// Number of its first row.
     first_row: u64,
     /// Number of its rows.
@@ -310,7 +310,7 @@ pub struct RunFile {
     params(("id" = String, Path, description = "Id of the run", format = "uuid")),
     responses((status = 200, description = "The files", body = RunManifest), RunResultProblems)
 )]
-pub async fn manifest(
+pub(crate) async fn manifest(
     Caller(jobs): Caller,
     RunId(id): RunId,
 ) -> Result<Json<RunManifest>, ApiError> {

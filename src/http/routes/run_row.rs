@@ -20,7 +20,7 @@ problems! {
 
 /// A row of a run by itself.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct RunRowAlone {
+pub(crate) struct RunRowAlone {
     /// Number of the row in what was sent, counted from 0.
     row: u64,
     /// The case that the row stands for: the template with the values of the row in their places. Submitted as a job it has the values per cell
@@ -44,7 +44,7 @@ pub struct RunRowAlone {
     ),
     responses((status = 200, description = "The row", body = RunRowAlone), RunRowProblems)
 )]
-pub async fn row(
+pub(crate) async fn row(
     Caller(jobs): Caller,
     RunRowId(id, row): RunRowId,
 ) -> Result<Json<RunRowAlone>, ApiError> {

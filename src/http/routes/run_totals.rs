@@ -67,7 +67,7 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
 
 /// What the answers of a run come to.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct RunTotals {
+pub(crate) struct RunTotals {
     /// All rows.
     all: SectionTotals,
     /// Sections in the order of their values; only with `by`.
@@ -78,7 +78,7 @@ pub struct RunTotals {
 
 /// What the answers to some rows come to.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct SectionTotals {
+pub(crate) struct SectionTotals {
     /// The value of `by`; only for texts.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -97,7 +97,7 @@ pub struct SectionTotals {
 
 /// What the numbers of a column come to.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct ColumnTotals {
+pub(crate) struct ColumnTotals {
     /// Rows that have a number.
     count: u64,
     /// The least number; null if there is none.
@@ -124,7 +124,7 @@ pub struct ColumnTotals {
     ),
     responses((status = 200, description = "The totals", body = RunTotals), RunResultProblems)
 )]
-pub async fn totals(
+pub(crate) async fn totals(
     Caller(jobs): Caller,
     RunId(id): RunId,
     uri: Uri,

@@ -83,7 +83,7 @@ query! {
         SubmitRunProblems
     )
 )]
-pub async fn submit(
+pub(crate) async fn submit(
     Caller(jobs): Caller,
     State(options): State<HttpOptions>,
     State(memory): State<Memory>,
@@ -112,7 +112,7 @@ pub async fn submit(
 
 /// A page of runs, newest first.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct RunPage {
+pub(crate) struct RunPage {
     /// The runs of this page.
     runs: Vec<RunAnswer>,
     /// Give this as `cursor` for the next page; null on the last one.
@@ -141,7 +141,7 @@ list_query! {
         ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
     )), ListProblems)
 )]
-pub async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
+pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
     let query = RunListQuery::read(&uri, &())?;
     let filter = BatchFilter {
         labels: query.label.unwrap_or_default(),
@@ -174,7 +174,10 @@ problems! {
     params(("id" = String, Path, description = "Id of the run", format = "uuid")),
     responses((status = 200, description = "The run", body = RunAnswer), GetRunProblems)
 )]
-pub async fn get(Caller(jobs): Caller, RunId(id): RunId) -> Result<Json<RunAnswer>, ApiError> {
+pub(crate) async fn get(
+    Caller(jobs): Caller,
+    RunId(id): RunId,
+) -> Result<Json<RunAnswer>, ApiError> {
     Ok(Json(jobs.run(id).await?.into()))
 }
 
@@ -191,7 +194,7 @@ pub async fn get(Caller(jobs): Caller, RunId(id): RunId) -> Result<Json<RunAnswe
         GetRunProblems
     )
 )]
-pub async fn cancel(Caller(jobs): Caller, RunId(id): RunId) -> Result<Response, ApiError> {
+pub(crate) async fn cancel(Caller(jobs): Caller, RunId(id): RunId) -> Result<Response, ApiError> {
     let run: RunAnswer = jobs.cancel_run(id).await?.into();
     let status = match run.ended() {
         true => StatusCode::OK,
@@ -214,7 +217,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the run", format = "uuid")),
     responses((status = 204, description = "The run is gone"), DeleteRunProblems)
 )]
-pub async fn delete(Caller(jobs): Caller, RunId(id): RunId) -> Result<StatusCode, ApiError> {
+pub(crate) async fn delete(Caller(jobs): Caller, RunId(id): RunId) -> Result<StatusCode, ApiError> {
     jobs.delete_run(id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -20,7 +20,7 @@ problems! {
 ///
 /// # Errors
 /// `output-not-asked`, or there is no such patch or motion, or no result.
-pub async fn stored(
+pub(crate) async fn stored(
     jobs: &Jobs,
     id: Uuid,
     patch: usize,
@@ -43,7 +43,7 @@ pub async fn stored(
 
 /// Is the output among what was stored?
 #[must_use]
-pub fn has(cells: &PatchCells, values: &PointFields, output: Output) -> bool {
+pub(crate) fn has(cells: &PatchCells, values: &PointFields, output: Output) -> bool {
     match output {
         Output::Tractions => values.traction_x_mpa.is_some() && values.traction_y_mpa.is_some(),
         Output::Pressure => cells.pressure_mpa.is_some(),
@@ -59,7 +59,7 @@ pub fn has(cells: &PatchCells, values: &PointFields, output: Output) -> bool {
 ///
 /// # Errors
 /// Always: `output-not-asked`, or what went wrong while finding out.
-pub async fn not_asked<T>(jobs: &Jobs, id: Uuid, output: Output) -> Result<T, ApiError> {
+pub(crate) async fn not_asked<T>(jobs: &Jobs, id: Uuid, output: Output) -> Result<T, ApiError> {
     let asked: Vec<String> = jobs
         .outputs(id)
         .await?

@@ -38,7 +38,7 @@ query! {
 /// Stresses below one patch for one motion.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Stresses)]
-pub struct SubsurfaceAnswer {
+pub(crate) struct SubsurfaceAnswer {
     /// Number of the patch, counted from 0.
     patch: usize,
     /// Number of the motion, counted from 0.
@@ -73,7 +73,7 @@ pub struct SubsurfaceAnswer {
     ),
     responses((status = 200, description = "Stresses at the requested points in the order of the case, and the worst point. CSV: one line per requested point", content((SubsurfaceAnswer = "application/json"), (String = "text/csv"))), FieldProblems)
 )]
-pub async fn subsurface(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn subsurface(request: PartRequest) -> Result<Response, ApiError> {
     let query = SubsurfaceQuery::read(&request.uri, &())?;
     let (patch, point) = (query.patch.unwrap_or(0), query.point.unwrap_or(0));
     let format = choose(&request.headers, query.format, FORMATS)?;

@@ -23,7 +23,7 @@ use crate::jobs::changes::{Changed, Follower};
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
 #[expect(dead_code, reason = "names the data of an event in the contract")]
-pub enum TenantEvent {
+pub(crate) enum TenantEvent {
     /// `job`: the job as `/v1/jobs/{id}` answers it.
     Job(Box<JobAnswer>),
     /// `batch`: the batch as `/v1/batches/{id}` answers it.
@@ -31,7 +31,7 @@ pub enum TenantEvent {
 }
 
 /// One event of the stream, in the contract.
-pub struct TenantEventSent;
+pub(crate) struct TenantEventSent;
 
 impl PartialSchema for TenantEventSent {
     fn schema() -> RefOr<Schema> {
@@ -59,7 +59,7 @@ impl ToSchema for TenantEventSent {
     params(("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen: the stream goes on from there")),
     responses((status = 200, description = "One event per change", content((TenantEventSent = "text/event-stream"))), PlainProblems)
 )]
-pub async fn follow(request: EventRequest) -> Result<Response, ApiError> {
+pub(crate) async fn follow(request: EventRequest) -> Result<Response, ApiError> {
     let seen = request.seen.as_ref().and_then(|text| text.parse().ok());
     let follower = request.jobs.follow(seen);
     let start = event("start", &follower.since().to_string(), &json!({}));

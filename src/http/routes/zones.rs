@@ -19,7 +19,7 @@ use crate::jobs::Jobs;
 /// Stick and slip zones of one patch for one motion.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
-pub enum Zones {
+pub(crate) enum Zones {
     /// Without `grid`: areas, outlines and the zone of every cell.
     PerCell(ZoneCells),
     /// With `grid`: the zone of the nearest cell, resampled.
@@ -32,7 +32,7 @@ pub enum Zones {
 
 /// Areas, outlines and the zone of every cell.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct ZoneCells {
+pub(crate) struct ZoneCells {
     /// Number of the patch, counted from 0.
     patch: usize,
     /// Number of the motion, counted from 0.
@@ -70,7 +70,7 @@ pub struct ZoneCells {
         (File = "image/png")
     )), FieldProblems)
 )]
-pub async fn zones(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn zones(request: PartRequest) -> Result<Response, ApiError> {
     let selection = Selection::read(&request)?;
     let shown = Output::Zones;
     let answer = async {

@@ -21,10 +21,10 @@ pub struct Peer(pub IpAddr);
 
 /// Marks a request on a connection that came when all places were taken: only the probes are answered.
 #[derive(Debug, Clone, Copy)]
-pub struct ProbesOnly;
+pub(crate) struct ProbesOnly;
 
 /// Answers one request; its connection counts as busy until the answer has been handed over.
-pub async fn answer(
+pub(crate) async fn answer(
     router: Router,
     peer: Peer,
     place: &Arc<Place>,
@@ -48,7 +48,7 @@ pub async fn answer(
 }
 
 /// Ends if there is no complete head within this time.
-pub async fn silent(place: &Place, within: Duration) {
+pub(crate) async fn silent(place: &Place, within: Duration) {
     sleep(within).await;
     if place.is_used() {
         std::future::pending::<()>().await;

@@ -26,7 +26,7 @@ const REST_WITHIN: Duration = Duration::from_millis(500);
 type BodySlot = Arc<Mutex<Option<Body>>>;
 
 /// Layer that discards the rest of a body, or has the connection closed; it stands around everything that reads bodies.
-pub async fn drain_body(request: Request, next: Next) -> Response {
+pub(crate) async fn drain_body(request: Request, next: Next) -> Response {
     if request.body().is_end_stream() {
         return next.run(request).await;
     }

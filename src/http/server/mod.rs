@@ -1,8 +1,8 @@
 //! Connections: accepting, counting, time limits and closing.
 
-pub mod connection;
-pub mod drain_body;
-pub mod listener;
-pub mod places;
-pub mod unread;
-pub mod write_timeout;
+pub(super) mod connection;
+pub(super) mod drain_body;
+pub(super) mod listener;
+pub(super) mod places;
+pub(super) mod unread;
+pub(super) mod write_timeout;

@@ -21,7 +21,7 @@ type Rank = (bool, u64);
 
 /// All places of a port; clones share them.
 #[derive(Debug, Clone)]
-pub struct Places {
+pub(crate) struct Places {
     shared: Arc<Shared>,
 }
 
@@ -60,7 +60,7 @@ struct Network {
 
 /// The place of one connection, free again when dropped.
 #[derive(Debug)]
-pub struct Place {
+pub(crate) struct Place {
     shared: Arc<Shared>,
     id: u64,
     close: CancellationToken,
@@ -71,12 +71,12 @@ pub struct Place {
 
 /// A request under way on a connection; when dropped the connection waits for the next head.
 #[derive(Debug)]
-pub struct Busy(Arc<Place>);
+pub(crate) struct Busy(Arc<Place>);
 
 impl Places {
     /// So many places, of which one address may have so many.
     #[must_use]
-    pub fn new(max: usize, of_address_max: usize) -> Places {
+    pub(crate) fn new(max: usize, of_address_max: usize) -> Places {
         Places {
             shared: Arc::new(Shared {
                 max: max.max(1),
@@ -88,7 +88,7 @@ impl Places {
     }
 
     /// Waits while even the reserve is used up by requests under way.
-    pub async fn room(&self) {
+    pub(crate) async fn room(&self) {
         loop {
             let freed = self.shared.freed.notified();
             {
@@ -104,7 +104,7 @@ impl Places {
 
     /// Takes a place for a connection from this address; another one makes way if there is none.
     #[must_use]
-    pub fn enter(&self, address: IpAddr) -> Arc<Place> {
+    pub(crate) fn enter(&self, address: IpAddr) -> Arc<Place> {
         let network = network(address);
         let mut register = self.shared.register();
         let own = register.networks.get(&network);
@@ -227,7 +227,7 @@ impl Register {
 impl Place {
     /// The head of a request is there.
     #[must_use]
-    pub fn begin(self: &Arc<Place>) -> Busy {
+    pub(crate) fn begin(self: &Arc<Place>) -> Busy {
         self.used.store(true, Ordering::Relaxed);
         self.shared.register().begin(self.id);
         Busy(self.clone())
@@ -235,12 +235,12 @@ impl Place {
 
     /// Was there ever a complete head?
     #[must_use]
-    pub fn is_used(&self) -> bool {
+    pub(crate) fn is_used(&self) -> bool {
         self.used.load(Ordering::Relaxed)
     }
 
     /// Ends when the connection has to make way.
-    pub async fn closed(&self) {
+    pub(crate) async fn closed(&self) {
         self.close.cancelled().await;
     }
 }
@@ -261,7 +261,7 @@ impl Drop for Busy {
 
 /// What counts as one address: one customer has a whole IPv6 network of 64 bits.
 #[must_use]
-pub fn network(address: IpAddr) -> IpAddr {
+pub(crate) fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) if !address.is_loopback() => {
             Ipv6Addr::from_bits(address.to_bits() >> 64 << 64).into()

@@ -16,11 +16,11 @@ use hyper::body::{Frame, SizeHint};
 use tokio::time::{Instant, sleep};
 
 /// Largest piece of an answer that is handed over at once, in bytes.
-pub const PIECE_BYTES: usize = 16 << 10;
+pub(crate) const PIECE_BYTES: usize = 16 << 10;
 
 /// The answers of one connection that wait for their client; clones share them.
 #[derive(Debug, Clone, Default)]
-pub struct Unread(Arc<Mutex<Waiting>>);
+pub(crate) struct Unread(Arc<Mutex<Waiting>>);
 
 #[derive(Debug, Default)]
 struct Waiting {
@@ -30,7 +30,7 @@ struct Waiting {
 
 impl Unread {
     /// The same answer, in small pieces and watched.
-    pub fn watch(&self, response: Response<Body>) -> Response<Body> {
+    pub(crate) fn watch(&self, response: Response<Body>) -> Response<Body> {
         let id = {
             let mut waiting = self.waiting();
             waiting.next += 1;
@@ -49,7 +49,7 @@ impl Unread {
     }
 
     /// Ends when an answer has waited for its client this long.
-    pub async fn stalled(&self, limit: Duration) {
+    pub(crate) async fn stalled(&self, limit: Duration) {
         loop {
             let oldest = self.waiting().since.values().min().copied();
             let left = oldest.map_or(limit, |since| limit.saturating_sub(since.elapsed()));

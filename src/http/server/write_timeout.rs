@@ -12,7 +12,7 @@ use tokio::time::{Instant, Sleep, sleep};
 
 /// A connection with a limit on how long a write may stand still.
 #[derive(Debug)]
-pub struct WriteTimeout {
+pub(crate) struct WriteTimeout {
     stream: TcpStream,
     limit: Duration,
     /// Runs while `waiting`.
@@ -23,7 +23,7 @@ pub struct WriteTimeout {
 impl WriteTimeout {
     /// The connection with this limit.
     #[must_use]
-    pub fn new(stream: TcpStream, limit: Duration) -> WriteTimeout {
+    pub(crate) fn new(stream: TcpStream, limit: Duration) -> WriteTimeout {
         WriteTimeout {
             stream,
             limit,

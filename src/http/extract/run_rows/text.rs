@@ -15,12 +15,12 @@ const ROWS: usize = 8192;
 /// Longest line in bytes.
 const LINE_BYTES_MAX: u64 = 1 << 20;
 
-pub fn faulty(detail: impl Into<String>) -> ApiError {
+pub(super) fn faulty(detail: impl Into<String>) -> ApiError {
     ApiError::new(ProblemKind::FaultyTable, detail)
 }
 
 /// Rows in CSV, whose first line names the columns.
-pub struct CsvRows<R: Read> {
+pub(super) struct CsvRows<R: Read> {
     reader: csv::Reader<R>,
     /// The columns.
     pub columns: Vec<RunColumn>,
@@ -33,7 +33,7 @@ impl<R: Read> CsvRows<R> {
     ///
     /// # Errors
     /// `faulty-table`
-    pub fn new(source: R) -> Result<CsvRows<R>, ApiError> {
+    pub(super) fn new(source: R) -> Result<CsvRows<R>, ApiError> {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
             .from_reader(source);
@@ -65,7 +65,7 @@ impl<R: Read> CsvRows<R> {
     ///
     /// # Errors
     /// `faulty-table` with line and column.
-    pub fn next(&mut self) -> Result<Option<Vec<Values>>, ApiError> {
+    pub(super) fn next(&mut self) -> Result<Option<Vec<Values>>, ApiError> {
         let mut values = empty(&self.columns);
         for _ in 0..ROWS {
             let Some(record) = &self.record else { break };
@@ -101,7 +101,7 @@ impl<R: Read> CsvRows<R> {
 }
 
 /// Rows as JSON objects, one in a line.
-pub struct JsonRows<R: BufRead> {
+pub(super) struct JsonRows<R: BufRead> {
     source: R,
     line: u64,
     /// The columns: the members of the first row.
@@ -114,7 +114,7 @@ impl<R: BufRead> JsonRows<R> {
     ///
     /// # Errors
     /// `faulty-table`
-    pub fn new(source: R) -> Result<JsonRows<R>, ApiError> {
+    pub(super) fn new(source: R) -> Result<JsonRows<R>, ApiError> {
         let mut rows = JsonRows {
             source,
             line: 0,
@@ -133,7 +133,7 @@ impl<R: BufRead> JsonRows<R> {
     ///
     /// # Errors
     /// `faulty-table` with line and member.
-    pub fn next(&mut self) -> Result<Option<Vec<Values>>, ApiError> {
+    pub(super) fn next(&mut self) -> Result<Option<Vec<Values>>, ApiError> {
         let mut values = empty(&self.columns);
         for _ in 0..ROWS {
             let Some(mut row) = self.row.take() else {

@@ -4,7 +4,7 @@ use crate::http::extract::batch::table::short_pointer;
 use crate::jobs::run::head::RunColumn;
 
 /// The column of this title.
-pub fn column(title: &str, text: bool) -> RunColumn {
+pub(super) fn column(title: &str, text: bool) -> RunColumn {
     let pointer = match title.starts_with('/') {
         true => Some(title.to_owned()),
         false => short_pointer(title).map(str::to_owned),

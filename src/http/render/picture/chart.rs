@@ -13,7 +13,7 @@ const TICK_SPACING: [f64; 2] = [90.0, 55.0];
 
 /// Maps numbers to the plotting area; the second of a pair may be the smaller one.
 #[derive(Debug, Clone, Copy)]
-pub struct Chart {
+pub(super) struct Chart {
     /// Left, top, width and height.
     pub area: [f64; 4],
     /// What stands at the left and the right end.
@@ -24,7 +24,7 @@ pub struct Chart {
 
 impl Chart {
     /// A place in the picture.
-    pub fn at(&self, x: f64, y: f64) -> (f64, f64) {
+    pub(super) fn at(&self, x: f64, y: f64) -> (f64, f64) {
         let share = |value: f64, [from, to]: [f64; 2]| (value - from) / (to - from);
         let [left, top, width, height] = self.area;
         (
@@ -34,7 +34,7 @@ impl Chart {
     }
 
     /// Lines at the ticks, below what is drawn.
-    pub fn grid(&self, svg: &mut Svg) {
+    pub(super) fn grid(&self, svg: &mut Svg) {
         let [left, top, width, height] = self.area;
         let mut data = String::new();
         for tick in self.ticks(0).0 {
@@ -59,7 +59,7 @@ impl Chart {
     }
 
     /// Frame, numbers and names, above what is drawn.
-    pub fn axes(&self, svg: &mut Svg, [x_name, y_name]: [&str; 2]) {
+    pub(super) fn axes(&self, svg: &mut Svg, [x_name, y_name]: [&str; 2]) {
         let [left, top, width, height] = self.area;
         let place = self.area.map(px);
         svg.element(
@@ -99,7 +99,7 @@ impl Chart {
 }
 
 /// Begins a picture of this height with a title, `width` pixels wide.
-pub fn open(title: &str, remarks: &[String], width: u32, height: f64) -> Svg {
+pub(super) fn open(title: &str, remarks: &[String], width: u32, height: f64) -> Svg {
     let shown_height = px(f64::from(width) * height / WIDTH);
     let height = px(height);
     let mut svg = Svg::default();
@@ -119,7 +119,7 @@ pub fn open(title: &str, remarks: &[String], width: u32, height: f64) -> Svg {
 }
 
 /// A range with some room at both ends; one of a single value has room too.
-pub fn roomy(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+pub(super) fn roomy(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     let ends = [f64::INFINITY, f64::NEG_INFINITY];
     let [low, high] = values
         .into_iter()

@@ -1,7 +1,7 @@
 //! Colours: a ramp whose lightness rises evenly, so that it reads the same in print without colour, and two for zones.
 
 /// Places at which the ramp is given; linear in between.
-pub const VIRIDIS_PLACES: usize = 17;
+pub(super) const VIRIDIS_PLACES: usize = 17;
 
 /// The map viridis (S. van der Walt, N. Smith and E. Firing 2015, CC0) at 17 even places from 0 to 1; linear in between.
 const VIRIDIS: [[u8; 3]; VIRIDIS_PLACES] = [
@@ -25,16 +25,16 @@ const VIRIDIS: [[u8; 3]; VIRIDIS_PLACES] = [
 ];
 
 /// Steps of the ramp.
-pub const LEVELS: usize = 128;
+pub(super) const LEVELS: usize = 128;
 
 /// Cells that stick.
-pub const STICK: &str = "#31688e";
+pub(super) const STICK: &str = "#31688e";
 /// Cells that slip; much lighter, so that both are told apart without colour.
-pub const SLIP: &str = "#fde725";
+pub(super) const SLIP: &str = "#fde725";
 
 /// The step of a value from 0 to 1; what lies outside is brought to the ends, NaN to 0.
 #[must_use]
-pub fn level(value: f64) -> usize {
+pub(super) fn level(value: f64) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -48,14 +48,14 @@ pub fn level(value: f64) -> usize {
 
 /// The colour of a step as `#rrggbb`.
 #[must_use]
-pub fn ramp(level: usize) -> String {
+pub(super) fn ramp(level: usize) -> String {
     let [r, g, b] = rgb(level);
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 /// The colour at a share of the ramp from 0 to 1, as `#rrggbb`.
 #[must_use]
-pub fn at(share: f64) -> String {
+pub(super) fn at(share: f64) -> String {
     ramp(level(share))
 }
 

@@ -20,7 +20,7 @@ const LOOKS: [&str; 2] = [
 
 /// A creep curve.
 #[derive(Debug, Clone)]
-pub struct Curve {
+pub(crate) struct Curve {
     /// First line, a text of the client.
     pub title: String,
     /// Smaller lines below, two at most.
@@ -37,7 +37,7 @@ pub struct Curve {
 
 /// One line of a creep curve.
 #[derive(Debug, Clone)]
-pub struct CurveLine {
+pub(crate) struct CurveLine {
     /// What it is.
     pub name: &'static str,
     /// Its values.
@@ -48,7 +48,7 @@ pub struct CurveLine {
 
 /// Draws a creep curve as SVG, `width` pixels wide.
 #[must_use]
-pub fn draw(curve: &Curve, width: u32) -> String {
+pub(crate) fn draw(curve: &Curve, width: u32) -> String {
     let mut order: Vec<usize> = (0..curve.x.len()).collect();
     order.sort_by(|a, b| curve.x[*a].total_cmp(&curve.x[*b]));
     let reach = curve.lines.iter().flat_map(|line| {

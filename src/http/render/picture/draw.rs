@@ -20,7 +20,7 @@ const TOLERANCE: f64 = 0.2;
 
 /// Draws a scene as SVG, `width` pixels wide.
 #[must_use]
-pub fn draw(scene: &Scene, width: u32) -> String {
+pub(crate) fn draw(scene: &Scene, width: u32) -> String {
     if width < ALONE_BELOW {
         return draw_alone(scene, width);
     }

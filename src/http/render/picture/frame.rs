@@ -1,7 +1,7 @@
 //! Where things stand in a picture: the same scale along both axes, round numbers at the ticks.
 
 /// Width of a picture in its own units.
-pub const WIDTH: f64 = 800.0;
+pub(super) const WIDTH: f64 = 800.0;
 /// Left border of the plotting area.
 const LEFT: f64 = 78.0;
 /// Top border of the plotting area.
@@ -19,7 +19,7 @@ const ALONE_MARGIN: f64 = 2.0;
 
 /// Maps mm to units of the picture; y points upward in mm and downward in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub(super) struct Frame {
     /// Left, top, width and height of the plotting area.
     pub area: [f64; 4],
     /// What the area shows in mm: x from, x to, y from, y to.
@@ -31,7 +31,7 @@ pub struct Frame {
 impl Frame {
     /// Shows a box `[x_min, x_max, y_min, y_max]` in mm with a margin around it.
     #[must_use]
-    pub fn around([x0, x1, y0, y1]: [f64; 4]) -> Frame {
+    pub(super) fn around([x0, x1, y0, y1]: [f64; 4]) -> Frame {
         let wide = ((x1 - x0) * (1.0 + 2.0 * MARGIN)).max(f64::MIN_POSITIVE);
         let high = ((y1 - y0) * (1.0 + 2.0 * MARGIN)).max(f64::MIN_POSITIVE);
         let height = (AREA_WIDTH * high / wide).clamp(AREA_HEIGHT[0], AREA_HEIGHT[1]);
@@ -47,7 +47,7 @@ impl Frame {
 
     /// Shows a box alone, `width` units wide, without room for axes.
     #[must_use]
-    pub fn alone([x0, x1, y0, y1]: [f64; 4], width: f64) -> Frame {
+    pub(super) fn alone([x0, x1, y0, y1]: [f64; 4], width: f64) -> Frame {
         let inner = width - 2.0 * ALONE_MARGIN;
         let (wide, high) = (
             (x1 - x0).max(f64::MIN_POSITIVE),
@@ -66,19 +66,19 @@ impl Frame {
 
     /// Height of a picture without axes.
     #[must_use]
-    pub fn height_alone(&self) -> f64 {
+    pub(super) fn height_alone(&self) -> f64 {
         self.area[3] + 2.0 * ALONE_MARGIN
     }
 
     /// Height of the whole picture.
     #[must_use]
-    pub fn height(&self) -> f64 {
+    pub(super) fn height(&self) -> f64 {
         self.area[1] + self.area[3] + BELOW
     }
 
     /// A point in mm, in the picture.
     #[must_use]
-    pub fn at(&self, x_mm: f64, y_mm: f64) -> (f64, f64) {
+    pub(super) fn at(&self, x_mm: f64, y_mm: f64) -> (f64, f64) {
         (
             self.area[0] + (x_mm - self.shown[0]) * self.scale,
             self.area[1] + (self.shown[3] - y_mm) * self.scale,
@@ -88,7 +88,7 @@ impl Frame {
 
 /// Round numbers within `from..=to`, about `wanted` of them, with the digits after the point that they need.
 #[must_use]
-pub fn ticks(from: f64, to: f64, wanted: f64) -> (Vec<f64>, usize) {
+pub(super) fn ticks(from: f64, to: f64, wanted: f64) -> (Vec<f64>, usize) {
     let rough = (to - from) / wanted.max(1.0);
     if !(rough.is_finite() && rough > 0.0) {
         return (Vec::new(), 0);
@@ -118,7 +118,7 @@ pub fn ticks(from: f64, to: f64, wanted: f64) -> (Vec<f64>, usize) {
 
 /// The power of ten, a multiple of 3, that brings `largest` to a number easy to read; 0 for ordinary numbers.
 #[must_use]
-pub fn exponent(largest: f64) -> i32 {
+pub(super) fn exponent(largest: f64) -> i32 {
     if !(largest.is_finite() && largest > 0.0) || (0.1..100_000.0).contains(&largest) {
         return 0;
     }

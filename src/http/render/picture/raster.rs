@@ -22,7 +22,7 @@ static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
 ///
 /// # Errors
 /// The text is no SVG, or the picture does not fit into memory.
-pub fn png(svg: &str, width: u32) -> Result<Vec<u8>, String> {
+pub(crate) fn png(svg: &str, width: u32) -> Result<Vec<u8>, String> {
     let options = Options {
         fontdb: FONTS.clone(),
         font_family: FAMILY.to_owned(),

@@ -7,7 +7,7 @@ use crate::contact::solution::words::zone::Zone;
 
 /// What a picture shows.
 #[derive(Debug, Clone)]
-pub struct Scene {
+pub(crate) struct Scene {
     /// First line, a text of the client.
     pub title: String,
     /// Smaller lines below, two at most.
@@ -23,7 +23,7 @@ pub struct Scene {
 }
 
 /// The coloured values: magnitudes per cell, their name and unit.
-pub struct Heat {
+pub(crate) struct Heat {
     /// Magnitude per cell.
     pub values: Vec<f64>,
     /// What they are.
@@ -36,14 +36,14 @@ pub struct Heat {
 
 impl Heat {
     /// Both ends of the scale, the second above the first.
-    pub fn range(&self, asked: Option<[f64; 2]>) -> [f64; 2] {
+    pub(crate) fn range(&self, asked: Option<[f64; 2]>) -> [f64; 2] {
         let largest = self.values.iter().copied().fold(0.0, f64::max);
         asked.unwrap_or([0.0, if largest > 0.0 { largest } else { 1.0 }])
     }
 }
 
 /// The magnitudes that a heat map shows; `None` for zones.
-pub fn heat(scene: &Scene) -> Option<Heat> {
+pub(crate) fn heat(scene: &Scene) -> Option<Heat> {
     let magnitude = |x: &Option<Vec<f64>>, y: &Option<Vec<f64>>| {
         let (x, y) = (x.as_deref().unwrap_or(&[]), y.as_deref().unwrap_or(&[]));
         x.iter().zip(y).map(|(x, y)| x.hypot(*y)).collect()
@@ -83,7 +83,7 @@ pub fn heat(scene: &Scene) -> Option<Heat> {
 }
 
 /// Box around the cells in mm.
-pub fn extent(fields: &PatchCells) -> [f64; 4] {
+pub(crate) fn extent(fields: &PatchCells) -> [f64; 4] {
     let mut shape = [
         f64::INFINITY,
         f64::NEG_INFINITY,
@@ -108,7 +108,7 @@ pub fn extent(fields: &PatchCells) -> [f64; 4] {
 }
 
 /// Does any cell stick, or slip?
-pub fn zones_present(scene: &Scene) -> (bool, bool) {
+pub(crate) fn zones_present(scene: &Scene) -> (bool, bool) {
     let zones = scene.values.zone.as_deref().unwrap_or(&[]);
     (zones.contains(&Zone::Stick), zones.contains(&Zone::Slip))
 }

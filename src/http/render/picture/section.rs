@@ -18,7 +18,7 @@ const STICK: &str = "fill=\"#d4e5f3\"";
 
 /// Sections of a patch.
 #[derive(Debug, Clone)]
-pub struct Sections {
+pub(crate) struct Sections {
     /// First line, a text of the client.
     pub title: String,
     /// Smaller lines below, two at most.
@@ -42,7 +42,7 @@ struct SectionLine {
 
 /// Draws sections as SVG, `width` pixels wide.
 #[must_use]
-pub fn draw(sections: &Sections, width: u32) -> String {
+pub(crate) fn draw(sections: &Sections, width: u32) -> String {
     let both = [along(sections), across(sections)];
     let values = both.iter().flat_map(|section| &section.points);
     let largest = values

@@ -21,7 +21,7 @@ const BELOW: f64 = 62.0;
 
 /// Wheel and rail with their patches.
 #[derive(Debug, Clone)]
-pub struct Standing {
+pub(crate) struct Standing {
     /// First line, a text of the client.
     pub title: String,
     /// Smaller lines below, two at most.
@@ -36,7 +36,7 @@ pub struct Standing {
 
 /// A patch on the rail.
 #[derive(Debug, Clone)]
-pub struct StandingPatch {
+pub(crate) struct StandingPatch {
     /// Where it lies.
     pub position: Position,
     /// Its cells, with the pressure where the case asked for it.
@@ -45,7 +45,7 @@ pub struct StandingPatch {
 
 /// Draws wheel and rail as SVG, `width` pixels wide.
 #[must_use]
-pub fn draw(standing: &Standing, width: u32) -> String {
+pub(crate) fn draw(standing: &Standing, width: u32) -> String {
     let rail = &standing.placed.rail_mm;
     let ends = rail
         .iter()

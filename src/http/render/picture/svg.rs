@@ -3,17 +3,17 @@
 use std::fmt::Write;
 
 /// Fonts that are looked for, the one that raster pictures are made with first.
-pub const FONTS: &str = "DejaVu Sans, Verdana, sans-serif";
+pub(super) const FONTS: &str = "DejaVu Sans, Verdana, sans-serif";
 
 /// A drawing in the making.
 #[derive(Debug, Default)]
-pub struct Svg {
+pub(super) struct Svg {
     text: String,
 }
 
 /// Which end of a text stands at its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Anchor {
+pub(super) enum Anchor {
     /// The beginning.
     Start,
     /// The middle.
@@ -24,17 +24,17 @@ pub enum Anchor {
 
 impl Svg {
     /// Adds an element without content; `attributes` is written as it stands.
-    pub fn element(&mut self, name: &str, attributes: &str) {
+    pub(super) fn element(&mut self, name: &str, attributes: &str) {
         self.raw(&format!("<{name} {attributes}/>\n"));
     }
 
     /// Adds a path.
-    pub fn path(&mut self, data: &str, attributes: &str) {
+    pub(super) fn path(&mut self, data: &str, attributes: &str) {
         self.raw(&format!("<path d=\"{data}\" {attributes}/>\n"));
     }
 
     /// Adds a line of text of the given size; `attributes` is written as it stands, `text` is escaped.
-    pub fn text(
+    pub(super) fn text(
         &mut self,
         (x, y): (f64, f64),
         size: f64,
@@ -54,20 +54,20 @@ impl Svg {
     }
 
     /// Adds text that is SVG already.
-    pub fn raw(&mut self, text: &str) {
+    pub(super) fn raw(&mut self, text: &str) {
         self.text.push_str(text);
     }
 
     /// The drawing so far.
     #[must_use]
-    pub fn finish(self) -> String {
+    pub(super) fn finish(self) -> String {
         self.text
     }
 }
 
 /// A length in the units of the drawing, to a hundredth.
 #[must_use]
-pub fn px(value: f64) -> String {
+pub(super) fn px(value: f64) -> String {
     let mut text = format!("{value:.2}");
     let kept = text.trim_end_matches('0').trim_end_matches('.').len();
     text.truncate(kept);
@@ -76,7 +76,7 @@ pub fn px(value: f64) -> String {
 
 /// A path through points; closed ones return to their beginning.
 #[must_use]
-pub fn polyline(points: impl IntoIterator<Item = (f64, f64)>, closed: bool) -> String {
+pub(super) fn polyline(points: impl IntoIterator<Item = (f64, f64)>, closed: bool) -> String {
     let mut data = String::new();
     for (index, (x, y)) in points.into_iter().enumerate() {
         let command = if index == 0 { 'M' } else { 'L' };
@@ -91,7 +91,7 @@ pub fn polyline(points: impl IntoIterator<Item = (f64, f64)>, closed: bool) -> S
 
 /// Closed curves through points, to a tenth: every point within `tolerance` of a straight line through its neighbours is left out.
 #[must_use]
-pub fn curves(loops: impl IntoIterator<Item = Vec<(f64, f64)>>, tolerance: f64) -> String {
+pub(super) fn curves(loops: impl IntoIterator<Item = Vec<(f64, f64)>>, tolerance: f64) -> String {
     #[expect(
         clippy::cast_possible_truncation,
         reason = "places in a picture, in tenths"
@@ -167,7 +167,7 @@ fn simplify(points: &[(f64, f64)], tolerance: f64, kept: &mut Vec<(f64, f64)>) {
 /// Text as XML character data. What XML cannot hold, other control characters, and marks that turn the direction of the text
 /// beyond its end are replaced by U+FFFD.
 #[must_use]
-pub fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -189,7 +189,7 @@ pub fn escape(text: &str) -> String {
 
 /// At most `most` characters; a text that is cut ends in an ellipsis.
 #[must_use]
-pub fn shorten(text: &str, most: usize) -> String {
+pub(super) fn shorten(text: &str, most: usize) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
     }

@@ -12,7 +12,7 @@ use crate::http::problem::error::ApiError;
 
 /// A case to begin with.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct ExampleCase {
+pub(crate) struct ExampleCase {
     /// Its name, as in `api/examples/{name}.case.json`.
     #[schema(value_type = String)]
     name: &'static str,
@@ -32,7 +32,7 @@ pub struct ExampleCase {
     operation_id = "list_examples",
     responses((status = 200, description = "All examples", body = Vec<ExampleCase>), PlainProblems)
 )]
-pub async fn examples() -> Result<Json<Vec<ExampleCase>>, ApiError> {
+pub(crate) async fn examples() -> Result<Json<Vec<ExampleCase>>, ApiError> {
     let read = |(name, summary, text): (&'static str, &'static str, &str)| {
         let case = serde_json::from_str(text);
         let case = case.map_err(|error| ApiError::internal(&error))?;

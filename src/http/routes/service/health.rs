@@ -13,7 +13,7 @@ use crate::jobs::error::JobsError;
 
 /// A healthy answer.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct Health {
+pub(crate) struct Health {
     /// `alive` or `ready`.
     #[schema(value_type = String, example = "ready")]
     status: &'static str,
@@ -39,7 +39,7 @@ impl Health {
     operation_id = "healthz",
     responses((status = 200, description = "The process is alive", body = Health))
 )]
-pub async fn alive() -> Json<Health> {
+pub(crate) async fn alive() -> Json<Health> {
     Health::new("alive")
 }
 
@@ -56,7 +56,9 @@ problems! {
     operation_id = "readyz",
     responses((status = 200, description = "The service takes jobs", body = Health), ReadyProblems)
 )]
-pub async fn ready(State(AnyTenant(jobs)): State<AnyTenant>) -> Result<Json<Health>, ApiError> {
+pub(crate) async fn ready(
+    State(AnyTenant(jobs)): State<AnyTenant>,
+) -> Result<Json<Health>, ApiError> {
     match jobs.ready().await {
         Ok(()) => Ok(Health::new("ready")),
         Err(reason)

@@ -16,7 +16,7 @@ use crate::jobs::PAGE_MAX;
 /// What the service can do.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Abilities)]
-pub struct Capabilities {
+pub(crate) struct Capabilities {
     /// Values of `solver.method`.
     methods: Vec<MethodCapability>,
     /// Values of `contact.type`.
@@ -33,7 +33,7 @@ pub struct Capabilities {
 /// A method of solving the tangential contact.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = MethodAbility)]
-pub struct MethodCapability {
+pub(crate) struct MethodCapability {
     /// The word for `solver.method`.
     name: MethodName,
     /// Used when the case names none.
@@ -46,7 +46,7 @@ pub struct MethodCapability {
 /// A way to describe where the bodies touch.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = ContactAbility)]
-pub struct ContactCapability {
+pub(crate) struct ContactCapability {
     /// The word for `contact.type`.
     #[schema(value_type = String)]
     name: &'static str,
@@ -60,7 +60,7 @@ pub struct ContactCapability {
 /// Something a case can ask for.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = OutputAbility)]
-pub struct OutputCapability {
+pub(crate) struct OutputCapability {
     /// The word for `outputs`.
     name: Output,
     /// Computed when the case names no outputs.
@@ -72,7 +72,7 @@ pub struct OutputCapability {
 
 /// Limits of requests.
 #[derive(Debug, Serialize, ToSchema)]
-pub struct RequestLimits {
+pub(crate) struct RequestLimits {
     /// Largest body of one case in bytes.
     body_max_bytes: usize,
     /// Longest `Prefer: wait`, in s.
@@ -112,7 +112,7 @@ pub struct RequestLimits {
     operation_id = "list_methods",
     responses((status = 200, description = "What the service can do", body = Capabilities), PlainProblems)
 )]
-pub async fn methods(
+pub(crate) async fn methods(
     State(options): State<HttpOptions>,
     State(AnyTenant(jobs)): State<AnyTenant>,
 ) -> Json<Capabilities> {

@@ -30,7 +30,7 @@ problems! {
     operation_id = "get_metrics",
     responses((status = 200, description = "The figures", content((String = "application/openmetrics-text"), (String = "text/plain"))), MetricsProblems)
 )]
-pub async fn metrics(
+pub(crate) async fn metrics(
     Operator(jobs): Operator,
     State(metrics): State<Metrics>,
     headers: HeaderMap,

@@ -1,8 +1,8 @@
 //! Resources that describe the service itself.
 
-pub mod examples;
-pub mod health;
-pub mod methods;
-pub mod metrics;
-pub mod problems;
-pub mod remarks;
+pub(crate) mod examples;
+pub(crate) mod health;
+pub(crate) mod methods;
+pub(crate) mod metrics;
+pub(crate) mod problems;
+pub(crate) mod remarks;

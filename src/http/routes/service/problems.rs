@@ -20,7 +20,7 @@ problems! {
     operation_id = "list_problems",
     responses((status = 200, description = "All kinds of problems", body = Vec<ProblemMeaning>), PlainProblems)
 )]
-pub async fn list() -> Json<Vec<ProblemMeaning>> {
+pub(crate) async fn list() -> Json<Vec<ProblemMeaning>> {
     Json(
         ProblemKind::ALL
             .iter()
@@ -39,7 +39,7 @@ pub async fn list() -> Json<Vec<ProblemMeaning>> {
     params(("name" = String, Path, description = "The last part of a problem's `type`", example = "faulty-case")),
     responses((status = 200, description = "What this kind of problem means", body = ProblemMeaning), ExplainProblems)
 )]
-pub async fn explain(Path(name): Path<String>) -> Result<Json<ProblemMeaning>, ApiError> {
+pub(crate) async fn explain(Path(name): Path<String>) -> Result<Json<ProblemMeaning>, ApiError> {
     let known = ProblemKind::ALL
         .iter()
         .copied()

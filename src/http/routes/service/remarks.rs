@@ -14,6 +14,6 @@ use crate::http::problem::catalogue::PlainProblems;
     operation_id = "list_remarks",
     responses((status = 200, description = "All kinds of remarks", body = Vec<RemarkKind>), PlainProblems)
 )]
-pub async fn remarks() -> Json<Vec<RemarkKind>> {
+pub(crate) async fn remarks() -> Json<Vec<RemarkKind>> {
     Json(Remark::kinds())
 }
