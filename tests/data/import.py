@@ -275,18 +275,25 @@ def subsurface():
     write_lines("subsurface.json", records)
 
 
+def ellipse(record):
+    """The contact of a record on an ellipse with one coefficient of friction."""
+    given = record["input"]
+    return {
+        "id": record["id"],
+        "semi_axes_mm": [given["hertz"]["a"], given["hertz"]["b"]],
+        "normal_force_n": given["load"]["FN"],
+        "friction": given["mu"],
+        "shear_modulus_mpa": given["material"]["G"],
+        "poisson_ratio": given["material"]["nu"],
+    }
+
+
 def temperature():
     records = []
     for record in json.loads((SOURCE / "reference/extended/temperature.json").read_text()):
         given, thermal = record["input"], record["input"]["thermal"]
         found = record["quadrature"]["converged"]["Tmax"]
-        records.append({
-            "id": record["id"],
-            "semi_axes_mm": [given["hertz"]["a"], given["hertz"]["b"]],
-            "normal_force_n": given["load"]["FN"],
-            "friction": given["mu"],
-            "shear_modulus_mpa": given["material"]["G"],
-            "poisson_ratio": given["material"]["nu"],
+        records.append(ellipse(record) | {
             "motion": [given["creepage"][k] for k in ("xi", "eta", "phi")],
             "speed_mm_per_s": given["V_mm_per_s"],
             "conductivity_w_per_mk": 1000 * thermal["lambda_W_per_mmC"],
@@ -418,13 +425,7 @@ def transient():
         columns = record["converged_history"]["columns"]
         table = [dict(zip(columns, row)) for row in record["converged_history"]["rows"]]
         rows = [[signs[name] * row[name] + 0.0 for name in signs] + [row["unc_" + k] for k in ("Fx", "Fy", "Mz", "xi")] for row in table]
-        records.append({
-            "id": record["id"],
-            "semi_axes_mm": [given["hertz"]["a"], given["hertz"]["b"]],
-            "normal_force_n": given["load"]["FN"],
-            "friction": given["mu"],
-            "shear_modulus_mpa": given["material"]["G"],
-            "poisson_ratio": given["material"]["nu"],
+        records.append(ellipse(record) | {
             "motion": [creepage.get(k, 0.0) for k in ("xi", "eta", "phi")],
             "force_x": -force if force else None,
             "shift_mm": finest[4] if force else None,
@@ -439,13 +440,7 @@ def prescribed_forces():
     for record in json.loads((SOURCE / "reference/extended/force_prescribed.json").read_text()):
         given, converged = record["input"], record["converged"]
         found = lambda k, sign: {"value": sign * converged[k]["value"] + 0.0, "unc": converged[k]["unc"]}
-        records.append({
-            "id": record["id"],
-            "semi_axes_mm": [given["hertz"]["a"], given["hertz"]["b"]],
-            "normal_force_n": given["load"]["FN"],
-            "friction": given["mu"],
-            "shear_modulus_mpa": given["material"]["G"],
-            "poisson_ratio": given["material"]["nu"],
+        records.append(ellipse(record) | {
             "forces": [flipped(given["load"][k]) for k in ("FXrel", "FYrel")],
             "spin_per_mm": given["creepage"]["phi"],
             "creepages": [found("xi", 1.0), found("eta", 1.0)],

@@ -17,18 +17,14 @@ use railhead::contact::solution::words::answer::{HistoryPoint, PointSolution, So
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use crate::reference::{assert_none, read, solve};
+use crate::reference::{SolvedEllipse, assert_none, read, solve};
 
 /// A history solved elsewhere: distance, forces over the friction limit, moment over that and √(ab), creepage along x, and the
 /// uncertainties of the last four.
 #[derive(Debug, Deserialize)]
 struct Reference {
-    id: String,
-    semi_axes_mm: [f64; 2],
-    normal_force_n: f64,
-    friction: f64,
-    shear_modulus_mpa: f64,
-    poisson_ratio: f64,
+    #[serde(flatten)]
+    contact: SolvedEllipse,
     motion: [f64; 3],
     force_x: Option<f64>,
     /// Of the finest mesh alone.
@@ -38,40 +34,24 @@ struct Reference {
 
 impl Reference {
     fn case(&self) -> Value {
-        let [a, b] = self.semi_axes_mm;
         let mut distances: Vec<f64> = self.rows.iter().map(|row| row[0]).collect();
         let history = match self.force_x {
             Some(force) => {
                 distances.insert(0, 0.0);
-                json!({ "distance_mm": distances, "force_x_n": force * self.limit() })
+                json!({ "distance_mm": distances, "force_x_n": force * self.contact.limit() })
             }
             None => {
                 let [x, y, spin] = self.motion;
                 json!({ "distance_mm": distances, "creepage_x": x, "creepage_y": y, "spin_per_mm": spin })
             }
         };
-        json!({
-            "material": { "shear_modulus_mpa": self.shear_modulus_mpa, "poisson_ratio": self.poisson_ratio },
-            "friction": { "coefficient": self.friction },
-            "contact": { "type": "ellipse", "a_mm": a, "b_mm": b },
-            "load": { "normal_force_n": self.normal_force_n },
-            "motion": { "history": history },
-        })
-    }
-
-    fn limit(&self) -> f64 {
-        self.friction * self.normal_force_n
+        self.contact.case(&json!({ "history": history }))
     }
 
     /// Errors of the forces and of the creepage over its peak beyond the uncertainty of the reference, and their estimates.
     fn errors(&self, point: &PointSolution, row: &[f64; 9]) -> ([f64; 2], [f64; 2]) {
-        let [a, b] = self.semi_axes_mm;
-        let found = [
-            point.force_x_n / self.limit(),
-            point.force_y_n / self.limit(),
-            point.moment_z_n_mm / self.limit() / (a * b).sqrt(),
-            point.motion.creepage_x,
-        ];
+        let [x, y, moment] = self.contact.relative(point);
+        let found = [x, y, moment, point.motion.creepage_x];
         let off = [0, 1, 2, 3].map(|k| ((found[k] - row[1 + k]).abs() - row[5 + k]).max(0.0));
         let peak = self
             .rows
@@ -79,7 +59,7 @@ impl Reference {
             .map(|row| row[4].abs())
             .fold(1e-9, f64::max);
         let of_creepage = of_history(point).creepage_x_error;
-        let of_forces = point.error_estimate.unwrap().force_x_n / self.limit();
+        let of_forces = point.error_estimate.unwrap().force_x_n / self.contact.limit();
         (
             [off[0].max(off[1]).max(off[2]), off[3] / peak],
             [of_forces, of_creepage.map_or(1e-6, |error| error / peak)],
@@ -117,7 +97,7 @@ fn histories_agree_with_contact_and_their_estimates_hold() {
         println!(
             "{}: forces off by {:.4} ({:.4} estimated), creepage by {:.3} ({:.3}) of its peak, shift by {shift:.4}; {covered}/{} covered; {:?}, \
              {} steps of Newton, {seconds:.3} s",
-            reference.id,
+            reference.contact.id,
             worst[0],
             most[0],
             worst[1],
@@ -128,10 +108,10 @@ fn histories_agree_with_contact_and_their_estimates_hold() {
         );
         let met = points.iter().all(|point| point.target_met == Some(true));
         if worst[0] > 0.015 || worst[1] > 0.05 || shift > 0.005 || !met {
-            failures.push(reference.id.clone());
+            failures.push(reference.contact.id.clone());
         }
         if 100 * covered < 95 * points.len() {
-            failures.push(format!("{}: {covered} covered", reference.id));
+            failures.push(format!("{}: {covered} covered", reference.contact.id));
         }
     }
     assert_none("too far from CONTACT", &failures);

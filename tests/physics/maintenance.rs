@@ -5,7 +5,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, good, with};
-use crate::reference::{Converged, Ellipse, assert_none, read, solve};
+use crate::reference::{Converged, Ellipse, SolvedEllipse, assert_none, read, solve};
 
 const ALL_MODELS: [&str; 6] = [
     "t_gamma",
@@ -178,12 +178,8 @@ fn what_is_not_asked_for_costs_nothing() {
 /// A contact whose temperature was computed elsewhere.
 #[derive(Debug, Deserialize)]
 struct HeatReference {
-    id: String,
-    semi_axes_mm: [f64; 2],
-    normal_force_n: f64,
-    friction: f64,
-    shear_modulus_mpa: f64,
-    poisson_ratio: f64,
+    #[serde(flatten)]
+    contact: SolvedEllipse,
     motion: [f64; 3],
     speed_mm_per_s: f64,
     conductivity_w_per_mk: f64,
@@ -203,15 +199,12 @@ impl HeatReference {
                 "specific_heat_j_per_kgk": self.specific_heat_j_per_kgk, "bulk_c": bulk
             })
         };
-        json!({
-            "material": { "shear_modulus_mpa": self.shear_modulus_mpa, "poisson_ratio": self.poisson_ratio },
-            "friction": { "coefficient": self.friction },
-            "contact": { "type": "ellipse", "a_mm": self.semi_axes_mm[0], "b_mm": self.semi_axes_mm[1] },
-            "load": { "normal_force_n": self.normal_force_n },
-            "motion": { "creepage_x": x, "creepage_y": y, "spin_per_mm": spin, "speed_mm_per_s": self.speed_mm_per_s },
-            "outputs": ["temperature"],
-            "thermal": { "lower": body(self.bulk_lower_c), "upper": body(self.bulk_upper_c) },
-        })
+        let motion = json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": spin, "speed_mm_per_s": self.speed_mm_per_s });
+        let mut case = self.contact.case(&motion);
+        case["outputs"] = json!(["temperature"]);
+        case["thermal"] =
+            json!({ "lower": body(self.bulk_lower_c), "upper": body(self.bulk_upper_c) });
+        case
     }
 }
 
@@ -224,9 +217,15 @@ fn the_highest_temperature_is_that_of_contact() {
             .temperature
             .expect("asked for");
         let error = (found.max_c - case.max_c.value).abs() - case.max_c.unc;
-        println!("{}: {} of {}", case.id, found.max_c, case.max_c.value);
+        println!(
+            "{}: {} of {}",
+            case.contact.id, found.max_c, case.max_c.value
+        );
         if error > 0.02 * case.max_c.value {
-            failures.push(format!("{}: {found:?} of {}", case.id, case.max_c.value));
+            failures.push(format!(
+                "{}: {found:?} of {}",
+                case.contact.id, case.max_c.value
+            ));
         }
         let cells = fields.patches[0].points[0]
             .temperature_c

@@ -10,6 +10,8 @@ use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::{check, solve_with};
 use serde_json::{Value, json};
 
+use crate::gap_samples::{profile, steel};
+
 /// Creepages whose spin pole lies on a grid of `side × side` places inside the patch, at fixed spin: every motion would like a mesh of
 /// its own.
 pub fn creep_map(side: u32, target: f64) -> Value {
@@ -25,15 +27,22 @@ pub fn creep_map(side: u32, target: f64) -> Value {
             }));
         }
     }
-    json!({
-        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
-        "friction": { "coefficient": 0.3 },
-        "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
-        "load": { "normal_force_n": 100_000 },
-        "motion": motions,
-        "solver": { "target_error": target },
-        "outputs": ["resultants"],
-    })
+    let contact = json!({ "type": "radii", "rolling_mm": 460, "lateral_mm": 300 });
+    resultants(
+        contact,
+        100_000,
+        &json!(motions),
+        &json!({ "target_error": target }),
+    )
+}
+
+/// The resultants of motions of a contact under a load in N.
+fn resultants(contact: Value, load: u32, motions: &Value, solver: &Value) -> Value {
+    let mut case = steel(contact, json!({ "normal_force_n": load }), [0.0; 3]);
+    case["motion"] = motions.clone();
+    case["solver"] = solver.clone();
+    case["outputs"] = json!(["resultants"]);
+    case
 }
 
 fn problem(case: &Value) -> CheckedCase {
@@ -54,16 +63,12 @@ fn answer(store: &Arc<OperatorStore>, checked: &CheckedCase) -> Solution {
 
 #[test]
 fn answers_do_not_depend_on_what_the_operator_store_keeps() {
-    let gap = json!({
-        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
-        "friction": { "coefficient": 0.3 },
-        "contact": { "type": "gap_profile", "rolling_mm": 460,
-                     "y_mm": (-20..=20).map(|k| 0.5 * f64::from(k)).collect::<Vec<_>>(),
-                     "gap_mm": (-20..=20).map(|k| f64::from(k * k) * 0.25 / 600.0).collect::<Vec<_>>() },
-        "load": { "normal_force_n": 60_000 },
-        "motion": [{ "creepage_x": 0.001 }, { "creepage_x": 0.001, "spin_per_mm": 0.0005 },
-                   { "creepage_x": 0.0012, "spin_per_mm": 0.0005 }],
-    });
+    let y: Vec<f64> = (-20..=20).map(|k| 0.5 * f64::from(k)).collect();
+    let contact = profile(460.0, &y, |y| y * y / 600.0);
+    let motions = json!([{ "creepage_x": 0.001 }, { "creepage_x": 0.001, "spin_per_mm": 0.0005 },
+                         { "creepage_x": 0.0012, "spin_per_mm": 0.0005 }]);
+    let mut gap = steel(contact, json!({ "normal_force_n": 60_000 }), [0.0; 3]);
+    gap["motion"] = motions;
     for case in [creep_map(4, 0.005), gap] {
         let checked = problem(&case);
         let roomy = Arc::new(OperatorStore::new(1 << 30));
@@ -104,24 +109,18 @@ fn the_memory_of_a_long_sweep_of_resultants_is_some_kilobytes_a_motion() {
 /// a part of the memory that the cost counts.
 #[test]
 fn the_cost_counts_the_operators_that_a_case_leaves_in_the_store() {
-    let ellipse = |solver: Value, motions: Value| {
-        json!({
-            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
-            "friction": { "coefficient": 0.3 },
-            "contact": { "type": "ellipse", "a_mm": 6, "b_mm": 4 },
-            "load": { "normal_force_n": 80_000 },
-            "motion": motions,
-            "solver": solver,
-            "outputs": ["resultants"],
-        })
+    let ellipse = |solver: &Value, motions: &Value| {
+        let contact = json!({ "type": "ellipse", "a_mm": 6, "b_mm": 4 });
+        resultants(contact, 80_000, motions, solver)
     };
+    let target = json!({ "target_error": 0.005 });
     let mesh = json!({ "mesh": { "strips": 20, "cells": 30 } });
     let creep = json!([{ "creepage_x": 0.001 }, { "creepage_x": 0.002 }]);
     let all = json!([{ "creepage_x": 0.001, "creepage_y": 0.0005, "spin_per_mm": 0.0004 }]);
     let cases = [
-        (ellipse(mesh, all.clone()), 1.01),
-        (ellipse(json!({ "target_error": 0.005 }), creep), 6.0),
-        (ellipse(json!({ "target_error": 0.005 }), all), 6.0),
+        (ellipse(&mesh, &all), 1.01),
+        (ellipse(&target, &creep), 6.0),
+        (ellipse(&target, &all), 6.0),
         (creep_map(9, 0.005), 2.5),
     ];
     for (case, factor) in cases {

@@ -78,6 +78,47 @@ impl ReferenceCase {
     }
 }
 
+/// An ellipse solved elsewhere: the head of records that each add what was asked and found.
+#[derive(Debug, Clone, Deserialize)]
+pub struct SolvedEllipse {
+    pub id: String,
+    semi_axes_mm: [f64; 2],
+    normal_force_n: f64,
+    friction: f64,
+    shear_modulus_mpa: f64,
+    poisson_ratio: f64,
+}
+
+impl SolvedEllipse {
+    /// μN in N.
+    pub fn limit(&self) -> f64 {
+        self.friction * self.normal_force_n
+    }
+
+    /// The contact as a client would ask for it with a motion, at default settings.
+    pub fn case(&self, motion: &Value) -> Value {
+        let [a, b] = self.semi_axes_mm;
+        json!({
+            "material": { "shear_modulus_mpa": self.shear_modulus_mpa, "poisson_ratio": self.poisson_ratio },
+            "friction": { "coefficient": self.friction },
+            "contact": { "type": "ellipse", "a_mm": a, "b_mm": b },
+            "load": { "normal_force_n": self.normal_force_n },
+            "motion": motion,
+        })
+    }
+
+    /// The resultants of a point relative to μN and μN√(ab).
+    pub fn relative(&self, point: &PointSolution) -> [f64; 3] {
+        let [a, b] = self.semi_axes_mm;
+        let forces = [
+            point.force_x_n,
+            point.force_y_n,
+            point.moment_z_n_mm / (a * b).sqrt(),
+        ];
+        forces.map(|force| force / self.limit())
+    }
+}
+
 /// Reads a file of `tests/data`.
 pub fn read<T: DeserializeOwned>(name: &str) -> T {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))

@@ -61,6 +61,19 @@ fn cylinder(x: f64, z: f64, nu: f64) -> Stress {
     ]
 }
 
+/// Shakedown needs a yield stress in shear of p0/4, half a half-width deep (Johnson 1985, section 9.2), where the shear σ_xz is largest.
+#[test]
+fn a_rolling_cylinder_shakes_down_at_four_times_the_yield_in_shear() {
+    let needed = |z: f64| {
+        let x = (-800..=800).map(|k| 0.01 * f64::from(k));
+        let states: Vec<Stress> = x.map(|x| cylinder(x, z, 0.3)).collect();
+        judge(PassageMeasure::Shakedown, &states).stress
+    };
+    assert!((needed(0.5) - 0.25).abs() < 1e-4, "{}", needed(0.5));
+    let depths = (2..40).map(|k| needed(0.05 * f64::from(k)));
+    assert!(depths.fold(0.0, f64::max) < 0.2501);
+}
+
 /// A patch two hundred times as wide as long: p0/4 for shakedown, Dang Van's stress of the closed form.
 #[test]
 fn a_cylinder_shakes_down_where_it_should() {

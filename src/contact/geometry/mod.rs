@@ -14,7 +14,6 @@ pub mod profile;
 pub mod profile_quality;
 pub mod rail_in_frame;
 pub mod rigid_touch;
-pub mod smoothing;
 pub mod surface_exit;
 pub mod wheel_in_frame;
 pub mod wheel_rail;

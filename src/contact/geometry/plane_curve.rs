@@ -1,6 +1,6 @@
 //! A plane curve whose coordinates are cubics between common knots, prepared for many evaluations.
 
-use crate::contact::geometry::smoothing::Spline;
+use crate::contact::numerics::spline::Spline;
 
 /// A curve `[y, z]` in mm over a parameter in mm, twice continuously differentiable, straight beyond its ends.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,7 +9,7 @@ use crate::contact::geometry::crossing;
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::geometry::profile_quality::{noise, shape};
-use crate::contact::geometry::smoothing::Spline;
+use crate::contact::numerics::spline::Spline;
 use crate::contact::remark::list::Remark;
 
 /// Length of the whole curve in mm that a profile may have; anything else is in another unit.

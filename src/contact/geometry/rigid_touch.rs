@@ -8,7 +8,8 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 const WHEEL_STEP: f64 = 0.05;
 /// The place of contact is then refined by parabolas through points so far apart, in mm.
 const REFINED: [f64; 2] = [0.05, 0.01];
-/// Steps of Newton's method for the rail under a point of the wheel.
+/// Steps of Newton's method for the rail under a point of the wheel, from a place on the line between two points of the rail [`CURVE_STEP`]
+/// apart. Each squares the error, so that none is tested; bounds of the root, as the common root finders need, are not known on a face.
 const NEWTON_STEPS: u32 = 4;
 
 /// The upper edge of a rail, and the points of the wheel above it.

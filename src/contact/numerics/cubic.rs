@@ -155,63 +155,9 @@ pub(crate) fn interval(axis: &[f64], x: f64) -> usize {
         - 1
 }
 
-/// Slopes at the nodes of a curve through at least 2 values, limited where the values jump or have a kink.
-///
-/// A slope is that of the parabola through the node and its two neighbours, unless this parabola is curved more than a fixed
-/// number of times as strongly as those of both neighbouring nodes. There the slope is blended with the harmonic mean of the
-/// adjoining chords' slopes, 0 where these differ in sign (the limiter of van Leer 1974), which keeps the curve from overshooting
-/// the values. At the ends the parabola of the adjacent node is used.
-pub(crate) fn limited_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
-    /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
-    const SLOPE_LIMIT: f64 = 8.0;
-    let n = axis.len();
-    let rises: Vec<f64> = (1..n)
-        .map(|k| (values[k] - values[k - 1]) / (axis[k] - axis[k - 1]))
-        .collect();
-    if n == 2 {
-        return vec![rises[0]; 2];
-    }
-    let bend = |k: usize| 2.0 * (rises[k] - rises[k - 1]) / (axis[k + 1] - axis[k - 1]);
-    let bends: Vec<f64> = (0..n).map(|k| bend(k.clamp(1, n - 2))).collect();
-    let allowed = |k: usize| {
-        SLOPE_LIMIT
-            * bends[k.saturating_sub(1)]
-                .abs()
-                .min(bends[(k + 1).min(n - 1)].abs())
-    };
-    // Share of the parabola in a slope.
-    let trust = |k: usize| {
-        let (bend, allowed) = (bends[k].abs(), allowed(k));
-        if bend <= allowed { 1.0 } else { allowed / bend }
-    };
-    let slope = |k: usize| {
-        let (before, after) = (rises[k - 1], rises[k]);
-        let parabola = tangent(
-            axis[k] - axis[k - 1],
-            axis[k + 1] - axis[k],
-            values[k] - values[k - 1],
-            values[k + 1] - values[k],
-        );
-        let trust = trust(k);
-        if trust == 1.0 {
-            return parabola;
-        }
-        let steepness = before.abs() + after.abs();
-        let mean = (before * after.abs() + after * before.abs()) / steepness;
-        trust * parabola + (1.0 - trust) * mean
-    };
-    let mut slopes: Vec<f64> = vec![0.0; n];
-    for (k, value) in slopes.iter_mut().enumerate().take(n - 1).skip(1) {
-        *value = slope(k);
-    }
-    slopes[0] = rises[0] - 0.5 * trust(1) * bends[1] * (axis[1] - axis[0]);
-    slopes[n - 1] = rises[n - 2] + 0.5 * trust(n - 2) * bends[n - 2] * (axis[n - 1] - axis[n - 2]);
-    slopes
-}
-
 /// Slope at a node of the parabola through it and its neighbours at distances `before` and `after`, over which the
 /// value rises by `rise_before` and `rise_after`.
-fn tangent(before: f64, after: f64, rise_before: f64, rise_after: f64) -> f64 {
+pub(crate) fn tangent(before: f64, after: f64, rise_before: f64, rise_after: f64) -> f64 {
     (rise_before / before * after + rise_after / after * before) / (before + after)
 }
 

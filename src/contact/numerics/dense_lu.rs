@@ -11,7 +11,7 @@ use faer::linalg::triangular_solve::{
 use faer::perm::{PermRef, permute_rows_in_place, permute_rows_in_place_scratch};
 use faer::{Accum, Mat, MatMut, Par};
 
-use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::monitor::{Monitor, Stop, Unmonitored};
 
 /// Columns eliminated at once.
 const PANEL: usize = 64;
@@ -135,6 +135,18 @@ pub fn subtract_product(
     Ok(())
 }
 
+/// The inverse of a small square matrix, both row by row; of a singular one it is not finite.
+pub(crate) fn inverse(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let n = rows.len();
+    let mut unit = Mat::<f64>::identity(n, n);
+    let lu = DenseLu::new(Mat::from_fn(n, n, |i, j| rows[i][j]), &Unmonitored);
+    let solved = lu.and_then(|lu| lu.solve(unit.as_mut(), &Unmonitored));
+    debug_assert!(solved.is_ok(), "nobody stops it");
+    (0..n)
+        .map(|i| (0..n).map(|j| unit[(i, j)]).collect())
+        .collect()
+}
+
 /// Calls the monitor.
 ///
 /// # Errors
@@ -152,8 +164,6 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::contact::monitor::Unmonitored;
-
     fn wavy(n: usize) -> Mat<f64> {
         // No large diagonal: rows must be exchanged, also across panels.
         Mat::from_fn(n, n, |i, j| ((7 * i * i + 13 * j + i * j) as f64).sin())
@@ -170,6 +180,19 @@ mod tests {
             let error = (&b - &x).norm_max();
             assert!(error < 1e-8, "{n}: {error}");
         }
+    }
+
+    #[test]
+    fn a_matrix_times_its_inverse_is_one() {
+        let n = 25;
+        let a = wavy(n);
+        let rows: Vec<Vec<f64>> = (0..n)
+            .map(|i| (0..n).map(|j| a[(i, j)]).collect())
+            .collect();
+        let found = inverse(&rows);
+        let product = &a * Mat::from_fn(n, n, |i, j| found[i][j]);
+        let error = (product - Mat::<f64>::identity(n, n)).norm_max();
+        assert!(error < 1e-9, "{error}");
     }
 
     #[test]

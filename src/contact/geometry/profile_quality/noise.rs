@@ -1,6 +1,7 @@
 //! Detects measurement artefacts in the points of a profile: noise, outliers, steps, polygons, rounding.
 
 use crate::contact::geometry::profile_quality::samples::Points;
+use crate::contact::numerics::least_squares::first_coefficient;
 
 /// Chords in one window of the noise estimate.
 const NOISE_CHORDS: usize = 4;
@@ -281,37 +282,7 @@ fn fitted<const N: usize>(points: &[[f64; 2]], t: f64) -> Option<f64> {
             (powers, at[1])
         })
         .collect();
-    first_factor(&rows)
-}
-
-/// First of the `N` coefficients of a least-squares fit; `None` if the functions are linearly dependent on the given points.
-fn first_factor<const N: usize>(rows: &[([f64; N], f64)]) -> Option<f64> {
-    let mut normal = [[0.0; N]; N];
-    let mut right = [0.0; N];
-    for (functions, height) in rows {
-        for i in 0..N {
-            right[i] += functions[i] * height;
-            for j in 0..N {
-                normal[i][j] += functions[i] * functions[j];
-            }
-        }
-    }
-    // Eliminated from the last coefficient to the first, because only the first is needed.
-    for k in (1..N).rev() {
-        let (pivot, own) = (normal[k], right[k]);
-        if pivot[k].abs() < 1e-12 {
-            return None;
-        }
-        for i in 0..k {
-            let factor = normal[i][k] / pivot[k];
-            right[i] -= factor * own;
-            for j in 0..=k {
-                normal[i][j] -= factor * pivot[j];
-            }
-        }
-    }
-    let value = right[0] / normal[0][0];
-    value.is_finite().then_some(value)
+    first_coefficient(&rows)
 }
 
 /// The median; 0 for an empty list.

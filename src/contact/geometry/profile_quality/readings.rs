@@ -6,7 +6,8 @@ use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::flattening::flattening;
 use crate::contact::geometry::profile_quality::noise::{MEDIAN_OF_NORMAL, median};
 use crate::contact::geometry::profile_quality::samples::Points;
-use crate::contact::geometry::smoothing::Spline;
+use crate::contact::numerics::hermite::{akima_slopes, value};
+use crate::contact::numerics::spline::Spline;
 
 /// Spacing of the comparison in mm.
 const STEP: f64 = 0.05;
@@ -78,8 +79,10 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
         ambiguity: if smoothing > 0.0 {
             0.0
         } else {
-            let akima = Akima::new(part);
-            over_contact(&pressures(&|s| akima.at(s)))
+            let values = [0, 1].map(|k| part.at.iter().map(|at| at[k]).collect::<Vec<_>>());
+            let slopes = [0, 1].map(|k| akima_slopes(part.along, &values[k]));
+            let akima = |s| [0, 1].map(|k| value(part.along, &values[k], &slopes[k], s));
+            over_contact(&pressures(&akima))
         },
     }
 }
@@ -97,71 +100,6 @@ fn spline(points: Points, cut: f64) -> PlaneCurve {
 fn above(CurvePoint { at, slope, .. }: &CurvePoint, [other_y, other_z]: [f64; 2]) -> f64 {
     let length = slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE);
     (slope[0] * (at[1] - other_z) - slope[1] * (at[0] - other_y)) / length
-}
-
-/// Akima's curve (Journal of the ACM 17, 1970): cubics whose slopes at the points favour the straighter side, so that it stays close to
-/// the chords where a spline overshoots.
-struct Akima {
-    knots: Vec<f64>,
-    values: Vec<[f64; 2]>,
-    slopes: Vec<[f64; 2]>,
-}
-
-impl Akima {
-    fn new(points: Points) -> Akima {
-        let slopes = [0, 1].map(|part| slopes(points, part));
-        Akima {
-            knots: points.along.to_vec(),
-            values: points.at.to_vec(),
-            slopes: slopes[0]
-                .iter()
-                .zip(&slopes[1])
-                .map(|(y, z)| [*y, *z])
-                .collect(),
-        }
-    }
-
-    fn at(&self, s: f64) -> [f64; 2] {
-        let after = self.knots.partition_point(|knot| *knot <= s);
-        let i = after.clamp(1, self.knots.len() - 1) - 1;
-        let step = self.knots[i + 1] - self.knots[i];
-        let t = (s - self.knots[i]) / step;
-        [0, 1].map(|part| {
-            let (a, b) = (self.values[i][part], self.values[i + 1][part]);
-            let (from, to) = (self.slopes[i][part], self.slopes[i + 1][part]);
-            let chord = (b - a) / step;
-            let bend = 3.0 * chord - 2.0 * from - to;
-            let twist = from + to - 2.0 * chord;
-            a + step * t * (from + t * (bend + t * twist))
-        })
-    }
-}
-
-/// Akima's slopes of one coordinate at the points.
-fn slopes(points: Points, part: usize) -> Vec<f64> {
-    let count = points.at.len();
-    let mut chords = vec![0.0; count + 3];
-    for k in 0..count - 1 {
-        chords[k + 2] =
-            (points.at[k + 1][part] - points.at[k][part]) / (points.along[k + 1] - points.along[k]);
-    }
-    for k in [1, 0] {
-        chords[k] = 2.0 * chords[k + 1] - chords[k + 2];
-    }
-    for k in [count + 1, count + 2] {
-        chords[k] = 2.0 * chords[k - 1] - chords[k - 2];
-    }
-    (0..count)
-        .map(|k| {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|j| chords[k + j]);
-            let (before, after) = ((b - a).abs(), (d - c).abs());
-            if before + after > 0.0 {
-                (after * b + before * c) / (before + after)
-            } else {
-                0.5 * (b + c)
-            }
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The gap between the undeformed bodies: samples, and a smooth surface through them.
 
-use crate::contact::numerics::cubic::{Cubic, interval, limited_slopes};
+use crate::contact::numerics::cubic::{Cubic, interval};
+use crate::contact::numerics::hermite;
 
 /// Distance of the undeformed surfaces in mm, both bodies together, over the contact plane.
 #[derive(Debug, Clone, PartialEq)]
@@ -204,14 +205,14 @@ impl GapSurface {
 impl GapCurve {
     fn new(axis: &[f64], values: &[f64]) -> GapCurve {
         GapCurve {
-            slopes: limited_slopes(axis, values),
+            slopes: hermite::limited_slopes(axis, values),
             axis: axis.to_vec(),
             values: values.to_vec(),
         }
     }
 
     fn at(&self, at: f64) -> f64 {
-        value_on(&self.axis, &self.values, &self.slopes, at)
+        hermite::value(&self.axis, &self.values, &self.slopes, at)
     }
 }
 
@@ -220,7 +221,7 @@ impl SampledSurface {
         let mut slopes = vec![0.0; x.len() * y.len()];
         for i in 0..x.len() {
             let column: Vec<f64> = samples.iter().map(|row| row[i]).collect();
-            for (j, slope) in limited_slopes(y, &column).into_iter().enumerate() {
+            for (j, slope) in hermite::limited_slopes(y, &column).into_iter().enumerate() {
                 slopes[j * x.len() + i] = slope;
             }
         }
@@ -245,8 +246,11 @@ impl SampledSurface {
                     Cubic::with_slopes(&self.y, j, values, slopes).at(*y)
                 })
                 .collect();
-            let slopes = limited_slopes(&self.x, &line);
-            out.extend(x.iter().map(|x| value_on(&self.x, &line, &slopes, *x)));
+            let slopes = hermite::limited_slopes(&self.x, &line);
+            out.extend(
+                x.iter()
+                    .map(|x| hermite::value(&self.x, &line, &slopes, *x)),
+            );
         }
         out
     }
@@ -254,18 +258,6 @@ impl SampledSurface {
 
 fn range(axis: &[f64]) -> [f64; 2] {
     [axis[0], axis[axis.len() - 1]]
-}
-
-/// Value of the curve with these values and slopes at the nodes of the axis.
-fn value_on(axis: &[f64], values: &[f64], slopes: &[f64], at: f64) -> f64 {
-    let i = interval(axis, at);
-    Cubic::with_slopes(
-        axis,
-        i,
-        [values[i], values[i + 1]],
-        [slopes[i], slopes[i + 1]],
-    )
-    .at(at)
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! Cell values as smooth fields over a patch, for pictures: interpolated, bounded by the border, cut at levels.
 
 mod contour;
-mod monotone;
 pub mod sheet;
 pub mod stick;

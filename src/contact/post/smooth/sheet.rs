@@ -4,8 +4,8 @@
 
 use std::f64::consts::PI;
 
+use crate::contact::numerics::hermite::monotone;
 use crate::contact::post::smooth::contour::{CurvedGrid, contours};
-use crate::contact::post::smooth::monotone::monotone;
 use crate::contact::post::strip_segments::Strips;
 use crate::contact::solution::words::fields::PatchCells;
 

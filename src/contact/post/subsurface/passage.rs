@@ -118,29 +118,4 @@ mod tests {
         close(dang_van(&[tension(60.0)]), 21.0);
         close(dang_van(&[[-40.0, -40.0, -40.0, 0.0, 0.0, 0.0]]), 0.0);
     }
-
-    /// Stresses below a rolling cylinder (Johnson 1985, eqs. 4.49, M'Ewen): shakedown needs a yield stress in shear of p0/4, half a
-    /// half-width deep (section 9.2), where the shear σ_xz is largest.
-    #[test]
-    fn a_rolling_cylinder_shakes_down_at_four_times_the_yield_in_shear() {
-        let nu = 0.3;
-        let at = |x: f64, z: f64| {
-            let sum = 1.0 - x * x + z * z;
-            let root = (sum * sum + 4.0 * x * x * z * z).sqrt();
-            let m = (0.5 * (root + sum)).sqrt();
-            let n = (0.5 * (root - sum)).max(0.0).sqrt() * x.signum();
-            let part = (z * z + n * n) / (m * m + n * n);
-            let xx = -(m * (1.0 + part) - 2.0 * z);
-            let zz = -m * (1.0 - part);
-            let xz = -n * (m * m - z * z) / (m * m + n * n);
-            [xx, nu * (xx + zz), zz, 0.0, xz, 0.0]
-        };
-        let needed = |z: f64| {
-            let states: Vec<Stress> = (-800..=800).map(|k| at(0.01 * f64::from(k), z)).collect();
-            judge(PassageMeasure::Shakedown, &states).stress
-        };
-        assert!((needed(0.5) - 0.25).abs() < 1e-4, "{}", needed(0.5));
-        let depths = (2..40).map(|k| needed(0.05 * f64::from(k)));
-        assert!(depths.fold(0.0, f64::max) < 0.2501);
-    }
 }

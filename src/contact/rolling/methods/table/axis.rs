@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::contact::numerics::dense_lu::inverse;
+
 /// Cubic pieces: how the four coefficients from a first one on weigh in each bin, by powers of the place in the bin.
 #[derive(Debug, Clone)]
 pub struct Axis {
@@ -135,7 +137,7 @@ pub fn mirrored_coefficients(nodes: usize, ends: [Mirror; 2]) -> Vec<Vec<f64>> {
             row[column] += sign * weight / 6.0;
         }
     }
-    let inside = inverse(system);
+    let inside = inverse(&system);
     let mut all = Vec::with_capacity(nodes + 2);
     for row in -1..=nodes as isize {
         let (inner, sign) = reflected(row, nodes, ends);
@@ -155,7 +157,7 @@ pub fn free_coefficients(places: &[u8]) -> Vec<Vec<f64>> {
             row[weights.first + k] = *weight;
         }
     }
-    inverse(system)
+    inverse(&system)
 }
 
 /// The node that stands for one beyond the ends, and its sign.
@@ -221,31 +223,6 @@ fn cubic_through(v: [f64; 4]) -> [f64; 4] {
         9.0 * a - 22.5 * b + 18.0 * c - 4.5 * d,
         -4.5 * a + 13.5 * b - 13.5 * c + 4.5 * d,
     ]
-}
-
-/// The inverse of a matrix of few rows (Gauss and Jordan, with exchange of rows).
-fn inverse(mut matrix: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let n = matrix.len();
-    for (k, row) in matrix.iter_mut().enumerate() {
-        row.extend((0..n).map(|j| f64::from(u8::from(j == k))));
-    }
-    for k in 0..n {
-        let pivot = (k..n).max_by(|i, j| matrix[*i][k].abs().total_cmp(&matrix[*j][k].abs()));
-        matrix.swap(k, pivot.unwrap_or(k));
-        let factor = 1.0 / matrix[k][k];
-        matrix[k].iter_mut().for_each(|v| *v *= factor);
-        let row = matrix[k].clone();
-        for (other, target) in matrix.iter_mut().enumerate() {
-            if other != k {
-                let factor = target[k];
-                target
-                    .iter_mut()
-                    .zip(&row)
-                    .for_each(|(t, r)| *t -= factor * r);
-            }
-        }
-    }
-    matrix.into_iter().map(|row| row[n..].to_vec()).collect()
 }
 
 #[cfg(test)]
