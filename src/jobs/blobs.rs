@@ -27,10 +27,12 @@ use crate::jobs::store::claim::Claim;
 /// The folder of the data folder in which results lie.
 pub(crate) const ROOT: &str = "results";
 
-/// Bytes that one request reads of a solution whose size is not known; larger ones take three.
+/// Bytes that one request reads of a solution whose size is not known; larger ones take three. Chosen by judgement: solutions of single
+/// motions have some kilobytes, those of sweeps pass this at a few hundred motions.
 const READ_AT_ONCE: u64 = 256 << 10;
 
-/// Bytes that the first request reads of fields: their header, which is rarely longer.
+/// Bytes that the first request reads of fields: their header, which is rarely longer. Chosen by judgement; a longer one takes another
+/// request.
 const FIELDS_AT_ONCE: u64 = 16 << 10;
 
 const SOLUTION: &str = "solution.json";

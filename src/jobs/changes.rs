@@ -19,7 +19,7 @@ use crate::jobs::store::list::{Change, Filter};
 const PAUSE: Duration = Duration::from_millis(250);
 /// How far each look reaches back, in ms.
 const REACH_MS: i64 = 2000;
-/// Changes read at once.
+/// Changes read at once; a look that finds more reads on. Chosen by judgement: a hundred kilobytes, far more than a look usually finds.
 const AT_ONCE: u32 = 1000;
 /// Running jobs whose progress is followed.
 const RUNNING_MAX: u32 = 100;

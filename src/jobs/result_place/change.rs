@@ -11,7 +11,8 @@ use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
 use crate::jobs::store::cluster::{Cluster, Deployment};
 use crate::jobs::store::postgres::database::PostgresStore;
 
-/// Results that are copied at once.
+/// Results that are copied at once: each waits for its requests most of the time. Chosen by judgement, below the usual 10 connections to
+/// the database.
 const AT_ONCE: usize = 8;
 
 /// What was moved.

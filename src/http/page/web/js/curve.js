@@ -11,7 +11,7 @@ import { adoptShown } from './adopt.js';
 
 /** Half the width of the end of an error bar, in pixels. */
 const CAP = 4;
-/** Values of a line that have marks and error bars; more of them are a line. */
+/** Values of a line that have marks and error bars; more of them would touch each other, and are a line. Chosen by judgement. */
 const MARKED_MAX = 60;
 
 export class CreepCurve extends HTMLElement {

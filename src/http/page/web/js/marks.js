@@ -2,6 +2,7 @@
 
 /** @typedef {import('./state.js').App} App */
 
+// As many as stand side by side in a window; chosen by judgement.
 export const MARKED_MAX = 4;
 
 /** @type {string[]} */
