@@ -15,7 +15,7 @@ const RESTARTS_MAX: usize = 3;
 pub struct Gmres {
     basis: Vec<Vec<f64>>,
     /// Upper triangle of the rotated Hessenberg matrix, column by column.
-    columns: Vec<Vec<f64>>,
+    columns: Vec<f64>,
     rotations: Vec<(f64, f64)>,
     rhs: Vec<f64>,
     direction: Vec<f64>,
@@ -179,17 +179,14 @@ impl Gmres {
     /// rotations. Returns true if the product lies in the span of the basis, so that the cycle has to end.
     fn orthogonalise(&mut self, k: usize) -> bool {
         let before = norm(&self.product);
-        if self.columns.len() <= k {
-            self.columns.push(Vec::with_capacity(k + 1));
-        }
-        let mut column = std::mem::take(&mut self.columns[k]);
-        column.clear();
-        for basis in &self.basis[..=k] {
+        self.columns.resize(column_start(k + 1), 0.0);
+        let column = &mut self.columns[column_start(k)..];
+        for (entry, basis) in column.iter_mut().zip(&self.basis) {
             let h = dot(basis, &self.product);
             for (p, b) in self.product.iter_mut().zip(basis) {
                 *p -= h * b;
             }
-            column.push(h);
+            *entry = h;
         }
         let rest = norm(&self.product);
         for (i, (c, s)) in self.rotations.iter().enumerate() {
@@ -204,7 +201,6 @@ impl Gmres {
             (column[k] / length, rest / length)
         };
         column[k] = length;
-        self.columns[k] = column;
         self.rotations.push((c, s));
         let last = self.rhs[k];
         self.rhs[k] = c * last;
@@ -226,10 +222,10 @@ impl Gmres {
         y.extend_from_slice(&self.rhs[..k]);
         for i in (0..k).rev() {
             for j in i + 1..k {
-                y[i] -= self.columns[j][i] * y[j];
+                y[i] -= self.columns[column_start(j) + i] * y[j];
             }
             // A pivot of 0 belongs to a singular system: that direction is left out.
-            let pivot = self.columns[i][i];
+            let pivot = self.columns[column_start(i) + i];
             y[i] = if pivot == 0.0 { 0.0 } else { y[i] / pivot };
         }
         self.direction.fill(0.0);
@@ -245,6 +241,11 @@ impl Gmres {
             *to += d;
         }
     }
+}
+
+/// Where column k of the triangular matrix, which has k + 1 entries, starts.
+fn column_start(k: usize) -> usize {
+    k * (k + 1) / 2
 }
 
 /// Inner product in eight running sums, so that it can be vectorised and rounds alike everywhere.

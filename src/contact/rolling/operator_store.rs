@@ -87,7 +87,7 @@ struct Shelf {
 #[derive(Debug, Clone)]
 struct Kept {
     kind: OperatorKind,
-    mesh: Mesh,
+    mesh: Arc<Mesh>,
     bytes: u64,
     used: u64,
     operator: Arc<LevelOperator>,
@@ -122,7 +122,7 @@ impl OperatorStore {
     /// The monitor may stop the work.
     pub fn get(
         &self,
-        mesh: &Mesh,
+        mesh: &Arc<Mesh>,
         kind: OperatorKind,
         monitor: &dyn Monitor,
     ) -> Result<Arc<LevelOperator>, Stop> {
@@ -145,7 +145,7 @@ impl OperatorStore {
         if kept_bytes(bytes, self.bytes_max) > 0 {
             let kept = Kept {
                 kind,
-                mesh: mesh.clone(),
+                mesh: Arc::clone(mesh),
                 bytes,
                 used: 0,
                 operator: Arc::clone(&operator),
@@ -220,7 +220,7 @@ pub struct CaseOperators {
 #[derive(Debug)]
 struct Held {
     kind: OperatorKind,
-    mesh: Mesh,
+    mesh: Arc<Mesh>,
     operator: Arc<LevelOperator>,
 }
 
@@ -240,7 +240,7 @@ impl CaseOperators {
     /// The monitor may stop the work.
     pub fn get(
         &self,
-        mesh: &Mesh,
+        mesh: &Arc<Mesh>,
         kind: OperatorKind,
         monitor: &dyn Monitor,
     ) -> Result<Arc<LevelOperator>, Stop> {
@@ -254,7 +254,7 @@ impl CaseOperators {
         let operator = self.store.get(mesh, kind, monitor)?;
         *last = Some(Held {
             kind,
-            mesh: mesh.clone(),
+            mesh: Arc::clone(mesh),
             operator: Arc::clone(&operator),
         });
         Ok(operator)
@@ -298,8 +298,8 @@ mod tests {
     use crate::contact::mesh::samples::mesh_between;
     use crate::contact::monitor::Unmonitored;
 
-    fn mesh(half_width: f64) -> Mesh {
-        mesh_between(half_width, [4, 6], |_| [-1.0, 1.0])
+    fn mesh(half_width: f64) -> Arc<Mesh> {
+        Arc::new(mesh_between(half_width, [4, 6], |_| [-1.0, 1.0]))
     }
 
     const KIND: OperatorKind = OperatorKind {

@@ -107,7 +107,7 @@ pub struct StripMesh {
     /// Units of the dimensionless problem.
     pub scale: Scale,
     /// The dimensionless mesh.
-    pub normalised: Mesh,
+    pub normalised: Arc<Mesh>,
     /// Friction bound of every cell, dimensionless.
     pub bound: Vec<f64>,
     /// Flexibility of an elastic layer between the bodies, dimensionless.
@@ -189,7 +189,7 @@ impl StripMesh {
             pressure,
             area,
             scale,
-            normalised,
+            normalised: Arc::new(normalised),
             bound,
             layer: task.interface.layer * scale.shear_modulus / scale.length,
             pressure_slip,
