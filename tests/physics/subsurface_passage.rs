@@ -135,6 +135,36 @@ fn wrong_passages_are_refused() {
         "/subsurface/passage/dang_van_slope",
         &["11", "10"],
     );
+    for (wrong, at, words) in [
+        (
+            json!({ "dang_van_slope": -0.1 }),
+            "/dang_van_slope",
+            ["-0.1", "0"],
+        ),
+        (
+            json!({ "dang_van_slope": "steep" }),
+            "/dang_van_slope",
+            ["steep", "number"],
+        ),
+        (
+            json!({ "dang_van_slope": null }),
+            "/dang_van_slope",
+            ["null", "number"],
+        ),
+        (
+            json!({ "dang_van_slope": [0.3] }),
+            "/dang_van_slope",
+            ["array", "number"],
+        ),
+        (json!(true), "", ["true", "object"]),
+        (json!(0.3), "", ["0.3", "object"]),
+        (json!("all"), "", ["all", "object"]),
+        (json!(null), "", ["null", "object"]),
+        (json!([]), "", ["array", "object"]),
+    ] {
+        let at = format!("/subsurface/passage{at}");
+        assert_fault(&put(json!({ "passage": wrong })), &at, &words);
+    }
     let unknown = json!({ "passage": { "slope": 0.3 } });
     assert_fault(
         &put(unknown),

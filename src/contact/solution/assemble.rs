@@ -112,8 +112,10 @@ impl<'a> Assembly<'a> {
                 Some(_) => maintain::add_of_history(case, solved, &mut points, monitor)?,
                 None => maintain::add_rest(case, solved, &mut points, monitor)?,
             };
+            let number = case.problem.part.before + index;
+            self.remarks.extend(kept.remark.map(|r| r.at_point(number)));
             if wants_fields(case) {
-                self.add_fields(level, fields, kept);
+                self.add_fields(level, fields, kept.fields);
             }
         }
         self.total.push(total(&self.patches, &self.limits, point));

@@ -13,12 +13,14 @@ use crate::contact::post::damage::evaluate::{DamagedPatch, damage};
 use crate::contact::post::damage::figures::DamageTask;
 use crate::contact::post::heat::{ThermalTask, heating};
 use crate::contact::post::local_power::{CellPower, PowerTask, cell_power};
+use crate::contact::post::subsurface::enclosing_ball::GAP;
 use crate::contact::post::subsurface::states::{STORED, in_patch_axes, point, stored};
 use crate::contact::post::subsurface::surface_load::{LoadResolution, LoadWorkspace, SurfaceLoad};
 use crate::contact::post::subsurface::task::{LoadedBody, StressPlaces, SubsurfaceTask};
 use crate::contact::post::subsurface::worst::worst_place;
 use crate::contact::post::subsurface::worst_passage::{PassagesOf, passage};
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -33,6 +35,15 @@ use crate::contact::solution::words::maintenance::{SubsurfaceSummary, Temperatur
 const LEAST_DEPTH: f64 = 0.01;
 /// Points between two looks at the monitor.
 const POINTS_UNASKED: usize = 16;
+
+/// What follows from the cells of a motion beside the summaries of its points.
+#[derive(Default)]
+pub(crate) struct KeptValues {
+    /// The values that are kept of every patch.
+    pub(crate) fields: Vec<PointFields>,
+    /// What there is to say of them.
+    pub(crate) remark: Option<Remark>,
+}
 
 /// A motion solved on a level.
 #[derive(Clone, Copy)]
@@ -68,13 +79,13 @@ pub(crate) fn add_damage(
     }
 }
 
-/// What follows from the cells of a motion: summaries into its points; the values that are kept of every patch are returned.
+/// What follows from the cells of a motion: summaries into its points; the rest is returned.
 pub(crate) fn add_rest(
     case: &CheckedCase,
     solved: SolvedMotion,
     points: &mut [PointSolution],
     monitor: &dyn Monitor,
-) -> Result<Vec<PointFields>, Stop> {
+) -> Result<KeptValues, Stop> {
     let run = &case.run;
     let mut kept = vec![PointFields::default(); points.len()];
     if run.after.needs_power(&run.outputs) {
@@ -110,8 +121,9 @@ pub(crate) fn add_rest(
             }
         }
     }
-    add_stresses(case, solved, points, &mut kept, monitor)?;
-    Ok(kept)
+    let remark = add_stresses(case, solved, points, &mut kept, monitor)?;
+    let fields = kept;
+    Ok(KeptValues { fields, remark })
 }
 
 /// The same of a point of a history, whose slips are those of its step.
@@ -120,7 +132,7 @@ pub(crate) fn add_of_history(
     solved: SolvedMotion,
     points: &mut [PointSolution],
     monitor: &dyn Monitor,
-) -> Result<Vec<PointFields>, Stop> {
+) -> Result<KeptValues, Stop> {
     let mut kept = vec![PointFields::default(); points.len()];
     if case.run.wants(Output::Slip) {
         let unit = solved.level.scale.slip();
@@ -131,27 +143,39 @@ pub(crate) fn add_of_history(
             (kept.slip_x, kept.slip_y) = (Some(x), Some(y));
         }
     }
-    add_stresses(case, solved, points, &mut kept, monitor)?;
-    Ok(kept)
+    let remark = add_stresses(case, solved, points, &mut kept, monitor)?;
+    let fields = kept;
+    Ok(KeptValues { fields, remark })
 }
 
-/// Stresses below the surface, where they are asked for.
+/// Stresses below the surface, where they are asked for; what there is to say of them is returned.
 fn add_stresses(
     case: &CheckedCase,
     solved: SolvedMotion,
     points: &mut [PointSolution],
     kept: &mut [PointFields],
     monitor: &dyn Monitor,
-) -> Result<(), Stop> {
+) -> Result<Option<Remark>, Stop> {
     let Some(task) = &case.run.after.subsurface else {
-        return Ok(());
+        return Ok(None);
     };
     let found = subsurface(task, solved, monitor)?;
+    let gap = found.iter().map(|found| found.gap).fold(0.0, f64::max);
     for ((point, kept), found) in points.iter_mut().zip(kept).zip(found) {
         point.subsurface = Some(found.summary);
         kept.subsurface = Some(found.points);
     }
-    Ok(())
+    Ok(ball_remark(gap))
+}
+
+/// The remark on a passage whose smallest ball about the stresses was not found to its tolerance.
+fn ball_remark(gap: f64) -> Option<Remark> {
+    (gap > GAP).then_some(Remark::IterationInexact {
+        iteration: "the smallest ball about the stresses of a passage",
+        reason: "the steps were used up",
+        residual: gap,
+        tolerance: GAP,
+    })
 }
 
 /// Stresses below one patch.
@@ -159,6 +183,8 @@ struct PatchStresses {
     summary: SubsurfaceSummary,
     /// The requested points as they are stored.
     points: Vec<f64>,
+    /// What is left of the search for smallest balls; 0 where no passage is judged.
+    gap: f64,
 }
 
 fn least_depth(patch: &Patch) -> f64 {
@@ -177,6 +203,14 @@ fn loaded<'a>(task: &SubsurfaceTask, of: SolvedMotion<'a>) -> (BodyName, Surface
     (body, load)
 }
 
+/// Goes on unless the monitor wants an end.
+fn ask(monitor: &dyn Monitor) -> Result<(), Stop> {
+    match monitor.tick(0.0) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(stop) => Err(stop),
+    }
+}
+
 /// Stresses below every patch. Patches of one frame load the same body: each point feels all of them.
 fn subsurface(
     task: &SubsurfaceTask,
@@ -185,10 +219,8 @@ fn subsurface(
 ) -> Result<Vec<PatchStresses>, Stop> {
     let (body, load) = loaded(task, of);
     let patches = of.footprint.patches();
-    let least = patches
-        .iter()
-        .map(least_depth)
-        .fold(f64::INFINITY, f64::min);
+    let depths = patches.iter().map(least_depth);
+    let least = depths.fold(f64::INFINITY, f64::min);
     let workspace = &mut load.workspace();
     let stress = |at: [f64; 3], workspace: &mut LoadWorkspace| {
         let stress = load.stress(at, LoadResolution::FINE, workspace);
@@ -197,10 +229,8 @@ fn subsurface(
     let evaluate = |places: &[[f64; 3]], workspace: &mut LoadWorkspace| {
         let mut values = Vec::with_capacity(places.len() * STORED);
         for (k, [x, y, depth]) in places.iter().enumerate() {
-            if k % POINTS_UNASKED == 0
-                && let ControlFlow::Break(stop) = monitor.tick(0.0)
-            {
-                return Err(stop);
+            if k % POINTS_UNASKED == 0 {
+                ask(monitor)?;
             }
             let at = [*x, *y, depth.max(least)];
             values.extend(stored(at, stress(at, workspace)));
@@ -214,9 +244,7 @@ fn subsurface(
     let below_worst = matches!(task.places, StressPlaces::BelowWorst(_));
     let mut found = Vec::with_capacity(patches.len());
     for (k, patch) in patches.iter().enumerate() {
-        if let ControlFlow::Break(stop) = monitor.tick(0.0) {
-            return Err(stop);
-        }
+        ask(monitor)?;
         let place = PassagesOf {
             load: &load,
             footprint: of.footprint,
@@ -233,17 +261,22 @@ fn subsurface(
             }
             _ => shared.clone(),
         };
+        let asked = task.passage.zip(worst);
+        let judged = asked.map(|(asked, worst)| passage(asked, place, worst, monitor));
+        let judged = judged.transpose()?;
         let summary = SubsurfaceSummary {
             body,
             least_depth_mm: least,
             worst: worst
                 .filter(|_| task.worst || below_worst)
                 .map(|at| point(at, stress(at, workspace))),
-            passage: (task.passage.zip(worst))
-                .map(|(judged, worst)| passage(judged, place, worst, monitor))
-                .transpose()?,
+            passage: judged.map(|judged| judged.summary),
         };
-        found.push(PatchStresses { summary, points });
+        found.push(PatchStresses {
+            summary,
+            points,
+            gap: judged.map_or(0.0, |judged| judged.gap),
+        });
     }
     Ok(found)
 }
@@ -376,4 +409,17 @@ fn wear_across(task: &DamageTask, of: SolvedMotion, power: &CellPower) -> Vec<We
     (0..of.footprint.patches().len())
         .map(|patch| across(task, cells, patch))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ball_that_was_not_found_exactly_is_told() {
+        assert_eq!(ball_remark(0.5 * GAP), None);
+        let remark = ball_remark(1e-3).expect("a remark");
+        assert_eq!(remark.code(), "iteration-inexact");
+        assert!(remark.detail().contains("1.00e-3"), "{}", remark.detail());
+    }
 }

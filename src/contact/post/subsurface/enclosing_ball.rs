@@ -9,7 +9,7 @@
 pub type Deviator = [f64; 5];
 
 /// Relative distance of primal and dual, in squares of the radius, and most steps. Chosen by judgement.
-const GAP: f64 = 1e-6;
+pub(crate) const GAP: f64 = 1e-6;
 const STEPS_MAX: usize = 2000;
 
 /// A ball about points.
@@ -17,8 +17,11 @@ const STEPS_MAX: usize = 2000;
 pub struct EnclosingBall {
     /// Its centre.
     pub centre: Deviator,
-    /// Its radius: no point is farther, and no ball smaller by more than half a millionth.
+    /// Its radius: no point is farther.
     pub radius: f64,
+    /// Relative distance of primal and dual in squares of the radius: no ball is smaller by more than half of it. Above [`GAP`] the steps were
+    /// used up.
+    pub gap: f64,
     /// Weights of the points; those on the sphere that hold the ball have one.
     pub weights: Vec<f64>,
 }
@@ -26,9 +29,15 @@ pub struct EnclosingBall {
 /// The smallest ball whose centre has only the first `free` coordinates. Without points it is a point.
 #[must_use]
 pub fn enclosing_ball(points: &[Deviator], free: usize) -> EnclosingBall {
+    ball_within(points, free, STEPS_MAX)
+}
+
+/// The same with so many steps at most.
+fn ball_within(points: &[Deviator], free: usize, steps_max: usize) -> EnclosingBall {
     let mut ball = EnclosingBall {
         centre: [0.0; 5],
         radius: 0.0,
+        gap: 0.0,
         weights: vec![0.0; points.len()],
     };
     if points.is_empty() {
@@ -36,7 +45,7 @@ pub fn enclosing_ball(points: &[Deviator], free: usize) -> EnclosingBall {
     }
     ball.weights[0] = 1.0;
     ball.centre[..free].copy_from_slice(&points[0][..free]);
-    for _ in 0..STEPS_MAX {
+    for step in 0..=steps_max {
         let apart = |k: usize| squared(&points[k], &ball.centre, 5);
         let distances: Vec<f64> = (0..points.len()).map(apart).collect();
         let held = |k: &usize| ball.weights[*k] > 0.0;
@@ -47,7 +56,12 @@ pub fn enclosing_ball(points: &[Deviator], free: usize) -> EnclosingBall {
             .map(|(distance, weight)| distance * weight)
             .sum();
         ball.radius = distances[far].sqrt();
-        if distances[far] - mean <= GAP * distances[far] {
+        ball.gap = if distances[far] > 0.0 {
+            (distances[far] - mean) / distances[far]
+        } else {
+            0.0
+        };
+        if ball.gap <= GAP || step == steps_max {
             break;
         }
         let forward = distances[far] - mean >= mean - distances[near];
@@ -101,6 +115,24 @@ mod tests {
         let ball = enclosing_ball(&points, 1);
         assert!((ball.radius - 3.0).abs() < 1e-5 && (ball.centre[0] - 2.0).abs() < 1e-2);
         assert_eq!(ball.centre[1..], [0.0; 4]);
+    }
+
+    #[test]
+    fn a_ball_whose_steps_are_used_up_says_by_how_much_it_may_be_too_large() {
+        let points: Vec<Deviator> = (0..40)
+            .map(|k| std::array::from_fn(|c| (1.3 * f64::from(k) + c as f64).sin()))
+            .collect();
+        let exact = enclosing_ball(&points, 5);
+        assert!(exact.gap <= GAP, "{exact:?}");
+        for steps in [0, 1, 3, 10] {
+            let ball = ball_within(&points, 5, steps);
+            let too_large = ball.radius / exact.radius - 1.0;
+            assert!(ball.gap > GAP, "{steps}: {ball:?}");
+            assert!(too_large >= -GAP, "{steps}: {too_large}");
+            // Squares: the dual is below that of the best.
+            let least = ball.radius * (1.0 - ball.gap).max(0.0).sqrt();
+            assert!(least <= exact.radius * (1.0 + GAP), "{steps}: {ball:?}");
+        }
     }
 
     #[test]

@@ -34,6 +34,8 @@ pub struct PassageValue {
     pub stress: f64,
     /// States that decide it.
     pub deciding: Vec<usize>,
+    /// What is left of the search for the smallest ball: see [`EnclosingBall`](crate::contact::post::subsurface::enclosing_ball::EnclosingBall).
+    pub gap: f64,
 }
 
 /// What stresses on a line along x amount to; the stress-free state before and after is added.
@@ -53,6 +55,7 @@ pub fn judge(measure: PassageMeasure, states: &[Stress]) -> PassageValue {
         return PassageValue {
             stress: FRAC_1_SQRT_2 * ball.radius,
             deciding,
+            gap: ball.gap,
         };
     };
     let hydrostatic = |k: usize| {
@@ -69,7 +72,11 @@ pub fn judge(measure: PassageMeasure, states: &[Stress]) -> PassageValue {
     if at < states.len() && !deciding.contains(&at) {
         deciding.push(at);
     }
-    PassageValue { stress, deciding }
+    PassageValue {
+        stress,
+        deciding,
+        gap: ball.gap,
+    }
 }
 
 /// First the coordinates that residual stresses change, then those of the shears σ_xz and σ_yz.

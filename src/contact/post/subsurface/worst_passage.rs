@@ -44,6 +44,15 @@ pub struct PassagesOf<'a> {
     pub least: f64,
 }
 
+/// What is found below a patch, and what is left of the searches for smallest balls about the stresses.
+#[derive(Debug, Clone, Copy)]
+pub struct JudgedPassage {
+    /// The worst of the passages.
+    pub summary: PassageSummary,
+    /// The largest gap of the balls on the worst lines, see [`enclosing_ball`](crate::contact::post::subsurface::enclosing_ball).
+    pub gap: f64,
+}
+
 /// What passages below a patch amount to at their worst, with the worst point `[x, y, depth]` of von Mises' stress.
 ///
 /// # Errors
@@ -54,7 +63,7 @@ pub fn passage(
     of: PassagesOf,
     worst: [f64; 3],
     monitor: &dyn Monitor,
-) -> Result<PassageSummary, Stop> {
+) -> Result<JudgedPassage, Stop> {
     let mut measures = vec![PassageMeasure::Shakedown];
     measures.extend(task.dang_van_slope.map(PassageMeasure::DangVan));
     let lines = Lines::new(of);
@@ -77,18 +86,22 @@ pub fn passage(
         }
     }
     let mut found = Vec::with_capacity(measures.len());
+    let mut gap = 0.0_f64;
     for (measure, (_, start)) in measures.into_iter().zip(starts) {
-        found.push(lines.search(measure, start, workspace, monitor)?);
+        let (place, left) = lines.search(measure, start, workspace, monitor)?;
+        found.push(place);
+        gap = gap.max(left);
     }
     let stress = of.load.stress(worst, LoadResolution::FINE, workspace);
-    Ok(PassageSummary {
+    let summary = PassageSummary {
         yield_with_residual: found[0],
         dang_van: found.get(1).copied(),
         yield_without_residual: PassagePlace {
             at_mm: [worst[1], worst[2]],
             stress_mpa: von_mises(stress) / 3_f64.sqrt(),
         },
-    })
+    };
+    Ok(JudgedPassage { summary, gap })
 }
 
 /// The lines below a patch.
@@ -148,8 +161,13 @@ impl<'a> Lines<'a> {
         self.stations.iter().map(state).collect()
     }
 
-    /// The measure of one line, with states added beside those that decide.
-    fn value(&self, measure: PassageMeasure, at: [f64; 2], workspace: &mut LoadWorkspace) -> f64 {
+    /// The measure of one line and the gap of its ball, with states added beside those that decide.
+    fn value(
+        &self,
+        measure: PassageMeasure,
+        at: [f64; 2],
+        workspace: &mut LoadWorkspace,
+    ) -> (f64, f64) {
         let [y, depth] = self.place(at);
         let mut states = self.states(at, LoadResolution::FINE, workspace);
         let judged = |states: &[(f64, Stress)]| {
@@ -170,7 +188,8 @@ impl<'a> Lines<'a> {
             }
             states.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
-        judged(&states).stress
+        let found = judged(&states);
+        (found.stress, found.gap)
     }
 
     /// The worst line from a start: steps along both axes, halved where none is worse.
@@ -180,8 +199,8 @@ impl<'a> Lines<'a> {
         start: [f64; 2],
         workspace: &mut LoadWorkspace,
         monitor: &dyn Monitor,
-    ) -> Result<PassagePlace, Stop> {
-        let (mut best, mut at) = (self.value(measure, start, workspace), start);
+    ) -> Result<(PassagePlace, f64), Stop> {
+        let ((mut best, mut gap), mut at) = (self.value(measure, start, workspace), start);
         let (mut steps, mut used) = (STEPS, 1);
         while used < EVALUATIONS {
             let before = best;
@@ -192,10 +211,10 @@ impl<'a> Lines<'a> {
                     }
                     let mut tried = at;
                     tried[axis] += sign * steps[axis];
-                    let found = self.value(measure, tried, workspace);
+                    let (found, left) = self.value(measure, tried, workspace);
                     used += 1;
                     if found > best {
-                        (best, at) = (found, tried);
+                        (best, gap, at) = (found, left, tried);
                         break;
                     }
                 }
@@ -204,9 +223,10 @@ impl<'a> Lines<'a> {
                 steps = steps.map(|step| 0.5 * step);
             }
         }
-        Ok(PassagePlace {
+        let place = PassagePlace {
             at_mm: self.place(at),
             stress_mpa: best,
-        })
+        };
+        Ok((place, gap))
     }
 }
