@@ -52,6 +52,7 @@ fn solve_motions(
             return Err(SolveError::NotCovered { reason });
         }
         for mut point in history::solve::solve(&task, history, &mut state, watch)? {
+            add_coupling_error(&mut point, solved.coupling_error);
             if assembly.is_empty() {
                 point.seconds += solved.report.map_or(0.0, |report| report.seconds);
             }
@@ -63,10 +64,7 @@ fn solve_motions(
     let mut before: Option<MotionAnswer> = None;
     for index in 0..case.problem.motions.len() {
         let mut point = force_control::solve(&task, &mut state, index, before.as_ref(), watch)?;
-        if solved.coupling_error > 0.0 {
-            let errors = point.errors.iter_mut().flatten();
-            errors.for_each(|error| *error = error.hypot(solved.coupling_error));
-        }
+        add_coupling_error(&mut point, solved.coupling_error);
         if index == 0 {
             // What all motions share is charged to the first.
             point.seconds += solved.report.map_or(0.0, |report| report.seconds);
@@ -77,4 +75,12 @@ fn solve_motions(
         watch.advance();
     }
     Ok(assembly.finish())
+}
+
+/// Widens the estimates by what pressures leave that do not quite belong to the tractions.
+fn add_coupling_error(point: &mut MotionAnswer, coupling: f64) {
+    if coupling > 0.0 {
+        let errors = point.errors.iter_mut().flatten();
+        errors.for_each(|error| *error = error.hypot(coupling));
+    }
 }

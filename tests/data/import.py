@@ -391,6 +391,26 @@ def unlike():
     write_lines("unlike.json", records)
 
 
+def pressing():
+    """Bodies that differ pressed together under friction, without rolling (Spence)."""
+    records = []
+    for record in json.loads((SOURCE / "reference/extended/dissimilar.json").read_text()):
+        if not record["id"].startswith("spence_"):
+            continue
+        given, converged = record["input"], record["converged"]
+        body = lambda k: {"shear_modulus_mpa": given["material"][f"G{k}"], "poisson_ratio": given["material"][f"nu{k}"]}
+        names = [("approach_mm", "approach_mm"), ("pmax_MPa", "pressure_max_mpa"), ("stick_radius_ratio", "stick_radius"), ("ptmax_MPa", "traction_max_mpa")]
+        records.append({
+            "id": record["id"],
+            "material": {"upper": body(1), "lower": body(2)},
+            "radius_mm": 0.5 / given["geometry"]["A"],
+            "normal_force_n": given["load"]["FN"],
+            "friction": given["mu"],
+            **{ours: {k: converged[theirs][k] for k in ("value", "unc")} for theirs, ours in names},
+        })
+    write_lines("pressing.json", records)
+
+
 def cylinders():
     """Steady rolling of unlike cylinders: the creepage that belongs to a force (lower body) over the friction limit."""
     records = []
@@ -461,6 +481,7 @@ subsurface()
 temperature()
 friction()
 unlike()
+pressing()
 cylinders()
 transient()
 prescribed_forces()

@@ -45,6 +45,7 @@ mod paper_figures;
 #[path = "../../benches/calibrate/population.rs"]
 mod population;
 mod power;
+mod pressing;
 mod pressure_grid;
 mod pressure_grid_faults;
 mod pressure_grid_shapes;

@@ -87,8 +87,7 @@ impl CheckedParts {
         faults.extend(motion_faults(&given, motions.as_ref(), force, limits));
         if let Some(history) = motions.as_ref().and_then(|all| all.history.as_ref()) {
             let task = task.as_ref().map(|(task, _)| task);
-            let of_history = history_faults(&given, history, elasticity.as_ref(), task, limits);
-            faults.extend(of_history);
+            faults.extend(history_faults(&given, history, task, limits));
         }
         if let Some(solver) = given.solver {
             let size = SizeInput {
@@ -103,6 +102,7 @@ impl CheckedParts {
                 spinning: motions.as_ref().map_or(0, |m| spinning(&m.motions))
                     * task.as_ref().map_or(1, |(task, _)| positions(task)),
                 history: motions.as_ref().is_some_and(|m| m.history.is_some()),
+                pressed: motions.as_ref().is_some_and(ExpandedMotions::begin_pressed),
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),
                 stress_points: given.after.stress_points(),
                 ellipse: task.as_ref().and_then(|(task, _)| length_over_width(task)),
@@ -140,7 +140,6 @@ impl CheckedParts {
 fn history_faults(
     given: &PartialCase,
     history: &HistoryTask,
-    elasticity: Option<&Elasticity>,
     task: Option<&NormalTask>,
     limits: &Limits,
 ) -> Vec<Fault> {
@@ -149,7 +148,6 @@ fn history_faults(
         solver: given.solver,
         outputs: given.outputs,
         friction: given.friction,
-        elasticity,
         patches: &task.and_then(NormalTask::known_patches).unwrap_or_default(),
     };
     history::faults(history, &beside, limits)

@@ -5,10 +5,9 @@ use crate::contact::case::words::contact::Contact;
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::solver::{MethodName, Output, Solver};
 use crate::contact::error::Fault;
-use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::patch::Patch;
 use crate::contact::rolling::history::solve::too_long;
-use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::rolling::history::task::{HistoryStart, HistoryTask};
 
 /// Outputs that hold for steady rolling only.
 const OUTPUTS_REFUSED: [(Output, &str); 3] = [
@@ -23,7 +22,6 @@ pub(crate) struct BesideHistory<'a> {
     pub(crate) solver: Option<&'a Solver>,
     pub(crate) outputs: &'a [Output],
     pub(crate) friction: Option<&'a Friction>,
-    pub(crate) elasticity: Option<&'a Elasticity>,
     /// Those that are known before a solve.
     pub(crate) patches: &'a [Patch],
 }
@@ -43,6 +41,27 @@ fn friction_fault(friction: &Friction) -> Option<Fault> {
     Some(Fault::new(pointer, detail))
 }
 
+/// The fault of a case that begins pressed together and whose patch would not stay similar to itself while it grows.
+fn pressed_fault(given: &BesideHistory) -> Option<Fault> {
+    let similar = given
+        .contact
+        .is_none_or(|c| matches!(c, Contact::Radii { .. } | Contact::Ellipse { .. }));
+    if !similar {
+        let detail = "\"pressed\" given for another contact than \"type\": \"radii\" or \"ellipse\", whose patches stay similar while they grow; give \"rest\"";
+        return Some(Fault::new("/motion/start", detail));
+    }
+    let friction = given.friction?;
+    let (pointer, what) = match (&friction.across, friction.layer) {
+        (Some(_), _) => ("/friction/across", "a coefficient that varies across"),
+        (None, Some(_)) => ("/friction/layer", "a layer"),
+        (None, None) => return None,
+    };
+    let detail = format!(
+        "{what} given for bodies that are \"pressed\", whose patch stays similar while it grows with one coefficient and without a layer only"
+    );
+    Some(Fault::new(pointer, detail))
+}
+
 /// Faults of a case with a history.
 pub(crate) fn faults(history: &HistoryTask, given: &BesideHistory, limits: &Limits) -> Vec<Fault> {
     let mut faults = Vec::new();
@@ -58,10 +77,8 @@ pub(crate) fn faults(history: &HistoryTask, given: &BesideHistory, limits: &Limi
         let detail = "only boundary_element (or auto) follows a history";
         faults.push(Fault::new("/solver/method", detail));
     }
-    if given.elasticity.is_some_and(|pair| pair.difference != 0.0) {
-        let detail =
-            "bodies of unlike material (K other than 0) given; a history is of like bodies";
-        faults.push(Fault::new("/material", detail));
+    if history.start == HistoryStart::Pressed {
+        faults.extend(pressed_fault(given));
     }
     if given
         .friction

@@ -53,6 +53,12 @@ pub(crate) fn expand(motions: &Motions, limits: &Limits) -> Result<ExpandedMotio
 }
 
 impl ExpandedMotions {
+    /// Is this a history that begins with bodies pressed together?
+    pub(crate) fn begin_pressed(&self) -> bool {
+        let start = self.history.as_ref().map(|history| history.start);
+        start == Some(HistoryStart::Pressed)
+    }
+
     /// Faults of prescribed forces: more than friction can carry, where the limit μN is known, or a contact without
     /// one common frame.
     pub(crate) fn faults(
@@ -213,6 +219,7 @@ fn history_task(history: &History, start: HistoryStartName) -> HistoryTask {
         start: match start {
             HistoryStartName::Rest => HistoryStart::Rest,
             HistoryStartName::Steady => HistoryStart::Steady,
+            HistoryStartName::Pressed => HistoryStart::Pressed,
         },
         distances: history.distance_mm.values(points),
         shifts: (0..points)

@@ -43,7 +43,8 @@ fn of_segment(
 }
 
 /// Displacements along x and across at a place from pressures on all cells, times G.
-fn displacement(mesh: &Mesh, difference: f64, pressure: &[f64], at: [f64; 2]) -> [f64; 2] {
+#[must_use]
+pub fn displacement(mesh: &Mesh, difference: f64, pressure: &[f64], at: [f64; 2]) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for segment in &mesh.segments {
         of_segment(mesh, segment, at, |cell, [x, y]| {

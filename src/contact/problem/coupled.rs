@@ -25,12 +25,16 @@ impl Problem {
         FIRST_ORDER * difference * self.friction.largest()
     }
 
-    /// Is the pressure found together with the tractions? It is of one motion alone, since all motions of a case share their patches, and
-    /// where the gap is known.
+    /// Is the pressure found together with the tractions? It is of one motion or one pressing alone, since all motions of a case share their
+    /// patches, and where the gap is known.
     #[must_use]
     pub fn is_coupled(&self, run: &Run) -> bool {
         let known = matches!(self.task, NormalTask::Hertz(_) | NormalTask::Gap(_));
-        known && self.part.all == 1 && self.first_order_error(run.method) > negligible(run)
+        let alone = match &self.history {
+            None => self.part.all == 1,
+            Some(history) => history.only_presses() && self.forces == [[None; 2]],
+        };
+        known && alone && self.first_order_error(run.method) > negligible(run)
     }
 
     /// The remark if the pressure should feel the tractions and does not.

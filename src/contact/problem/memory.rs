@@ -6,6 +6,8 @@ use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::post::subsurface::task::SubsurfaceTask;
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::rolling::history::solve::{pressed_bytes, pressed_cells_max};
+use crate::contact::rolling::history::task::HistoryStart;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::{OperatorKind, kept_bytes};
 use crate::contact::rolling::refinement::levels::LEVELS_KEPT;
@@ -56,6 +58,8 @@ pub(crate) struct SizeInput {
     pub(crate) ellipse: Option<f64>,
     /// Are the motions the points of a history, which is kept whole on two levels?
     pub(crate) history: bool,
+    /// Does it begin with bodies pressed together?
+    pub(crate) pressed: bool,
     /// Bound in bytes of the store of operators.
     pub(crate) store: u64,
 }
@@ -194,13 +198,17 @@ impl SizeInput {
         self.operators().min(self.store as f64)
     }
 
-    /// Bytes of the tractions and slips of a history on two levels.
+    /// Bytes of the tractions and slips of a history on two levels, and of what pressing needs.
     fn kept_of_history(&self, cells: f64) -> f64 {
-        if self.history {
-            2.0 * self.motions as f64 * cells * HISTORY_BYTES_PER_CELL
-        } else {
-            0.0
+        if !self.history {
+            return 0.0;
         }
+        let pressing = match (self.pressed, self.resolution) {
+            (false, _) => 0.0,
+            (true, Resolution::Mesh(_)) => pressed_bytes(cells),
+            (true, Resolution::Target(_)) => pressed_bytes(cells.min(pressed_cells_max())),
+        };
+        pressing + 2.0 * self.motions as f64 * cells * HISTORY_BYTES_PER_CELL
     }
 
     /// Cells and segments of the finest mesh over all patches.
@@ -246,6 +254,7 @@ impl CheckedCase {
             motions: self.problem.motions.len() * positions(&self.problem.task),
             spinning: spinning(&self.problem.motions) * positions(&self.problem.task),
             history: self.problem.history.is_some(),
+            pressed: (self.problem.history.iter()).any(|h| h.start == HistoryStart::Pressed),
             fields: self.run.outputs.iter().any(|output| output.is_per_cell()),
             stress_points: self.run.after.subsurface.as_ref().map_or(0, places),
             ellipse: length_over_width(&self.problem.task),

@@ -41,19 +41,20 @@ pub(crate) fn read(block: &mut Object) -> Option<Motions> {
     let words = [
         ("rest", HistoryStartName::Rest),
         ("steady", HistoryStartName::Steady),
+        ("pressed", HistoryStartName::Pressed),
     ];
     let start = match block.has("start") {
         true => block.word("start", &words, &[]),
         false => Some(HistoryStartName::Rest),
     };
-    let history = history(&mut block.child("history")?, start.unwrap_or_default());
+    let history = history(&mut block.child("history")?, start);
     Some(Motions::History {
         history: history?,
         start: start?,
     })
 }
 
-fn history(block: &mut Object, start: HistoryStartName) -> Option<History> {
+fn history(block: &mut Object, start: Option<HistoryStartName>) -> Option<History> {
     let names = ["distance_mm"].into_iter();
     let names: Vec<&str> = names.chain(COMPONENTS.map(|(name, _)| name)).collect();
     block.only(&names, &[]);
@@ -78,7 +79,8 @@ fn history(block: &mut Object, start: HistoryStartName) -> Option<History> {
             }
         }
     }
-    if read.iter().all(Option::is_none) {
+    let needs_motion = start.is_some_and(|start| start != HistoryStartName::Pressed);
+    if needs_motion && read.iter().all(Option::is_none) {
         let names = COMPONENTS.map(|(name, _)| name).join(", ");
         block.fault_here(format!(
             "no motion given; at least one of {names} is needed"
@@ -89,7 +91,7 @@ fn history(block: &mut Object, start: HistoryStartName) -> Option<History> {
     sound &= increasing(block, &distances);
     for k in SHIFTS {
         if let Some(Some(course)) = &read[k] {
-            sound &= shifted_at_rest(block, COMPONENTS[k].0, course, &distances, start);
+            sound &= shifted_at_rest(block, COMPONENTS[k].0, course, &distances, start?);
         }
     }
     let [
@@ -151,7 +153,7 @@ fn shifted_at_rest(
     };
     let detail = format!(
         "{} given for point {k}, to which the bodies roll; a shift belongs to a point with the distance of the point before, or to a first \
-         point with the distance 0 that starts from \"rest\"",
+         point with the distance 0 that starts from \"rest\" or \"pressed\"",
         values[k]
     );
     block.faults().add(pointer, detail);

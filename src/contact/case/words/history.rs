@@ -92,4 +92,6 @@ pub enum HistoryStartName {
     Rest,
     /// In steady rolling with the motion or forces of the first point.
     Steady,
+    /// Pressed together under friction without rolling: bodies that differ have tangential tractions then. For `radii` and `ellipse`.
+    Pressed,
 }

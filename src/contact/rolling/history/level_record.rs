@@ -7,6 +7,7 @@ use crate::contact::rolling::history::plan::{StepKind, weights};
 use crate::contact::rolling::history::record::PointRecord;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::slip_equations::SlipSource;
 
 impl LevelRun<'_> {
     /// Adds what friction has dissipated in a step that began with the tractions `from`: what the motion has given less what is stored.
@@ -14,7 +15,7 @@ impl LevelRun<'_> {
     /// Power summed over the cells, `∬T·s`, would miss several per cent: in steady rolling its error is that of the slip at the trailing edge,
     /// where ν·F is as exact as the forces. In a shift there is no such slip, and the sum is taken.
     pub(super) fn dissipate(&mut self, of: &StepEquations, from: &[f64]) {
-        let rigid = of.equations.rigid(&self.state.motion);
+        let rigid = self.rigid(of, &self.state.motion);
         let slip = self.workspace.slip().to_vec();
         let [before, now, over] = [
             self.per_patch(from, &rigid),
@@ -29,7 +30,7 @@ impl LevelRun<'_> {
             let stored = 0.5 * length * stored[patch];
             let (power, dissipated) = match of.kind {
                 StepKind::Steady => (now[patch], 0.0),
-                StepKind::Shift => (0.0, length * over[patch]),
+                StepKind::Shift | StepKind::Press => (0.0, length * over[patch]),
                 StepKind::Roll { distance, growth } => {
                     let [a, b, c] = weights(growth);
                     let growing = (a * stored - b * last + c * earlier) / distance;
@@ -47,8 +48,25 @@ impl LevelRun<'_> {
         }
     }
 
+    /// Rigid slip of a motion, with that of the pressure of unlike bodies where they roll.
+    pub(super) fn rigid(&self, of: &StepEquations, motion: &Motion) -> Vec<f64> {
+        let rolls = matches!(of.kind, StepKind::Steady | StepKind::Roll { .. });
+        let source = self.level.pressure_slip.as_ref().filter(|_| rolls);
+        of.equations
+            .given(motion, source.map(|[x, y]| SlipSource { x, y }))
+    }
+
+    /// Adds values of the cells, along x and across, to those of the unknowns.
+    pub(super) fn add_to_cells(&self, unknowns: &mut [f64], values: [&Vec<f64>; 2]) {
+        let half = unknowns.len() / 2;
+        for (unknowns, values) in unknowns.chunks_exact_mut(half).zip(values) {
+            let cells = unknowns.iter_mut().zip(values).take(self.cells);
+            cells.for_each(|(unknown, value)| *unknown += value);
+        }
+    }
+
     /// `∬a·b` over each patch in N where `a` is a traction and `b` a slip, both of the unknowns and dimensionless.
-    fn per_patch(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
+    pub(super) fn per_patch(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
         let [a, b] = [a, b].map(|values| self.expand(values));
         let level = self.level;
         let unit = level.scale.traction * level.scale.slip();
@@ -79,7 +97,7 @@ impl LevelRun<'_> {
         let scale = level.scale;
         let motion = self.state.motion;
         let (shifted, motion) = match of.kind {
-            StepKind::Shift => {
+            StepKind::Shift | StepKind::Press => {
                 // Displacements are no slips.
                 slip.iter_mut().for_each(|slip| slip.fill(0.0));
                 (scale.shift(&motion), Motion::default())
@@ -95,6 +113,7 @@ impl LevelRun<'_> {
                 .collect(),
             power: self.state.power.clone(),
             dissipated: self.state.dissipated.clone(),
+            carried: self.mean(&self.state.tractions),
             elastic: self.state.stored.iter().map(|[now, _]| now).sum(),
             traction,
             slip,
@@ -105,7 +124,7 @@ impl LevelRun<'_> {
     }
 
     /// Values of the unknowns over the whole mesh.
-    fn expand(&self, values: &[f64]) -> [Vec<f64>; 2] {
+    pub(super) fn expand(&self, values: &[f64]) -> [Vec<f64>; 2] {
         let (x, y) = values.split_at(values.len() / 2);
         match self.parity {
             None => [x, y].map(|v| v[..self.level.mesh.cells()].to_vec()),

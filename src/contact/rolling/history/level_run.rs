@@ -7,7 +7,9 @@ use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::answer::{LevelFailure, Work};
 use crate::contact::rolling::displacement_memory::{DisplacementMemory, LeadingEdges};
-use crate::contact::rolling::history::plan::{HistoryStep, StepKind, steps, weights};
+use crate::contact::rolling::history::plan::{
+    HistoryStep, PRESS_WEIGHTS, StepKind, steps, weights,
+};
 use crate::contact::rolling::history::record::PointRecord;
 use crate::contact::rolling::history::search::StepSearch;
 use crate::contact::rolling::history::task::HistoryTask;
@@ -19,7 +21,7 @@ use crate::contact::rolling::methods::boundary_element::task::{
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::operator_store::LevelOperator;
-use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch, SlipSource};
+use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
@@ -182,7 +184,7 @@ impl<'a> LevelRun<'a> {
         let patch = self.task.footprint.patches()[0].extent;
         let stiffness = STIFFNESS / limit;
         let reach = match kind {
-            StepKind::Shift => 1.0,
+            StepKind::Shift | StepKind::Press => 1.0,
             StepKind::Roll { distance, growth } => {
                 distance / (self.level.scale.length * weights(growth)[0])
             }
@@ -199,6 +201,9 @@ impl<'a> LevelRun<'a> {
         step: &HistoryStep,
         search: &mut StepSearch,
     ) -> Result<(), LevelFailure> {
+        if of.kind == StepKind::Press {
+            return self.press(of);
+        }
         let (given, forces) = self.asked(step);
         let memory = self.memory(of);
         let motion_before = self.state.motion;
@@ -277,7 +282,7 @@ impl<'a> LevelRun<'a> {
             ..
         } = &self.state;
         let part: Vec<f64> = match of.kind {
-            StepKind::Steady => vec![0.0; displacement.len()],
+            StepKind::Steady | StepKind::Press => vec![0.0; displacement.len()],
             StepKind::Shift => displacement.clone(),
             StepKind::Roll { distance, growth } => {
                 let unit = self.level.scale.length / distance;
@@ -292,13 +297,14 @@ impl<'a> LevelRun<'a> {
     }
 
     /// Tractions of a step under a dimensionless motion.
-    fn solve(
+    pub(super) fn solve(
         &mut self,
         of: &StepEquations,
         motion: &Motion,
         [x, y]: &[Vec<f64>; 2],
     ) -> Result<Vec<f64>, LevelFailure> {
-        let rigid = of.equations.given(motion, Some(SlipSource { x, y }));
+        let mut rigid = self.rigid(of, motion);
+        self.add_to_cells(&mut rigid, [x, y]);
         let law = NewtonTask {
             rigid: &rigid,
             bound: &self.bound,
@@ -319,7 +325,13 @@ impl<'a> LevelRun<'a> {
                 let level = (self.level, &*self.operator, self.parity);
                 let equations = steady(Rule::Upwind, level);
                 let newton = Newton::new(&equations);
-                let rigid = &equations.rigid(motion);
+                let rigid = &self.rigid(
+                    &StepEquations {
+                        equations: &equations,
+                        ..*of
+                    },
+                    motion,
+                );
                 let law = NewtonTask { rigid, ..law };
                 let report = newton.solve(&law, &mut tractions, self.workspace, self.monitor)?;
                 work.add(count(&report, &newton));
@@ -362,7 +374,7 @@ impl<'a> LevelRun<'a> {
     }
 
     /// Friction limit of the unknowns, dimensionless.
-    fn limit(&self) -> f64 {
+    pub(super) fn limit(&self) -> f64 {
         let cells = self.area.iter().zip(&self.bound).take(self.cells);
         cells.map(|(area, bound)| area * bound).sum()
     }
@@ -391,6 +403,7 @@ fn memory(kind: StepKind, edges: &LeadingEdges, unit: f64) -> DisplacementMemory
     let (factor, rolls) = match kind {
         StepKind::Steady => (0.0, true),
         StepKind::Shift => (1.0, false),
+        StepKind::Press => (PRESS_WEIGHTS[0], false),
         StepKind::Roll { distance, growth } => (weights(growth)[0] * unit / distance, true),
     };
     DisplacementMemory {

@@ -3,7 +3,9 @@
 pub(crate) mod level_record;
 pub mod level_run;
 pub mod plan;
+pub(crate) mod press;
 pub mod record;
 pub(crate) mod search;
+pub(crate) mod smaller_self;
 pub mod solve;
 pub mod task;

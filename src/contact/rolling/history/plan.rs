@@ -8,11 +8,16 @@ use crate::contact::rolling::history::task::{HistoryStart, HistoryTask};
 /// A step may be longer than the one before by this factor at most; BDF2 is stable up to 1 + √2.
 const GROWTH_MAX: f64 = 2.0;
 
+/// Weights in the slip of a step of pressing: of the displacements at its end, and with the sign turned of those one and two steps smaller.
+pub(super) const PRESS_WEIGHTS: [f64; 3] = [1.5, 2.0, -0.5];
+
 /// What the bodies do in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepKind {
     /// They roll in the state that belongs to the motion.
     Steady,
+    /// They are pressed together.
+    Press,
     /// They are shifted without rolling.
     Shift,
     /// They roll a distance in mm; the step before was longer by 1/growth, which is 0 if there was none.
@@ -86,6 +91,15 @@ pub fn count(history: &HistoryTask, longest: f64) -> f64 {
     3.0 + steps.sum::<f64>()
 }
 
+/// Do the bodies shift at a first point to which they do not roll?
+fn begins_with_shift(history: &HistoryTask, forced: bool) -> bool {
+    match history.start {
+        HistoryStart::Steady => false,
+        HistoryStart::Rest => true,
+        HistoryStart::Pressed => forced || !history.only_presses(),
+    }
+}
+
 /// The steps of a history, none longer than `longest` mm. With `forced`, where a force is prescribed, one that is there at once is
 /// brought up by a shift before the bodies roll.
 #[must_use]
@@ -99,10 +113,11 @@ pub fn steps(history: &HistoryTask, longest: f64, forced: bool) -> Vec<HistorySt
     };
     match history.start {
         HistoryStart::Steady => steps.push(whole(StepKind::Steady, 0)),
-        HistoryStart::Rest if forced && history.rolled(0) > 0.0 => {
-            steps.push(whole(StepKind::Shift, 0));
-        }
+        HistoryStart::Pressed => steps.push(whole(StepKind::Press, 0)),
         HistoryStart::Rest => {}
+    }
+    if forced && history.rolled(0) > 0.0 && history.start != HistoryStart::Steady {
+        steps.push(whole(StepKind::Shift, 0));
     }
     let mut before = None;
     for point in 0..history.distances.len() {
@@ -129,7 +144,7 @@ pub fn steps(history: &HistoryTask, longest: f64, forced: bool) -> Vec<HistorySt
                 });
                 before = Some(length);
             }
-        } else if point > 0 || history.start == HistoryStart::Rest {
+        } else if point > 0 || begins_with_shift(history, forced) {
             steps.push(whole(StepKind::Shift, point));
             before = None;
         }

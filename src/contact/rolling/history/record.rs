@@ -17,6 +17,8 @@ pub struct PointRecord {
     pub power: Vec<f64>,
     /// What friction has dissipated since the start, of every patch, in N·mm.
     pub dissipated: Vec<f64>,
+    /// Sum of the lengths of all tractions over the friction limit.
+    pub carried: f64,
     /// Elastic energy of all tangential displacements in N·mm.
     pub elastic: f64,
     /// Tractions, slips, and which cells slip, dimensionless on the level.

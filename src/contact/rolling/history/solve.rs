@@ -7,7 +7,8 @@ use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan;
 use crate::contact::rolling::history::record::PointRecord;
-use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::rolling::history::smaller_self::SmallerSelf;
+use crate::contact::rolling::history::task::{HistoryStart, HistoryTask};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{HistoryAnswer, MotionAnswer, SolvedFields};
 use crate::contact::rolling::refinement::level_solve::named;
@@ -28,6 +29,10 @@ const LEVELS_MAX: i32 = 4;
 /// Cells along x per strip on a patch as long as wide. What travels through the contact is rounded over two cells, so that cells count for
 /// more than strips: with 3 creepages are as exact, moments under spin half as.
 const SHAPE: f64 = 2.0;
+/// The same where pressing is all that is asked for, whose tractions change as much across as along.
+const SHAPE_PRESSED: f64 = 1.0;
+/// Steps in which a pressing usually settles.
+const STEPS_PRESSED: f64 = 100.0;
 /// Steps per half-length of the patch and cell along x. With twice as many the creepages are off by up to twice as much, since shorter
 /// steps round less in time; forces change by 0.002 of the limit at most.
 const STEPS_PER_CELL: f64 = 1.0 / 3.0;
@@ -43,6 +48,8 @@ const CREEPAGE_ERROR_OVER_CHANGE: f64 = 1.4;
 const REMEMBERED: f64 = 0.7;
 /// By how much prescribed forces may be missed, relative to the friction limit, with some room.
 const MISSED: f64 = 2e-5;
+/// Residual of the tractions of a pressing, whose steps are many and alike.
+const PRESSED_RESIDUAL: f64 = 1e-5;
 /// The error of creepages and shifts that are found is to be below this many times the target, relative to the largest creepage.
 const CREEPAGE_SHARE: f64 = 10.0;
 
@@ -99,8 +106,26 @@ pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]]) -> (f64, f64) {
         return (history.distances.len() as f64, CELLS_FIRST * CELLS_FIRST);
     };
     let cells = CELLS_FIRST * FINER * FINER;
+    let pressed = history.start == HistoryStart::Pressed;
     let steps = plan::count(history, half / (STEPS_PER_CELL * cells));
-    (steps, cells * cells / SHAPE)
+    if pressed && history.distances.len() == 1 {
+        let second = CELLS_FIRST * FINER;
+        return (STEPS_PRESSED, second * second / SHAPE_PRESSED);
+    }
+    let pressing = if pressed { STEPS_PRESSED } else { 0.0 };
+    (steps + pressing, cells * cells / SHAPE)
+}
+
+/// Most cells that a target leads to where pressing is all that is asked for.
+#[must_use]
+pub fn pressed_cells_max() -> f64 {
+    (CELLS_FIRST * FINER.powi(LEVELS_MAX - 1)).powi(2) / SHAPE_PRESSED
+}
+
+/// Bytes that a pressing keeps on a mesh of so many cells.
+#[must_use]
+pub fn pressed_bytes(cells: f64) -> f64 {
+    SmallerSelf::bytes(cells)
 }
 
 /// Half the length of the shortest patch.
@@ -131,7 +156,8 @@ pub fn solve(
     state: &mut RefinementState,
     monitor: &dyn Monitor,
 ) -> Result<Vec<MotionAnswer>, SolveError> {
-    let plans = level_plans(task);
+    let presses = history.only_presses() && !task.has_prescribed_forces();
+    let plans = level_plans(task, if presses { SHAPE_PRESSED } else { SHAPE });
     let mut before: Option<SolvedHistory> = None;
     let mut seconds = 0.0;
     let mut work = Work::default();
@@ -153,7 +179,13 @@ pub fn solve(
         for point in &coarser.points {
             work.add(point.work);
         }
-        let changes = changes(task, &coarser.points, &found.points);
+        let mut changes = changes(task, &coarser.points, &found.points);
+        if presses {
+            // Forces balance; what pressing has brought about shows in the sum of the tractions.
+            let grown = (found.points[0].carried - coarser.points[0].carried).abs();
+            let of_all = changes[0].resultants.iter_mut();
+            of_all.for_each(|change| *change = change.max(grown));
+        }
         if last || is_met(task, &found.points, &changes) {
             return Ok(answers(task, history, found, &changes, work));
         }
@@ -162,8 +194,9 @@ pub fn solve(
     unreachable!("there are two levels at least")
 }
 
-/// The levels that a history may be solved on, coarse to fine: those of a target, or a mesh of the client's behind a coarser one.
-fn level_plans(task: &RollingTask) -> Vec<HistoryLevel> {
+/// The levels that a history may be solved on, coarse to fine: those of a target, with so many cells along x per strip on a round patch, or a
+/// mesh of the client's behind a coarser one.
+fn level_plans(task: &RollingTask, shape: f64) -> Vec<HistoryLevel> {
     let patches = task.footprint.patches();
     let extents: Vec<[f64; 4]> = patches.iter().map(|patch| patch.extent).collect();
     let half = half_length(&extents).unwrap_or(1.0);
@@ -181,7 +214,7 @@ fn level_plans(task: &RollingTask) -> Vec<HistoryLevel> {
         return vec![coarse, plan(strips, cells)];
     }
     let [x0, x1, y0, y1] = extents[0];
-    let shape = SHAPE * ((x1 - x0) / (y1 - y0)).powf(0.45);
+    let shape = shape * ((x1 - x0) / (y1 - y0)).powf(0.45);
     let patches = (patches.len() as f64).sqrt();
     let levels = (0..LEVELS_MAX).map(|k| {
         let cells = (CELLS_FIRST * FINER.powi(k) / patches).round().max(8.0);
@@ -203,6 +236,7 @@ fn on_level(
     let level = state.levels.get(number);
     let forced = task.has_prescribed_forces();
     let residual = match task.resolution {
+        Resolution::Target(_) if history.start == HistoryStart::Pressed => PRESSED_RESIDUAL,
         Resolution::Target(target) => (0.02 * target).clamp(1e-6, 1e-4),
         Resolution::Mesh(_) => 1e-6,
     };

@@ -10,6 +10,8 @@ pub enum HistoryStart {
     Rest,
     /// Steady rolling with the first motion.
     Steady,
+    /// Pressed together under friction, without rolling.
+    Pressed,
 }
 
 /// A sequence of motions in the distance rolled; creepages, spin and forces change linearly between them.
@@ -26,6 +28,14 @@ pub struct HistoryTask {
 }
 
 impl HistoryTask {
+    /// Is pressing all that is asked for?
+    #[must_use]
+    pub fn only_presses(&self) -> bool {
+        self.start == HistoryStart::Pressed
+            && self.distances == [0.0]
+            && self.shifts == [Motion::default()]
+    }
+
     /// Distance rolled from the point before to point `index`; 0 of a shift.
     #[must_use]
     pub fn rolled(&self, index: usize) -> f64 {

@@ -1,0 +1,260 @@
+//! Displacements of the smaller patch that a pressed one has grown from, where every state of the growth is a scaled copy of the last.
+//!
+//! Under a gap of second degree a patch pressed together along one load path stays similar to itself: at half the size it has half the
+//! tractions and a quarter of the displacements (Spence 1968). With U(x) the displacements of the present state, those at the time when the patch
+//! was smaller by ρ are ρ⁻² U(ρx).
+
+use crate::contact::half_space::kernels::{Rectangle, rectangle};
+use crate::contact::half_space::unlike_bodies::displacement;
+use crate::contact::mesh::strips::Mesh;
+use crate::contact::numerics::lagrange;
+
+/// What the displacements of a state depend on, over all cells of a dimensionless mesh.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct PressedState {
+    /// Displacements at the nodes, along x and across.
+    pub(crate) displacement: [Vec<f64>; 2],
+    /// Tractions.
+    pub(crate) traction: [Vec<f64>; 2],
+}
+
+impl PressedState {
+    /// The state in the middle between two.
+    pub(crate) fn mean(&self, other: &PressedState) -> PressedState {
+        let between = |a: &[Vec<f64>; 2], b: &[Vec<f64>; 2]| {
+            [0, 1].map(|k| a[k].iter().zip(&b[k]).map(|(a, b)| 0.5 * (a + b)).collect())
+        };
+        PressedState {
+            displacement: between(&self.displacement, &other.displacement),
+            traction: between(&self.traction, &other.traction),
+        }
+    }
+}
+
+/// How the displacement at a scaled place follows from a state.
+#[derive(Debug, Clone)]
+enum ScaledPlace {
+    /// Inside the patch, from those at nodes around it.
+    Inside(Vec<(usize, f64)>),
+    /// Outside, from the tractions of all cells (along x, either from the other, across) and the pressures.
+    Outside {
+        along: Vec<f64>,
+        mixed: Vec<f64>,
+        across: Vec<f64>,
+        of_pressure: [f64; 2],
+    },
+}
+
+/// The displacements of a state that was smaller by a factor, at the nodes of the present one.
+#[derive(Debug, Clone)]
+pub(crate) struct SmallerSelf {
+    factor: f64,
+    places: Vec<ScaledPlace>,
+}
+
+/// The pair, and pressures over the unit of traction.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PressedPair<'a> {
+    /// Poisson's ratio of the pair.
+    pub(crate) poisson_ratio: f64,
+    /// K of the pair.
+    pub(crate) difference: f64,
+    /// Pressures of all cells.
+    pub(crate) pressure: &'a [f64],
+}
+
+impl SmallerSelf {
+    /// The state that was smaller by `factor`, more than 1, about `centre`, at the first `cells` nodes of a mesh.
+    pub(crate) fn new(
+        mesh: &Mesh,
+        pair: &PressedPair,
+        centre: [f64; 2],
+        factor: f64,
+        cells: usize,
+    ) -> SmallerSelf {
+        let scaled = |x: f64, y: f64| {
+            [
+                centre[0] + factor * (x - centre[0]),
+                centre[1] + factor * (y - centre[1]),
+            ]
+        };
+        let mut places = Vec::with_capacity(cells);
+        for segment in &mesh.segments {
+            for i in segment.cells.clone().take_while(|i| *i < cells) {
+                let at = scaled(mesh.node[i], segment.chord.y);
+                places.push(match around(mesh, at) {
+                    Some(weights) => ScaledPlace::Inside(weights),
+                    None => outside(mesh, pair, at),
+                });
+            }
+        }
+        SmallerSelf { factor, places }
+    }
+
+    /// Displacements of the smaller state at the nodes.
+    pub(crate) fn displacements(&self, state: &PressedState) -> [Vec<f64>; 2] {
+        let scale = self.factor.powi(-2);
+        let [u, v] = &state.displacement;
+        let [tx, ty] = &state.traction;
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let at = |place: &ScaledPlace| match place {
+            ScaledPlace::Inside(weights) => {
+                let sum = |values: &[f64]| weights.iter().map(|(i, w)| w * values[*i]).sum();
+                [sum(u), sum(v)]
+            }
+            ScaledPlace::Outside {
+                along,
+                mixed,
+                across,
+                of_pressure: [x, y],
+            } => [
+                x + dot(along, tx) + dot(mixed, ty),
+                y + dot(mixed, tx) + dot(across, ty),
+            ],
+        };
+        let found: Vec<[f64; 2]> = self.places.iter().map(at).collect();
+        [0, 1].map(|k| found.iter().map(|u| scale * u[k]).collect())
+    }
+
+    /// Bytes of those that a mesh of so many cells needs.
+    pub(crate) fn bytes(cells: f64) -> f64 {
+        // Two factors, unknowns in half of the cells, three numbers for each of the third of the scaled nodes that lies outside.
+        3.0 * 8.0 * cells * cells / 3.0
+    }
+}
+
+/// Nodes around a place of the mesh with their weights, along x at the same angle and across by cubics; none outside.
+fn around(mesh: &Mesh, [x, y]: [f64; 2]) -> Option<Vec<(usize, f64)>> {
+    let middles: Vec<f64> = mesh.segments.iter().map(|s| s.chord.y).collect();
+    let (first, last) = (*middles.first()?, *middles.last()?);
+    if middles.len() < 4 || y < first || y > last {
+        return None;
+    }
+    let above = middles.partition_point(|middle| *middle < y);
+    let from = above.saturating_sub(2).min(middles.len() - 4);
+    let nodes: [f64; 4] = std::array::from_fn(|k| middles[from + k]);
+    let relative = |j: usize| {
+        let chord = mesh.segments[j].chord;
+        let half = 0.5 * (chord.right - chord.left);
+        (x - 0.5 * (chord.left + chord.right)) / half
+    };
+    let strips: [usize; 4] = std::array::from_fn(|k| from + k);
+    let mut places = strips.map(relative);
+    if places.iter().any(|place| place.abs() >= 1.0) {
+        // Near the edge strips are followed at the same part of their half-length, which is that at the place.
+        let half = |j: usize| 0.5 * (mesh.segments[j].chord.right - mesh.segments[j].chord.left);
+        let squares = strips.map(|j| half(j) * half(j));
+        let weights = lagrange::weights(&nodes, y);
+        let square: f64 = weights.iter().zip(squares).map(|(w, s)| w * s).sum();
+        let middle: f64 = weights
+            .iter()
+            .zip(strips)
+            .map(|(w, j)| {
+                let chord = mesh.segments[j].chord;
+                0.5 * w * (chord.left + chord.right)
+            })
+            .sum();
+        let place = (x - middle) / square.max(0.0).sqrt();
+        if place.is_nan() || place.abs() >= 1.0 {
+            return None;
+        }
+        places = [place; 4];
+    }
+    let across = lagrange::weights(&nodes, y);
+    let mut weights = Vec::with_capacity(16);
+    for (k, j) in strips.into_iter().enumerate() {
+        for (i, weight) in along(mesh, j, places[k])? {
+            weights.push((i, across[k] * weight));
+        }
+    }
+    Some(weights)
+}
+
+/// Nodes of strip `j` and their weights at a place between −1 and 1 of its half-length: a cubic in the angle, in which nodes have equal distances.
+fn along(mesh: &Mesh, j: usize, place: f64) -> Option<[(usize, f64); 4]> {
+    let segment = &mesh.segments[j];
+    let chord = segment.chord;
+    let (middle, half) = (
+        0.5 * (chord.left + chord.right),
+        0.5 * (chord.right - chord.left),
+    );
+    let angle = |x: f64| ((x - middle) / half).clamp(-1.0, 1.0).asin();
+    let cells = segment.cells.clone();
+    if cells.len() < 4 {
+        return None;
+    }
+    let at = place.asin();
+    let above = mesh.node[cells.clone()].partition_point(|x| angle(*x) < at);
+    let from = cells.start + above.saturating_sub(2).min(cells.len() - 4);
+    let nodes: [f64; 4] = std::array::from_fn(|k| angle(mesh.node[from + k]));
+    let weights = lagrange::weights(&nodes, at);
+    Some(std::array::from_fn(|k| (from + k, weights[k])))
+}
+
+/// What every cell displaces at a place.
+fn outside(mesh: &Mesh, pair: &PressedPair, [x, y]: [f64; 2]) -> ScaledPlace {
+    let [mut along, mut mixed, mut across] =
+        [0; 3].map(|_| Vec::<f64>::with_capacity(mesh.cells()));
+    for segment in &mesh.segments {
+        let (middle, half) = (segment.chord.y, 0.5 * segment.chord.dy);
+        for i in segment.cells.clone() {
+            let cell = Rectangle {
+                x0: mesh.left[i],
+                x1: mesh.right[i],
+                y0: middle - half,
+                y1: middle + half,
+            };
+            let found = rectangle(x, y, cell, pair.poisson_ratio);
+            along.push(found.xx);
+            mixed.push(found.xy);
+            across.push(found.yy);
+        }
+    }
+    ScaledPlace::Outside {
+        along,
+        mixed,
+        across,
+        of_pressure: displacement(mesh, pair.difference, pair.pressure, [x, y]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::mesh::samples::mesh_between;
+
+    /// A field of second degree is its own smaller self.
+    #[test]
+    fn a_field_that_is_its_own_copy_is_met_inside() {
+        let half = |y: f64| (1.0 - 0.25 * y * y).sqrt();
+        let mesh = mesh_between(1.8, [12, 16], |y| [-half(y), half(y)]);
+        let cells = mesh.cells();
+        let rows = mesh.cell_load_y();
+        let pressure = vec![0.0; cells];
+        let pair = PressedPair {
+            poisson_ratio: 0.3,
+            difference: 0.0,
+            pressure: &pressure,
+        };
+        let of = |f: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
+            (0..cells).map(|i| f(mesh.node[i], rows[i])).collect()
+        };
+        let u = of(&|x, y| 0.3 * x * x - x * y);
+        let v = of(&|x, y| y * y + 0.2 * x * y);
+        let state = PressedState {
+            displacement: [u.clone(), v.clone()],
+            traction: [vec![0.0; cells], vec![0.0; cells]],
+        };
+        let smaller = SmallerSelf::new(&mesh, &pair, [0.0; 2], 1.05, cells);
+        let found = smaller.displacements(&state);
+        let mut inside = 0;
+        for i in 0..cells {
+            if matches!(smaller.places[i], ScaledPlace::Inside(_)) {
+                inside += 1;
+                let off = (found[0][i] - u[i]).hypot(found[1][i] - v[i]);
+                assert!(off < 2e-3, "{} {}: {off}", mesh.node[i], rows[i]);
+            }
+        }
+        assert!(inside > cells / 2 && inside < cells, "{inside} of {cells}");
+    }
+}
