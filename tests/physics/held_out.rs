@@ -118,5 +118,5 @@ fn estimates_cover_the_error_of_random_gaps() {
 
 #[test]
 fn estimates_cover_the_error_of_wheels_on_rails() {
-    assert_covers(Class::Profiles, 90, 1, 5.0);
+    assert_covers(Class::Profiles, 90, 1, 5.5);
 }

@@ -32,6 +32,8 @@ const WIDENINGS_MAX: usize = 5;
 const SLOPE_BEYOND_CUT: f64 = 0.5;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
+/// Lowering in mm under a light load; the estimate for heavier ones doubles it until it carries them. It changes times, no answer.
+const LOWERING_FIRST: f64 = 0.032;
 /// Clearance in mm below which the inclination of a line is kept: more than usual loads lower a wheel. It changes times, no answer.
 const NEAR: f64 = 0.3;
 
@@ -166,16 +168,18 @@ impl<'g> ContactLocus<'g> {
     /// horizontal: `N = 4/3 E* √(A/π) δ`, exact for paraboloids.
     #[must_use]
     pub fn estimated_lowering(&self, force: f64) -> f64 {
-        let (mut low, mut high) = (0.0_f64, 1e-3);
-        while estimated_force(self.lines, self.rolling_radius(), high) < force
-            && high < LOWERING_MAX
-        {
+        let (mut low, mut high) = (0.0_f64, LOWERING_FIRST);
+        let below = |lines: &[LocusPoint], lowering: f64| -> Vec<LocusPoint> {
+            let inside = |line: &&LocusPoint| line.clearance < 0.5 * lowering;
+            lines.iter().filter(inside).copied().collect()
+        };
+        let mut near = below(self.lines, high);
+        while estimated_force(&near, self.rolling_radius(), high) < force && high < LOWERING_MAX {
             (low, high) = (high, 2.0 * high);
+            near = below(self.lines, high);
         }
-        let inside = |line: &&LocusPoint| line.clearance < 0.5 * high;
-        let near: Vec<LocusPoint> = self.lines.iter().filter(inside).copied().collect();
         // The estimate jumps where one more line overlaps: only its being more or less than the force can be relied on.
-        let [low, high] = bisect([low, high], 12, |lowering| {
+        let [low, high] = bisect([low, high], 17, |lowering| {
             estimated_force(&near, self.rolling_radius(), lowering) < force
         });
         0.5 * (low + high)

@@ -61,7 +61,7 @@ impl<T: FftFloat> PressureInfluence for GridOperator<T> {
 const ITERATIONS_MAX: u32 = 500;
 
 /// Pressures, distances and approach of two bodies pressed together, and how well they meet the contact conditions.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PressureAnswer {
     /// Pressure of every cell in MPa.
     pub(crate) pressure: Vec<f64>,

@@ -10,6 +10,8 @@ pub mod pilot;
 pub mod pilot_solve;
 pub mod search_box;
 pub mod solve;
+pub mod solve_from;
+pub mod start;
 pub mod summits;
 pub mod surface;
 pub mod task;

@@ -2,6 +2,7 @@
 
 use crate::contact::normal::answer::{NormalAnswer, NormalError, NormalWork};
 use crate::contact::normal::gap::edges;
+use crate::contact::normal::gap::start::GapStart;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, Tile};
 use crate::contact::normal::pressure_field::field::PressureField;
@@ -68,10 +69,17 @@ impl GapTask {
             remarks.push(Remark::GapRough {}.into());
         }
         remarks.extend(self.remarks(&field, pressed.approach - outcome.least));
+        let depth = pressed.approach - outcome.least;
+        let mut tiles = outcome.tiles;
+        let start = match (tiles.pop(), tiles.is_empty()) {
+            (Some(tile), true) => Some(GapStart::new(tile, depth, field.load_centre(None))),
+            _ => None,
+        };
         Ok(NormalAnswer {
             field,
             report,
             remarks,
+            start,
         })
     }
 

@@ -61,20 +61,23 @@ impl GapTask {
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
-        self.solve_on(RESOLUTION.for_target(target), workspace, monitor)
+        self.solve_near(None, RESOLUTION.for_target(target), workspace, monitor)
     }
 
-    /// The same at a third of the cost, for the search of a height: forces within some tenths of a per cent, edges within one cell, a
-    /// twentieth of the contact. Roughness is not resolved.
-    ///
-    /// # Errors
-    /// As [`GapTask::solve_for`].
-    pub fn estimate(
+    /// The solution from a start, if it has one there.
+    pub(crate) fn solve_near(
         &self,
+        start: Option<Tile>,
+        resolution: GridFineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
-        self.solve_on(RESOLUTION_COARSE, workspace, monitor)
+        if let Some(start) = start
+            && let Some(found) = self.solve_from(start, resolution, workspace, monitor)?
+        {
+            return self.found(found);
+        }
+        self.solve_on(resolution, workspace, monitor)
     }
 
     fn solve_on(
@@ -174,7 +177,7 @@ impl GapTask {
     }
 
     /// Whether a grid is to be enlarged, to be refined, or is the last one.
-    fn next_grid(
+    pub(crate) fn next_grid(
         &self,
         grid: &PressureGrid,
         pressed: &PressureAnswer,
@@ -218,13 +221,31 @@ impl GapTask {
 }
 
 /// What follows a grid.
-enum NextStep {
+pub(crate) enum NextStep {
     PressureGrid(PressureGrid),
     /// It is the last one, and whether a patch would want more cells than a grid may have.
     End(GridsExit, bool),
 }
 
+impl NextStep {
+    /// Is the grid before the last one, fine enough and settled?
+    pub(crate) fn is_settled(&self) -> bool {
+        matches!(self, NextStep::End(GridsExit::Settled, false))
+    }
+}
+
 impl GridFineness {
+    /// The resolution for the search of a height, at a third of the cost: forces within some tenths of a per cent, edges within one cell, a
+    /// twentieth of the contact. Roughness is not resolved.
+    pub(crate) fn coarse() -> GridFineness {
+        RESOLUTION_COARSE
+    }
+
+    /// That for an answer: [`GapTask::solve_for`].
+    pub(crate) fn for_answer(target: f64) -> GridFineness {
+        RESOLUTION.for_target(target)
+    }
+
     /// The resolution for a target of the resultants' error relative to μN; unchanged for targets from [`TARGET_USUAL`] on.
     fn for_target(self, target: f64) -> GridFineness {
         let finer = (target.min(TARGET_USUAL) / TARGET_USUAL).powf(TARGET_POWER);

@@ -4,7 +4,7 @@ use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
 use crate::contact::normal::gap::grid::PressureGrid;
 
 /// A grid with its part of the solution: distances and pressures are its own, the rest is common to all tiles.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tile {
     pub(crate) grid: PressureGrid,
     pub(crate) pressed: PressureAnswer,

@@ -227,6 +227,7 @@ impl GridPressure {
             axis: x,
             intervals: shape.columns.clone(),
             value: |i| self.value_on_column(i, j, weights),
+            inside: |i| self.q[j * x.len() + i] > 0.0 && self.q[(j + 1) * x.len() + i] > 0.0,
             smooth: |i| self.is_smooth(i, j),
             allowed: |i| self.allowed(label, i, j, t),
         };

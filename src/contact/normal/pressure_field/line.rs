@@ -3,13 +3,15 @@
 use crate::contact::numerics::cubic::Cubic;
 
 /// Values at the nodes of an axis, and the intervals that may belong to a patch. Everything is asked for when it is needed: most
-/// intervals of a line lie inside the contact, where the values at their two ends tell all.
-pub(crate) struct GridLine<'f, V, S, A> {
+/// intervals of a line lie inside the contact, where no values are.
+pub(crate) struct GridLine<'f, V, I, S, A> {
     pub(crate) axis: &'f [f64],
     /// The intervals, each named by the node at its start. Values are asked for one node before and one after them as well.
     pub(crate) intervals: std::ops::RangeInclusive<usize>,
     /// The value at a node.
     pub(crate) value: V,
+    /// Is the value at a node surely positive?
+    pub(crate) inside: I,
     /// Are the samples around an interval smooth?
     pub(crate) smooth: S,
     /// Which part of an interval may belong to the patch, from 0 at its start to 1 at its end; nothing if the part is empty.
@@ -23,26 +25,18 @@ pub(crate) struct BoundedCubic {
     bounds: [f64; 2],
 }
 
-impl<V, S, A> GridLine<'_, V, S, A>
+impl<V, I, S, A> GridLine<'_, V, I, S, A>
 where
     V: Fn(usize) -> f64,
+    I: Fn(usize) -> bool,
     S: Fn(usize) -> bool,
     A: Fn(usize) -> [f64; 2],
 {
     /// The segments where the curve is positive, from smaller to larger coordinate.
     pub(crate) fn segments(&self) -> Vec<(f64, f64)> {
         let mut segments: Vec<(f64, f64)> = Vec::new();
-        let first = *self.intervals.start();
-        let mut values = [0, 1, 2, 3].map(|k| (self.value)(first + k - 1));
+        let mut known: Option<(usize, [f64; 4])> = None;
         for node in self.intervals.clone() {
-            if node > first {
-                values = [values[1], values[2], values[3], (self.value)(node + 2)];
-            }
-            let [_, here, next, _] = values;
-            // Between two nodes that are not positive, a positive part counts only where it continues a smooth edge.
-            if here <= 0.0 && next <= 0.0 && !(self.smooth)(node) {
-                continue;
-            }
             let [from, to] = (self.allowed)(node);
             if to <= from {
                 continue;
@@ -57,14 +51,31 @@ where
                 }
             };
             let (from, to) = (part(from, low), part(to, high));
-            self.positive_parts(node, values, |left, right| {
+            let mut tell = |left: f64, right: f64| {
                 let (left, right) = (left.max(from), right.min(to));
                 match segments.last_mut() {
                     _ if left >= right => {}
                     Some(last) if last.1 == left => last.1 = right,
                     _ => segments.push((left, right)),
                 }
-            });
+            };
+            // Between two positive nodes the contact is whole: a gap there is not in the data.
+            if (self.inside)(node) && (self.inside)(node + 1) {
+                tell(low, high);
+                continue;
+            }
+            let values = match known {
+                Some((before, [_, a, b, c])) if before + 1 == node => {
+                    [a, b, c, (self.value)(node + 2)]
+                }
+                _ => [0, 1, 2, 3].map(|k| (self.value)(node + k - 1)),
+            };
+            known = Some((node, values));
+            let [_, here, next, _] = values;
+            // Between two nodes that are not positive, a positive part counts only where it continues a smooth edge.
+            if here > 0.0 || next > 0.0 || (self.smooth)(node) {
+                self.positive_parts(node, values, tell);
+            }
         }
         segments
     }
@@ -73,7 +84,6 @@ where
     fn positive_parts(&self, node: usize, values: [f64; 4], mut tell: impl FnMut(f64, f64)) {
         let (low, high) = (self.axis[node], self.axis[node + 1]);
         let [_, here, next, _] = values;
-        // Between two positive nodes the contact is whole: a gap there is not in the data.
         if here > 0.0 && next > 0.0 {
             tell(low, high);
             return;

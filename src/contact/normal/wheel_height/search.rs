@@ -10,9 +10,11 @@ use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::answer::NormalError;
+use crate::contact::normal::gap::grid::GridFineness;
 use crate::contact::normal::gap::pilot::PilotOnce;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::gap::tile::Tile;
 use crate::contact::normal::hertz::NormalLoad;
 use crate::contact::normal::neighbours::{Neighbour, neglected};
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
@@ -79,6 +81,15 @@ struct Fineness {
 }
 
 impl Fineness {
+    /// At the first height: coarse where it is not near the one sought.
+    fn first(wanted: NormalPass, near: bool) -> Fineness {
+        let mut fineness = Fineness::fine(wanted);
+        if !near {
+            fineness.detail = GapSampling::Coarse;
+        }
+        fineness
+    }
+
     fn fine(wanted: NormalPass) -> Fineness {
         let target = match wanted.accuracy {
             Accuracy::About(_) => f64::INFINITY,
@@ -89,6 +100,17 @@ impl Fineness {
             target,
         }
     }
+}
+
+/// One gap at one height of the wheel's centre.
+struct LoweredGap<'a> {
+    gap: &'a LocalGap,
+    /// Deepest overlap in mm.
+    depth: f64,
+    /// Height of the wheel's centre in mm.
+    centre: f64,
+    /// What it is solved from, if anything is known.
+    start: Option<Tile>,
 }
 
 impl WheelTask {
@@ -139,7 +161,7 @@ impl WheelTask {
     ) -> Result<WheelContact, NormalError> {
         if let WheelLoad::Lowering(lowering) = self.loading {
             let fineness = Fineness::fine(wanted);
-            return self.lowered(search, lowering, fineness, workspace, monitor);
+            return self.lowered(search, lowering, fineness, start.before, workspace, monitor);
         }
         let force = self.target(wanted.friction_share).unwrap_or_default();
         let tolerance = wanted.accuracy.tolerance();
@@ -169,17 +191,17 @@ impl WheelTask {
         let mut force = target(friction_share);
         let tolerance = wanted.accuracy.tolerance();
         let exact = matches!(wanted.accuracy, Accuracy::For(_));
-        let (mut bracket, mut fineness) = (Bracket::default(), Fineness::fine(wanted));
-        let starts_near = before.is_some_and(|before| before.is_near(force));
-        if !(exact && starts_near) {
-            fineness.detail = GapSampling::Coarse;
-        }
-        let mut lowering = match before.map(|before| (before.lowering, before.found)) {
-            Some((height, [carried, slope])) => bracket.next(height, carried, force, slope),
+        let starts_near = exact && before.is_some_and(|before| before.is_near(force));
+        let mut fineness = Fineness::first(wanted, starts_near);
+        let (mut bracket, mut last) = (Bracket::default(), None::<WheelContact>);
+        let mut lowering = match before {
+            Some(known) => bracket.next(known.lowering, known.found[0], force, known.found[1]),
             None => search.estimated_lowering(force / self.contact_modulus),
         };
         for heights in 1..=HEIGHTS_MAX {
-            let mut found = match self.at_height(search, lowering, fineness, workspace, monitor) {
+            let near = last.as_ref().or(before);
+            let pressed = self.at_height(search, lowering, fineness, near, workspace, monitor);
+            let mut found = match pressed {
                 Ok(found) => found,
                 Err(NormalError::NoAnswer(reason)) => {
                     // The wheel may lie too deep; the load may be carried higher up.
@@ -212,8 +234,7 @@ impl WheelTask {
             }
             let closed = bracket.is_closed(lowering);
             if closed && fine {
-                let exit = HeightExit::closed(force / carried, tolerance);
-                return Ok(found.at_rest(exit, force));
+                return Ok(found.at_rest(HeightExit::closed(force / carried, tolerance), force));
             }
             lowering = if closed { found.lowering } else { next };
             if closed || !fine && found.is_near(force) {
@@ -221,6 +242,7 @@ impl WheelTask {
                 fineness.detail = GapSampling::Fine;
                 bracket = bracket.opened(found.found[1]);
             }
+            last = Some(found);
         }
         Err(NormalError::NoAnswer(format!(
             "no height of the wheel carries the load after {HEIGHTS_MAX} tries"
@@ -233,16 +255,17 @@ impl WheelTask {
         search: &ContactLocus,
         lowering: f64,
         fineness: Fineness,
+        near: Option<&WheelContact>,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<WheelContact, NormalError> {
-        match self.lowered(search, lowering, fineness, workspace, monitor) {
+        match self.lowered(search, lowering, fineness, near, workspace, monitor) {
             Err(NormalError::NoAnswer(_)) if fineness.detail == GapSampling::Coarse => {
                 let fine = Fineness {
                     detail: GapSampling::Fine,
                     ..fineness
                 };
-                self.lowered(search, lowering, fine, workspace, monitor)
+                self.lowered(search, lowering, fine, near, workspace, monitor)
             }
             found => found,
         }
@@ -254,6 +277,7 @@ impl WheelTask {
         search: &ContactLocus,
         lowering: f64,
         fineness: Fineness,
+        near: Option<&WheelContact>,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<WheelContact, NormalError> {
@@ -265,7 +289,16 @@ impl WheelTask {
         let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
         let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
         let patches = touching
-            .map(|(gap, depth)| self.solve_gap(gap, *depth, centre, fineness, workspace, monitor))
+            .map(|(gap, depth)| {
+                let start = near.and_then(|near| near.start_for(gap, *depth));
+                let place = LoweredGap {
+                    gap,
+                    depth: *depth,
+                    centre,
+                    start,
+                };
+                self.solve_gap(place, fineness, workspace, monitor)
+            })
             .collect::<Result<Vec<_>, _>>()?;
         if patches.is_empty() {
             return Err(NormalError::NoAnswer(
@@ -292,13 +325,17 @@ impl WheelTask {
     /// One gap under the overlap it has; approaches count from the first touch of its patch along the normal.
     fn solve_gap(
         &self,
-        gap: &LocalGap,
-        depth: f64,
-        centre: f64,
+        place: LoweredGap,
         fineness: Fineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<GapContact, NormalError> {
+        let LoweredGap {
+            gap,
+            depth,
+            centre,
+            start,
+        } = place;
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(NormalError::Stopped(stop));
         }
@@ -313,10 +350,11 @@ impl WheelTask {
             contact_modulus: self.contact_modulus,
             pilot: PilotOnce::default(),
         };
-        let found = match fineness.detail {
-            GapSampling::Coarse => contact.estimate(workspace, monitor)?,
-            GapSampling::Fine => contact.solve_for(fineness.target, workspace, monitor)?,
+        let resolution = match fineness.detail {
+            GapSampling::Coarse => GridFineness::coarse(),
+            GapSampling::Fine => GridFineness::for_answer(fineness.target),
         };
+        let found = contact.solve_near(start, resolution, workspace, monitor)?;
         let mut remarks = found.remarks;
         remarks.extend(missed_beside(gap, &found.field));
         if fineness.detail == GapSampling::Fine {
@@ -339,6 +377,7 @@ impl WheelTask {
             field: found.field.from_origin(middle),
             report: found.report,
             remarks,
+            start: found.start,
         })
     }
 

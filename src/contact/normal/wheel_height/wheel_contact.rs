@@ -3,7 +3,10 @@
 use std::f64::consts::PI;
 
 use crate::contact::geometry::frame::Frame;
+use crate::contact::geometry::local_gap::LocalGap;
 use crate::contact::normal::answer::NormalWork;
+use crate::contact::normal::gap::start::GapStart;
+use crate::contact::normal::gap::tile::Tile;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::wheel_height::bracket::HeightExit;
 use crate::contact::remark::entry::RemarkEntry;
@@ -15,6 +18,10 @@ const CORRECTED: f64 = 1.0 / 3.0;
 const NEAR: f64 = 0.02;
 /// The same with a single patch, whose force grows as Hertz's: the next height misses the force by the square of this.
 const NEAR_SINGLE: f64 = 0.1;
+
+/// Gaps of one contact at two heights differ by less than this in the inclination of their frames, in rad. Chosen by judgement: a start that
+/// does not suit is found out.
+const TURN_MAX: f64 = 0.05;
 
 /// The wheel at rest on its rail.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,9 +61,24 @@ pub struct GapContact {
     pub report: NormalWork,
     /// Remarks for the answer.
     pub remarks: Vec<RemarkEntry>,
+    /// What the gap at another height may be solved from.
+    pub(crate) start: Option<GapStart>,
 }
 
 impl GapContact {
+    /// The start for a gap of the same contact at another height, whose deepest overlap is given in mm; nothing if it is another contact.
+    pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Tile> {
+        let from = [1, 2].map(|k| self.frame.origin[k]);
+        let along = self.frame.origin[0] - gap.frame.origin[0];
+        let [across, _] = gap.frame.plane().across(from);
+        let inside = |axis: &[f64], at: f64| axis.first() < Some(&at) && Some(&at) < axis.last();
+        let same = inside(&gap.x, along)
+            && inside(&gap.y, across)
+            && (self.frame.angle - gap.frame.angle).abs() < TURN_MAX;
+        let start = self.start.as_ref().filter(|_| same)?;
+        Some(start.at([along, across], depth))
+    }
+
     /// Sum of the normal forces in N.
     #[must_use]
     pub fn normal_force(&self) -> f64 {
@@ -107,6 +129,15 @@ impl WheelContact {
             wheel.correct(factor, (wanted - carried) / slope);
             wheel
         })
+    }
+
+    /// The start for a gap at another height of the wheel.
+    pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Tile> {
+        let apart = |known: &&GapContact| (known.frame.rail - gap.frame.rail).abs();
+        self.patches
+            .iter()
+            .min_by(|a, b| apart(a).total_cmp(&apart(b)))?
+            .start_for(gap, depth)
     }
 
     /// Is the force near enough to go on with fine gaps?

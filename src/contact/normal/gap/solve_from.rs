@@ -1,0 +1,140 @@
+//! The contact of a gap from a solved grid of nearly the same gap.
+
+use std::f64::consts::PI;
+
+use crate::contact::half_space::grid_operator::GridWorkspace;
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::answer::NormalError;
+use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
+use crate::contact::normal::gap::constants::NEAR;
+use crate::contact::normal::gap::grid::{GridFineness, PressureGrid};
+use crate::contact::normal::gap::search_box::SearchBox;
+use crate::contact::normal::gap::surface::Window;
+use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
+use crate::contact::normal::hertz::NormalLoad;
+
+/// Grids that are tried from a start; each is larger than the one before. Numeric safety.
+const GRIDS_MAX: usize = 3;
+/// Blocks of cells along either axis whose loads stand for the pressure far from it.
+const BLOCKS: usize = 6;
+/// Part of the length of the grid beyond its sides within which the contact shows itself in the outermost cells.
+const RING: f64 = 0.05;
+
+/// The load of a block of cells, and its place.
+struct BlockLoad {
+    at: [f64; 2],
+    force: f64,
+}
+
+impl GapTask {
+    /// The solution from a start, in place of a search for its box and a first grid there. Nothing where the solution and the start
+    /// differ by more than two grids of one gap may, or where the bodies may touch outside the grid as well.
+    ///
+    /// # Errors
+    /// The monitor stopped the work.
+    pub(crate) fn solve_from(
+        &self,
+        start: Tile,
+        resolution: GridFineness,
+        workspace: &mut GridWorkspace<f32>,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<GapOutcome>, NormalError> {
+        let NormalLoad::Approach(approach) = self.loading else {
+            return Ok(None);
+        };
+        let (limits, [least, _]) = (self.gap.window(), self.gap.extremes());
+        let depth = approach - least;
+        let wanted = start
+            .grid
+            .wanted(&start.pressed, NEAR * depth, resolution, limits);
+        let mut grid = PressureGrid::new(wanted.window, wanted.cells, self.gap.is_mirrored());
+        let reach = SearchBox {
+            window: wanted.window,
+            level: approach,
+            least,
+        };
+        let start = (start.grid, start.pressed);
+        let mut last: Option<(PressureGrid, PressureAnswer)> = None;
+        let mut iterations = 0;
+        for _ in 0..GRIDS_MAX {
+            let from = last.as_ref().unwrap_or(&start);
+            let pressed = match self.pressure_on(&grid, Some(from), &reach, workspace, monitor) {
+                Ok(pressed) => pressed,
+                Err(NormalError::NoAnswer(_)) => return Ok(None),
+                Err(stopped) => return Err(stopped),
+            };
+            iterations += pressed.iterations;
+            let short = grid.sides_in_contact(&pressed.pressure);
+            if !short.is_empty() {
+                let larger = grid.enlarged(&short, limits);
+                last = Some((std::mem::replace(&mut grid, larger), pressed));
+                continue;
+            }
+            let next = self.next_grid(&grid, &pressed, Some(&start), depth, resolution);
+            if !next.is_ok_and(|next| next.is_settled()) || self.touches_beside(&grid, &pressed) {
+                return Ok(None);
+            }
+            return Ok(Some(GapOutcome {
+                iterations,
+                exit: GridsExit::Settled,
+                pressure_change: start.1.largest() / pressed.largest() - 1.0,
+                least,
+                tiles: vec![Tile { grid, pressed }],
+            }));
+        }
+        Ok(None)
+    }
+
+    /// May the bodies touch at a sample outside a grid, under the pressures on it?
+    fn touches_beside(&self, grid: &PressureGrid, pressed: &PressureAnswer) -> bool {
+        let Some([x, y, gap]) = self.gap.grid_samples() else {
+            return true;
+        };
+        let loads = blocks(grid, pressed);
+        let ringed: Window = [0, 1].map(|k| {
+            let [low, high] = grid.range(k);
+            let ring = RING * (high - low);
+            [low - ring, high + ring]
+        });
+        let outside = |at: [f64; 2]| (0..2).any(|k| at[k] < ringed[k][0] || at[k] > ringed[k][1]);
+        let sunk = |at: [f64; 2]| {
+            let each = loads
+                .iter()
+                .map(|load| load.force / (load.at[0] - at[0]).hypot(load.at[1] - at[1]));
+            each.sum::<f64>() / (PI * self.contact_modulus)
+        };
+        gap.iter().enumerate().any(|(k, gap)| {
+            let at = [x[k % x.len()], y[k / x.len()]];
+            *gap < pressed.approach && outside(at) && gap + sunk(at) < pressed.approach
+        })
+    }
+}
+
+/// The loads of blocks of cells.
+fn blocks(grid: &PressureGrid, pressed: &PressureAnswer) -> Vec<BlockLoad> {
+    let mut sums = vec![[0.0; 3]; BLOCKS * BLOCKS];
+    let axes = [0, 1].map(|axis| grid.centres(axis));
+    let area = grid.step[0] * grid.step[1];
+    for (k, pressure) in pressed
+        .pressure
+        .iter()
+        .enumerate()
+        .filter(|(_, p)| **p > 0.0)
+    {
+        let [i, j] = [k % grid.cells[0], k / grid.cells[0]];
+        let block = j * BLOCKS / grid.cells[1] * BLOCKS + i * BLOCKS / grid.cells[0];
+        let force = pressure * area;
+        let parts = [force, force * axes[0][i], force * axes[1][j]];
+        for (sum, part) in sums[block].iter_mut().zip(parts) {
+            *sum += part;
+        }
+    }
+    let loaded = sums.into_iter().filter(|[force, ..]| *force > 0.0);
+    loaded
+        .map(|[force, x, y]| BlockLoad {
+            at: [x / force, y / force],
+            force,
+        })
+        .collect()
+}
