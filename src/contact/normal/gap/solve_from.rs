@@ -138,3 +138,74 @@ fn blocks(grid: &PressureGrid, pressed: &PressureAnswer) -> Vec<BlockLoad> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::monitor::Unmonitored;
+    use crate::contact::normal::gap::pilot::PilotOnce;
+    use crate::contact::normal::gap::surface::GapSurface;
+    use crate::contact::normal::pressure_field::field::PressureField;
+
+    const TARGET: f64 = 0.005;
+
+    /// A bump at y = −6 mm, and another at 6 mm that is `lift` lower, pressed together by an approach.
+    fn bumps(lift: f64, approach: f64) -> GapTask {
+        let [x, y] = [140, 120]
+            .map(|most| -> Vec<f64> { (-most..=most).map(|k| 0.1 * f64::from(k)).collect() });
+        let across = |y: f64| ((y + 6.0).powi(2) / 300.0).min((y - 6.0).powi(2) / 100.0 + lift);
+        let line = |y: &f64| x.iter().map(|x| x * x / 920.0 + across(*y)).collect();
+        let gap: Vec<Vec<f64>> = y.iter().map(line).collect();
+        GapTask {
+            gap: GapSurface::grid(&x, &y, &gap),
+            loading: NormalLoad::Approach(approach),
+            contact_modulus: 115_000.0,
+            pilot: PilotOnce::default(),
+        }
+    }
+
+    /// What the bumps under an approach of 0.05 mm leave as a start for another approach.
+    fn start_for(lift: f64, approach: f64) -> Tile {
+        let mut workspace = GridWorkspace::default();
+        let solved = bumps(lift, 0.05).solve_for(TARGET, &mut workspace, &Unmonitored);
+        let start = solved.unwrap().start.expect("one grid");
+        start.at([0.0, -6.0], approach)
+    }
+
+    fn force(field: &PressureField) -> f64 {
+        field.patches().iter().map(|patch| patch.normal_force).sum()
+    }
+
+    #[test]
+    fn a_contact_found_from_another_height_is_that_of_a_search() {
+        let task = bumps(0.08, 0.06);
+        let mut workspace = GridWorkspace::default();
+        let fineness = GridFineness::for_answer(TARGET);
+        let start = start_for(0.08, 0.06);
+        let near = task.solve_from(start, fineness, &mut workspace, &Unmonitored);
+        let near = near.unwrap().expect("nothing else touches");
+        let near = task.found(near).unwrap();
+        let searched = task
+            .solve_for(TARGET, &mut workspace, &Unmonitored)
+            .unwrap();
+        assert_eq!(near.field.patches().len(), 1);
+        let ratio = force(&near.field) / force(&searched.field);
+        assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
+        assert!(near.report.iterations < searched.report.iterations);
+    }
+
+    #[test]
+    fn a_contact_beside_the_grid_of_the_start_is_not_overlooked() {
+        // The second bump does not touch at 0.05 mm, and at 0.06 mm it does: the first one bends it away by less than 0.009 mm.
+        let task = bumps(0.047, 0.06);
+        let mut workspace = GridWorkspace::default();
+        let fineness = GridFineness::for_answer(TARGET);
+        let start = start_for(0.047, 0.06);
+        let near = task.solve_from(start, fineness, &mut workspace, &Unmonitored);
+        assert_eq!(near.unwrap().map(|found| found.tiles.len()), None);
+        let searched = task
+            .solve_for(TARGET, &mut workspace, &Unmonitored)
+            .unwrap();
+        assert_eq!(searched.field.patches().len(), 2);
+    }
+}
