@@ -8,12 +8,12 @@ use std::time::Instant;
 
 use bytes::Bytes;
 use railhead::jobs::State;
+use railhead::jobs::model::submit_options::SubmitOptions;
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, ReleaseReason};
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::sqlite::database::SqliteStore;
 use railhead::jobs::store::submission::{NewBatch, NewJob, QueueBounds};
-use railhead::jobs::submit_options::SubmitOptions;
 use uuid::Uuid;
 
 use crate::Row;

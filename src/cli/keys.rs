@@ -6,9 +6,9 @@ use anyhow::{Context, bail};
 
 use crate::cli::commands::{KeysAction, KeysArgs};
 use crate::cli::output::{print, print_error};
-use crate::jobs::keys::bound::{BOUND_MAX, Labels};
-use crate::jobs::keys::key::Key;
 use crate::jobs::keys::keyring::Keyring;
+use crate::jobs::model::key::Key;
+use crate::jobs::model::labels::{BOUND_MAX, Labels};
 
 /// Runs the action on the keys.
 pub(super) fn run(args: &KeysArgs) -> anyhow::Result<ExitCode> {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::contact::error::{Fault, FaultCode};
 use crate::jobs::handle::Jobs;
-use crate::jobs::keys::bound::Labels;
+use crate::jobs::model::labels::Labels;
 
 impl Jobs {
     /// The same jobs as a key sees them that is bound to these labels; all of them without labels.

@@ -9,10 +9,10 @@ use std::time::Duration;
 use tokio::time::sleep;
 use uuid::Uuid;
 
-use crate::jobs::batch::model::Batch;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::{Job, State};
+use crate::jobs::model::batch::Batch;
+use crate::jobs::model::job::{Job, State};
 use crate::jobs::store::list::{Change, Filter};
 
 /// Time between two looks.

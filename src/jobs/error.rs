@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::contact::error::CaseError;
-use crate::jobs::model::{Job, State};
+use crate::jobs::model::job::{Job, State};
 use crate::jobs::store::error::StoreError;
 
 /// Every way a call of [`Jobs`](crate::jobs::Jobs) can fail.

@@ -9,10 +9,10 @@ use uuid::Uuid;
 
 use crate::contact::error::CaseError;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::batch::model::Batch;
 use crate::jobs::error::JobsError;
-use crate::jobs::keys::bound::Labels;
-use crate::jobs::model::{Job, QueuePlace, State};
+use crate::jobs::model::batch::Batch;
+use crate::jobs::model::job::{Job, QueuePlace, State};
+use crate::jobs::model::labels::Labels;
 use crate::jobs::options::Options;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::cluster::Bell;

@@ -10,7 +10,7 @@ use opentelemetry_sdk::propagation::TraceContextPropagator;
 use uuid::Uuid;
 
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::created_at;
+use crate::jobs::model::job::created_at;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::claim::Claim;
 use crate::jobs::trace::{SubmitSpan, TRACEPARENT, Tracer};

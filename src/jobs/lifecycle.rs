@@ -20,12 +20,12 @@ use crate::jobs::clock_steps::ClockSteps;
 use crate::jobs::engine::Engine;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::keys::key::ANONYMOUS;
 use crate::jobs::maintenance::disk_reserve::make_private_folder;
 use crate::jobs::maintenance::{
     blob_collector, deadlines, disk_reserve, nodes, reaper, recovery, retention,
 };
 use crate::jobs::metrics::Metrics;
+use crate::jobs::model::key::ANONYMOUS;
 use crate::jobs::open_store::{note_closed, open_for_service};
 use crate::jobs::options::Options;
 use crate::jobs::quota::StagedBytes;

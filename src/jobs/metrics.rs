@@ -12,7 +12,7 @@ use prometheus_client::registry::Registry;
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::solution::words::answer::Solution;
-use crate::jobs::model::{FailureKind, State};
+use crate::jobs::model::job::{FailureKind, State};
 use crate::jobs::store::ending::Ending;
 
 /// Upper bounds of solve times in s.

@@ -67,13 +67,12 @@ pub mod storage_fault;
 pub mod storage_health;
 pub mod store;
 pub mod submit;
-pub mod submit_options;
 pub mod trace;
 pub mod worker;
 
 pub use crate::jobs::error::JobsError;
 pub use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
-pub use crate::jobs::model::{Failure, FailureKind, Job, QueuePlace, State};
+pub use crate::jobs::model::job::{Failure, FailureKind, Job, QueuePlace, State};
 pub use crate::jobs::options::Options;
 pub use crate::jobs::store::error::StorageFault;
 pub use crate::jobs::store::list::{BatchFilter, Filter, Page, Total};

@@ -8,10 +8,10 @@ use std::time::Duration;
 use tokio::time::{Instant, sleep, timeout_at};
 use uuid::Uuid;
 
-use crate::jobs::batch::model::Batch;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::Job;
+use crate::jobs::model::batch::Batch;
+use crate::jobs::model::job::Job;
 use crate::jobs::shared::POLL_INTERVAL;
 
 /// Shortest time between two reads of one waiting caller.

@@ -14,7 +14,7 @@ use crate::contact::evaluate::sections::{named_and_given, named_sections, put_se
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
-use crate::jobs::run::lane::tenant_of;
+use crate::jobs::model::lane::tenant_of;
 use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 
 /// Longest list.

@@ -4,7 +4,7 @@ use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::State;
+use crate::jobs::model::job::State;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::submission::{CacheKey, NewJob};
 

@@ -10,7 +10,7 @@ use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::PatchFields;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::Job;
+use crate::jobs::model::job::Job;
 use crate::jobs::store::ending::{ResultRef, StoredResult};
 
 /// Solutions from this size on are read off the threads that answer requests.

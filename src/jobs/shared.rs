@@ -10,14 +10,14 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Timestamp, Uuid};
 
-use crate::jobs::batch::model::Batch;
 use crate::jobs::batch::unfinished::UnfinishedBatches;
 use crate::jobs::blobs::Blobs;
 use crate::jobs::clock_steps::{ClockStep, ClockSteps};
 use crate::jobs::engine::Engine;
-use crate::jobs::keys::key::Trusted;
 use crate::jobs::metrics::Metrics;
-use crate::jobs::model::Job;
+use crate::jobs::model::batch::Batch;
+use crate::jobs::model::job::Job;
+use crate::jobs::model::key::Trusted;
 use crate::jobs::options::Options;
 use crate::jobs::quota::StagedBytes;
 use crate::jobs::recent_reads::RecentReads;

@@ -12,9 +12,9 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
-use crate::jobs::model::{Job, created_at};
+use crate::jobs::model::job::{Job, created_at};
+use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds, Refusal};
-use crate::jobs::submit_options::SubmitOptions;
 
 impl Jobs {
     /// Checks a case and queues it. Once this returns the job survives the death of the process. If an identical case

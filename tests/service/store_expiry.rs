@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use railhead::jobs::run::lane::rows_lane;
+use railhead::jobs::model::lane::rows_lane;
 use railhead::jobs::store::claim::Claim;
 use railhead::jobs::store::retention::RetentionRule;
 use railhead::jobs::store::submission::{BatchBegun, NewJob, QueueBounds};

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
+use railhead::jobs::model::submit_options::{Priority, SubmitOptions};
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{
     Claim, ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason, Renewal,
@@ -13,7 +14,6 @@ use railhead::jobs::store::claim::{
 use railhead::jobs::store::ending::{Ending, NewSlice, SliceRecord, StoredResult};
 use railhead::jobs::store::retention::{Deleted, Moment, RetentionRule};
 use railhead::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
-use railhead::jobs::submit_options::{Priority, SubmitOptions};
 use railhead::jobs::{Failure, FailureKind, State};
 use uuid::Uuid;
 

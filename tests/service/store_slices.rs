@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
+use railhead::jobs::model::submit_options::SubmitOptions;
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::Reap;
 use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, ReleaseReason};
@@ -11,7 +12,6 @@ use railhead::jobs::store::ending::SliceRecord;
 use railhead::jobs::store::ending::{Ending, NewSlice, StoredResult};
 use railhead::jobs::store::retention::Moment;
 use railhead::jobs::store::submission::NewJob;
-use railhead::jobs::submit_options::SubmitOptions;
 use railhead::jobs::{Failure, State};
 use uuid::Uuid;
 

@@ -1,9 +1,9 @@
 //! In which order are jobs claimed, and what is held against them when their process dies?
 
 use railhead::jobs::State;
+use railhead::jobs::model::submit_options::{Priority, SubmitOptions};
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason};
 use railhead::jobs::store::submission::{NewJob, QueueBounds};
-use railhead::jobs::submit_options::{Priority, SubmitOptions};
 
 use crate::store::{StoreKind, Table, claim_up_to, conformance, new_job, success};
 

@@ -242,7 +242,7 @@ async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
         jobs.wait(old, AT_MOST).await.unwrap().state,
         State::Succeeded
     );
-    let options = railhead::jobs::submit_options::SubmitOptions {
+    let options = railhead::jobs::model::submit_options::SubmitOptions {
         ends_within: Some(Duration::from_secs(1800)),
         ..Default::default()
     };

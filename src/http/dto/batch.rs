@@ -8,9 +8,9 @@ use utoipa::ToSchema;
 use crate::contact::case::words::question::Case;
 use crate::http::dto::job::rfc3339;
 use crate::http::dto::problem::Fault;
-use crate::jobs::batch::model::Batch;
-use crate::jobs::model::State as JobState;
-use crate::jobs::submit_options::Priority;
+use crate::jobs::model::batch::Batch;
+use crate::jobs::model::job::State as JobState;
+use crate::jobs::model::submit_options::Priority;
 
 /// The cases of a batch.
 #[derive(ToSchema)]

@@ -8,8 +8,8 @@ use utoipa::ToSchema;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
-use crate::jobs::model::{Job, QueuePlace, State as JobState};
-use crate::jobs::submit_options::Priority;
+use crate::jobs::model::job::{Job, QueuePlace, State as JobState};
+use crate::jobs::model::submit_options::Priority;
 
 /// A job as the client sees it. Times are RFC 3339 in UTC with milliseconds.
 #[derive(Debug, Serialize, ToSchema)]

@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 use crate::contact::error::{Fault as CaseFault, FaultCode};
 use crate::http::problem::kinds::ProblemKind;
-use crate::jobs::model::{Failure, FailureKind, Job};
+use crate::jobs::model::job::{Failure, FailureKind, Job};
 
 /// A failure as the client reads it (RFC 9457).
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]

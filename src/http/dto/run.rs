@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 use crate::http::dto::job::rfc3339;
 use crate::jobs::codec::table::TableKind;
-use crate::jobs::model::State as JobState;
+use crate::jobs::model::job::State as JobState;
 use crate::jobs::run::head::RunColumn;
 use crate::jobs::run::model::Run;
 

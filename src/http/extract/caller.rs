@@ -13,7 +13,7 @@ use crate::http::limits::holding_body::HeldShares;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::Jobs;
-use crate::jobs::keys::key::{ANONYMOUS, OPERATOR};
+use crate::jobs::model::key::{ANONYMOUS, OPERATOR};
 
 /// Whose request it is, once that is known; in its extensions.
 #[derive(Debug, Clone)]

@@ -5,7 +5,7 @@ use std::time::Duration;
 use axum::http::{HeaderMap, header};
 
 use crate::http::extract::query::{query, reader, seconds};
-use crate::jobs::submit_options::{Priority, SubmitOptions};
+use crate::jobs::model::submit_options::{Priority, SubmitOptions};
 
 /// Longest deadline in s: 30 days.
 pub const DEADLINE_MAX_SECONDS: u32 = 30 * 24 * 3600;

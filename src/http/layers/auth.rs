@@ -11,7 +11,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::server::connection::Peer;
 use crate::jobs::Jobs;
-use crate::jobs::keys::key::Key;
+use crate::jobs::model::key::Key;
 
 /// Paths where a body is sent and nothing is changed.
 const QUESTIONS: [&str; 2] = ["/v1/cases/check", "/v1/evaluate"];

@@ -15,7 +15,7 @@ use uuid::Uuid;
 use crate::http::extract::accept::Format;
 use crate::http::problem::error::ApiError;
 use crate::jobs::Jobs;
-use crate::jobs::model::State;
+use crate::jobs::model::job::State;
 
 /// For results: they never change, but they can be deleted.
 const IMMUTABLE: HeaderValue = HeaderValue::from_static("private, max-age=3600");

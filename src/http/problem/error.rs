@@ -10,7 +10,7 @@ use crate::http::dto::problem::{Fault, ProblemBody};
 use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::StorageFault;
 use crate::jobs::error::JobsError;
-use crate::jobs::model::{Job, State};
+use crate::jobs::model::job::{Job, State};
 
 /// Content type of every failure.
 pub(crate) const PROBLEM_JSON: &str = "application/problem+json";

@@ -22,10 +22,10 @@ use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::batch_csv::Columns;
 use crate::http::render::csv::finish;
 use crate::jobs::Jobs;
-use crate::jobs::batch::model::{BatchItem, ItemFault, ItemResult};
 use crate::jobs::batch::results::{OpenedItem, PAGE_BYTES};
 use crate::jobs::error::JobsError;
-use crate::jobs::model::State as JobState;
+use crate::jobs::model::batch::{BatchItem, ItemFault, ItemResult};
+use crate::jobs::model::job::State as JobState;
 
 /// What a reader holds of small results: those of a page, and the text written of them.
 pub(crate) const STREAM_BYTES: usize = 2 * PAGE_BYTES;

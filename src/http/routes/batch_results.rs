@@ -28,7 +28,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::render::batch_csv::Columns;
 use crate::http::routes::batch_lines::{FIRST_PAGE_JOBS, Lines, STREAM_BYTES, Source};
 use crate::http::state::AppState;
-use crate::jobs::model::State as JobState;
+use crate::jobs::model::job::State as JobState;
 
 /// Longest time results are waited for, in s.
 const WAIT_MAX_SECONDS: u32 = 3600;

@@ -26,7 +26,7 @@ use crate::http::routes::event_stream::{EventRequest, changed, event};
 use crate::http::routes::jobs::GetProblems;
 use crate::http::routes::runs::GetRunProblems;
 use crate::jobs::Jobs;
-use crate::jobs::model::{Job, State as JobState};
+use crate::jobs::model::job::{Job, State as JobState};
 
 /// The data of an event of a job.
 #[derive(Debug, Serialize, ToSchema)]

@@ -15,7 +15,7 @@ use crate::http::extract::query::{Parameters, Reader, Repeated, count, id, reade
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::routes::next_page::{answer, list_query};
-use crate::jobs::model::State as JobState;
+use crate::jobs::model::job::State as JobState;
 use crate::jobs::{Filter, PAGE_MAX, Total};
 
 /// Jobs in one page of a list when nothing is said.

@@ -25,7 +25,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::routes::prefer_wait::{Awaited, preferred_wait, say_applied};
 use crate::http::routes::results::result_text;
 use crate::jobs::Jobs;
-use crate::jobs::model::{Job, State as JobState};
+use crate::jobs::model::job::{Job, State as JobState};
 
 /// Longest idempotency key in characters.
 const IDEMPOTENCY_KEY_MAX_CHARS: usize = 255;

@@ -12,7 +12,7 @@ use crate::http::extract::caller::Caller;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::PlainProblems;
 use crate::http::problem::error::ApiError;
-use crate::jobs::model::State as JobState;
+use crate::jobs::model::job::State as JobState;
 
 /// Who asks, what it uses, and what it may use.
 #[derive(Debug, Serialize, ToSchema)]

@@ -2,9 +2,9 @@
 
 use uuid::Uuid;
 
-use crate::jobs::batch::model::Batch;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
+use crate::jobs::model::batch::Batch;
 use crate::jobs::store::cluster::Bell;
 use crate::jobs::worker::attempt_control::StopReason;
 

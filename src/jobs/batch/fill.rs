@@ -6,14 +6,14 @@ use std::time::Duration;
 use bytes::Bytes;
 use opentelemetry::KeyValue;
 
-use crate::jobs::batch::model::Batch;
 use crate::jobs::batch::staging::StagedCase;
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::created_at;
+use crate::jobs::model::batch::Batch;
+use crate::jobs::model::job::created_at;
+use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob};
-use crate::jobs::submit_options::SubmitOptions;
 
 /// Jobs queued in one transaction.
 const CHUNK_JOBS: usize = 1000;

@@ -3,7 +3,6 @@
 pub mod abandon;
 pub mod control;
 pub mod fill;
-pub mod model;
 pub mod results;
 pub mod staging;
 pub mod template;

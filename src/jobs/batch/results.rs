@@ -7,10 +7,10 @@ use futures_util::stream::BoxStream;
 use tokio::time::{Instant, timeout_at};
 use uuid::Uuid;
 
-use crate::jobs::batch::model::{BatchItem, ItemFault};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::State;
+use crate::jobs::model::batch::{BatchItem, ItemFault};
+use crate::jobs::model::job::State;
 use crate::jobs::shared::POLL_INTERVAL;
 
 /// Small solutions read at once: once they are this large together, the rest is left for the next page.

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::jobs::submit_options::CaseOptions;
+use crate::jobs::model::submit_options::CaseOptions;
 
 /// What the job table needs to know of a case besides its text.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

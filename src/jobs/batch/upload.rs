@@ -14,11 +14,11 @@ use crate::jobs::batch::template::Cell;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
-use crate::jobs::model::created_at;
+use crate::jobs::model::job::created_at;
+use crate::jobs::model::submit_options::{CaseOptions, SubmitOptions};
 use crate::jobs::profiles::KnownSections;
 use crate::jobs::store::submission::NewBatch;
 use crate::jobs::submit::{cost_us, outputs_text};
-use crate::jobs::submit_options::{CaseOptions, SubmitOptions};
 
 /// Faulty cases whose faults are kept; further ones are only counted.
 const FAULTY_KEPT: usize = 1000;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use crate::jobs::clock::Clock;
 use crate::jobs::error::JobsError;
-use crate::jobs::keys::bound::Labels;
-use crate::jobs::keys::key::{Key, MARK, is_tenant};
+use crate::jobs::model::key::{Key, MARK, is_tenant};
+use crate::jobs::model::labels::Labels;
 use crate::jobs::open_store::{open_beside, open_shared, table_file};
 use crate::jobs::store::Store;
 

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::keys::key::{Key, MARK};
+use crate::jobs::model::key::{Key, MARK};
 
 /// How long a valid key is not read again; a revoked one stops working within this time.
 const TRUSTED_FOR: Duration = Duration::from_secs(1);

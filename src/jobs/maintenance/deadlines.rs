@@ -6,7 +6,7 @@ use std::time::Duration;
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::model::{FailureKind, too_late};
+use crate::jobs::model::job::{FailureKind, too_late};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::retention::Moment;
 use crate::jobs::worker::attempt_control::StopReason;

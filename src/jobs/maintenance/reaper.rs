@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use crate::jobs::model::{FailureKind, State};
+use crate::jobs::model::job::{FailureKind, State};
 use crate::jobs::shared::{Shared, heartbeat};
 use crate::jobs::store::claim::Reap;
 

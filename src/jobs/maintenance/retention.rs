@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::Job;
+use crate::jobs::model::job::Job;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::retention::RetentionRule;
 

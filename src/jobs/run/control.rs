@@ -2,11 +2,11 @@
 
 use uuid::Uuid;
 
-use crate::jobs::batch::model::Batch;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
+use crate::jobs::model::batch::Batch;
+use crate::jobs::model::lane::rows_lane;
 use crate::jobs::run::head::RunHead;
-use crate::jobs::run::lane::rows_lane;
 use crate::jobs::run::model::Run;
 use crate::jobs::store::list::{BatchFilter, Page};
 

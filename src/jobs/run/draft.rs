@@ -17,12 +17,12 @@ use crate::jobs::batch::staging::nameless;
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
+use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::profiles::{KnownSections, unknown};
 use crate::jobs::run::chunk::RunChunk;
 use crate::jobs::run::head::{RunColumn, RunHead};
 use crate::jobs::run::model::Run;
 use crate::jobs::submit::microseconds;
-use crate::jobs::submit_options::SubmitOptions;
 
 /// Expected solve time of a chunk in s: much longer than a claim takes, shorter than a lease, and soon done again.
 const CHUNK_SECONDS: f64 = 3.0;

@@ -1,7 +1,7 @@
 //! A run as clients read it.
 
-use crate::jobs::batch::model::{Batch, RunRecord};
-use crate::jobs::model::State;
+use crate::jobs::model::batch::{Batch, RunRecord};
+use crate::jobs::model::job::State;
 use crate::jobs::run::head::RunHead;
 
 /// A run.

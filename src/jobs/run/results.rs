@@ -5,12 +5,12 @@ use serde_json::Value;
 use uuid::Uuid;
 
 use crate::contact::evaluate::varied::case_of_row;
-use crate::jobs::batch::model::ItemResult;
 use crate::jobs::codec::parquet::TableReader;
 use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::State;
+use crate::jobs::model::batch::ItemResult;
+use crate::jobs::model::job::State;
 use crate::jobs::run::chunk::{RunChunk, parted};
 use crate::jobs::run::control::of_run;
 use crate::jobs::run::head::{RunHead, table_column};

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use crate::contact::remark::entry::RemarkEntry;
 use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::model::{Failure, State};
+use crate::jobs::model::job::{Failure, State};
 
 /// A solved slice about to be stored.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use uuid::Uuid;
 
-use crate::jobs::model::State;
+use crate::jobs::model::job::State;
 
 /// Which jobs to list; everything left out does not restrict.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use uuid::Uuid;
 
-use crate::jobs::model::State;
+use crate::jobs::model::job::State;
 
 /// The answer to a call that deletes a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use bytes::Bytes;
 use uuid::Uuid;
 
-use crate::jobs::model::Job;
-use crate::jobs::submit_options::SubmitOptions;
+use crate::jobs::model::job::Job;
+use crate::jobs::model::submit_options::SubmitOptions;
 
 /// Equal for cases of one tenant that have the same answer.
 pub type CacheKey = [u8; 16];

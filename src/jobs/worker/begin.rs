@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::mpsc::unbounded_channel;
 
 use crate::jobs::job_trace::JobTrace;
-use crate::jobs::model::{Failure, FailureKind};
+use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::claim::Claim;
 use crate::jobs::worker::attempt::{Attempt, Member, Phase, Solver, TimeSpentOn};

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::jobs::run::lane::{rows_lane, tenant_of};
+use crate::jobs::model::lane::{rows_lane, tenant_of};
 use crate::jobs::worker::attempt::{Attempt, TimeSpentOn};
 
 /// Time after which a solver second counts half.

@@ -4,7 +4,7 @@
 use crate::contact::error::SolveError;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::model::{Failure, FailureKind, too_late};
+use crate::jobs::model::job::{Failure, FailureKind, too_late};
 use crate::jobs::store::ending::{Ending, SliceRecord};
 use crate::jobs::worker::attempt_control::StopReason;
 use crate::jobs::worker::outcome::{INTERNAL, Outcome};

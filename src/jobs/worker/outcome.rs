@@ -3,7 +3,7 @@
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::model::Failure;
+use crate::jobs::model::job::Failure;
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
 use crate::jobs::worker::slices::SlicedCase;

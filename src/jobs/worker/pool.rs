@@ -7,7 +7,7 @@ use tokio::time::sleep;
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::model::State;
+use crate::jobs::model::job::State;
 use crate::jobs::shared::Shared;
 use crate::jobs::worker::attempt::{Phase, TimeSpentOn};
 use crate::jobs::worker::solver_thread::SolverThread;

@@ -8,7 +8,7 @@ use uuid::Uuid;
 
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
-use crate::jobs::model::{Failure, FailureKind, State};
+use crate::jobs::model::job::{Failure, FailureKind, State};
 use crate::jobs::store::claim::{Claim, ReleaseReason};
 use crate::jobs::store::ending::{Ending, StoredResult};
 use crate::jobs::worker::attempt::{Attempt, Phase};

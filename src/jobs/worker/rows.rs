@@ -15,7 +15,7 @@ use crate::jobs::codec::parquet::encode;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::error::JobsError;
-use crate::jobs::model::{Failure, FailureKind};
+use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::run::chunk::{RunChunk, parted};
 use crate::jobs::run::head::RunHead;
 use crate::jobs::shared::Shared;

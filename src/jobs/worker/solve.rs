@@ -13,7 +13,7 @@ use crate::contact::solution::words::fields::{Fields, PatchFields};
 use crate::jobs::codec::encode::encode;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
-use crate::jobs::model::{Failure, FailureKind};
+use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::run::chunk::RunChunk;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;

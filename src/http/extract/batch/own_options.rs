@@ -6,7 +6,7 @@ use serde_json::Value;
 use crate::contact::error::Fault;
 use crate::http::extract::submit_options::DEADLINE_MAX_SECONDS;
 use crate::jobs::batch::upload::BatchCase;
-use crate::jobs::submit_options::{CaseOptions, Priority};
+use crate::jobs::model::submit_options::{CaseOptions, Priority};
 
 /// Names of the options, as members and as columns.
 pub const NAMES: [&str; 2] = ["priority", "deadline_s"];

@@ -14,7 +14,7 @@ use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::batch::template;
 use crate::jobs::batch::template::Cell;
 use crate::jobs::batch::upload::BatchRow;
-use crate::jobs::submit_options::CaseOptions;
+use crate::jobs::model::submit_options::CaseOptions;
 
 /// Short names of columns and what they stand for.
 const SHORT_NAMES: [(&str, &str); 18] = [

@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, HashMap};
 
 use uuid::Uuid;
 
-use crate::jobs::batch::model::Batch;
-use crate::jobs::model::State;
+use crate::jobs::model::batch::Batch;
+use crate::jobs::model::job::State;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{BatchFilter, Page, Total, first_id_at};
 

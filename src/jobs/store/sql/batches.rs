@@ -18,8 +18,8 @@ use std::sync::Arc;
 use futures_util::TryStreamExt;
 use uuid::Uuid;
 
-use crate::jobs::batch::model::{BatchItem, ItemResult};
-use crate::jobs::model::{State, created_at};
+use crate::jobs::model::batch::{BatchItem, ItemResult};
+use crate::jobs::model::job::{State, created_at};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds, Refusal};
 

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use async_trait::async_trait;
 use uuid::Uuid;
 
-use crate::jobs::batch::model::{Batch, BatchItem, RunRecord};
-use crate::jobs::keys::key::Key;
-use crate::jobs::model::{Failure, Job, State};
+use crate::jobs::model::batch::{Batch, BatchItem, RunRecord};
+use crate::jobs::model::job::{Failure, Job, State};
+use crate::jobs::model::key::Key;
 use crate::jobs::store::claim::{
     Claim, ClaimRequest, Lease, QueueAhead, Reap, ReleaseReason, Renewal,
 };

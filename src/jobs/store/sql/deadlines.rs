@@ -6,7 +6,7 @@ use super::rows::{read_id, read_move, read_state, to_json};
 use crate::jobs::store::retention::Overdue;
 use uuid::Uuid;
 
-use crate::jobs::model::{Failure, State};
+use crate::jobs::model::job::{Failure, State};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::retention::Moment;
 

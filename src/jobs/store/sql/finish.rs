@@ -11,7 +11,7 @@ use std::collections::HashSet;
 
 use uuid::Uuid;
 
-use crate::jobs::model::State;
+use crate::jobs::model::job::State;
 use crate::jobs::store::claim::Claim;
 use crate::jobs::store::ending::{Ending, StoredResult};
 use crate::jobs::store::error::StoreError;

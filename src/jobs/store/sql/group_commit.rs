@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 
 use tokio::sync::{mpsc, oneshot};
 
-use crate::jobs::model::{Job, State};
+use crate::jobs::model::job::{Job, State};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
 

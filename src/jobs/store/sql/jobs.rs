@@ -10,7 +10,7 @@ use sqlx::Row;
 
 use uuid::Uuid;
 
-use crate::jobs::model::Job;
+use crate::jobs::model::job::Job;
 use crate::jobs::store::ending::ResultRef;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::retention::Deleted;

@@ -2,7 +2,7 @@
 
 use super::engine::{DbRow, SqlStore};
 use super::rows::{from_json, read_flag, to_json};
-use crate::jobs::keys::key::Key;
+use crate::jobs::model::key::Key;
 use crate::jobs::store::error::StoreError;
 use sqlx::Row;
 use std::sync::Arc;

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use bytes::Bytes;
 use uuid::Uuid;
 
-use crate::jobs::model::State;
+use crate::jobs::model::job::State;
 use crate::jobs::store::claim::{Claim, Lease, ReleaseReason, Renewal};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::StoredCase;

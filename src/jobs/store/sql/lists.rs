@@ -7,7 +7,7 @@ use std::cmp::Reverse;
 
 use uuid::Uuid;
 
-use crate::jobs::model::{Job, State};
+use crate::jobs::model::job::{Job, State};
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{Change, Filter, Page, Total};
 

@@ -6,7 +6,7 @@ use super::rows::{read_move, to_json};
 use crate::jobs::store::claim::Reap;
 use uuid::Uuid;
 
-use crate::jobs::model::{Failure, State};
+use crate::jobs::model::job::{Failure, State};
 use crate::jobs::store::error::StoreError;
 
 /// Those whose lease has run out: a job that was claimed alone counts the attempt; those of a group do not, and come alone next

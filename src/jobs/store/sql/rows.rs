@@ -7,10 +7,10 @@ use serde::de::DeserializeOwned;
 use sqlx::{QueryBuilder, Row};
 use uuid::Uuid;
 
-use crate::jobs::model::{Job, State};
+use crate::jobs::model::job::{Job, State};
+use crate::jobs::model::submit_options::Priority;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::CacheKey;
-use crate::jobs::submit_options::Priority;
 
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {

@@ -6,7 +6,7 @@ use sqlx::Row;
 
 use uuid::Uuid;
 
-use crate::jobs::batch::model::RunRecord;
+use crate::jobs::model::batch::RunRecord;
 use crate::jobs::store::error::StoreError;
 
 /// Of a chunk, `field_patches` counts the rows without an answer.

@@ -2,11 +2,11 @@
 
 use super::engine::SqlStore;
 use super::rows::{read_count, read_state};
-use crate::jobs::model::Job;
+use crate::jobs::model::job::Job;
 use crate::jobs::store::claim::QueueAhead;
 use std::collections::BTreeMap;
 
-use crate::jobs::model::State;
+use crate::jobs::model::job::State;
 use crate::jobs::store::error::StoreError;
 use crate::jobs::store::retention::{Stats, Usage};
 

@@ -3,7 +3,7 @@
 use sqlx::{AssertSqlSafe, Row};
 use uuid::Uuid;
 
-use crate::jobs::model::State;
+use crate::jobs::model::job::State;
 use crate::jobs::store::list::{BatchFilter, Filter};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::sql::cached::SOURCE;

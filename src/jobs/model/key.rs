@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::jobs::keys::bound::Labels;
+use crate::jobs::model::labels::Labels;
 
 /// The tenant of requests without a key.
 pub const ANONYMOUS: &str = "anonymous";

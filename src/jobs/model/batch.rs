@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use bytes::Bytes;
 use uuid::Uuid;
 
-use crate::jobs::model::{Job, State};
+use crate::jobs::model::job::{Job, State};
 
 /// What is known of one batch.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use uuid::Uuid;
 
 use crate::contact::error::SolveError;
 use crate::contact::remark::entry::RemarkEntry;
-use crate::jobs::submit_options::Priority;
+use crate::jobs::model::submit_options::Priority;
 
 /// What is known of one job. Times are epoch milliseconds (UTC).
 #[derive(Debug, Clone, PartialEq)]
