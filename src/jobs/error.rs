@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::contact::error::CaseError;
 use crate::jobs::model::job::{Job, State};
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 
 /// Every way a call of [`Jobs`](crate::jobs::Jobs) can fail.
 #[derive(Debug, Error)]

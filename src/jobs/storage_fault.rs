@@ -4,7 +4,7 @@ use std::error::Error;
 use std::io;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::store::error::StorageFault;
+use crate::jobs::store_error::StorageFault;
 
 /// What a folder is called in errors.
 const DISK: &str = "LocalFileSystem";

@@ -9,7 +9,7 @@ use std::time::Duration;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::error::{StorageFault, StoreError};
+use crate::jobs::store_error::{StorageFault, StoreError};
 
 /// Tries to write where the cause is not the disk, with pauses that double from [`FIRST_PAUSE`].
 const WRITE_TRIES: u32 = 6;

@@ -11,7 +11,7 @@ use uuid::Uuid;
 use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::cluster::{Bell, Cluster, ClusterView};
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 use crate::jobs::worker::attempt_control::StopReason;
 
 /// Time between two signs of life; the store counts a node as dead after four.

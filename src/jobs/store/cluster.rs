@@ -7,7 +7,7 @@ use async_trait::async_trait;
 use object_store::ObjectStore;
 use uuid::Uuid;
 
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 
 /// A hint to other processes that something happened. Whoever misses one finds out a little later by looking.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

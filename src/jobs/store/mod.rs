@@ -19,7 +19,6 @@
 pub mod claim;
 pub mod cluster;
 pub mod ending;
-pub mod error;
 pub mod list;
 pub(crate) mod portion;
 pub mod postgres;
@@ -44,13 +43,13 @@ use crate::jobs::store::claim::{
 };
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::ending::{Ending, NewSlice, ResultRef, SliceRecord, StoredResult};
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
 use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
 use crate::jobs::store::submission::{
     BatchBegun, CacheKey, Enqueued, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
 };
+use crate::jobs::store_error::StoreError;
 
 /// A job table, which also keeps API keys.
 #[async_trait]

@@ -7,7 +7,7 @@ use sqlx::postgres::PgDatabaseError;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::storage_fault::of_io;
-use crate::jobs::store::error::{StorageFault, StoreError};
+use crate::jobs::store_error::{StorageFault, StoreError};
 
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {

@@ -12,9 +12,9 @@ use sqlx::Row;
 use sqlx::postgres::{PgConnection, PgRow};
 
 use crate::jobs::store::claim::ClaimRequest;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::sql::claim::{PEEK, count_waiting, first_queued};
 use crate::jobs::store::postgres::sql::rows::count;
+use crate::jobs::store_error::StoreError;
 
 /// Queues that are shorter are counted and walked from their start at every claim.
 const LONG: i64 = 2000;

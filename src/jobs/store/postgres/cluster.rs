@@ -7,13 +7,13 @@ use object_store::ObjectStore;
 use uuid::Uuid;
 
 use crate::jobs::store::cluster::{Bell, Cluster, ClusterView, Deployment, Node};
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::answer::in_time;
 use crate::jobs::store::postgres::bell;
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::postgres::engine::fold_counts;
 use crate::jobs::store::postgres::objects::PgObjects;
 use crate::jobs::store::postgres::sql::rows::{count, read_id, read_small};
+use crate::jobs::store_error::StoreError;
 
 const NOW: &str = "SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)";
 

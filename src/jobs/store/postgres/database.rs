@@ -6,12 +6,12 @@ use sqlx::postgres::{PgConnectOptions, PgPool};
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::cluster::Bells;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::bell::BellRinger;
 use crate::jobs::store::postgres::claim_memory::ClaimMemory;
 use crate::jobs::store::postgres::connection::{connect, session};
 use crate::jobs::store::postgres::schema::require;
 use crate::jobs::store::postgres::sql::group_commit::GroupCommit;
+use crate::jobs::store_error::StoreError;
 
 /// The job table that several processes share.
 #[derive(Clone)]

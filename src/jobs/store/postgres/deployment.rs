@@ -3,8 +3,8 @@
 use sqlx::Row;
 
 use crate::jobs::store::cluster::Deployment;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::database::PostgresStore;
+use crate::jobs::store_error::StoreError;
 
 impl PostgresStore {
     /// What the database knows; a node counts as living that was seen within `living_ms`.

@@ -8,10 +8,10 @@ use uuid::Uuid;
 
 use crate::jobs::store::claim::ClaimRequest;
 use crate::jobs::store::cluster::Cluster;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::postgres::answer::in_time;
 use crate::jobs::store::postgres::connection::{ADMISSION, FOLD, LOCKS, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
+use crate::jobs::store_error::StoreError;
 
 pub(crate) type Db = Postgres;
 pub(crate) type DbConnection = PgConnection;

@@ -9,8 +9,8 @@ use uuid::Uuid;
 
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::State;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{BatchFilter, Page, Total, first_id_at};
+use crate::jobs::store_error::StoreError;
 
 /// Most batches that are looked at for one page, and how far they are counted.
 const LOOKED_AT: i64 = 10_000;

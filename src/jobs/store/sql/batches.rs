@@ -20,8 +20,8 @@ use uuid::Uuid;
 
 use crate::jobs::model::batch::{BatchItem, ItemResult};
 use crate::jobs::model::job::{State, created_at};
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds, Refusal};
+use crate::jobs::store_error::StoreError;
 
 const CANCEL: &str = concat!(
     "WITH open AS MATERIALIZED (SELECT id FROM jobs \

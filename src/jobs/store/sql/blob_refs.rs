@@ -8,7 +8,7 @@ use super::rows::{count, push_list, read_blob_ids, read_id, read_small, read_sta
 use sqlx::{QueryBuilder, Row};
 
 use crate::jobs::store::ending::StoredResult;
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 
 /// Values bound in one statement; far below the bound of SQLite.
 pub(crate) const VALUES_PER_STATEMENT: usize = 250;

@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use uuid::Uuid;
 
 use crate::jobs::store::Orphans;
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 
 impl SqlStore {
     /// Keys of large results that are to be removed, at most `limit`; those in `done` are forgotten first.

@@ -7,8 +7,8 @@ use super::rows::read_id;
 use sqlx::QueryBuilder;
 use uuid::Uuid;
 
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::NewJob;
+use crate::jobs::store_error::StoreError;
 
 /// One seek in the index, however many jobs have the same key.
 pub(crate) const SOURCE: &str =

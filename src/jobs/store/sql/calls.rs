@@ -15,7 +15,6 @@ use crate::jobs::store::claim::{
 };
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::ending::{Ending, NewSlice, ResultRef, SliceRecord, StoredResult};
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
 use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
@@ -23,6 +22,7 @@ use crate::jobs::store::submission::{
     BatchBegun, CacheKey, Enqueued, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
 };
 use crate::jobs::store::{KeyStore, Orphans, Store};
+use crate::jobs::store_error::StoreError;
 
 #[async_trait]
 impl Store for SqlStore {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use crate::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease};
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 
 macro_rules! peek {
     ($begun:literal) => {

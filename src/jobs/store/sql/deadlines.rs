@@ -7,8 +7,8 @@ use crate::jobs::store::retention::Overdue;
 use uuid::Uuid;
 
 use crate::jobs::model::job::{Failure, State};
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::retention::Moment;
+use crate::jobs::store_error::StoreError;
 
 /// Late at $1; what was submitted before $2 is late only if it is at $3.
 pub(crate) const LATE: &str = "SELECT id, state FROM jobs WHERE deadline <= $1 AND deadline IS NOT NULL AND ended_at IS NULL \

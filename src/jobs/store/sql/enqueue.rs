@@ -4,8 +4,8 @@ use super::engine::SqlStore;
 use super::group_commit::{Submission, by_key};
 use tokio::sync::oneshot;
 
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
+use crate::jobs::store_error::StoreError;
 
 impl SqlStore {
     /// Queues a job if the bounds leave it a place, or finds the one its idempotency key already stands for. Durable once it returns. Whoever stops

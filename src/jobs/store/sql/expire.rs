@@ -6,9 +6,9 @@ use super::rows::{push_list, read_blob_ids, read_id};
 use sqlx::QueryBuilder;
 use uuid::Uuid;
 
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::first_id_at;
 use crate::jobs::store::retention::RetentionRule;
+use crate::jobs::store_error::StoreError;
 
 /// Ids grow with the time of submission, so that only the oldest rows are read. Chunks of a run, which are the jobs of a lane, expire with
 /// the last of them.

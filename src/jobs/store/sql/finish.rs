@@ -14,7 +14,7 @@ use uuid::Uuid;
 use crate::jobs::model::job::State;
 use crate::jobs::store::claim::Claim;
 use crate::jobs::store::ending::{Ending, StoredResult};
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 
 impl SqlStore {
     /// Ends jobs, all in one transaction. Returns those that ended; the others' leases were lost and nothing of them

@@ -11,8 +11,8 @@ use std::collections::{HashMap, HashSet};
 use tokio::sync::{mpsc, oneshot};
 
 use crate::jobs::model::job::{Job, State};
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
+use crate::jobs::store_error::StoreError;
 
 /// Most jobs stored together.
 const TOGETHER: usize = 256;

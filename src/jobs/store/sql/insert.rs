@@ -6,8 +6,8 @@ use super::rows::to_json;
 use sqlx::QueryBuilder;
 use uuid::Uuid;
 
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::{CacheKey, NewJob};
+use crate::jobs::store_error::StoreError;
 
 /// Jobs in one statement; with 18 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;

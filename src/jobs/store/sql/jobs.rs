@@ -12,8 +12,8 @@ use uuid::Uuid;
 
 use crate::jobs::model::job::Job;
 use crate::jobs::store::ending::ResultRef;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::retention::Deleted;
+use crate::jobs::store_error::StoreError;
 
 impl SqlStore {
     /// Cancels a queued job at once and asks the worker of a running one to stop; an ended job stays as it is.

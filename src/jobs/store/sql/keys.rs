@@ -3,7 +3,7 @@
 use super::engine::{DbRow, SqlStore};
 use super::rows::{from_json, read_flag, to_json};
 use crate::jobs::model::key::Key;
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 use sqlx::Row;
 use std::sync::Arc;
 

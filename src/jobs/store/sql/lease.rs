@@ -12,8 +12,8 @@ use uuid::Uuid;
 
 use crate::jobs::model::job::State;
 use crate::jobs::store::claim::{Claim, Lease, ReleaseReason, Renewal};
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::StoredCase;
+use crate::jobs::store_error::StoreError;
 
 impl SqlStore {
     /// The cases of jobs, and whether their cancellation was asked for. A template is read once, however many rows fill it.

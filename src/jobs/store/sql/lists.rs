@@ -8,8 +8,8 @@ use std::cmp::Reverse;
 use uuid::Uuid;
 
 use crate::jobs::model::job::{Job, State};
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::list::{Change, Filter, Page, Total};
+use crate::jobs::store_error::StoreError;
 
 /// Most jobs that are looked at for one page where no index finds them.
 const LOOKED_AT: i64 = 20_000;

@@ -4,8 +4,8 @@ use super::engine::{self, DbRow, SqlStore};
 use super::rows::read_count;
 use sqlx::Row;
 
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::profile::{ProfileKept, StoredProfile};
+use crate::jobs::store_error::StoreError;
 
 impl SqlStore {
     /// Keeps a cross-section, unless the tenant has it already, or `max_bytes` would be passed with it.

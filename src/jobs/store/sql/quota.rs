@@ -8,8 +8,8 @@ use std::collections::{HashMap, HashSet};
 
 use uuid::Uuid;
 
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::{NewJob, QueueBounds, Refusal};
+use crate::jobs::store_error::StoreError;
 
 /// Queued jobs of a tenant (of all tenants if it is NULL) and the places reserved for batches that are being filled.
 const TAKEN: &str = "SELECT (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts \

@@ -7,7 +7,7 @@ use crate::jobs::store::claim::Reap;
 use uuid::Uuid;
 
 use crate::jobs::model::job::{Failure, State};
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 
 /// Those whose lease has run out: a job that was claimed alone counts the attempt; those of a group do not, and come alone next
 /// time.

@@ -9,8 +9,8 @@ use uuid::Uuid;
 
 use crate::jobs::model::job::{Job, State};
 use crate::jobs::model::submit_options::Priority;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::submission::CacheKey;
+use crate::jobs::store_error::StoreError;
 
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {

@@ -7,7 +7,7 @@ use sqlx::Row;
 use uuid::Uuid;
 
 use crate::jobs::model::batch::RunRecord;
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 
 /// Of a chunk, `field_patches` counts the rows without an answer.
 const GET: &str = "SELECT body, \

@@ -10,7 +10,7 @@ use uuid::Uuid;
 
 use crate::jobs::store::claim::Claim;
 use crate::jobs::store::ending::{NewSlice, SliceRecord, StoredResult};
-use crate::jobs::store::error::StoreError;
+use crate::jobs::store_error::StoreError;
 
 pub(crate) const NOTES: &str =
     "SELECT number, motions, digest, spent_us FROM job_slices WHERE job_id = $1 ORDER BY number";

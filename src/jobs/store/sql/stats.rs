@@ -7,8 +7,8 @@ use crate::jobs::store::claim::QueueAhead;
 use std::collections::BTreeMap;
 
 use crate::jobs::model::job::State;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::retention::{Stats, Usage};
+use crate::jobs::store_error::StoreError;
 
 pub(crate) const COUNT: &str =
     "SELECT state, CAST(SUM(number) AS bigint) AS jobs FROM job_counts GROUP BY state";

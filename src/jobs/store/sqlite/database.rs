@@ -16,9 +16,9 @@ use sqlx::sqlite::{
 use sqlx::{Connection, SqliteConnection};
 
 use crate::jobs::error::JobsError;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::schema::{make_or_require, mark, require};
 use crate::jobs::store::sqlite::sql::group_commit::GroupCommit;
+use crate::jobs::store_error::StoreError;
 
 /// The write-ahead log is cut to this size when it was larger for a while.
 const LOG_BYTES: &str = "67108864";

@@ -10,9 +10,9 @@ use uuid::Uuid;
 
 use crate::jobs::store::claim::ClaimRequest;
 use crate::jobs::store::cluster::Cluster;
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::sql::claim::{PEEK, count_waiting, first_queued};
+use crate::jobs::store_error::StoreError;
 
 pub(crate) type Db = Sqlite;
 pub(crate) type DbConnection = SqliteConnection;

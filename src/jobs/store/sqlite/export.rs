@@ -5,9 +5,9 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
 use tokio::sync::mpsc;
 
-use crate::jobs::store::error::StoreError;
 use crate::jobs::store::portion::{Portion, Values};
 use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store_error::StoreError;
 
 /// A portion ends with this row, or once its bytes are so many.
 const ROWS_MAX: usize = 500;

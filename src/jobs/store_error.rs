@@ -1,4 +1,4 @@
-//! Why a call of a store failed, sorted by what the caller can do.
+//! Why a call of a store failed, sorted by what the caller can do. It stands before the stores, because every error of this room may carry one.
 
 use std::error::Error;
 use std::sync::Arc;
