@@ -24,9 +24,9 @@ use crate::cli::serve_args::ServeArgs;
 use crate::cli::stop::{Schedule, Signals};
 use crate::cli::values::Anonymous;
 use crate::http::{self, HttpOptions};
+use crate::jobs::attempts::heap;
 use crate::jobs::engine::Engine;
 use crate::jobs::trace::Tracer;
-use crate::jobs::worker::heap;
 use crate::jobs::{Jobs, Options};
 use crate::telemetry::{self, Traces};
 

@@ -5,8 +5,8 @@ use std::io;
 use std::os::unix::fs::DirBuilderExt;
 use std::path::Path;
 
+use crate::jobs::disk_reserve::make_private_folder;
 use crate::jobs::error::JobsError;
-use crate::jobs::maintenance::disk_reserve::make_private_folder;
 use crate::jobs::open_store::table_file;
 use crate::jobs::store::sqlite::database::SqliteStore;
 

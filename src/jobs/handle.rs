@@ -9,6 +9,7 @@ use uuid::Uuid;
 
 use crate::contact::error::CaseError;
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::{Job, QueuePlace, State};
@@ -18,7 +19,6 @@ use crate::jobs::shared::Shared;
 use crate::jobs::store::cluster::Bell;
 use crate::jobs::store::list::{BatchFilter, Filter, Page};
 use crate::jobs::store::retention::{Deleted, Usage};
-use crate::jobs::worker::attempt_control::StopReason;
 
 /// Longest list page.
 pub const PAGE_MAX: u32 = 1000;

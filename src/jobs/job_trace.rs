@@ -9,12 +9,12 @@ use opentelemetry::{Context, KeyValue};
 use opentelemetry_sdk::propagation::TraceContextPropagator;
 use uuid::Uuid;
 
+use crate::jobs::attempts::outcome::Outcome;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::job::created_at;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::claim::Claim;
 use crate::jobs::trace::{SubmitSpan, TRACEPARENT, Tracer};
-use crate::jobs::worker::outcome::Outcome;
 
 impl Jobs {
     /// What makes the spans, if they are collected.

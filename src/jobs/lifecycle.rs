@@ -14,16 +14,17 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Uuid};
 
+use crate::jobs::attempts::fair_turns::FairTurns;
+use crate::jobs::attempts::running::RunningAttempts;
 use crate::jobs::batch::unfinished::UnfinishedBatches;
 use crate::jobs::blobs::Blobs;
 use crate::jobs::clock_steps::ClockSteps;
+use crate::jobs::disk_reserve;
+use crate::jobs::disk_reserve::make_private_folder;
 use crate::jobs::engine::Engine;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::maintenance::disk_reserve::make_private_folder;
-use crate::jobs::maintenance::{
-    blob_collector, deadlines, disk_reserve, nodes, reaper, recovery, retention,
-};
+use crate::jobs::maintenance::{blob_collector, deadlines, nodes, reaper, recovery, retention};
 use crate::jobs::metrics::Metrics;
 use crate::jobs::model::key::ANONYMOUS;
 use crate::jobs::open_store::{note_closed, open_for_service};
@@ -34,9 +35,7 @@ use crate::jobs::result_place::settle::settle;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::Store;
 use crate::jobs::store::cluster::Node;
-use crate::jobs::worker::fair_turns::FairTurns;
 use crate::jobs::worker::pool::Worker;
-use crate::jobs::worker::running::RunningAttempts;
 
 /// How long a shutdown waits for workers that were told to stop.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);

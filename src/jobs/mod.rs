@@ -9,7 +9,7 @@
 //!    case that the tenant had solved before gives a job that has already succeeded with the same result.
 //! 3. **Insert** ([`store`]): one transaction decides key, quota and queue bound and inserts the job. Single
 //!    submissions that arrive together share it. From here on the job survives the process.
-//! 4. **Claim** ([`worker::claim_loop`]): a worker asks whose [turn](worker::fair_turns) it is and claims a group of that
+//! 4. **Claim** ([`worker::claim_loop`]): a worker asks whose [turn](attempts::fair_turns) it is and claims a group of that
 //!    tenant's jobs, or resumes a solve that waits for its next turn. A single job is a group of one. Each claim has a
 //!    fencing token, which every later write names.
 //! 5. **Keep the lease** ([`worker::heartbeat`]): from the claim until the end is written. A lease is renewed while the
@@ -18,8 +18,8 @@
 //! 6. **Settle without solving** ([`worker::record`]): jobs with a known answer end with it; equal jobs of the group wait
 //!    for the first of them.
 //! 7. **Solve** ([`worker::turn`], [`worker::solve`]): on a thread, outside any transaction, one case after the other. A
-//!    solve that takes longer than a slice of time waits at its [gate](worker::gate) while others have their turn; a
-//!    long sweep is cut into [slices](worker::slices), each stored when it is solved.
+//!    solve that takes longer than a slice of time waits at its [gate](attempts::gate) while others have their turn; a
+//!    long sweep is cut into [slices](attempts::slices), each stored when it is solved.
 //! 8. **Judge** ([`worker::judge`]): the one place that decides what an outcome means for the job.
 //! 9. **Store and finish** ([`worker::record`]): a large result goes to the [`blobs`] first, under a key with the fencing
 //!    token; then one transaction writes all ends of the group, small results included. What was not begun is released.
@@ -30,6 +30,7 @@
 //!
 //! [`lifecycle`] opens, starts and stops all this; [`shared`] is what its parts share.
 
+pub mod attempts;
 pub mod backup;
 pub mod batch;
 mod blob_lists;
@@ -39,6 +40,7 @@ pub mod changes;
 pub mod clock;
 pub mod clock_steps;
 pub mod codec;
+pub mod disk_reserve;
 pub mod engine;
 pub mod error;
 pub mod expiry;

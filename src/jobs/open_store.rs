@@ -5,8 +5,8 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::jobs::disk_reserve;
 use crate::jobs::error::JobsError;
-use crate::jobs::maintenance::disk_reserve;
 use crate::jobs::options::Database;
 use crate::jobs::store::Store;
 use crate::jobs::store::postgres::database::PostgresStore;

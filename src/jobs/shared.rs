@@ -10,6 +10,8 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Timestamp, Uuid};
 
+use crate::jobs::attempts::fair_turns::FairTurns;
+use crate::jobs::attempts::running::RunningAttempts;
 use crate::jobs::batch::unfinished::UnfinishedBatches;
 use crate::jobs::blobs::Blobs;
 use crate::jobs::clock_steps::{ClockStep, ClockSteps};
@@ -24,8 +26,6 @@ use crate::jobs::recent_reads::RecentReads;
 use crate::jobs::store::Store;
 use crate::jobs::store::claim::Lease;
 use crate::jobs::store::cluster::{Bell, Node};
-use crate::jobs::worker::fair_turns::FairTurns;
-use crate::jobs::worker::running::RunningAttempts;
 
 /// How often a waiting caller reads again although nothing was announced.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_secs(1);

@@ -2,11 +2,11 @@
 
 use uuid::Uuid;
 
+use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::store::cluster::Bell;
-use crate::jobs::worker::attempt_control::StopReason;
 
 /// Jobs removed in one transaction.
 pub(crate) const DELETED_AT_ONCE: u32 = 500;

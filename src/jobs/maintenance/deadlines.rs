@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use uuid::Uuid;
 
+use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::job::{FailureKind, too_late};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::retention::Moment;
-use crate::jobs::worker::attempt_control::StopReason;
 
 /// Time between two checks for jobs whose deadline has passed.
 const DEADLINE_INTERVAL: Duration = Duration::from_secs(1);

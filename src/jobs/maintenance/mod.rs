@@ -2,7 +2,6 @@
 
 pub mod blob_collector;
 pub mod deadlines;
-pub mod disk_reserve;
 pub mod nodes;
 pub mod reaper;
 pub mod recovery;

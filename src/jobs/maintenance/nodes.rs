@@ -8,11 +8,11 @@ use std::time::Duration;
 use tokio::time::{MissedTickBehavior, interval, sleep};
 use uuid::Uuid;
 
+use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::cluster::{Bell, Cluster, ClusterView};
 use crate::jobs::store_error::StoreError;
-use crate::jobs::worker::attempt_control::StopReason;
 
 /// Time between two signs of life; the store counts a node as dead after four.
 const BEAT_EVERY: Duration = Duration::from_secs(5);

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use crate::jobs::disk_reserve;
 use crate::jobs::error::JobsError;
-use crate::jobs::maintenance::disk_reserve;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::claim::Reap;
 

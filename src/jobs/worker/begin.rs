@@ -6,17 +6,17 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc::unbounded_channel;
 
+use crate::jobs::attempts::attempt::{Attempt, Member, Phase, Solver, TimeSpentOn};
+use crate::jobs::attempts::attempt_control::AttemptControl;
+use crate::jobs::attempts::gate::Gate;
+use crate::jobs::attempts::outcome::{Outcome, Work};
+use crate::jobs::attempts::solver_thread::{SolverThread, Task};
 use crate::jobs::job_trace::JobTrace;
 use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::claim::Claim;
-use crate::jobs::worker::attempt::{Attempt, Member, Phase, Solver, TimeSpentOn};
-use crate::jobs::worker::attempt_control::AttemptControl;
-use crate::jobs::worker::gate::Gate;
 use crate::jobs::worker::heartbeat;
-use crate::jobs::worker::outcome::{Outcome, Work};
 use crate::jobs::worker::solve::solve_guarded;
-use crate::jobs::worker::solver_thread::{SolverThread, Task};
 
 /// A group that takes longer hands back what it has not begun.
 const GROUP_TIME: Duration = Duration::from_millis(400);

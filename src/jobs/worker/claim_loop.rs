@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
+use crate::jobs::attempts::attempt::Attempt;
+use crate::jobs::attempts::fair_turns::LongSolve;
 use crate::jobs::error::JobsError;
 use crate::jobs::store::claim::{Claim, ClaimKind, ClaimRequest};
-use crate::jobs::worker::attempt::Attempt;
 use crate::jobs::worker::begin;
-use crate::jobs::worker::fair_turns::LongSolve;
 use crate::jobs::worker::pool::Worker;
 
 /// Largest sum of expected solve times in a group, in µs.

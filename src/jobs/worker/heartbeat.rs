@@ -5,10 +5,10 @@ use std::sync::atomic::Ordering;
 
 use tokio::time::{MissedTickBehavior, interval};
 
+use crate::jobs::attempts::attempt_control::{AttemptControl, StopReason};
+use crate::jobs::attempts::lease::{GroupLease, HeldLeases};
 use crate::jobs::shared::{Shared, heartbeat};
 use crate::jobs::store::claim::{Claim, Renewal};
-use crate::jobs::worker::attempt_control::{AttemptControl, StopReason};
-use crate::jobs::worker::lease::{GroupLease, HeldLeases};
 
 /// Starts the heartbeat of jobs that were claimed just now.
 pub(crate) fn start(shared: &Arc<Shared>, leases: Vec<(Claim, Arc<AttemptControl>)>) -> GroupLease {

@@ -3,12 +3,12 @@
 
 use crate::contact::error::SolveError;
 use crate::contact::remark::entry::RemarkEntry;
+use crate::jobs::attempts::attempt_control::StopReason;
+use crate::jobs::attempts::outcome::{INTERNAL, Outcome};
+use crate::jobs::attempts::slices::SlicedCase;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::model::job::{Failure, FailureKind, too_late};
 use crate::jobs::store::ending::{Ending, SliceRecord};
-use crate::jobs::worker::attempt_control::StopReason;
-use crate::jobs::worker::outcome::{INTERNAL, Outcome};
-use crate::jobs::worker::slices::SlicedCase;
 
 /// What follows from the outcome of an attempt.
 pub(crate) enum Verdict {

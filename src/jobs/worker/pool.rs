@@ -6,11 +6,11 @@ use std::time::Duration;
 use tokio::time::sleep;
 use uuid::Uuid;
 
+use crate::jobs::attempts::attempt::{Phase, TimeSpentOn};
+use crate::jobs::attempts::solver_thread::SolverThread;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::job::State;
 use crate::jobs::shared::Shared;
-use crate::jobs::worker::attempt::{Phase, TimeSpentOn};
-use crate::jobs::worker::solver_thread::SolverThread;
 
 /// How often an idle worker asks for jobs although nothing has woken it.
 const POLL_INTERVAL: Duration = Duration::from_secs(1);

@@ -6,13 +6,13 @@ use std::time::SystemTime;
 
 use uuid::Uuid;
 
+use crate::jobs::attempts::attempt::{Attempt, Phase};
+use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::job::{Failure, FailureKind, State};
 use crate::jobs::store::claim::{Claim, ReleaseReason};
 use crate::jobs::store::ending::{Ending, StoredResult};
-use crate::jobs::worker::attempt::{Attempt, Phase};
-use crate::jobs::worker::attempt_control::StopReason;
 use crate::jobs::worker::judge::{Verdict, judge};
 use crate::jobs::worker::pool::{StepReport, Worker};
 use crate::jobs::worker::slice_storage::SliceFate;

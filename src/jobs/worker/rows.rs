@@ -11,6 +11,8 @@ use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::words::answer::Solution;
+use crate::jobs::attempts::attempt_control::AttemptControl;
+use crate::jobs::attempts::outcome::{INTERNAL, Outcome};
 use crate::jobs::codec::parquet::encode;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::codec::table::{RowTable, TableColumn};
@@ -20,8 +22,6 @@ use crate::jobs::run::chunk::{RunChunk, parted};
 use crate::jobs::run::head::RunHead;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::submission::StoredCase;
-use crate::jobs::worker::attempt_control::AttemptControl;
-use crate::jobs::worker::outcome::{INTERNAL, Outcome};
 
 /// Solves a chunk; its answers are a Parquet file.
 pub(crate) fn solve_chunk(

@@ -2,14 +2,14 @@
 
 use uuid::Uuid;
 
+use crate::jobs::attempts::attempt::Attempt;
+use crate::jobs::attempts::outcome::Work;
+use crate::jobs::attempts::slices::SlicedCase;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
 use crate::jobs::store::ending::{NewSlice, SliceRecord, StoredResult};
 use crate::jobs::submit::microseconds;
-use crate::jobs::worker::attempt::Attempt;
-use crate::jobs::worker::outcome::Work;
 use crate::jobs::worker::pool::Worker;
-use crate::jobs::worker::slices::SlicedCase;
 
 /// What became of a slice that was to be stored.
 pub(crate) enum SliceFate {

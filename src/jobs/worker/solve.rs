@@ -10,6 +10,9 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::{Fields, PatchFields};
+use crate::jobs::attempts::attempt_control::AttemptControl;
+use crate::jobs::attempts::outcome::{INTERNAL, Outcome, Work};
+use crate::jobs::attempts::slices::SlicedCase;
 use crate::jobs::codec::encode::encode;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
@@ -18,10 +21,7 @@ use crate::jobs::run::chunk::RunChunk;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
-use crate::jobs::worker::attempt_control::AttemptControl;
-use crate::jobs::worker::outcome::{INTERNAL, Outcome, Work};
 use crate::jobs::worker::rows;
-use crate::jobs::worker::slices::SlicedCase;
 
 /// Does the work; a panic becomes a failure and the thread stays usable.
 pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Work) -> Outcome {

@@ -11,15 +11,15 @@ use std::time::{Duration, Instant};
 
 use tokio::time::{MissedTickBehavior, interval};
 
+use crate::jobs::attempts::attempt::{Attempt, Phase};
+use crate::jobs::attempts::attempt_control::StopReason;
+use crate::jobs::attempts::outcome::Work;
+use crate::jobs::attempts::solver_thread::{Counted, SolverThread};
 use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::claim::ReleaseReason;
-use crate::jobs::worker::attempt::{Attempt, Phase};
-use crate::jobs::worker::attempt_control::StopReason;
 use crate::jobs::worker::begin;
-use crate::jobs::worker::outcome::Work;
 use crate::jobs::worker::pool::{StepReport, Turn, Worker};
-use crate::jobs::worker::solver_thread::{Counted, SolverThread};
 
 /// How long a solver that was told to stop may go on before its thread is left behind.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);

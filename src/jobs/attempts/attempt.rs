@@ -21,14 +21,14 @@ use std::time::{Duration, Instant};
 use tokio::sync::mpsc::UnboundedReceiver;
 use uuid::Uuid;
 
+use crate::jobs::attempts::attempt_control::{AttemptControl, StopReason};
+use crate::jobs::attempts::gate::Gate;
+use crate::jobs::attempts::lease::GroupLease;
+use crate::jobs::attempts::outcome::Outcome;
+use crate::jobs::attempts::running::RunningEntry;
+use crate::jobs::attempts::slices::SlicedCase;
+use crate::jobs::attempts::solver_thread::SolverThread;
 use crate::jobs::store::claim::Claim;
-use crate::jobs::worker::attempt_control::{AttemptControl, StopReason};
-use crate::jobs::worker::gate::Gate;
-use crate::jobs::worker::lease::GroupLease;
-use crate::jobs::worker::outcome::Outcome;
-use crate::jobs::worker::running::RunningEntry;
-use crate::jobs::worker::slices::SlicedCase;
-use crate::jobs::worker::solver_thread::SolverThread;
 
 /// One claimed job.
 #[derive(Debug)]
@@ -250,8 +250,8 @@ impl Attempt {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jobs::worker::lease::HeldLeases;
-    use crate::jobs::worker::running::RunningAttempts;
+    use crate::jobs::attempts::lease::HeldLeases;
+    use crate::jobs::attempts::running::RunningAttempts;
 
     fn attempt(jobs: u32) -> Attempt {
         let gate = Arc::new(Gate::default());

@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::{Duration, Instant};
 
+use crate::jobs::attempts::heap::give_memory_back;
 use crate::jobs::error::JobsError;
-use crate::jobs::worker::heap::give_memory_back;
 
 /// After tasks of at least this length free memory is given back to the system, which takes a walk over the whole heap.
 const LONG: Duration = Duration::from_secs(1);

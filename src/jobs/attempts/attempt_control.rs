@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::jobs::worker::gate::Gate;
+use crate::jobs::attempts::gate::Gate;
 
 /// Why a running solve was told to stop. The first reason given stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

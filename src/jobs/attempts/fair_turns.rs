@@ -6,8 +6,8 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::jobs::attempts::attempt::{Attempt, TimeSpentOn};
 use crate::jobs::model::lane::{rows_lane, tenant_of};
-use crate::jobs::worker::attempt::{Attempt, TimeSpentOn};
 
 /// Time after which a solver second counts half.
 const HALF_LIFE: Duration = Duration::from_secs(60);

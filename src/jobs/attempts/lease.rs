@@ -11,8 +11,8 @@ use tokio::task::AbortHandle;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
+use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::store::claim::Claim;
-use crate::jobs::worker::attempt_control::AttemptControl;
 
 /// The heartbeat of some claimed jobs; it ends when this is dropped.
 #[derive(Debug)]

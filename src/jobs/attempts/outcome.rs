@@ -2,11 +2,11 @@
 
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::remark::entry::RemarkEntry;
+use crate::jobs::attempts::slices::SlicedCase;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::model::job::Failure;
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
-use crate::jobs::worker::slices::SlicedCase;
 
 /// What came out of the solver thread.
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use uuid::Uuid;
 
-use crate::jobs::worker::attempt_control::AttemptControl;
+use crate::jobs::attempts::attempt_control::AttemptControl;
 
 /// The attempts of this process; clones share them.
 #[derive(Debug, Clone, Default)]
