@@ -16,7 +16,6 @@ use uuid::{ContextV7, Uuid};
 
 use crate::jobs::attempts::fair_turns::FairTurns;
 use crate::jobs::attempts::running::RunningAttempts;
-use crate::jobs::batch::unfinished::UnfinishedBatches;
 use crate::jobs::blobs::Blobs;
 use crate::jobs::clock_steps::ClockSteps;
 use crate::jobs::disk_reserve;
@@ -32,7 +31,7 @@ use crate::jobs::options::Options;
 use crate::jobs::quota::StagedBytes;
 use crate::jobs::recent_reads::RecentReads;
 use crate::jobs::result_place::settle::settle;
-use crate::jobs::shared::Shared;
+use crate::jobs::shared::{Shared, UnfinishedBatches};
 use crate::jobs::store::Store;
 use crate::jobs::store::cluster::Node;
 use crate::jobs::worker::pool::Worker;

@@ -1,5 +1,6 @@
 //! What every handle and every worker shares.
 
+use std::collections::HashSet;
 use std::fs::File;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -12,7 +13,6 @@ use uuid::{ContextV7, Timestamp, Uuid};
 
 use crate::jobs::attempts::fair_turns::FairTurns;
 use crate::jobs::attempts::running::RunningAttempts;
-use crate::jobs::batch::unfinished::UnfinishedBatches;
 use crate::jobs::blobs::Blobs;
 use crate::jobs::clock_steps::{ClockStep, ClockSteps};
 use crate::jobs::engine::Engine;
@@ -89,6 +89,22 @@ pub(crate) struct Shared {
     pub(crate) lock: Mutex<Option<File>>,
     /// Ids that are made with the clock of the store grow within a millisecond too.
     pub(crate) id_context: Mutex<ContextV7>,
+}
+
+/// Batches that are not acknowledged: being received and filled, or given up and to be removed.
+#[derive(Debug, Default)]
+pub(crate) struct UnfinishedBatches {
+    /// Being received or filled by this process.
+    pub(crate) living: HashSet<Uuid>,
+    /// Given up: their jobs are neither solved nor shown, and are removed as soon as the disk allows it.
+    pub(crate) abandoned: HashSet<Uuid>,
+}
+
+impl UnfinishedBatches {
+    /// This process neither receives nor fills this batch any more.
+    pub(crate) fn forget(&mut self, id: Uuid) {
+        self.living.remove(&id);
+    }
 }
 
 impl Shared {

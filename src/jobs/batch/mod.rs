@@ -6,5 +6,4 @@ pub mod fill;
 pub mod results;
 pub mod staging;
 pub mod template;
-pub mod unfinished;
 pub mod upload;
