@@ -14,8 +14,8 @@ use utoipa::openapi::{HeaderBuilder, ObjectBuilder, Required, ResponseBuilder};
 use utoipa_axum::router::OpenApiRouter;
 
 use crate::http::contract_forms;
-use crate::http::dto::problem::ProblemBody;
 use crate::http::examples::EXAMPLES;
+use crate::http::problem::body::ProblemBody;
 use crate::http::problem::catalogue::describe_also;
 use crate::http::problem::kinds::ProblemKind;
 

@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::question::Case;
 use crate::http::dto::job::rfc3339;
-use crate::http::dto::problem::Fault;
+use crate::http::problem::body::Fault;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::State as JobState;
 use crate::jobs::model::submit_options::Priority;

@@ -6,8 +6,8 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::remark::entry::RemarkEntry;
-use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
+use crate::http::problem::body::ProblemBody;
 use crate::jobs::model::job::{Job, QueuePlace, State as JobState};
 use crate::jobs::model::submit_options::Priority;
 

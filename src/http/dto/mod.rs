@@ -3,7 +3,6 @@
 pub(super) mod batch;
 pub(super) mod cells;
 pub(super) mod job;
-pub(super) mod problem;
 pub(super) mod result;
 pub(super) mod resultants;
 pub(super) mod run;

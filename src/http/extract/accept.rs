@@ -8,6 +8,7 @@ use axum::response::{IntoResponse, Response};
 use crate::http::extract::query::{Reader, reader};
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
+use crate::http::render::format::Format;
 
 /// Refuses requests that want something else than JSON, by `format` or because `Accept` excludes `application/json`.
 pub async fn require_json(request: Request, next: Next) -> Response {
@@ -28,67 +29,6 @@ pub async fn require_json(request: Request, next: Next) -> Response {
         given.join(", ")
     );
     ApiError::new(ProblemKind::NotAcceptable, detail).into_response()
-}
-
-/// A form in which something can be answered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
-    /// `application/json`.
-    Json,
-    /// `application/x-ndjson`: one JSON value per line.
-    Ndjson,
-    /// `text/csv`.
-    Csv,
-    /// NumPy's archive of arrays.
-    Npz,
-    /// Legacy VTK, binary.
-    Vtk,
-    /// A picture as SVG.
-    Svg,
-    /// A picture as PNG.
-    Png,
-    /// Arrow's stream of columns.
-    Arrow,
-    /// A Parquet file.
-    Parquet,
-    /// Server-sent events.
-    Events,
-}
-
-impl Format {
-    /// The name that `?format=` takes.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Format::Json => "json",
-            Format::Ndjson => "ndjson",
-            Format::Csv => "csv",
-            Format::Npz => "npz",
-            Format::Vtk => "vtk",
-            Format::Svg => "svg",
-            Format::Png => "png",
-            Format::Arrow => "arrow",
-            Format::Parquet => "parquet",
-            Format::Events => "events",
-        }
-    }
-
-    /// The content type of the answer.
-    #[must_use]
-    pub fn media_type(self) -> &'static str {
-        match self {
-            Format::Json => "application/json",
-            Format::Ndjson => "application/x-ndjson",
-            Format::Csv => "text/csv; charset=utf-8",
-            Format::Npz => "application/x-npz",
-            Format::Vtk => "application/x-vtk",
-            Format::Svg => "image/svg+xml",
-            Format::Png => "image/png",
-            Format::Arrow => "application/vnd.apache.arrow.stream",
-            Format::Parquet => "application/vnd.apache.parquet",
-            Format::Events => "text/event-stream",
-        }
-    }
 }
 
 /// Reads the name of one of the formats that are offered.

@@ -9,7 +9,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
 
-use crate::http::dto::problem::Fault;
+use crate::http::problem::body::Fault;
 use crate::http::problem::error::ApiError;
 
 /// Parameters that belong together; [`query`] makes such types.

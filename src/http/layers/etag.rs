@@ -12,8 +12,8 @@ use axum::response::{IntoResponse, Response};
 use http_body_util::BodyExt;
 use uuid::Uuid;
 
-use crate::http::extract::accept::Format;
 use crate::http::problem::error::ApiError;
+use crate::http::render::format::Format;
 use crate::jobs::Jobs;
 use crate::jobs::model::job::State;
 

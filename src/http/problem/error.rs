@@ -6,7 +6,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::contact::error::CaseError;
-use crate::http::dto::problem::{Fault, ProblemBody};
+use crate::http::problem::body::{Fault, ProblemBody};
 use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::StorageFault;
 use crate::jobs::error::JobsError;

@@ -3,6 +3,7 @@
 pub(super) mod batch_csv;
 pub(super) mod csv;
 pub(super) mod forces;
+pub(super) mod format;
 pub(super) mod npz;
 pub(super) mod picture;
 pub(super) mod pieces;

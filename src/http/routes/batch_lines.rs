@@ -13,10 +13,10 @@ use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::Solution;
-use crate::http::dto::problem::ProblemBody;
 use crate::http::dto::result::JobResult;
 use crate::http::limits::memory::Memory;
 use crate::http::limits::shares::Share;
+use crate::http::problem::body::ProblemBody;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::batch_csv::Columns;

@@ -9,7 +9,6 @@ use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
 
 use crate::http::dto::batch::{BatchAnswer, BatchReceipt, Cases, links};
-use crate::http::dto::problem::Fault;
 use crate::http::extract::batch::body::{form, read_draft};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::BatchId;
@@ -18,6 +17,7 @@ use crate::http::extract::query::{Parameters, Repeated, id, query, reader};
 use crate::http::extract::submit_options::SubmitQuery;
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
+use crate::http::problem::body::Fault;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;

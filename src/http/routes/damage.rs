@@ -7,9 +7,9 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::damage::{Damage, DamageFiguresUsed};
-use crate::http::extract::accept::Format;
 use crate::http::extract::query::{Parameters, index, query, require_index};
 use crate::http::problem::error::ApiError;
+use crate::http::render::format::Format;
 use crate::http::routes::part_request::PartRequest;
 use crate::http::routes::stored_fields::{FieldProblems, not_asked};
 

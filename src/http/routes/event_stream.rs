@@ -11,12 +11,13 @@ use axum::response::{IntoResponse, Response};
 use futures_util::{Stream, StreamExt};
 use serde::Serialize;
 
-use crate::http::extract::accept::{Format, choose};
+use crate::http::extract::accept::choose;
 use crate::http::extract::caller::{Caller, Credential, revoked};
 use crate::http::layers::auth::Access;
 use crate::http::limits::concurrency::ConcurrencyLimits;
 use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
 use crate::http::problem::error::ApiError;
+use crate::http::render::format::Format;
 use crate::jobs::Jobs;
 
 /// A comment is sent when nothing has happened for this long, so that no one in between closes the connection.

@@ -10,7 +10,6 @@ use axum::{Extension, Json};
 
 use crate::contact::case::words::question::Case;
 use crate::http::dto::job::JobAnswer;
-use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::json::JsonBody;
@@ -22,6 +21,7 @@ use crate::http::limits::memory::Memory;
 use crate::http::limits::shares::Share;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
+use crate::http::render::format::Format;
 use crate::http::routes::prefer_wait::{Awaited, preferred_wait, say_applied};
 use crate::http::routes::results::result_text;
 use crate::jobs::Jobs;

@@ -6,12 +6,12 @@ use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use uuid::Uuid;
 
-use crate::http::extract::accept::Format;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::memory::Rendering;
 use crate::http::problem::error::ApiError;
+use crate::http::render::format::Format;
 use crate::http::state::AppState;
 use crate::jobs::Jobs;
 

@@ -4,10 +4,10 @@ use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 use crate::contact::case::words::solver::Output;
-use crate::http::extract::accept::Format;
 use crate::http::extract::query::{Parameters, count, index, query, reader, require_index};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::problem::error::ApiError;
+use crate::http::render::format::Format;
 use crate::http::render::picture::draw::draw;
 use crate::http::render::picture::raster;
 use crate::http::render::picture::scene::Scene;

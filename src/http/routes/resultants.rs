@@ -5,11 +5,12 @@ use axum::response::{IntoResponse, Response};
 
 use crate::contact::solution::words::answer::Solution;
 use crate::http::dto::resultants::{Resultants, sums};
-use crate::http::extract::accept::{Format, choose, one_of};
+use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::query::{Parameters, index, query, require_index};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
+use crate::http::render::format::Format;
 use crate::http::render::resultants::{csv_body, json_body};
 use crate::http::routes::part_request::PartRequest;
 

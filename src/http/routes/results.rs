@@ -8,13 +8,13 @@ use futures_util::{StreamExt, TryStreamExt, stream};
 use uuid::Uuid;
 
 use crate::http::dto::result::JobResult;
-use crate::http::extract::accept::Format;
 use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
 use crate::http::limits::shares::Share;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
+use crate::http::render::format::Format;
 use crate::http::routes::prefer_wait::{Awaited, say_applied};
 use crate::jobs::Jobs;
 

@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::http::dto::run::{AnswerColumn, answer_columns};
-use crate::http::extract::accept::{Format, choose, one_of};
+use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::{Caller, Credential, revoked};
 use crate::http::extract::ids::RunId;
 use crate::http::extract::query::{Parameters, query, reader};
@@ -23,6 +23,7 @@ use crate::http::limits::memory::Memory;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
+use crate::http::render::format::Format;
 use crate::http::render::row_tables::{RowWriter, WriteError};
 use crate::jobs::codec::table::{RowTable, TableKind};
 use crate::jobs::run::model::Run;

@@ -7,9 +7,9 @@ use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
 use crate::http::dto::cells::{Cells, GriddedField, Outlines, per_cell};
-use crate::http::extract::accept::Format;
 use crate::http::extract::query::require_index;
 use crate::http::problem::error::ApiError;
+use crate::http::render::format::Format;
 use crate::http::render::table::File;
 use crate::http::routes::fields::{Field, FieldQuery, Selection, Written, write, write_file};
 use crate::http::routes::part_request::PartRequest;
