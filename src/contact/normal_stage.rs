@@ -3,8 +3,8 @@
 use crate::contact::error::SolveError;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::answer::{NormalError, NormalWork};
 use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::gap::answer::{NormalError, NormalWork};
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::problem::checked_case::CheckedCase;

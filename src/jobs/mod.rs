@@ -29,6 +29,12 @@
 //!     whose last reference goes enters an outbox in the same transaction, and the collector deletes it.
 //!
 //! [`lifecycle`] opens, starts and stops all this; [`shared`] is what its parts share.
+//!
+//! # The folders
+//!
+//! Each uses only those before it: [`model`] (the words of the room), [`codec`] (results, fields and tables as bytes),
+//! [`store`] (the job table), [`result_place`] (where results lie), [`attempts`] (one attempt at a job), [`keys`],
+//! [`maintenance`], [`batch`], [`run`] (batches of rows) and [`worker`]. [`handle`] with [`Jobs`] stands behind `attempts`.
 
 pub mod attempts;
 pub mod backup;

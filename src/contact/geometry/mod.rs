@@ -6,6 +6,7 @@ pub mod crossing;
 pub mod formats;
 pub mod frame;
 pub mod grouping;
+pub mod holes;
 pub mod local_gap;
 pub mod locus_lines;
 pub mod overlaps;

@@ -1,6 +1,5 @@
 //! The normal problem: which patches touch, and with what pressure.
 
-pub mod answer;
 pub mod footprint;
 pub mod gap;
 pub mod hertz;

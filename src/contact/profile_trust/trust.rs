@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::contact::error::SolveError;
 use crate::contact::geometry::contact_locus::ContactLocus;
+use crate::contact::geometry::holes::{Hole, holes};
 use crate::contact::geometry::profile::{Body, Profile};
-use crate::contact::geometry::profile_quality::holes::{Hole, holes};
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};

@@ -4,7 +4,6 @@
 //! that of the contact (see [`flattening`]).
 
 pub mod flattening;
-pub mod holes;
 pub mod noise;
 pub mod points;
 pub mod readings;

@@ -1,5 +1,6 @@
 //! Region and pressure of a given gap.
 
+pub mod answer;
 pub mod conjugate_gradients;
 pub mod constants;
 pub mod coupling;

@@ -1,6 +1,6 @@
 //! The answer of a gap: pressures of the last grids as a field, and remarks on them.
 
-use crate::contact::normal::answer::{NormalAnswer, NormalError, NormalWork};
+use crate::contact::normal::gap::answer::{NormalAnswer, NormalError, NormalWork};
 use crate::contact::normal::gap::edges;
 use crate::contact::normal::gap::start::GapStart;
 use crate::contact::normal::gap::task::GapTask;

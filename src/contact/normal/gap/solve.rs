@@ -6,7 +6,7 @@
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::answer::{NormalAnswer, NormalError, edge_reached, no_touch};
+use crate::contact::normal::gap::answer::{NormalAnswer, NormalError, edge_reached, no_touch};
 use crate::contact::normal::gap::conjugate_gradients::{
     PressureAnswer, PressureTask, solve_pressure,
 };

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::answer::NormalError;
+use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
 use crate::contact::normal::gap::constants::NEAR;
 use crate::contact::normal::gap::grid::{GridFineness, PressureGrid};
@@ -144,7 +144,7 @@ fn blocks(grid: &PressureGrid, pressed: &PressureAnswer) -> Vec<BlockLoad> {
 mod tests {
     use super::*;
     use crate::contact::monitor::Unmonitored;
-    use crate::contact::normal::answer::NormalAnswer;
+    use crate::contact::normal::gap::answer::NormalAnswer;
     use crate::contact::normal::gap::pilot::PilotOnce;
     use crate::contact::normal::gap::surface::GapSurface;
     use crate::contact::normal::pressure_field::field::PressureField;

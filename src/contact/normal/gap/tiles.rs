@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::answer::{NormalError, edge_reached};
+use crate::contact::normal::gap::answer::{NormalError, edge_reached};
 use crate::contact::normal::gap::conjugate_gradients::{
     PressureAnswer, PressureTask, solve_pressure,
 };

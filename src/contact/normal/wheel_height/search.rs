@@ -9,7 +9,7 @@ use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::answer::NormalError;
+use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::gap::grid::GridFineness;
 use crate::contact::normal::gap::pilot::PilotOnce;
 use crate::contact::normal::gap::surface::GapSurface;

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::local_gap::LocalGap;
-use crate::contact::normal::answer::NormalWork;
+use crate::contact::normal::gap::answer::NormalWork;
 use crate::contact::normal::gap::start::GapStart;
 use crate::contact::normal::gap::tile::Tile;
 use crate::contact::normal::pressure_field::field::PressureField;

@@ -1,4 +1,4 @@
-//! The result of a normal problem, or the reason why there is none.
+//! The contact of a gap, or the reason why there is none.
 
 use crate::contact::monitor::Stop;
 use crate::contact::normal::gap::conjugate_gradients;
