@@ -8,6 +8,8 @@
 
 use std::f64::consts::PI;
 
+use crate::contact::numerics::bisection::bisect;
+
 /// Places of the quadrature between the turning points, equally spaced in the angle: with linear Δr it is exact.
 const PLACES: usize = 2000;
 /// Halvings of a bracket; more change nothing.
@@ -103,15 +105,7 @@ impl RadiusDifference {
         if self.at(bound)[1] < energy {
             return None;
         }
-        let (mut inside, mut outside) = (rest, bound);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (inside + outside);
-            if self.at(middle)[1] < energy {
-                inside = middle;
-            } else {
-                outside = middle;
-            }
-        }
+        let [_, outside] = bisect([rest, bound], HALVINGS, |at| self.at(at)[1] < energy);
         Some(outside)
     }
 
@@ -124,19 +118,13 @@ impl RadiusDifference {
             Some([left, right])
         };
         // The right turning point is bounded by what both sides can reach.
-        let (mut inside, mut outside) = (rest, high);
         let wide = |[left, right]: [f64; 2]| right - left >= 2.0 * amplitude;
         if width(high).is_some_and(|turns| !wide(turns)) {
             return None;
         }
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (inside + outside);
-            if width(middle).is_none_or(wide) {
-                outside = middle;
-            } else {
-                inside = middle;
-            }
-        }
+        let [inside, _] = bisect([rest, high], HALVINGS, |right| {
+            width(right).is_some_and(|turns| !wide(turns))
+        });
         let found = width(inside)?;
         // Where the left side ends first, the width stops short of the amplitude.
         (found[1] - found[0] > 2.0 * amplitude * (1.0 - 1e-9)).then_some(found)

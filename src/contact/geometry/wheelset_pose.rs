@@ -2,11 +2,10 @@
 
 use crate::contact::geometry::rigid_touch::{RailTop, RigidTouch};
 use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::numerics::monotone_root::{CloseEnough, Course, try_find};
 
 /// The wheels' heights may differ by so much in mm, 1e-10 rad of roll.
 const LEVEL: f64 = 1e-7;
-/// Steps for the roll; between two places of contact the heights have a kink, which costs some.
-const STEPS_MAX: u32 = 40;
 
 /// Both wheels over both rails, to be placed again and again.
 #[derive(Debug, Clone)]
@@ -57,16 +56,17 @@ impl PairOfRails {
     ///
     /// # Errors
     /// A sentence, if a wheel is not over its rail or the roll is not found.
-    pub fn pose(
-        &mut self,
-        lateral_shift: f64,
-        yaw: f64,
-        mut roll: f64,
-    ) -> Result<RigidPose, String> {
-        let mut bracket = [f64::NEG_INFINITY, f64::INFINITY];
-        for _ in 0..STEPS_MAX {
+    pub fn pose(&mut self, lateral_shift: f64, yaw: f64, roll: f64) -> Result<RigidPose, String> {
+        // Rolled to the left rail's side up, the left wheel hangs higher: its height above the right one falls with the roll, with
+        // a kink where a wheel changes its place of contact.
+        let close = CloseEnough {
+            value: LEVEL,
+            place: 0.0,
+        };
+        let mut found = None;
+        let unbounded = [f64::NEG_INFINITY, f64::INFINITY];
+        try_find(unbounded, roll, Course::Falling, close, |roll| {
             let touches = self.touches(lateral_shift, yaw, roll)?;
-            // Rolled to the left rail's side up, the left wheel hangs higher: this falls with the roll.
             let above = touches[0].height - touches[1].height;
             let pose = RigidPose {
                 lateral_shift,
@@ -75,19 +75,14 @@ impl PairOfRails {
                 height: 0.5 * (touches[0].height + touches[1].height),
                 touches,
             };
-            if above.abs() <= LEVEL {
-                return Ok(pose);
-            }
-            let side = usize::from(above < 0.0);
-            bracket[side] = roll;
-            let next = roll + above / pose.contact_distance();
-            let middle = 0.5 * (bracket[0] + bracket[1]);
-            let inside = next > bracket[0] && next < bracket[1];
-            roll = if inside { next } else { middle };
-        }
-        Err(format!(
-            "no roll of the wheelset was found at which both wheels touch, at a lateral shift of {lateral_shift} mm"
-        ))
+            found = (above.abs() < LEVEL).then_some(pose);
+            Ok::<_, String>([above, -pose.contact_distance()])
+        })?;
+        found.ok_or_else(|| {
+            format!(
+                "no roll of the wheelset was found at which both wheels touch, at a lateral shift of {lateral_shift} mm"
+            )
+        })
     }
 
     /// The wheelset at a shift to the left in mm and a yaw in rad with its axle level, as if one wheel could hang in the air.

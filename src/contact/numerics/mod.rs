@@ -1,4 +1,30 @@
 //! General numerical algorithms, independent of contact mechanics; one implementation of each.
+//!
+//! | For | There is |
+//! | --- | --- |
+//! | a root between two bounds, with slopes | [`monotone_root`] |
+//! | a root of an increasing function without bounds, without slopes | [`bracketed_root`] |
+//! | the boundary of a condition | [`bisection`] |
+//! | the largest value in an interval | [`maximum`] |
+//! | values between nodes | [`cubic`] (one interval), [`hermite`] (given slopes, or slopes without overshoot), [`spline`] (smoothing), [`lagrange`] (one polynomial) |
+//! | integrals | [`quadrature`] |
+//! | linear equations | [`dense_lu`], [`gmres`]; few unknowns fitted to samples: [`least_squares`] |
+//! | connected cells | [`flood_fill`] |
+//! | logarithms in bulk | [`simd_ln`] |
+//!
+//! Some iterations of the physics resemble one of these, and stay where they are because what they do beside the iteration differs:
+//!
+//! - [`RailInFrame`](crate::contact::geometry::rail_in_frame) follows a curve with Newton's method. No bounds of the root are known, and
+//!   the end of the curve, or a curve that turns away, is an answer too.
+//! - [`WheelInFrame`](crate::contact::geometry::wheel_in_frame) has two unknowns, height and place on the profile.
+//! - [`rigid_touch`](crate::contact::geometry::rigid_touch) starts within 0.02 mm of the root and takes four steps untested; where the rail
+//!   is upright, it keeps the start instead of failing.
+//! - [`coordinates`](crate::contact::rolling::methods::table::coordinates) of the creep table always takes six steps, without a test in
+//!   between, because it is evaluated for millions of rows.
+//! - The [bracket](crate::contact::normal::wheel_height::bracket) of a wheel's height has ends at which there is no value, because the gap
+//!   could not be solved. Each value costs the solve of a gap, which gives a slope too, and values of different grids differ.
+//! - [`force_control`](crate::contact::rolling::force_control) and the [search](crate::contact::rolling::history::search) of a history
+//!   look for two creepages at once; the latter keeps its compliance from step to step.
 
 pub mod bisection;
 pub mod bracketed_root;
