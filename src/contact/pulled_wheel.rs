@@ -27,10 +27,10 @@ use crate::contact::wheel_on_rail::SolvedWheel;
 const MISSED_OF_TARGET: f64 = 0.1;
 /// See [`MISSED_OF_TARGET`].
 const MISSED_LEAST: f64 = 5e-5;
-/// Allowed error of the resultants in the first look, which tells patches, loads and radii.
+/// Allowed error of the resultants in the first estimate, which tells patches, loads and radii.
 /// Chosen by judgement; how much it matters was not measured.
 const TARGET_FIRST: f64 = 0.05;
-/// Progress of the first look and of the search; the rest is the answer.
+/// Progress of the first estimate and of the search; the rest is the answer.
 const PROGRESS: [f64; 2] = [0.1, 0.8];
 /// Trials after which the progress of the search stands still.
 /// Chosen by judgement; how much it matters was not measured.
@@ -67,8 +67,8 @@ pub(crate) fn solve(
     search.to(force, &first)
 }
 
-/// What the first look says of the contact.
-struct FirstLook {
+/// What the first estimate says of the contact.
+struct FirstEstimate {
     /// Friction limit of all patches in N.
     limit: f64,
     law: CubicLaw,
@@ -76,8 +76,8 @@ struct FirstLook {
     radius: f64,
 }
 
-impl FirstLook {
-    fn of(solution: &Solution, case: &CheckedCase) -> FirstLook {
+impl FirstEstimate {
+    fn of(solution: &Solution, case: &CheckedCase) -> FirstEstimate {
         let elasticity = &case.problem.elasticity;
         let modulus = case.problem.interface.reduction * elasticity.shear_modulus;
         let (mut limit, mut stiffness, mut load, mut moment) = (0.0, 0.0, 0.0, 0.0);
@@ -92,7 +92,7 @@ impl FirstLook {
             load += patch.normal_force_n;
             moment += patch.normal_force_n * radius_of(patch);
         }
-        FirstLook {
+        FirstEstimate {
             limit,
             law: CubicLaw {
                 stiffness: [stiffness / limit.max(f64::MIN_POSITIVE); 2],
@@ -141,7 +141,7 @@ impl PullSearch<'_> {
         trust::judged(self.operators, case, self.contact, &part)
     }
 
-    fn first(&self) -> Result<FirstLook, SolveError> {
+    fn first(&self) -> Result<FirstEstimate, SolveError> {
         let part = MonitorPart {
             inner: self.monitor,
             before: 0.0,
@@ -152,11 +152,11 @@ impl PullSearch<'_> {
             &self.at(0.0, self.contact.geometry.placement.rolling_radius, &run),
             part,
         )?;
-        Ok(FirstLook::of(&found.solution, self.case))
+        Ok(FirstEstimate::of(&found.solution, self.case))
     }
 
     /// The answer at the force.
-    fn to(&self, force: f64, first: &FirstLook) -> Result<(Solution, Fields), SolveError> {
+    fn to(&self, force: f64, first: &FirstEstimate) -> Result<(Solution, Fields), SolveError> {
         let target = self.case.run.resolution.target_or_usual();
         // Outputs never change forces, so that trials need none.
         let run = self.case.run.for_resultants(0.0);

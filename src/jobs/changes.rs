@@ -1,7 +1,7 @@
 //! Following everything that is a tenant's: jobs that were submitted alone, and batches.
 //!
 //! The store is asked again and again what changed since a moment; nothing is kept for a client. Changes are ordered by their
-//! time, but may become visible a little later than they say, so each look reaches back, and what was told already is left out.
+//! time, but may become visible a little later than they say, so each poll reaches back, and what was told already is left out.
 
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::time::Duration;
@@ -15,11 +15,11 @@ use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::{Job, State};
 use crate::jobs::store::list::{Change, Filter};
 
-/// Time between two looks.
+/// Time between two polls of the store.
 const PAUSE: Duration = Duration::from_millis(250);
-/// How far each look reaches back, in ms.
+/// How far each poll reaches back, in ms.
 const REACH_MS: i64 = 2000;
-/// Changes read at once; a look that finds more reads on. Chosen by judgement: a hundred kilobytes, far more than a look usually finds.
+/// Changes read at once; a poll that finds more reads on. Chosen by judgement: a hundred kilobytes, far more than a poll usually finds.
 const AT_ONCE: u32 = 1000;
 /// Running jobs whose progress is followed.
 const RUNNING_MAX: u32 = 100;
@@ -75,7 +75,7 @@ impl Follower {
             if let Some(next) = self.told.pop_front() {
                 return Ok(Some(next));
             }
-            self.look().await?;
+            self.poll().await?;
             if self.told.is_empty() {
                 tokio::select! {
                     () = sleep(PAUSE) => {}
@@ -85,7 +85,7 @@ impl Follower {
         }
     }
 
-    async fn look(&mut self) -> Result<(), JobsError> {
+    async fn poll(&mut self) -> Result<(), JobsError> {
         let (mut from, mut after) = (self.since.saturating_sub(REACH_MS), None);
         let mut batches = HashSet::new();
         loop {

@@ -41,7 +41,7 @@ impl ClockStep {
 
 impl ClockSteps {
     /// Reads the clocks and notes whether the wall clock was set.
-    pub(crate) fn look(&self, clock: &Clock) -> ClockStep {
+    pub(crate) fn measure(&self, clock: &Clock) -> ClockStep {
         let mut seen = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let wall = clock.now_ms();
         let offset = wall - clock.steady_ms();
@@ -76,9 +76,9 @@ mod tests {
         };
         let leaps = ClockSteps::default();
         let before = clock.now_ms();
-        assert_eq!(leaps.look(&clock).ms, 0);
+        assert_eq!(leaps.measure(&clock).ms, 0);
         set.store(3_600_000, Ordering::SeqCst);
-        let leap = leaps.look(&clock);
+        let leap = leaps.measure(&clock);
         assert!((leap.ms - 3_600_000).abs() < 1000, "{leap:?}");
         let now = clock.now_ms();
         assert!(leap.now_for(before, now) - before < 10_000);
@@ -88,9 +88,9 @@ mod tests {
             "what begins afterwards is judged by the clock"
         );
         set.store(0, Ordering::SeqCst);
-        assert_eq!(leaps.look(&clock), ClockStep::default());
+        assert_eq!(leaps.measure(&clock), ClockStep::default());
         // A clock that falls back harms nothing.
         set.store(-3_600_000, Ordering::SeqCst);
-        assert_eq!(leaps.look(&clock), ClockStep::default());
+        assert_eq!(leaps.measure(&clock), ClockStep::default());
     }
 }

@@ -97,11 +97,11 @@ impl Jobs {
     /// # Errors
     /// As [`Jobs::get`].
     pub(crate) async fn recent(&self, id: Uuid, age: Duration) -> Result<Job, JobsError> {
-        let look = self.shared.store.job(&self.tenant, id);
+        let read = self.shared.store.job(&self.tenant, id);
         let job = self
             .shared
             .recent_jobs
-            .at(&self.tenant, id, age, look)
+            .at(&self.tenant, id, age, read)
             .await?;
         match job {
             Some(job) if !self.sees(&job.labels) => Err(JobsError::NotFound),
@@ -112,11 +112,11 @@ impl Jobs {
 
     /// The same of a batch.
     pub(crate) async fn recent_batch(&self, id: Uuid, age: Duration) -> Result<Batch, JobsError> {
-        let look = self.shared.store.batch(&self.tenant, id);
+        let read = self.shared.store.batch(&self.tenant, id);
         let batch = self
             .shared
             .recent_batches
-            .at(&self.tenant, id, age, look)
+            .at(&self.tenant, id, age, read)
             .await?;
         match batch {
             Some(batch) if !self.sees(&batch.labels) => Err(JobsError::BatchNotFound),

@@ -10,10 +10,10 @@ use uuid::Uuid;
 
 /// Whose thing, and which.
 type OwnedId = (Arc<str>, Uuid);
-type Look<T> = Arc<tokio::sync::Mutex<Option<(Instant, T)>>>;
+type SharedRead<T> = Arc<tokio::sync::Mutex<Option<(Instant, T)>>>;
 
 /// The last reads of what clients follow.
-pub(crate) struct RecentReads<T>(Mutex<HashMap<OwnedId, Look<T>>>);
+pub(crate) struct RecentReads<T>(Mutex<HashMap<OwnedId, SharedRead<T>>>);
 
 impl<T> Default for RecentReads<T> {
     fn default() -> Self {
@@ -23,7 +23,7 @@ impl<T> Default for RecentReads<T> {
 
 impl<T> fmt::Debug for RecentReads<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("RecentLooks")
+        f.write_str("RecentReads")
     }
 }
 
@@ -34,7 +34,7 @@ impl<T: Clone> RecentReads<T> {
         tenant: &Arc<str>,
         id: Uuid,
         age: Duration,
-        look: impl Future<Output = Result<T, E>>,
+        read: impl Future<Output = Result<T, E>>,
     ) -> Result<T, E> {
         let last = {
             let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -46,7 +46,7 @@ impl<T: Clone> RecentReads<T> {
         {
             return Ok(found.clone());
         }
-        let found = look.await?;
+        let found = read.await?;
         *seen = Some((Instant::now(), found.clone()));
         drop(seen);
         drop(last);
@@ -57,9 +57,9 @@ impl<T: Clone> RecentReads<T> {
     /// Forgets what is not read any more.
     fn forget(&self, age: Duration) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        all.retain(|_, look| {
-            Arc::strong_count(look) > 1
-                || look.try_lock().is_ok_and(|seen| {
+        all.retain(|_, read| {
+            Arc::strong_count(read) > 1
+                || read.try_lock().is_ok_and(|seen| {
                     seen.as_ref()
                         .is_some_and(|(when, _)| when.elapsed() < 4 * age)
                 })
@@ -74,40 +74,40 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn a_thousand_who_look_for_the_same_are_a_few_looks() {
-        let looks = Arc::new(RecentReads::<u64>::default());
+    async fn a_thousand_clients_that_ask_for_the_same_cause_a_few_reads() {
+        let reads = Arc::new(RecentReads::<u64>::default());
         let asked = Arc::new(AtomicU64::new(0));
         let tenant: Arc<str> = "t".into();
         let (id, age) = (Uuid::now_v7(), Duration::from_millis(200));
         for round in 1..=2 {
             let before = asked.load(Ordering::SeqCst);
             let all = (0..1000).map(|_| {
-                let (looks, asked, tenant) = (looks.clone(), asked.clone(), tenant.clone());
+                let (reads, asked, tenant) = (reads.clone(), asked.clone(), tenant.clone());
                 tokio::spawn(async move {
-                    let look = async {
+                    let read = async {
                         tokio::time::sleep(Duration::from_millis(5)).await;
                         Ok::<_, ()>(asked.fetch_add(1, Ordering::SeqCst) + 1)
                     };
-                    looks.at(&tenant, id, age, look).await
+                    reads.at(&tenant, id, age, read).await
                 })
             });
             for found in all.collect::<Vec<_>>() {
                 assert!(found.await.unwrap().unwrap() > before, "older than allowed");
             }
             // One, on a machine that is not very slow.
-            let looked = asked.load(Ordering::SeqCst) - before;
-            assert!(looked <= 20, "round {round}: {looked}");
+            let made = asked.load(Ordering::SeqCst) - before;
+            assert!(made <= 20, "round {round}: {made}");
             tokio::time::sleep(age).await;
         }
         // A failed read is the answer of its caller alone, and what is not followed is forgotten.
-        let failed = looks
+        let failed = reads
             .at(&tenant, id, age, async { Err::<u64, _>("away") })
             .await;
         assert_eq!(failed, Err("away"));
-        let other = looks.at(&tenant, Uuid::now_v7(), age, async { Ok::<_, ()>(7) });
+        let other = reads.at(&tenant, Uuid::now_v7(), age, async { Ok::<_, ()>(7) });
         assert_eq!(other.await, Ok(7));
         tokio::time::sleep(5 * age).await;
-        looks.forget(age);
-        assert!(looks.0.lock().unwrap().is_empty());
+        reads.forget(age);
+        assert!(reads.0.lock().unwrap().is_empty());
     }
 }

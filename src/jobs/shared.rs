@@ -125,7 +125,7 @@ impl Shared {
 
     /// How far the wall clock has leapt since the start.
     pub(crate) fn clock_step(&self) -> ClockStep {
-        self.leaps.look(&self.options.clock)
+        self.leaps.measure(&self.options.clock)
     }
 
     /// A lease that begins now.

@@ -10,9 +10,9 @@ use crate::contact::geometry::locus_lines::LocusPoint;
 
 /// Overlaps nearer to each other than this along the rail, in mm, share one gap, because they influence each other. CONTACT, too,
 /// separates patches that are 8 mm or 30° apart.
-const TOGETHER: f64 = 8.0;
+const SHARED_GAP_DISTANCE: f64 = 8.0;
 /// They do so if their mean inclinations differ by less than this, in rad.
-const TOGETHER_ANGLE: f64 = 0.5;
+const SHARED_GAP_ANGLE: f64 = 0.5;
 
 /// An overlap is cut where it is thinner than this fraction of the lobes on both sides. By Hertz's law two bodies touch where they
 /// overlap by more than half of the deepest overlap, so that a lobe may be cut where it is thin. 0.25 and 0.5 change none
@@ -78,7 +78,7 @@ impl ContactLocus<'_> {
             };
             for overlap in lobes {
                 match found.last_mut() {
-                    Some(before) if self.together(*before, overlap, lowering, grouping) => {
+                    Some(before) if self.share_a_gap(*before, overlap, lowering, grouping) => {
                         before.ends[1] = overlap.ends[1];
                         before.cut[1] = overlap.cut[1];
                     }
@@ -122,8 +122,8 @@ impl ContactLocus<'_> {
         lobes
     }
 
-    /// Do two neighbouring overlaps share a gap?
-    fn together(
+    /// Whether two neighbouring overlaps share a gap: as a known grouping says, else by how near they are.
+    fn share_a_gap(
         &self,
         one: Overlap,
         other: Overlap,
@@ -132,7 +132,7 @@ impl ContactLocus<'_> {
     ) -> bool {
         let known =
             grouping.and_then(|grouping| Some(grouping.of(one.ends)? == grouping.of(other.ends)?));
-        known.unwrap_or_else(|| self.share_a_gap(one, other, lowering))
+        known.unwrap_or_else(|| self.are_near(one, other, lowering))
     }
 
     /// An overlap that bends, such as one of tread and flange together, cut where it is thin between two lobes of
@@ -152,7 +152,7 @@ impl ContactLocus<'_> {
                     valley = k;
                 }
                 if depths[valley] <= VALLEY_DEPTH * depths[k]
-                    && (angles[k] - angles[main]).abs() > TOGETHER_ANGLE
+                    && (angles[k] - angles[main]).abs() > SHARED_GAP_ANGLE
                     && other.is_none_or(|(deepest, _)| depths[k] > deepest)
                 {
                     other = Some((depths[k], valley));
@@ -214,12 +214,12 @@ impl ContactLocus<'_> {
         })
     }
 
-    fn share_a_gap(&self, one: Overlap, other: Overlap, lowering: f64) -> bool {
+    fn are_near(&self, one: Overlap, other: Overlap, lowering: f64) -> bool {
         let apart = self.lines[other.ends[0]].rail - self.lines[one.ends[1]].rail;
         let angle = |overlap: Overlap| self.frame(self.around(overlap.ends), lowering).angle;
         !one.cut[1]
-            && apart.abs() <= TOGETHER
-            && (angle(one) - angle(other)).abs() <= TOGETHER_ANGLE
+            && apart.abs() <= SHARED_GAP_DISTANCE
+            && (angle(one) - angle(other)).abs() <= SHARED_GAP_ANGLE
     }
 
     fn cut_off(&self, line: usize) -> String {

@@ -48,16 +48,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_top_of_a_hump_is_found_in_few_looks() {
+    fn the_top_of_a_hump_is_found_in_few_evaluations() {
         let humps: [(&dyn Fn(f64) -> f64, f64); 3] = [
             (&|x: f64| 1.0 - (x - 0.3).powi(2), 1.0),
             (&|x: f64| (x - 1.2).cos() * (1.0 + 1e-3 * x), 0.0),
             (&|x: f64| -(x - 0.77).abs(), 0.0),
         ];
         for (k, (hump, top)) in humps.into_iter().enumerate() {
-            let looks = std::cell::Cell::new(0);
+            let evaluations = std::cell::Cell::new(0);
             let counted = |x: f64| {
-                looks.set(looks.get() + 1);
+                evaluations.set(evaluations.get() + 1);
                 hump(x)
             };
             let found = maximum([-0.5, 2.0], counted);
@@ -71,7 +71,11 @@ mod tests {
             // At a kink the error of the value is proportional to that of the argument.
             let allowed = if k == 2 { 5e-5 } else { 1e-9 };
             assert!((found - exact).abs() < allowed, "{k}: {found} {exact}");
-            assert!(looks.get() <= 32, "{k}: {} looks", looks.get());
+            assert!(
+                evaluations.get() <= 32,
+                "{k}: {} evaluations",
+                evaluations.get()
+            );
         }
     }
 }

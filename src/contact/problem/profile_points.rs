@@ -3,7 +3,7 @@
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::points::{Grain, advised_smoothing};
-use crate::contact::geometry::profile_quality::shape::{Looks, looks_like};
+use crate::contact::geometry::profile_quality::shape::{LikelyBody, looks_like};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
@@ -80,8 +80,12 @@ pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
 #[must_use]
 pub fn misplaced(profile: &Profile, body: Body) -> Option<RemarkEntry> {
     let (looks, like, pointer) = match body {
-        Body::Rail => (Looks::Wheel, "a wheel with its flange", "/contact/rail"),
-        Body::Wheel => (Looks::Rail, "the head of a rail", "/contact/wheel"),
+        Body::Rail => (
+            LikelyBody::Wheel,
+            "a wheel with its flange",
+            "/contact/rail",
+        ),
+        Body::Wheel => (LikelyBody::Rail, "the head of a rail", "/contact/wheel"),
     };
     let remark = Remark::ProfileOfOtherBody {
         profile: body.name(),

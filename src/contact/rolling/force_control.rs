@@ -30,7 +30,7 @@ const SHARE_OF_TARGET: f64 = 0.02;
 const MISSED_FOR_TARGET: f64 = 1e-5;
 /// The same of the first search, on the coarsest level. 0.003 and 0.03 take 1 % more work on the 118 prescribed forces of `cargo bench --bench
 /// stress -- --only times`, and no such search five times as much, most of it in a few slender ellipses.
-const MISSED_BY_LOOK: f64 = 0.01;
+const MISSED_ON_COARSEST: f64 = 0.01;
 /// Tolerance of a force on an explicit mesh and for the simplified theory, relative to μN.
 const MISSED: f64 = 1e-6;
 /// Near μN the creepage depends on the small remainder `1 − force/μN`; the tolerance is at most this multiple of the remainder. Chosen by
@@ -49,7 +49,7 @@ const WORSE_MAX: u32 = 3;
 /// judgement; how much it matters was not measured.
 const INNER_TOLERANCE: f64 = 0.3;
 /// How often the levels are chosen anew because the motion that was found does not meet its target on them. Keeps the numbers safe; not tuned.
-const CLIMBS_MAX: u32 = 3;
+const LEVEL_CHOICES_MAX: u32 = 3;
 /// How often a search is corrected by what the answer judged at its end was extrapolated. Keeps the numbers safe; not tuned: the
 /// extrapolation changes by some per cent of the change of the force, so that two corrections suffice.
 const CORRECTIONS_MAX: u32 = 5;
@@ -74,9 +74,9 @@ pub fn solve(
     let mut search = ForceSearch::new(task, state, index, monitor);
     let mut place = search.places.start(&task.motions[index], before);
     if search.extrapolates && search.state.sweep.begin.is_none() {
-        place = search.look(place)?;
+        place = search.start_on_coarsest(place)?;
     }
-    for _ in 0..CLIMBS_MAX {
+    for _ in 0..LEVEL_CHOICES_MAX {
         // Refinement chooses the levels; on them the force is one function of the creepage.
         search.path.clear();
         search.plain = false;
@@ -153,7 +153,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
 
     /// Finds the places on the coarsest level, roughly; the start if they are not found there. The levels are then chosen, and the fine ones
     /// solved, for a motion near the one that is sought.
-    fn look(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
+    fn start_on_coarsest(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
         self.path = vec![self.state.policy.first()];
         self.rough = true;
         let found = match self.find(start) {
@@ -388,7 +388,7 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         let scale = self.first.unwrap_or(1.0).max(wanted).min(1.0);
         let left = (NEAR_LIMIT * (1.0 - wanted)).max(0.0);
         let most = if self.rough {
-            MISSED_BY_LOOK.max(most)
+            MISSED_ON_COARSEST.max(most)
         } else {
             most
         };

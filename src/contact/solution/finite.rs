@@ -110,14 +110,14 @@ impl Members {
     fn item<T: Serialize + ?Sized>(&mut self, item: &T) -> Result<(), Path> {
         let number = self.next;
         self.next += 1;
-        let look = item.serialize(Finder);
-        look.map_err(|path| path.under(format_args!("[{number}]")))
+        let visited = item.serialize(Finder);
+        visited.map_err(|path| path.under(format_args!("[{number}]")))
     }
 }
 
 fn member<T: Serialize + ?Sized>(name: &str, value: &T) -> Result<(), Path> {
-    let look = value.serialize(Finder);
-    look.map_err(|path| path.under(format_args!(".{name}")))
+    let visited = value.serialize(Finder);
+    visited.map_err(|path| path.under(format_args!(".{name}")))
 }
 
 /// Lists and tuples are searched in the same way.
@@ -259,7 +259,7 @@ impl Serializer for Finder {
         name: &'static str,
         _: usize,
     ) -> Result<Self::SerializeTupleStruct, Path> {
-        Err(unlooked(name))
+        Err(unvisited(name))
     }
 
     fn serialize_tuple_variant(
@@ -269,7 +269,7 @@ impl Serializer for Finder {
         _: &'static str,
         _: usize,
     ) -> Result<Self::SerializeTupleVariant, Path> {
-        Err(unlooked(name))
+        Err(unvisited(name))
     }
 
     fn serialize_map(self, _: Option<usize>) -> Result<Members, Path> {
@@ -287,13 +287,13 @@ impl Serializer for Finder {
         _: &'static str,
         _: usize,
     ) -> Result<Self::SerializeStructVariant, Path> {
-        Err(unlooked(name))
+        Err(unvisited(name))
     }
 }
 
 /// A type that answers do not contain yet. It is reported as an error, so that the search is extended when one does.
-fn unlooked(name: &str) -> Path {
-    Path(format!(" (nobody looks into the type {name})"))
+fn unvisited(name: &str) -> Path {
+    Path(format!(" (the search does not enter the type {name})"))
 }
 
 #[cfg(test)]
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_are_looked_at_too() {
+    fn cells_are_searched_too() {
         let mut patch = PatchFields {
             meshes: vec![PatchCells::default()],
             points: vec![PointFields::default(); 2],

@@ -20,12 +20,12 @@ pub(crate) fn trace<S: Clone + Send + Sync + 'static>(
     tracer: Option<&Tracer>,
 ) -> Router<S> {
     match tracer {
-        Some(tracer) => router.layer(from_fn_with_state(tracer.clone(), follow)),
+        Some(tracer) => router.layer(from_fn_with_state(tracer.clone(), trace_request)),
         None => router,
     }
 }
 
-async fn follow(State(tracer): State<Tracer>, request: Request, next: Next) -> Response {
+async fn trace_request(State(tracer): State<Tracer>, request: Request, next: Next) -> Response {
     let matched = request.extensions().get::<MatchedPath>();
     let route = matched.map(MatchedPath::as_str).unwrap_or_default();
     if route.is_empty() || UNTRACED.contains(&route) {

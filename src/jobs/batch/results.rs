@@ -64,12 +64,12 @@ impl Jobs {
                             .await
                             .is_ok_and(|job| !job.state.ended())
                     {
-                        let look = until.min(Instant::now() + POLL_INTERVAL);
+                        let poll_at = until.min(Instant::now() + POLL_INTERVAL);
                         // A lagging receiver may have missed the announcement, so it reads again as well.
                         let announced =
                             async { while ended.recv().await.is_ok_and(|ended| ended != first) {} };
                         tokio::select! {
-                            _ = timeout_at(look, announced) => {}
+                            _ = timeout_at(poll_at, announced) => {}
                             () = self.shared.draining.cancelled() => {}
                         }
                         // Many jobs end in the same moment; one read serves all of them.

@@ -21,7 +21,7 @@ pub(crate) async fn watch_deadlines(shared: Arc<Shared>) {
     let draining = shared.draining.clone();
     while draining.run_until_cancelled(beat.tick()).await.is_some() {
         if let Err(error) = enforce_deadlines(&shared).await {
-            tracing::warn!(%error, "deadlines could not be looked at");
+            tracing::warn!(%error, "deadlines could not be checked");
         }
     }
 }

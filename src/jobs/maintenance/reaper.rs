@@ -14,7 +14,7 @@ pub(crate) async fn reap_expired(shared: Arc<Shared>) {
     let recovered = shared.recovered.wait();
     let _ = shared.draining.run_until_cancelled(recovered).await;
     let mut quiet_until = i64::MIN;
-    let mut looked = shared.steady_ms();
+    let mut checked_at = shared.steady_ms();
     while shared
         .draining
         .run_until_cancelled(beat.tick())
@@ -27,10 +27,10 @@ pub(crate) async fn reap_expired(shared: Arc<Shared>) {
         }
         let now = shared.steady_ms();
         // Who was held up by the table has held up the heartbeats of the workers as well.
-        if now.saturating_sub(looked) > shared.lease_ms() * 2 / 3 {
+        if now.saturating_sub(checked_at) > shared.lease_ms() * 2 / 3 {
             quiet_until = shared.lease_until();
         }
-        looked = now;
+        checked_at = now;
         if now < quiet_until {
             continue;
         }

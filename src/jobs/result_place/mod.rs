@@ -17,7 +17,7 @@ use crate::jobs::result_place::url::ResultsPlace;
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::postgres::doctor::Finding;
 
-/// Looks at the place of the results of a database.
+/// Examines the place of the results of a database.
 ///
 /// # Errors
 /// The database cannot be reached, or has no job table.
@@ -26,9 +26,9 @@ pub async fn examine_results(
     place: Option<&ResultsPlace>,
 ) -> Result<Finding, JobsError> {
     let store = PostgresStore::open(url, 1).await?;
-    let looked = settle::examine(&store, place).await;
+    let examined = settle::examine(&store, place).await;
     store.close().await;
-    let (says, wrong) = looked?;
+    let (says, wrong) = examined?;
     Ok(Finding {
         about: "place of the results",
         says,

@@ -218,7 +218,7 @@ fn unusable(error: &Error) -> JobsError {
     JobsError::ResultPlace(error.to_string())
 }
 
-/// Looks at the place of the results of a database, and writes, reads and removes an object there.
+/// Examines the place of the results of a database, and writes, reads and removes an object there.
 ///
 /// # Errors
 /// The database failed.
@@ -232,13 +232,13 @@ pub(crate) async fn examine(
             None => ("not decided: no node has been started".to_owned(), false),
             Some(INSIDE) => ("in the database".to_owned(), false),
             Some(known) => (
-                format!("{known}; not looked at without --results-url"),
+                format!("{known}; not examined without --results-url"),
                 false,
             ),
         });
     };
-    let looked = timeout(SETTLED_WITHIN, look(&deployment, &place.url)).await;
-    Ok(match looked {
+    let probed = timeout(SETTLED_WITHIN, probe(&deployment, &place.url)).await;
+    Ok(match probed {
         Ok(Ok(())) => (
             format!("{}: an object was written, read and removed", place.url),
             false,
@@ -248,7 +248,8 @@ pub(crate) async fn examine(
     })
 }
 
-async fn look(deployment: &Deployment, url: &ResultsUrl) -> Result<(), JobsError> {
+/// Checks whose results are there, and writes, reads and removes an object.
+async fn probe(deployment: &Deployment, url: &ResultsUrl) -> Result<(), JobsError> {
     let wrong = |why: String| Err(JobsError::ResultPlace(why));
     match &deployment.results_place {
         Some(known) if known != &url.to_string() => {

@@ -81,8 +81,8 @@ impl Filter {
         read_cursor(text, &self.change_tag())
     }
 
-    /// Is more asked of a job than an index finds?
-    pub(crate) fn looks_at_jobs(&self) -> bool {
+    /// Whether jobs themselves have to be read, because no index knows all that is asked for.
+    pub(crate) fn reads_jobs(&self) -> bool {
         self.labels.len() > 1 || self.name.is_some() || self.updated_after.is_some()
     }
 

@@ -153,8 +153,8 @@ impl Worker {
         let (start, mut charged) = (Instant::now(), Instant::now());
         let turn_began = attempt.turn_began;
         let slice = shared.options.slice;
-        let mut look = interval(YIELD_CHECK_INTERVAL.min(slice.max(Duration::from_millis(1))));
-        look.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut check = interval(YIELD_CHECK_INTERVAL.min(slice.max(Duration::from_millis(1))));
+        check.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut told: Option<Instant> = None;
         // The member that nobody wants any more, and since when the solver has been at it all the same.
         let mut unwanted: Option<(usize, Instant)> = None;
@@ -174,7 +174,7 @@ impl Worker {
                     (told, closed) = (Some(Instant::now()), false);
                 }
                 () = lost.cancelled(), if told.is_none() => told = Some(Instant::now()),
-                _ = look.tick() => {
+                _ = check.tick() => {
                     shared.turns.charge(&attempt.tenant, charged.elapsed(), spent);
                     charged = Instant::now();
                     unwanted = attempt.unwanted().map(|member| {

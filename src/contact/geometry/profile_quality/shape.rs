@@ -22,7 +22,7 @@ const STRAY_POINTS_MAX: usize = 2;
 
 /// The body that a shape resembles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Looks {
+pub enum LikelyBody {
     /// A rail's head: wide on top and far from both ends.
     Rail,
     /// A wheel: its flange has a narrow tip.
@@ -31,12 +31,12 @@ pub enum Looks {
 
 /// The body that the points resemble, for either sense of z; `None` if the shape is inconclusive.
 #[must_use]
-pub fn looks_like(points: &[[f64; 2]]) -> Option<Looks> {
+pub fn looks_like(points: &[[f64; 2]]) -> Option<LikelyBody> {
     let mirrored: Vec<[f64; 2]> = points.iter().map(|[y, z]| [*y, -z]).collect();
     let either = |test: fn(&[[f64; 2]]) -> bool| test(points) || test(&mirrored);
     match (either(has_head), either(has_tip)) {
-        (true, false) => Some(Looks::Rail),
-        (false, true) => Some(Looks::Wheel),
+        (true, false) => Some(LikelyBody::Rail),
+        (false, true) => Some(LikelyBody::Wheel),
         _ => None,
     }
 }
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn a_rail_looks_like_a_rail_and_a_wheel_like_a_wheel_whatever_the_sense_of_z() {
-        for (points, looks) in [(head(), Looks::Rail), (wheel(), Looks::Wheel)] {
+        for (points, looks) in [(head(), LikelyBody::Rail), (wheel(), LikelyBody::Wheel)] {
             assert_eq!(looks_like(&points), Some(looks));
             assert_eq!(looks_like(&upside_down(&points)), Some(looks));
         }

@@ -8,7 +8,7 @@ const POINTS: usize = 48;
 /// Most samples along one axis that are evaluated one by one; of more samples, only every second or third is.
 const SAMPLES_MAX: usize = 400;
 /// Most boxes that are tried until one is filled; each try shrinks a box that is too large at least by half.
-const LOOKS_MAX: usize = 40;
+const BOXES_TRIED_MAX: usize = 40;
 /// A box is filled if the region found takes this fraction of it along both axes. Chosen by judgement; how much it matters was not measured.
 const FILLED: f64 = 0.5;
 /// Factor on the estimated approach: on smooth gaps it was never too small by more. If it is, the solution shows it and the box grows.
@@ -41,14 +41,16 @@ pub(crate) fn reach(gap: &GapSurface, loading: NormalLoad, contact_modulus: f64)
     let mut window = first_box(gap);
     let mut level = f64::INFINITY;
     let mut least = f64::INFINITY;
-    for _ in 0..LOOKS_MAX {
-        let look = GapSamples::new(gap, window);
-        least = look.least;
+    for _ in 0..BOXES_TRIED_MAX {
+        let samples = GapSamples::new(gap, window);
+        least = samples.least;
         level = match loading {
             NormalLoad::Approach(approach) => approach,
-            NormalLoad::Force(force) => look.least + MARGIN * look.depth(force / contact_modulus),
+            NormalLoad::Force(force) => {
+                samples.least + MARGIN * samples.depth(force / contact_modulus)
+            }
         };
-        let mut next = look.below(level, limits);
+        let mut next = samples.below(level, limits);
         if let Some(rolling) = gap.rolling_radius()
             && level > least
         {

@@ -93,9 +93,9 @@ impl Indicators {
         level: &StripMesh,
         answer: &LevelAnswer,
         found: &[Resultants],
-        circumstances: EstimateContext,
+        context: EstimateContext,
     ) -> Indicators {
-        let EstimateContext { motion, finer, .. } = circumstances;
+        let EstimateContext { motion, finer, .. } = context;
         let patches = task.footprint.patches();
         let none = vec![0.0; patches.len() + 1];
         let all = |value| Indicators::Known(vec![value; patches.len() + 1]);
@@ -119,7 +119,7 @@ impl Indicators {
             )));
         }
         if task.method == Method::LiuHsu {
-            return Indicators::Known(dense_errors(task, patches, found, circumstances));
+            return Indicators::Known(dense_errors(task, patches, found, context));
         }
         let rules = answer.second.as_ref().map(|second| {
             let second: Vec<Resultants> = (0..patches.len())
@@ -133,13 +133,13 @@ impl Indicators {
             pole_error(task, level, answer)
         };
         if matches!(task.resolution, Resolution::Mesh(_)) {
-            let errors = mesh_errors(task, level, rules.as_deref(), &sums, pole, circumstances);
+            let errors = mesh_errors(task, level, rules.as_deref(), &sums, pole, context);
             return Indicators::Known(errors);
         }
         let sticking = matches!(level.plan.regime, Regime::Sticking { .. });
         Indicators::Measured(Box::new(Measured {
             rules,
-            before: circumstances
+            before: context
                 .before
                 .map(|before| change(task, patches, level, found, before)),
             companions: [None, None],
@@ -151,7 +151,7 @@ impl Indicators {
                 Some(finer) => data_errors(patches, [level, finer]),
                 None => normal_errors(task, patches),
             },
-            tolerance: circumstances.tolerance,
+            tolerance: context.tolerance,
             scale: scale(task, level, patches.len()),
         }))
     }
@@ -324,9 +324,9 @@ fn dense_errors(
     task: &RollingTask,
     patches: &[Patch],
     found: &[Resultants],
-    circumstances: EstimateContext,
+    context: EstimateContext,
 ) -> RelativeErrors {
-    let Some(CoarserLevel { summed, share, .. }) = circumstances.before else {
+    let Some(CoarserLevel { summed, share, .. }) = context.before else {
         return vec![None; patches.len() + 1];
     };
     let factor = if share > SHARE_LARGE {
@@ -334,10 +334,10 @@ fn dense_errors(
     } else {
         DENSE_LEVELS
     };
-    let factor = factor * share * circumstances.slenderness.powf(CAUTION);
+    let factor = factor * share * context.slenderness.powf(CAUTION);
     distances(task, patches, found, summed)
         .iter()
-        .map(|d| Some((factor * d).max(circumstances.tolerance)))
+        .map(|d| Some((factor * d).max(context.tolerance)))
         .collect()
 }
 
@@ -348,19 +348,19 @@ fn mesh_errors(
     rules: Option<&[f64]>,
     sums: &[f64],
     pole: f64,
-    circumstances: EstimateContext,
+    context: EstimateContext,
 ) -> RelativeErrors {
     let factor = if task.footprint.is_closed_form() {
         RULES_ON_MESH
     } else {
         RULES_ON_MESH_SAMPLED
     };
-    let factor = factor * circumstances.slenderness.powf(CAUTION) * few_strips(level);
+    let factor = factor * context.slenderness.powf(CAUTION) * few_strips(level);
     let factor = factor * caution(task);
     let Some(rules) = rules else {
         return vec![None; sums.len()];
     };
-    let least = pole.max(circumstances.tolerance);
+    let least = pole.max(context.tolerance);
     let errors = rules.iter().zip(sums);
     errors
         .map(|(rule, sum)| Some((factor * rule).max(*sum).max(least)))

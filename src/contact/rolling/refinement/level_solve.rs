@@ -140,14 +140,14 @@ pub fn solve_level(
         .as_ref()
         .and_then(|point| before(state, &level, point));
     let finer = finer_for_sums(task, &level, asked, &tangential);
-    let circumstances = EstimateContext {
+    let context = EstimateContext {
         motion: &asked.motion,
         before,
         finer: finer.as_ref(),
         slenderness: state.policy.slenderness(),
         tolerance: task.tolerance(),
     };
-    let indicators = Indicators::of_level(task, &level, &tangential, &summed, circumstances);
+    let indicators = Indicators::of_level(task, &level, &tangential, &summed, context);
     state.sweep.remember(number, motion, &tangential);
     // A search for creepages solves its later trials on the same levels.
     state.sweep.path.push(number);

@@ -13,7 +13,7 @@ const BAR_SPACING: f64 = 9.0;
 /// The bound of friction is drawn if a force comes as near to it as this.
 const BOUND_IN_SIGHT: f64 = 0.4;
 /// Colour and dashes of the lines, in their order.
-const LOOKS: [&str; 2] = [
+const STYLES: [&str; 2] = [
     "stroke=\"#0b5a9e\"",
     "stroke=\"#b4530a\" stroke-dasharray=\"7 3\"",
 ];
@@ -84,8 +84,8 @@ pub(crate) fn draw(curve: &Curve, width: u32) -> String {
         let (x, y) = ends[1];
         svg.text((x - 6.0, y - 5.0), 11.0, Anchor::End, "fill=\"#555\"", "μN");
     }
-    for (line, look) in curve.lines.iter().zip(LOOKS) {
-        draw_line(&mut svg, &chart, curve, line, &order, look);
+    for (line, style) in curve.lines.iter().zip(STYLES) {
+        draw_line(&mut svg, &chart, curve, line, &order, style);
     }
     chart.axes(&mut svg, [&curve.x_name, "force in N"]);
     legend(&mut svg, curve);
@@ -99,13 +99,13 @@ fn draw_line(
     curve: &Curve,
     line: &CurveLine,
     order: &[usize],
-    look: &str,
+    style: &str,
 ) {
     let places = order.iter().map(|k| chart.at(curve.x[*k], line.y[*k]));
     let data = polyline(places, false);
     svg.path(
         &data,
-        &format!("fill=\"none\" {look} stroke-width=\"1.8\" stroke-linejoin=\"round\""),
+        &format!("fill=\"none\" {style} stroke-width=\"1.8\" stroke-linejoin=\"round\""),
     );
     let mut bars = String::new();
     let mut last = f64::NEG_INFINITY;
@@ -122,16 +122,19 @@ fn draw_line(
             let _ = write!(bars, "M{} {}h5", px(at - 2.5), px(end));
         }
     }
-    let solid = look.split(" stroke-dasharray").next().unwrap_or(look);
+    let solid = style.split(" stroke-dasharray").next().unwrap_or(style);
     svg.path(&bars, &format!("fill=\"none\" {solid}"));
 }
 
 fn legend(svg: &mut Svg, curve: &Curve) {
     let y = HEIGHT - 30.0;
     let mut x = 78.0;
-    for (line, look) in curve.lines.iter().zip(LOOKS) {
+    for (line, style) in curve.lines.iter().zip(STYLES) {
         let data = format!("M{} {}h30", px(x), px(y - 4.0));
-        svg.path(&data, &format!("fill=\"none\" {look} stroke-width=\"1.8\""));
+        svg.path(
+            &data,
+            &format!("fill=\"none\" {style} stroke-width=\"1.8\""),
+        );
         svg.text((x + 37.0, y), 12.0, Anchor::Start, "", line.name);
         x += 190.0;
     }

@@ -151,8 +151,8 @@ fn combs(svg: &mut Svg, chart: &Chart, patches: &[StandingPatch]) {
             let foot = comb.iter().map(|[across, _]| on(*across, 0.0));
             let back = comb.iter().rev();
             let shape = foot.chain(back.map(|[across, p]| on(*across, p / largest * COMB)));
-            let look = "fill=\"#2a78b8\" fill-opacity=\"0.75\" stroke=\"#0b5a9e\"";
-            svg.path(&polyline(shape, true), look);
+            let style = "fill=\"#2a78b8\" fill-opacity=\"0.75\" stroke=\"#0b5a9e\"";
+            svg.path(&polyline(shape, true), style);
         }
         let [_, y, z] = patch.position.track_mm;
         let (x, foot) = chart.at(y, z);

@@ -19,7 +19,7 @@ const CHANNEL: &str = "railhead";
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// Most bells in one notification, whose text may have 8000 bytes.
-const TOGETHER: usize = 200;
+const BELLS_MAX: usize = 200;
 
 /// After so long without a bell the server is asked whether it is still there: on a way that was cut, silence is all there is.
 const SILENT_FOR: Duration = Duration::from_secs(10);
@@ -47,8 +47,8 @@ impl BellRinger {
 }
 
 async fn ring_all(pool: PgPool, mut waiting: mpsc::Receiver<Bell>) {
-    let mut bells = Vec::with_capacity(TOGETHER);
-    while waiting.recv_many(&mut bells, TOGETHER).await > 0 {
+    let mut bells = Vec::with_capacity(BELLS_MAX);
+    while waiting.recv_many(&mut bells, BELLS_MAX).await > 0 {
         let text = text_of(&bells);
         bells.clear();
         let rung = sqlx::query("SELECT pg_notify($1, $2)")
@@ -140,6 +140,6 @@ mod tests {
         assert_eq!(heard, [Bell::Work, Bell::Ended(one), Bell::Cancel(other)]);
         assert_eq!(read("z1"), None);
         assert_eq!(read(""), None);
-        assert!(text_of(&[Bell::Ended(one); TOGETHER]).len() < 8000);
+        assert!(text_of(&[Bell::Ended(one); BELLS_MAX]).len() < 8000);
     }
 }

@@ -12,8 +12,8 @@ use crate::jobs::model::job::State;
 use crate::jobs::store::list::{BatchFilter, Page, Total, first_id_at};
 use crate::jobs::store_error::StoreError;
 
-/// Most batches that are looked at for one page, and how far they are counted.
-const LOOKED_AT: i64 = 10_000;
+/// Most batches that are examined for one page, and how far they are counted.
+const EXAMINED_MAX: i64 = 10_000;
 
 /// The columns a [`Batch`] is read from.
 const COLUMNS: &str = "id, tenant, created_at, count, rejected, name, labels, ended_at";
@@ -65,11 +65,11 @@ impl SqlStore {
     async fn count_batches(&self, tenant: &str, filter: &BatchFilter) -> Result<Total, StoreError> {
         let mut query = QueryBuilder::<Db>::new("SELECT COUNT(*) AS number FROM (");
         push_page(&mut query, "id", tenant, filter, None);
-        query.push(" LIMIT ").push_bind(LOOKED_AT);
+        query.push(" LIMIT ").push_bind(EXAMINED_MAX);
         query.push(") AS counted");
         let row = query.build().fetch_one(&self.readers).await?;
         let number = read_count(&row, "number")?;
-        Ok(match number < LOOKED_AT.unsigned_abs() {
+        Ok(match number < EXAMINED_MAX.unsigned_abs() {
             true => Total::Exactly(number),
             false => Total::AtLeast(number),
         })

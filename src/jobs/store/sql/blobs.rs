@@ -49,10 +49,10 @@ impl SqlStore {
         for some in results.chunks(VALUES_PER_STATEMENT) {
             // In this order: what a running job has written is known by its key before the job no longer runs.
             let running = self.running(some).await?;
-            let mut look = QueryBuilder::<Db>::new("SELECT key FROM blobs WHERE key IN (");
+            let mut query = QueryBuilder::<Db>::new("SELECT key FROM blobs WHERE key IN (");
             let keys: Vec<String> = some.iter().map(|(_, key)| key.clone()).collect();
-            push_keys(&mut look, &keys);
-            let known: HashSet<String> = look
+            push_keys(&mut query, &keys);
+            let known: HashSet<String> = query
                 .build_query_scalar::<String>()
                 .fetch_all(&self.readers)
                 .await?

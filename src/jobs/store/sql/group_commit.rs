@@ -15,7 +15,7 @@ use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
 use crate::jobs::store_error::StoreError;
 
 /// Most jobs stored together.
-const TOGETHER: usize = 256;
+const GROUP_MAX: usize = 256;
 
 /// What an idempotency key of a tenant stands for.
 pub(crate) const BY_KEY: &str = concat!(
@@ -39,15 +39,15 @@ pub(crate) struct GroupCommit(pub(crate) mpsc::Sender<Submission>);
 impl GroupCommit {
     /// Starts the task.
     pub(crate) fn start(writer: DbPool) -> GroupCommit {
-        let (sender, waiting) = mpsc::channel(TOGETHER);
+        let (sender, waiting) = mpsc::channel(GROUP_MAX);
         tokio::spawn(store_all(writer, waiting));
         GroupCommit(sender)
     }
 }
 
 async fn store_all(writer: DbPool, mut waiting: mpsc::Receiver<Submission>) {
-    let mut group = Vec::with_capacity(TOGETHER);
-    while waiting.recv_many(&mut group, TOGETHER).await > 0 {
+    let mut group = Vec::with_capacity(GROUP_MAX);
+    while waiting.recv_many(&mut group, GROUP_MAX).await > 0 {
         while !group.is_empty() {
             let later = set_aside_repeated_keys(&mut group);
             store_some(&writer, std::mem::replace(&mut group, later)).await;

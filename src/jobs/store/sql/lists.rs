@@ -11,8 +11,8 @@ use crate::jobs::model::job::{Job, State};
 use crate::jobs::store::list::{Change, Filter, Page, Total};
 use crate::jobs::store_error::StoreError;
 
-/// Most jobs that are looked at for one page where no index finds them.
-const LOOKED_AT: i64 = 20_000;
+/// Most jobs that are examined for one page where no index finds them.
+const EXAMINED_MAX: i64 = 20_000;
 /// How far the jobs of a list are counted.
 const COUNTED: i64 = 1_000;
 
@@ -34,7 +34,7 @@ impl SqlStore {
             for row in &query.build().fetch_all(&self.readers).await? {
                 jobs.push(read_job(row)?);
             }
-            if filter.looks_at_jobs() {
+            if filter.reads_jobs() {
                 let mut query = end_query(tenant, filter, state, after);
                 let end = query.build().fetch_optional(&self.readers).await?;
                 looked_to = looked_to.max(end.as_ref().map(read_id).transpose()?);
@@ -53,7 +53,7 @@ impl SqlStore {
         };
         Ok(Page {
             next_cursor: last.map(|last| filter.cursor_after(last)),
-            total: match filter.looks_at_jobs() {
+            total: match filter.reads_jobs() {
                 true => Total::AtLeast(jobs.len() as u64),
                 false => self.count(tenant, filter).await?,
             },
@@ -135,7 +135,7 @@ pub(crate) fn page_query(
     limit: u32,
 ) -> QueryBuilder<Db> {
     let most = i64::from(limit) + 1;
-    if !filter.looks_at_jobs() {
+    if !filter.reads_jobs() {
         let mut query = QueryBuilder::new("");
         walk(&mut query, job_columns!(), tenant, filter, state, after);
         query.push(" LIMIT ").push_bind(most);
@@ -143,8 +143,8 @@ pub(crate) fn page_query(
     }
     let mut query = QueryBuilder::new(concat!("SELECT ", job_columns!(), " FROM ("));
     walk(&mut query, job_columns!(), tenant, filter, state, after);
-    query.push(" LIMIT ").push_bind(LOOKED_AT);
-    query.push(") AS looked_at WHERE TRUE");
+    query.push(" LIMIT ").push_bind(EXAMINED_MAX);
+    query.push(") AS examined WHERE TRUE");
     if let Some(time) = filter.updated_after {
         query.push(" AND updated_at >= ").push_bind(time);
     }
@@ -161,13 +161,13 @@ pub(crate) fn page_query(
         query.push_bind(tenant.to_owned()).push(" AND key = ");
         query.push_bind(key.clone()).push(" AND value = ");
         query.push_bind(value.clone());
-        query.push(" AND job_id = looked_at.id)");
+        query.push(" AND job_id = examined.id)");
     }
     query.push(" ORDER BY id DESC LIMIT ").push_bind(most);
     query
 }
 
-/// The last of the jobs that are looked at for one page, if it was not the last of all.
+/// The last of the jobs that are examined for one page, if it was not the last of all.
 fn end_query(
     tenant: &str,
     filter: &Filter,
@@ -176,7 +176,7 @@ fn end_query(
 ) -> QueryBuilder<Db> {
     let mut query = QueryBuilder::new("");
     walk(&mut query, "id", tenant, filter, state, after);
-    query.push(" LIMIT 1 OFFSET ").push_bind(LOOKED_AT - 1);
+    query.push(" LIMIT 1 OFFSET ").push_bind(EXAMINED_MAX - 1);
     query
 }
 
