@@ -11,6 +11,24 @@
 //!
 //! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`], [`wheel_on_rail`] (in [`profile_trust`]), [`wheelset`].
 //! Frame, signs, units and words: [`conventions`].
+//!
+//! # The way of a motion
+//!
+//! 1. **Read**: [`case::read::draft`] turns JSON into the words of a [`Case`](case::words::question::Case) and names every fault of the text.
+//! 2. **Check**: [`case::checks`] turns each part into numbers and names every fault of them; [`case::check`] puts the parts together.
+//!    From here on there is only the [`CheckedCase`].
+//! 3. **Cut**: [`slices()`] divides a long sweep; [`solve_slice`] starts the clock of the recipe for each slice.
+//! 4. **Find region and pressure**: [`normal_stage::solve`]. A gap is solved by [`normal::gap::solve`], a wheel is brought to rest on its
+//!    rail by [`normal::wheel_height::search`], and each of its patches becomes a problem of its own in [`wheel_on_rail`].
+//! 5. **Take one motion after the other**: [`rolling_stage`]. [`rolling::force_control`] finds the creepages of a prescribed force; for
+//!    given creepages it passes the motion on. A history goes to [`rolling::history::solve`] instead.
+//! 6. **Refine**: [`rolling::refinement::refine`] solves the motion on a coarse mesh, chooses the next mesh by
+//!    [`rolling::refinement::mesh_policy`], and stops when the estimate meets the target.
+//! 7. **Solve one level**: [`rolling::refinement::level_solve`] chooses the start, calls the [method](rolling::methods), and collects what
+//!    [`rolling::refinement::error_estimate`] needs.
+//! 8. **Answer**: [`solution::assemble`] turns the [`MotionAnswer`](rolling::motion_answer::MotionAnswer) into the words of the client, with
+//!    the outputs that were asked for ([`solution::maintain`]: stresses, damage, temperatures).
+//! 9. **Finish**: [`solution::finish`] distributes the time, adds remarks on implausible numbers, and refuses numbers that are not finite.
 
 pub mod case;
 pub mod conventions;

@@ -18,13 +18,13 @@ pub struct SolvedFootprint {
     pub footprint: Footprint,
     /// How they were found, where they were not known beforehand.
     pub report: Option<NormalReport>,
-    /// Error of forces relative to μN that pressures leave because they do not quite belong to the tractions.
+    /// Error of forces relative to μN because the pressures were found without, or with earlier, tractions.
     pub coupling_error: f64,
     /// Remarks on them.
     pub remarks: Vec<RemarkEntry>,
 }
 
-/// Patches and pressures of a checked case; of a gap they are found.
+/// Patches and pressures of a checked case: known from the case, or found for a gap.
 ///
 /// # Errors
 /// Why there are none, or why the tangential problem on them needs too much memory; or the monitor stopped the work.
@@ -58,7 +58,7 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprin
     }
 }
 
-/// Patches and pressures of a gap, checked against the memory allowed; nothing is said of coupling and time.
+/// Patches and pressures of a gap, checked against the memory allowed; coupling error and time are left 0.
 ///
 /// # Errors
 /// As [`solve`].

@@ -77,7 +77,7 @@ fn solve_motions(
     Ok(assembly.finish())
 }
 
-/// Widens the estimates by what pressures leave that do not quite belong to the tractions.
+/// Adds the error of the pressures (see [`SolvedFootprint`]) to the estimates.
 fn add_coupling_error(point: &mut MotionAnswer, coupling: f64) {
     if coupling > 0.0 {
         let errors = point.errors.iter_mut().flatten();

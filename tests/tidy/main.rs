@@ -177,6 +177,45 @@ fn every_file_says_what_it_is_for() {
     assert_eq!(silent, Vec::<&str>::new());
 }
 
+/// Files that comments name, as `name.rs`, and that are neither in the room of the comment nor among tests and benches.
+fn names_of_no_file(sources: &Sources) -> Vec<String> {
+    let mut stale = Vec::new();
+    for (path, text) in sources.within("src/") {
+        let room: Vec<&str> = path.split('/').take(2).collect();
+        let room = room.join("/");
+        let places = [room.as_str(), "tests/", "benches/"];
+        let exists = |name: &str| {
+            let mut files = places.iter().flat_map(|place| sources.within(place));
+            files.any(|(file, _)| file.ends_with(&format!("/{name}")) || file == name)
+        };
+        for (number, line) in text.lines().enumerate() {
+            let comment = line.split_once("//").map_or("", |(_, comment)| comment);
+            let quoted = comment.split('`').skip(1).step_by(2);
+            let names = quoted.filter(|name| name.ends_with(".rs") && !name.contains('*'));
+            let gone = names.filter(|name| !exists(name));
+            stale.extend(gone.map(|name| format!("{path}:{}: {name}", number + 1)));
+        }
+    }
+    stale
+}
+
+#[test]
+fn files_that_comments_name_exist() {
+    let planted = Sources::planted(&[
+        ("src/jobs/a.rs", "//! See `b.rs`, `c/d.rs` and `gone.rs`."),
+        ("src/jobs/b.rs", "// `a.rs`, `tests/t.rs` and `c/b.rs`"),
+        ("tests/t.rs", ""),
+        ("src/jobs/c/d.rs", ""),
+        ("src/http/gone.rs", ""),
+    ]);
+    assert_eq!(
+        names_of_no_file(&planted),
+        ["src/jobs/a.rs:1: gone.rs", "src/jobs/b.rs:1: c/b.rs"]
+    );
+    let found = names_of_no_file(&Sources::below(&["src", "tests", "benches"]));
+    assert_eq!(found, Vec::<String>::new());
+}
+
 /// The targets of the relative links of a document that are not there.
 fn dead_links(document: &Path, text: &str) -> Vec<String> {
     let folder = document.parent().expect("a folder");

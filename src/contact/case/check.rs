@@ -94,7 +94,7 @@ impl CheckedCase {
     }
 }
 
-/// The motions whose creepages are given; those that are searched are looked at when they are found.
+/// The motions, if all their creepages are given; creepages that are searched are assessed once they are found.
 fn given_creepages<'a>(motions: &'a [Motion], forces: &[PrescribedForces]) -> &'a [Motion] {
     match forces.iter().all(|forces| *forces == [None; 2]) {
         true => motions,
@@ -112,7 +112,7 @@ fn label(case: &Case, digest: String) -> Label {
     }
 }
 
-/// What of a case stands in its answer.
+/// The parts of a case that its answer repeats.
 fn asked(case: &Case) -> Asked {
     Asked {
         contact: case.contact.name().to_owned(),

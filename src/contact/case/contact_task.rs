@@ -1,4 +1,4 @@
-//! What a case asks of the normal problem: from the words of contact and load to a checked task. Profiles: see `profiles.rs`.
+//! What a case asks of the normal problem: from the words of contact and load to a checked task. Wheel on rail: see `wheel_task.rs`.
 
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::error::Fault;

@@ -1,4 +1,4 @@
-//! Quantities derived from cell values: friction power, outlines, samples on a grid.
+//! Quantities derived from cell values: friction power, outlines, samples on a grid, stresses below the surface, damage, temperatures.
 
 pub mod damage;
 pub mod heat;

@@ -1,4 +1,17 @@
-//! The tangential problem of steady rolling.
+//! The tangential problem: which tractions, slips and forces belong to a motion on a given footprint.
+//!
+//! | question | where |
+//! |---|---|
+//! | what is asked | [`task`], [`motion`], [`resolution`] |
+//! | which creepages give a prescribed force | [`force_control`], with its unknowns in [`force_places`] |
+//! | on which meshes, until when | [`refinement`] |
+//! | how one mesh is solved | [`methods`] |
+//! | which equations they solve | [`slip_equations`], [`slip_rules`], [`layer_slip`] |
+//! | mesh, pressures and bounds of one level | [`strip_mesh`], [`strip_chords`] |
+//! | operators kept for later cases | [`operator_store`], [`own_blocks`] |
+//! | rolling that changes, step by step | [`history`], with [`displacement_memory`] |
+//! | what comes out | [`answer`] (one level), [`motion_answer`] (one motion), [`resultants`], [`vortex`] |
+//! | closed forms | [`linear_theory`], [`cubic_law`], [`load_ellipse`] |
 
 pub mod answer;
 pub mod cubic_law;

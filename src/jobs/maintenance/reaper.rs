@@ -26,7 +26,7 @@ pub(crate) async fn reap_expired(shared: Arc<Shared>) {
             quiet_until = shared.lease_until();
         }
         let now = shared.steady_ms();
-        // Who was held up by the table has held up the heartbeats of the workers as well.
+        // If the table has held up this loop, it has held up the heartbeats of the workers as well.
         if now.saturating_sub(checked_at) > shared.lease_ms() * 2 / 3 {
             quiet_until = shared.lease_until();
         }

@@ -25,7 +25,7 @@ const SHRINK_PAGES: u32 = 2000;
 const SPARE_PAGES: i64 = 4000;
 
 /// Pause between two steps, in which others may write.
-const BREATH: Duration = Duration::from_millis(20);
+const PAUSE: Duration = Duration::from_millis(20);
 
 /// Longest and shortest time between two sweeps.
 const SWEEP_EVERY: (Duration, Duration) = (Duration::from_secs(60), Duration::from_secs(1));
@@ -51,11 +51,11 @@ impl Shared {
     async fn sweep_expired(&self) -> Result<u64, JobsError> {
         let now = self.now_ms();
         let mut removed = 0;
-        let leapt = self.clock_step().ms > 0;
-        if leapt {
+        let clock_leapt = self.clock_step().ms > 0;
+        if clock_leapt {
             tracing::warn!("the clock was set forward; nothing is removed before the next start");
         }
-        if let Some(retention) = self.options.retention.filter(|_| !leapt) {
+        if let Some(retention) = self.options.retention.filter(|_| !clock_leapt) {
             let expiry = RetentionRule {
                 now,
                 ended_before: now.saturating_sub(millis(retention)),
@@ -68,12 +68,12 @@ impl Shared {
                 if expired < u64::from(SWEEP_JOBS) {
                     break;
                 }
-                tokio::time::sleep(BREATH).await;
+                tokio::time::sleep(PAUSE).await;
             }
         }
         self.collect_blobs().await;
         while self.store.compact(SPARE_PAGES, SHRINK_PAGES).await? {
-            tokio::time::sleep(BREATH).await;
+            tokio::time::sleep(PAUSE).await;
         }
         Ok(removed)
     }

@@ -51,7 +51,7 @@ async fn beat(shared: Arc<Shared>, kept: Arc<HeldLeases>) {
                 Err(error) => {
                     tracing::warn!(%error, "leases could not be renewed");
                     if error.storage_fault().is_some() {
-                        // What cannot be written cannot give the jobs away either.
+                        // While nothing can be written, the reaper cannot give the jobs away either.
                         seen = ticks;
                         until = now.saturating_add(lease_ms);
                     }

@@ -1,5 +1,4 @@
-//! What becomes of claimed jobs: answers that are known, results that are stored, ends that are written, and the rest
-//! that goes back to the queue.
+//! Writes what became of claimed jobs: known answers, stored results, ends; the rest goes back to the queue.
 
 use std::collections::{HashMap, HashSet};
 use std::time::SystemTime;
@@ -82,7 +81,7 @@ impl Worker {
     ) -> Result<(), JobsError> {
         let shared = &self.shared;
         let from = shared.options.tracer.is_some().then(SystemTime::now);
-        let mut sorted = Sorted::default();
+        let mut pending = PendingWrites::default();
         for place in 0..attempt.members.len() {
             let phase = &mut attempt.members[place].phase;
             if !matches!(phase, Phase::Solved(_)) {
@@ -90,18 +89,18 @@ impl Worker {
             }
             if let Phase::Solved(outcome) = std::mem::replace(phase, Phase::Done) {
                 let reason = attempt.members[place].control.reason();
-                self.sort(attempt, place, judge(outcome, reason), &mut sorted)
+                self.carry_out(attempt, place, judge(outcome, reason), &mut pending)
                     .await;
             }
         }
-        attempt.done(&sorted.lost);
-        step.lost.append(&mut sorted.lost);
-        let Sorted {
+        attempt.done(&pending.lost);
+        step.lost.append(&mut pending.lost);
+        let PendingWrites {
             ends,
             mut back,
             long,
             ..
-        } = sorted;
+        } = pending;
         self.finish(attempt, ends, from, step).await?;
         back.extend(attempt.claims(|phase| matches!(phase, Phase::NotBegun)));
         self.release(attempt, &back, ReleaseReason::NotBegun, step)
@@ -112,30 +111,30 @@ impl Worker {
         self.settle_duplicates(attempt, step).await
     }
 
-    /// Stores what there is to be stored of a member, and says what is to be written down of it.
-    async fn sort(
+    /// Stores the result or the slice that a verdict keeps, and notes what remains to be written for the member.
+    async fn carry_out(
         &self,
         attempt: &mut Attempt,
         place: usize,
         verdict: Verdict,
-        sorted: &mut Sorted,
+        pending: &mut PendingWrites,
     ) {
         let claim = attempt.members[place].claim.clone();
         let stored = match verdict {
-            Verdict::Discard => return sorted.lost.push(claim.id),
-            Verdict::Release => return sorted.back.push(claim),
-            Verdict::ReleaseAsLong => return sorted.long.push(claim),
+            Verdict::Discard => return pending.lost.push(claim.id),
+            Verdict::Release => return pending.back.push(claim),
+            Verdict::ReleaseAsLong => return pending.long.push(claim),
             Verdict::End(ending) => Ok(ending),
             Verdict::StoreSlice {
                 sliced,
                 part,
                 stopped,
             } => match self.keep_slice(attempt, place, sliced, part).await {
-                Ok(SliceFate::Lost) => return sorted.lost.push(claim.id),
+                Ok(SliceFate::Lost) => return pending.lost.push(claim.id),
                 Ok(SliceFate::Stored) => match stopped {
-                    Some(StopReason::TooLong) => return sorted.long.push(claim),
-                    Some(_) => return sorted.back.push(claim),
-                    None if self.makes_room(attempt).await => return sorted.back.push(claim),
+                    Some(StopReason::TooLong) => return pending.long.push(claim),
+                    Some(_) => return pending.back.push(claim),
+                    None if self.makes_room(attempt).await => return pending.back.push(claim),
                     None => return attempt.members[place].phase = Phase::Solving,
                 },
                 Err(error) => Err(error),
@@ -145,7 +144,7 @@ impl Worker {
                 remarks,
                 field_patches,
             } => self
-                .place(&claim, result)
+                .store_result(&claim, result)
                 .await
                 .map(|result| Ending::Succeeded {
                     remarks,
@@ -154,10 +153,10 @@ impl Worker {
                 }),
         };
         match stored {
-            Ok(ending) => sorted.ends.push((claim, ending)),
+            Ok(ending) => pending.ends.push((claim, ending)),
             // The service stops while the disk takes nothing.
-            Err(error) if error.storage_fault().is_some() => sorted.back.push(claim),
-            Err(error) => sorted.ends.push((claim, not_stored(&error))),
+            Err(error) if error.storage_fault().is_some() => pending.back.push(claim),
+            Err(error) => pending.ends.push((claim, not_stored(&error))),
         }
     }
 
@@ -210,7 +209,7 @@ impl Worker {
         }
     }
 
-    /// Members that waited for an equal one get its answer, or go back if it will not come.
+    /// Ends members that waited for an equal one with its answer; without an answer they go back to the queue.
     async fn settle_duplicates(
         &self,
         attempt: &mut Attempt,
@@ -239,8 +238,12 @@ impl Worker {
         self.answer_with(attempt, pairs.collect(), step).await
     }
 
-    /// Puts a result where it is kept: a small one goes into the database with the end of its job.
-    async fn place(&self, claim: &Claim, result: EncodedResult) -> Result<StoredResult, JobsError> {
+    /// Stores a large result as a blob; a small one is handed back and goes into the database with the end of its job.
+    async fn store_result(
+        &self,
+        claim: &Claim,
+        result: EncodedResult,
+    ) -> Result<StoredResult, JobsError> {
         let shared = &self.shared;
         // Other programs read the answers of rows where they lie.
         if !result.is_rows() && result.bytes() <= shared.options.small_result_max_bytes {
@@ -287,9 +290,9 @@ impl Worker {
     }
 }
 
-/// What is to be written down of the members of an attempt.
+/// What remains to be written for the members of an attempt, in few transactions for all of them.
 #[derive(Default)]
-struct Sorted {
+struct PendingWrites {
     ends: Vec<(Claim, Ending)>,
     back: Vec<Claim>,
     long: Vec<Claim>,

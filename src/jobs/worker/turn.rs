@@ -1,9 +1,9 @@
-//! Take whose turn it is, solve for a slice of time, record what became of it.
+//! One turn of a worker: solve for a slice of time, and record what became of the jobs.
 //!
 //! A turn is either a new claim, of a job or of a group of small ones, or a solve that waits at its gate. The async side
 //! claims and finishes; the arithmetic runs on a thread of the attempt's own, one at a time for each worker. When a slice
 //! is over and somebody else waits, the solver is held at its gate and the worker takes the next turn. A solver that does
-//! not listen any more is left behind with its thread, and the worker goes on with a new one.
+//! not stop when told to is left behind with its thread, and the worker goes on with a new one.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -156,7 +156,7 @@ impl Worker {
         let mut check = interval(YIELD_CHECK_INTERVAL.min(slice.max(Duration::from_millis(1))));
         check.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut told: Option<Instant> = None;
-        // The member that nobody wants any more, and since when the solver has been at it all the same.
+        // The member that was told to stop, and since when its solver has gone on all the same.
         let mut unwanted: Option<(usize, Instant)> = None;
         let mut closed = false;
         let gate = attempt.gate.clone();
@@ -201,15 +201,15 @@ impl Worker {
         turn
     }
 
-    /// Does a case that has just stored a slice go back to the queue? Only after half a slice of time, so that the next slice is
-    /// hardly ever interrupted.
+    /// Whether a case that has just stored a slice goes back to the queue. It does so only after half of its time has passed: then the
+    /// next slice would probably be interrupted.
     pub(crate) async fn makes_room(&self, attempt: &Attempt) -> bool {
         let slice = self.shared.options.slice;
         attempt.turn_began.elapsed() >= slice / 2 && self.somebody_waits().await
     }
 
-    /// Closes the gate, if there is room for one more solver that waits; a job that came although there was none, because
-    /// it was thought to be short, goes back.
+    /// Closes the gate, if one more solver may wait. If not, the solver goes on, or, where all gates are taken, gives a job back that was
+    /// claimed because it was expected to be short.
     fn hold(&self, attempt: &Attempt) -> bool {
         let options = &self.shared.options;
         let (parked, bytes) = self.shared.turns.parked();
@@ -241,8 +241,8 @@ impl Worker {
                 .is_ok_and(|tenants| !tenants.is_empty())
     }
 
-    /// Leaves a thread behind whose solver does not listen. Too many of them end the process, in good order: only that ends
-    /// them.
+    /// Leaves a thread behind whose solver does not stop. Nothing but the end of the process ends such threads, so that too many of
+    /// them shut the service down.
     fn leave_behind(&self, thread: Option<SolverThread>) {
         let Some(thread) = thread else { return };
         let shared = &self.shared;
