@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::cli::values::positive;
 use crate::jobs::Options;
-use crate::jobs::quota::StagingBounds;
+use crate::jobs::staged_bytes::StagingBounds;
 
 /// Settings of workers and of batches that are being received.
 #[derive(Debug, Clone, Args)]

@@ -1,4 +1,4 @@
-//! What friction will carry of a vertical force, forecast by the table of creep forces, so that the height of a wheel is sought with it.
+//! The part of a vertical force that friction will carry, forecast with the table of creep forces, so that the height of a wheel is sought with it.
 
 use crate::contact::error::SolveError;
 use crate::contact::friction::on_rail::in_frame;

@@ -6,9 +6,9 @@
 //! 1. [`server::listener`] accepts the connection and gives it a [place](server::places); [`server::connection`] passes its
 //!    requests on. A client that sends nothing, or does not read its answer, is disconnected ([`server::write_timeout`]).
 //! 2. The [`layers`] around all routes, from the outside inward: [`security_headers`], [`drain_body`], [`request_id`],
-//!    [`request_log`], [`otel`], [`metrics`], [`etag::complete`], [`compression`], the path in problems
-//!    ([`error::name_instance`]), [`origin_guard`], what the request holds until its answer is sent ([`holding_body`]),
-//!    [`catch_panic`], [`admission`] of compressed bodies and their decompression.
+//!    [`request_log`], [`otel`], [`metrics`], [`etag::complete`], [`compression`], [`final_newline`], the path in problems
+//!    ([`error::name_instance`]), [`origin_guard`], what is left of the rate ([`rate_limit::tell_left`]), what the request holds
+//!    until its answer is sent ([`holding_body`]), [`catch_panic`], [`admission`] of compressed bodies and their decompression.
 //! 3. The layers of a group of routes: whether JSON is accepted ([`accept::require_json`]) and what clients may keep
 //!    ([`etag::immutable`], [`etag::revalidate`]).
 //! 4. [`extract`]: the caller (key, tenant, rate), ids, query and body, each read strictly; what it takes is counted by

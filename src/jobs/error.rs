@@ -1,4 +1,4 @@
-//! Errors of this room.
+//! The errors of the calls of [`Jobs`](crate::jobs::Jobs).
 
 use std::path::PathBuf;
 

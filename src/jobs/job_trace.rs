@@ -1,4 +1,4 @@
-//! Spans of one job: `submit`, `queue`, `solve`, `store`.
+//! The spans of the life of one job: `submit`, `queue`, `solve`, `store`.
 
 use std::collections::HashMap;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};

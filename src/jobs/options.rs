@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use crate::contact::case::limits::Limits;
 use crate::jobs::clock::Clock;
-use crate::jobs::quota::StagingBounds;
 use crate::jobs::result_place::url::ResultsPlace;
+use crate::jobs::staged_bytes::StagingBounds;
 pub use crate::jobs::store::cluster::Bells;
 use crate::jobs::trace::Tracer;
 

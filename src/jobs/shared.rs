@@ -1,4 +1,4 @@
-//! What every handle and every worker shares.
+//! What all handles and workers of a process use together.
 
 use std::collections::HashSet;
 use std::fs::File;
@@ -21,8 +21,8 @@ use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::Job;
 use crate::jobs::model::key::Trusted;
 use crate::jobs::options::Options;
-use crate::jobs::quota::StagedBytes;
 use crate::jobs::recent_reads::RecentReads;
+use crate::jobs::staged_bytes::StagedBytes;
 use crate::jobs::store::Store;
 use crate::jobs::store::claim::Lease;
 use crate::jobs::store::cluster::{Bell, Node};

@@ -1,4 +1,4 @@
-//! The life of a job as spans of one trace: `submit`, `queue`, `solve`, `store`.
+//! What makes spans: of a request, of a submission, and of what has passed already.
 //!
 //! A job may be solved by another process than the one that took it, so its trace travels with its row, as a W3C
 //! `traceparent`. Where nobody collects spans there is no [`Tracer`], and nothing is made, stored or measured.

@@ -49,7 +49,7 @@ const ORDER: &[&str] = &[
     "jobs::error",
     "jobs::storage_fault",
     "jobs::codec",
-    "jobs::quota",
+    "jobs::staged_bytes",
     "jobs::store::list",
     "jobs::store::submission",
     "jobs::store::claim",

@@ -1,4 +1,4 @@
-//! The heartbeat of an attempt: from the claim until its end is written.
+//! The leases that an attempt holds, from the claim until its end is written, and whether they are to be renewed.
 //!
 //! While a solver works the leases are renewed only if it ticks: a heartbeat shall prove that the solver moves, not that
 //! the process lives. While it waits for its turn, and while results are stored, there is nothing to tick, and the leases

@@ -1,4 +1,4 @@
-//! API keys: which tenant a request belongs to. Of a key only its hash is kept.
+//! The keys of a data folder or database: made, listed and revoked, as `railhead keys` does. Only the hash of a key is kept.
 
 use std::path::Path;
 use std::sync::Arc;

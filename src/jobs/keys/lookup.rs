@@ -1,4 +1,4 @@
-//! Which tenant a request belongs to.
+//! Finds the key of a request, in memory if it was found a moment ago, else in the store.
 
 use std::sync::PoisonError;
 use std::time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! Claim, solve, finish: one path for every group of jobs, and a job is a group of one.
+//! Claim, solve, finish: one path for every group of jobs; a single job is a group of one.
 
 pub mod begin;
 pub mod claim_loop;
