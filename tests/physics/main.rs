@@ -20,6 +20,7 @@ mod fastsim;
 mod forces;
 mod forces_reference;
 mod friction;
+mod friction_along;
 mod friction_laws;
 mod friction_passage;
 mod gap_faults;

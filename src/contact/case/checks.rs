@@ -183,6 +183,13 @@ fn motion_faults(
         .zip(force)
         .map(|(mu, force)| mu.largest() * force);
     let mut faults = expanded.faults(motion, limit, of_profiles);
+    let lies_along = given
+        .friction
+        .is_some_and(|friction| friction.along.is_some());
+    if lies_along && expanded.history.is_none() {
+        let detail = "given without a history; rolling is steady only where nothing changes along the track: give /motion/history, or a coefficient";
+        faults.push(Fault::new("/friction/along", detail));
+    }
     if let Some(what) = given.friction.and_then(Friction::falls_with) {
         // Temperatures need speeds whatever they are for, see `AfterWords::faults`.
         if expanded.history.is_none() && what == "slip" {

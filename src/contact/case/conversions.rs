@@ -6,6 +6,7 @@ use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
 use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::friction::across::{AcrossLaw, AcrossPlace};
+use crate::contact::friction::along::AlongLaw;
 use crate::contact::friction::falling::{FallForm, FallTerm, FallingLaw};
 use crate::contact::friction::interface::{Interface, LayerYield};
 use crate::contact::friction::law::FrictionLaw;
@@ -78,11 +79,14 @@ impl FrictionLaw {
         }
         if let Some(across) = &words.across {
             let (place, at) = match (&across.angle_rad, &across.y_mm) {
-                (Some(angles), _) => (AcrossPlace::Angle, angles.clone()),
-                (None, y) => (AcrossPlace::Y, y.clone().unwrap_or_default()),
+                (Some(angles), _) => (AcrossPlace::Angle, angles),
+                (None, Some(y)) => (AcrossPlace::Y, y),
+                (None, None) => return FrictionLaw::Constant(0.0),
             };
-            let coefficient = across.coefficient.clone();
-            return FrictionLaw::Across(AcrossLaw::new(place, at, coefficient));
+            return FrictionLaw::Across(AcrossLaw::new(place, at, &across.coefficient));
+        }
+        if let Some(along) = &words.along {
+            return FrictionLaw::Along(AlongLaw::new(&along.x_mm, &along.coefficient));
         }
         let Some(law) = words.law else {
             return FrictionLaw::Constant(words.coefficient.unwrap_or(0.0));

@@ -51,10 +51,13 @@ fn pressed_fault(given: &BesideHistory) -> Option<Fault> {
         return Some(Fault::new("/motion/start", detail));
     }
     let friction = given.friction?;
-    let (pointer, what) = match (&friction.across, friction.layer) {
-        (Some(_), _) => ("/friction/across", "a coefficient that varies across"),
-        (None, Some(_)) => ("/friction/layer", "a layer"),
-        (None, None) => return None,
+    let (pointer, what) = match friction {
+        Friction {
+            across: Some(_), ..
+        } => ("/friction/across", "a coefficient that varies across"),
+        Friction { along: Some(_), .. } => ("/friction/along", "a coefficient that varies along"),
+        Friction { layer: Some(_), .. } => ("/friction/layer", "a layer"),
+        _ => return None,
     };
     let detail = format!(
         "{what} given for bodies that are \"pressed\", whose patch stays similar while it grows with one coefficient and without a layer only"

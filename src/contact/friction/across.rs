@@ -1,7 +1,6 @@
 //! Friction that varies across the contact: a table of coefficients by y or by the inclination of the surface.
 
-use std::sync::Arc;
-
+use crate::contact::friction::coefficient_table::CoefficientTable;
 use crate::contact::normal::load_across::LoadAcross;
 
 /// What the places of a table are.
@@ -18,37 +17,29 @@ pub enum AcrossPlace {
 pub struct AcrossLaw {
     /// What the places are.
     pub place: AcrossPlace,
-    table: Arc<[(f64, f64)]>,
+    table: CoefficientTable,
 }
 
 impl AcrossLaw {
     /// A law from as many places, in order, as coefficients, of which there is at least one.
     #[must_use]
-    pub fn new(place: AcrossPlace, at: Vec<f64>, coefficient: Vec<f64>) -> AcrossLaw {
+    pub fn new(place: AcrossPlace, at: &[f64], coefficient: &[f64]) -> AcrossLaw {
         AcrossLaw {
             place,
-            table: at.into_iter().zip(coefficient).collect(),
+            table: CoefficientTable::new(at, coefficient),
         }
     }
 
     /// The coefficient at a place; on a jump that of the side of larger places.
     #[must_use]
     pub fn at(&self, place: f64) -> f64 {
-        let table = &self.table;
-        let above = table.partition_point(|(at, _)| *at <= place);
-        match (above.checked_sub(1).map(|k| table[k]), table.get(above)) {
-            (Some((low, mu)), Some((high, next))) => {
-                mu + (place - low) / (high - low) * (next - mu)
-            }
-            (Some((_, mu)), None) | (None, Some(&(_, mu))) => mu,
-            (None, None) => 0.0,
-        }
+        self.table.at(place)
     }
 
     /// The largest coefficient.
     #[must_use]
     pub fn largest(&self) -> f64 {
-        self.table.iter().fold(0.0, |most, (_, mu)| most.max(*mu))
+        self.table.largest()
     }
 
     /// The mean coefficient of loads at places; the plain mean where nothing is carried.
@@ -72,7 +63,7 @@ impl AcrossLaw {
     /// The mean coefficient over a load.
     #[must_use]
     pub fn mean_over(&self, load: &LoadAcross) -> f64 {
-        load.mean(&self.table)
+        load.mean(self.table.points())
     }
 }
 
@@ -81,8 +72,11 @@ mod tests {
     use super::*;
 
     fn law() -> AcrossLaw {
-        let at = vec![-1.0, 1.0, 1.0, 2.0];
-        AcrossLaw::new(AcrossPlace::Y, at, vec![0.1, 0.3, 0.5, 0.2])
+        AcrossLaw::new(
+            AcrossPlace::Y,
+            &[-1.0, 1.0, 1.0, 2.0],
+            &[0.1, 0.3, 0.5, 0.2],
+        )
     }
 
     #[test]
@@ -121,10 +115,10 @@ mod tests {
     #[test]
     fn an_even_table_carries_its_coefficient_times_the_load() {
         let load = LoadAcross::of_ellipse([-2.0, 3.0]);
-        let even = AcrossLaw::new(AcrossPlace::Y, vec![0.0, 1.0], vec![0.3, 0.3]);
+        let even = AcrossLaw::new(AcrossPlace::Y, &[0.0, 1.0], &[0.3, 0.3]);
         assert!((even.mean_over(&load) - 0.3).abs() < 1e-14);
         // A straight line has the value of its middle.
-        let slope = AcrossLaw::new(AcrossPlace::Y, vec![-10.0, 10.0], vec![0.0, 0.4]);
+        let slope = AcrossLaw::new(AcrossPlace::Y, &[-10.0, 10.0], &[0.0, 0.4]);
         assert!((slope.mean_over(&load) - 0.21).abs() < 1e-14);
         assert_eq!(slope.mean([(0.0, 0.0), (5.0, 0.0)].into_iter()), 0.25);
     }

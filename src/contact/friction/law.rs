@@ -8,6 +8,7 @@
 use std::borrow::Borrow;
 
 use crate::contact::friction::across::AcrossLaw;
+use crate::contact::friction::along::AlongLaw;
 use crate::contact::friction::falling::{BoundFall, FallingLaw};
 use crate::contact::friction::passage::HeatedLaw;
 use crate::contact::normal::footprint::Footprint;
@@ -25,6 +26,9 @@ pub enum FrictionLaw {
     Across(AcrossLaw),
     /// A coefficient that falls with the temperature of the contact.
     Heated(HeatedLaw),
+    /// A coefficient that varies along the track, which a history passes over. Bounds and limits told here are those of the largest one; the
+    /// history takes its part of them step by step.
+    Along(AlongLaw),
 }
 
 impl FrictionLaw {
@@ -36,6 +40,7 @@ impl FrictionLaw {
             FrictionLaw::Falling(law) => law.at_rest(),
             FrictionLaw::Across(law) => law.largest(),
             FrictionLaw::Heated(law) => law.largest(),
+            FrictionLaw::Along(law) => law.largest(),
         }
     }
 
@@ -50,7 +55,10 @@ impl FrictionLaw {
     #[must_use]
     pub fn bound_fall(&self, rolling_speed: Option<f64>, slip_unit: f64) -> Option<BoundFall> {
         match self {
-            FrictionLaw::Constant(_) | FrictionLaw::Across(_) | FrictionLaw::Heated(_) => None,
+            FrictionLaw::Constant(_)
+            | FrictionLaw::Across(_)
+            | FrictionLaw::Heated(_)
+            | FrictionLaw::Along(_) => None,
             FrictionLaw::Falling(law) => {
                 rolling_speed.map(|speed| law.bound_fall(speed, slip_unit))
             }
@@ -75,7 +83,7 @@ impl FrictionLaw {
         let speed = speeds.iter().copied().flatten().reduce(f64::max)?;
         let most = |of: &dyn Fn(&Patch) -> f64| patches.iter().map(of).reduce(f64::max);
         match self {
-            FrictionLaw::Constant(_) | FrictionLaw::Across(_) => None,
+            FrictionLaw::Constant(_) | FrictionLaw::Across(_) | FrictionLaw::Along(_) => None,
             FrictionLaw::Falling(law) => {
                 let of = |patch: &Patch| law.stability(speed, patch.pressure_max, shear_modulus);
                 FallingLaw::too_fast(most(&of)?)
@@ -104,7 +112,19 @@ impl FrictionLaw {
     pub fn across(&self) -> Option<&AcrossLaw> {
         match self {
             FrictionLaw::Across(law) => Some(law),
-            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) | FrictionLaw::Heated(_) => None,
+            FrictionLaw::Constant(_)
+            | FrictionLaw::Falling(_)
+            | FrictionLaw::Heated(_)
+            | FrictionLaw::Along(_) => None,
+        }
+    }
+
+    /// The table of a coefficient that varies along the track, where it does.
+    #[must_use]
+    pub fn along(&self) -> Option<&AlongLaw> {
+        match self {
+            FrictionLaw::Along(law) => Some(law),
+            _ => None,
         }
     }
 
@@ -113,7 +133,10 @@ impl FrictionLaw {
     #[must_use]
     pub fn share(&self, loads: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
         match self {
-            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) | FrictionLaw::Heated(_) => 1.0,
+            FrictionLaw::Constant(_)
+            | FrictionLaw::Falling(_)
+            | FrictionLaw::Heated(_)
+            | FrictionLaw::Along(_) => 1.0,
             FrictionLaw::Across(law) => law.mean(loads) / law.largest(),
         }
     }
@@ -133,9 +156,10 @@ impl FrictionLaw {
         load: impl FnOnce() -> L,
     ) -> f64 {
         match self {
-            FrictionLaw::Constant(_) | FrictionLaw::Falling(_) | FrictionLaw::Heated(_) => {
-                self.largest() * normal_force
-            }
+            FrictionLaw::Constant(_)
+            | FrictionLaw::Falling(_)
+            | FrictionLaw::Heated(_)
+            | FrictionLaw::Along(_) => self.largest() * normal_force,
             FrictionLaw::Across(law) => law.mean_over(load().borrow()) * normal_force,
         }
     }
@@ -148,9 +172,10 @@ impl FrictionLaw {
             FrictionLaw::Constant(coefficient) => {
                 coefficient * patches.iter().map(|patch| patch.normal_force).sum::<f64>()
             }
-            FrictionLaw::Falling(_) | FrictionLaw::Across(_) | FrictionLaw::Heated(_) => {
-                (0..patches.len()).map(|k| self.limit(footprint, k)).sum()
-            }
+            FrictionLaw::Falling(_)
+            | FrictionLaw::Across(_)
+            | FrictionLaw::Heated(_)
+            | FrictionLaw::Along(_) => (0..patches.len()).map(|k| self.limit(footprint, k)).sum(),
         }
     }
 }

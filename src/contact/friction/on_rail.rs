@@ -38,6 +38,6 @@ pub(crate) fn in_frame(
     let (y, coefficient): (Vec<f64>, Vec<f64>) = found.unzip();
     match y.is_empty() {
         true => FrictionLaw::Constant(law.largest()),
-        false => FrictionLaw::Across(AcrossLaw::new(AcrossPlace::Y, y, coefficient)),
+        false => FrictionLaw::Across(AcrossLaw::new(AcrossPlace::Y, &y, &coefficient)),
     }
 }

@@ -1,4 +1,4 @@
-//! Reads `friction`: a coefficient, a law that falls with slip or temperature or a coefficient across, and what lies between the bodies.
+//! Reads `friction`: a coefficient, a law that falls with slip or temperature or a coefficient across or along, and what lies between the bodies.
 
 use serde_json::Value;
 
@@ -6,7 +6,7 @@ use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, shown};
 use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::words::friction::{
-    AcrossWords, ByTemperatureWords, FallName, FallTermWords, Friction, LayerWords,
+    AcrossWords, AlongWords, ByTemperatureWords, FallName, FallTermWords, Friction, LayerWords,
 };
 
 const COEFFICIENT: AllowedRange = AllowedRange::closed(0.0, 100.0, "");
@@ -22,10 +22,10 @@ const REDUCTION: AllowedRange = AllowedRange::positive(1.0, "");
 const TEMPERATURE: AllowedRange = AllowedRange::closed(-273.15, 1e5, "°C");
 const YIELD: AllowedRange = AllowedRange::positive(1e9, "MPa");
 const HARDENING: AllowedRange = AllowedRange::closed(0.0, 1e9, "MPa/mm");
-/// Points of a coefficient across, or by temperature.
+/// Points of a coefficient across, along or by temperature.
 const POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// The ways to give a coefficient.
-const WAYS: [&str; 4] = ["coefficient", "law", "across", "by_temperature"];
+const WAYS: [&str; 5] = ["coefficient", "law", "across", "along", "by_temperature"];
 const LAWS: [(&str, FallName); 3] = [
     ("exponential", FallName::Exponential),
     ("rational", FallName::Rational),
@@ -42,6 +42,10 @@ pub(crate) fn read(case: &mut Object) -> Option<Friction> {
         ["law"] => law(&mut block),
         ["across"] => across(&mut block).map(|across| Friction {
             across: Some(across),
+            ..Friction::default()
+        }),
+        ["along"] => along(&mut block).map(|along| Friction {
+            along: Some(along),
             ..Friction::default()
         }),
         ["by_temperature"] => by_temperature(&mut block).map(|law| Friction {
@@ -164,20 +168,7 @@ fn across(block: &mut Object) -> Option<AcrossWords> {
         true => ("angle_rad", ANGLE),
         false => ("y_mm", PLACE),
     };
-    let places = list(&mut across, name, allowed);
-    let coefficient = list(&mut across, "coefficient", ACROSS);
-    let (places, coefficient) = (places?, coefficient?);
-    as_many(&mut across, name, places.len(), coefficient.len())?;
-    if let Some(k) = places.windows(2).position(|pair| pair[1] < pair[0]) {
-        let pointer = join(&across.pointer_to(name), k + 1);
-        let detail = format!(
-            "{} given after {}; the places have to be in order, and two may be equal where the coefficient jumps",
-            places[k + 1],
-            places[k]
-        );
-        across.faults().add(pointer, detail);
-        return None;
-    }
+    let (places, coefficient) = places(&mut across, name, allowed)?;
     let places = Some(places);
     let (y_mm, angle_rad) = if angles {
         (None, places)
@@ -189,6 +180,32 @@ fn across(block: &mut Object) -> Option<AcrossWords> {
         angle_rad,
         coefficient,
     })
+}
+
+fn along(block: &mut Object) -> Option<AlongWords> {
+    let mut along = block.child("along")?;
+    along.only(&["x_mm", "coefficient"], &[]);
+    let (x_mm, coefficient) = places(&mut along, "x_mm", PLACE)?;
+    Some(AlongWords { x_mm, coefficient })
+}
+
+/// Places in order, and as many coefficients.
+fn places(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<(Vec<f64>, Vec<f64>)> {
+    let places = list(block, name, allowed);
+    let coefficient = list(block, "coefficient", ACROSS);
+    let (places, coefficient) = (places?, coefficient?);
+    as_many(block, name, places.len(), coefficient.len())?;
+    if let Some(k) = places.windows(2).position(|pair| pair[1] < pair[0]) {
+        let pointer = join(&block.pointer_to(name), k + 1);
+        let detail = format!(
+            "{} given after {}; the places have to be in order, and two may be equal where the coefficient jumps",
+            places[k + 1],
+            places[k]
+        );
+        block.faults().add(pointer, detail);
+        return None;
+    }
+    Some((places, coefficient))
 }
 
 /// There is one coefficient for every place of a table.

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`), `across` and `by_temperature`. `layer` and `reduction` make the contact
-/// softer to tractions and may stand beside each of them.
+/// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`), `across`, `along` and `by_temperature`. `layer` and
+/// `reduction` make the contact softer to tractions and may stand beside each of them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema)]
 pub struct Friction {
     /// Friction coefficient: 0 (frictionless), or 1e-12 to 100.
@@ -27,6 +27,10 @@ pub struct Friction {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub across: Option<AcrossWords>,
+    /// A coefficient that varies along the track; the case needs a `history`, which rolls over it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub along: Option<AlongWords>,
     /// A coefficient that falls with the temperature of the contact; the case needs `thermal` and every motion its `speed_mm_per_s`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -84,6 +88,19 @@ pub struct AcrossWords {
     pub coefficient: Vec<f64>,
 }
 
+/// A coefficient along the track, on which it lies still while the contact rolls over it: linear between points, constant outside; two
+/// points at the same place are a jump.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = FrictionAlong)]
+pub struct AlongWords {
+    /// Places in mm, in order: x in the axes of the case when the history begins. After a rolled distance q the contact's x = 0 stands at q.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub x_mm: Vec<f64>,
+    /// The coefficient at each of them, 1e-12 to 100.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub coefficient: Vec<f64>,
+}
+
 /// A coefficient by the temperature of both surfaces in the contact: linear between points, constant outside. Friction heats the contact,
 /// and every place has the coefficient of the temperature it reaches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -126,6 +143,7 @@ impl Friction {
         let falling = |limit: f64| limit + self.terms.iter().map(|t| t.coefficient).sum::<f64>();
         let across = self.across.iter().flat_map(|across| &across.coefficient);
         let given = self.coefficient.or_else(|| self.limit.map(falling));
+        let across = across.chain(self.along.iter().flat_map(|along| &along.coefficient));
         let across = across.chain(self.by_temperature.iter().flat_map(|law| &law.coefficient));
         across.fold(given.unwrap_or(0.0), |most, value| most.max(*value))
     }

@@ -2,9 +2,10 @@
 
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::rolling::answer::project_on_bound;
-use crate::contact::rolling::history::level_run::{LevelRun, StepEquations};
+use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan::{StepKind, weights};
 use crate::contact::rolling::history::record::PointRecord;
+use crate::contact::rolling::history::step_equations::StepEquations;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::slip_equations::SlipSource;
@@ -93,7 +94,7 @@ impl LevelRun<'_> {
         let slips: Vec<bool> = slides.into_iter().map(|slips| slips > 0.5).collect();
         let mut traction = self.expand(&self.state.tractions);
         let mut slip = self.expand(slip);
-        slip = project_on_bound(&level.bound, &slips, &mut traction, &slip);
+        slip = project_on_bound(&self.bounds_of_mesh(), &slips, &mut traction, &slip);
         let scale = level.scale;
         let motion = self.state.motion;
         let (shifted, motion) = match of.kind {

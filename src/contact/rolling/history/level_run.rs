@@ -6,13 +6,13 @@ use std::sync::Arc;
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::answer::{LevelFailure, Work};
-use crate::contact::rolling::displacement_memory::{DisplacementMemory, LeadingEdges};
-use crate::contact::rolling::history::plan::{
-    HistoryStep, PRESS_WEIGHTS, StepKind, steps, weights,
-};
+use crate::contact::rolling::displacement_memory::LeadingEdges;
+use crate::contact::rolling::history::plan::{HistoryStep, StepKind, steps, weights};
 use crate::contact::rolling::history::record::PointRecord;
 use crate::contact::rolling::history::search::StepSearch;
+use crate::contact::rolling::history::step_equations::{StepEquations, memory, steady};
 use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::rolling::history::track_friction::TrackFriction;
 use crate::contact::rolling::methods::boundary_element::fixed_point::slide_along;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{
@@ -42,7 +42,11 @@ pub struct LevelRun<'a> {
     pub(super) edges: LeadingEdges,
     /// Cells with unknowns.
     pub(super) cells: usize,
+    /// Of the last step.
     pub(super) bound: Vec<f64>,
+    pub(super) track: Option<TrackFriction>,
+    /// Friction limit of the unknowns with the largest coefficient, dimensionless.
+    pub(super) limit: f64,
     pub(super) area: Vec<f64>,
     /// Residual of the tractions, and by how much forces may be missed, both relative.
     pub(super) tolerance: [f64; 2],
@@ -70,13 +74,6 @@ pub(super) struct RunState {
     pub(super) saturated: bool,
 }
 
-/// Equations of steps of one kind.
-pub(super) struct StepEquations<'e> {
-    pub(super) kind: StepKind,
-    pub(super) equations: &'e SlipEquations<'e>,
-    pub(super) newton: &'e Newton<'e>,
-}
-
 impl<'a> LevelRun<'a> {
     /// A run that begins without tractions.
     ///
@@ -100,14 +97,19 @@ impl<'a> LevelRun<'a> {
         };
         let patches = task.footprint.patches().len();
         let zero = vec![0.0; 2 * padded];
-        Ok(LevelRun {
-            cells: match parity {
-                Some(_) => level.mesh.cells() / 2,
-                None => level.mesh.cells(),
-            },
+        let cells = match parity {
+            Some(_) => level.mesh.cells() / 2,
+            None => level.mesh.cells(),
+        };
+        let (bound, area) = (resized(&level.bound), resized(&level.normalised.areas()));
+        let forces = area.iter().zip(&bound).take(cells);
+        let mut run = LevelRun {
+            cells,
+            limit: forces.map(|(area, bound)| area * bound).sum(),
+            track: None,
             edges: LeadingEdges::new(&level.normalised, level.poisson_ratio(), parity),
-            bound: resized(&level.bound),
-            area: resized(&level.normalised.areas()),
+            bound,
+            area,
             state: RunState {
                 tractions: zero.clone(),
                 guess: zero.clone(),
@@ -126,7 +128,9 @@ impl<'a> LevelRun<'a> {
             tolerance,
             workspace,
             monitor,
-        })
+        };
+        run.track = run.track_friction();
+        Ok(run)
     }
 
     /// Solves all points with steps of at most `longest` mm.
@@ -180,7 +184,7 @@ impl<'a> LevelRun<'a> {
 
     /// The search for the forces of steps of a kind.
     fn search(&self, kind: StepKind) -> StepSearch {
-        let limit = self.limit();
+        let limit = self.limit;
         let patch = self.task.footprint.patches()[0].extent;
         let stiffness = STIFFNESS / limit;
         let reach = match kind {
@@ -201,6 +205,7 @@ impl<'a> LevelRun<'a> {
         step: &HistoryStep,
         search: &mut StepSearch,
     ) -> Result<(), LevelFailure> {
+        self.lay_bounds(step);
         if of.kind == StepKind::Press {
             return self.press(of);
         }
@@ -369,14 +374,8 @@ impl<'a> LevelRun<'a> {
                 .map(|i| self.area[i] * values[i])
                 .sum::<f64>()
         };
-        let limit = self.limit();
+        let limit = self.limit;
         [sum(x) / limit, sum(y) / limit]
-    }
-
-    /// Friction limit of the unknowns, dimensionless.
-    pub(super) fn limit(&self) -> f64 {
-        let cells = self.area.iter().zip(&self.bound).take(self.cells);
-        cells.map(|(area, bound)| area * bound).sum()
     }
 
     /// Takes over the tractions of a step.
@@ -396,30 +395,6 @@ impl<'a> LevelRun<'a> {
         state.motion = motion;
         self.dissipate(of, &from);
     }
-}
-
-/// How the displacements enter the slip of a step of this kind, for a unit of length in mm.
-fn memory(kind: StepKind, edges: &LeadingEdges, unit: f64) -> DisplacementMemory<'_> {
-    let (factor, rolls) = match kind {
-        StepKind::Steady => (0.0, true),
-        StepKind::Shift => (1.0, false),
-        StepKind::Press => (PRESS_WEIGHTS[0], false),
-        StepKind::Roll { distance, growth } => (weights(growth)[0] * unit / distance, true),
-    };
-    DisplacementMemory {
-        edges,
-        factor,
-        rolls,
-    }
-}
-
-/// Equations of steady rolling by a rule.
-fn steady<'e>(
-    rule: Rule,
-    (level, operator, parity): (&StripMesh, &'e LevelOperator, Option<Parity>),
-) -> SlipEquations<'e> {
-    SlipEquations::new(rule, &level.normalised, &operator.influence, parity)
-        .with_layer(&level.normalised, level.layer)
 }
 
 /// A motion that has every component that any motion or shift of a history has.

@@ -8,4 +8,6 @@ pub mod record;
 pub(crate) mod search;
 pub(crate) mod smaller_self;
 pub mod solve;
+pub(crate) mod step_equations;
 pub mod task;
+pub(crate) mod track_friction;

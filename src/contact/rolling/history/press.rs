@@ -8,9 +8,10 @@ use std::ops::ControlFlow;
 
 use crate::contact::half_space::unlike_bodies::displacement;
 use crate::contact::rolling::answer::LevelFailure;
-use crate::contact::rolling::history::level_run::{LevelRun, StepEquations};
+use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan::PRESS_WEIGHTS;
 use crate::contact::rolling::history::smaller_self::{PressedPair, PressedState, SmallerSelf};
+use crate::contact::rolling::history::step_equations::StepEquations;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_equations::SlipScratch;
 
@@ -111,7 +112,7 @@ impl LevelRun<'_> {
     pub(super) fn mean(&self, tractions: &[f64]) -> f64 {
         let half = tractions.len() / 2;
         let of_cell = |i: usize| self.area[i] * tractions[i].hypot(tractions[half + i]);
-        (0..self.cells).map(of_cell).sum::<f64>() / self.limit()
+        (0..self.cells).map(of_cell).sum::<f64>() / self.limit
     }
 
     /// The state of tractions and of displacements that pressures give.
