@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::contact::mesh::strips::Chord;
+use crate::contact::normal::axis_ratio::{axis_ratio, axis_ratio_and_integral, complete_integrals};
 use crate::contact::normal::patch::Patch;
 
 /// An elliptic patch with Hertz's pressure `p0 √(1 − x²/a² − y²/b²)`, centred at the origin.
@@ -194,14 +195,14 @@ pub struct HertzShape {
 }
 
 impl HertzShape {
-    /// The shape of bodies with relative radii of curvature `rolling` and `lateral` in mm; relative accuracy about 1e-12.
+    /// The shape of bodies with relative radii of curvature `rolling` and `lateral` in mm; relative accuracy about 1e-11.
     #[must_use]
     pub fn of_radii(rolling: f64, lateral: f64) -> HertzShape {
         let (large, small) = (rolling.max(lateral), rolling.min(lateral));
-        let ratio = axis_ratio_quick(small / large);
+        let (ratio, d_integral) = axis_ratio_and_integral(small / large);
         HertzShape {
             ratio,
-            d_integral: complete_integrals(ratio).1,
+            d_integral,
             curvature: 0.5 / large,
             long: rolling >= lateral,
         }
@@ -221,153 +222,9 @@ impl HertzShape {
     }
 }
 
-/// As [`axis_ratio`] to about 1e-12, with a third of the steps: each pair of them is extrapolated to its limit (Aitken).
-fn axis_ratio_quick(curvature_ratio: f64) -> f64 {
-    const ROUNDS_MAX: usize = 12;
-    let step = |k: f64| {
-        let (k_integral, d_integral) = complete_integrals(k);
-        let next = curvature_ratio * (k_integral - d_integral) / d_integral;
-        next.sqrt().min(1.0)
-    };
-    let mut k = curvature_ratio.powf(2.0 / 3.0);
-    for _ in 0..ROUNDS_MAX {
-        let one = step(k);
-        let two = step(one);
-        let bend = two - 2.0 * one + k;
-        let far = two - (two - one) * (two - one) / bend;
-        let next = if bend != 0.0 && far > 0.0 && far <= 1.0 {
-            far
-        } else {
-            two
-        };
-        let change = (next - k).abs();
-        k = next;
-        if change <= 1e-7 * k {
-            // The next round would square the relative change.
-            break;
-        }
-    }
-    k
-}
-
-/// Ratio of the semi-axes (smaller to larger) for the ratio A/B of the curvatures, both from 0 to 1.
-///
-/// Solves `k² D(k)/(K(k) − D(k)) = A/B` by iterating `k = √(A/B (K − D)/D)`. The bracket varies slowly with k: each
-/// step reduces the error at least fourfold, from the circle (where `A/B ≈ k^{3/2}`) to any slender ellipse.
-fn axis_ratio(curvature_ratio: f64) -> f64 {
-    const STEPS_MAX: usize = 40;
-    let mut k = curvature_ratio.powf(2.0 / 3.0);
-    for _ in 0..STEPS_MAX {
-        let (k_integral, d_integral) = complete_integrals(k);
-        let next = (curvature_ratio * (k_integral - d_integral) / d_integral)
-            .sqrt()
-            .min(1.0);
-        let change = (next - k).abs();
-        k = next;
-        if change <= f64::EPSILON * k {
-            break;
-        }
-    }
-    // A quarter to the power of the steps is 1e-24: the loop has converged for every ratio that a case may have.
-    k
-}
-
-/// Complete elliptic integrals K and `D = (K − E)/m` of parameter m = 1 − k², for 0 < k ≤ 1.
-///
-/// Arithmetic–geometric mean: `K = π/(2 agm(1, k))` and `D = K Σ 2^{n−1} c_n²/m`. The quotients `c_n²/m` are carried
-/// along as such, so nothing is 0/0 at the circle. Relative accuracy a few units in the last place. Source: Gauss;
-/// Abramowitz and Stegun 1964, 17.6.
-fn complete_integrals(k: f64) -> (f64, f64) {
-    let (mut a, mut g) = (0.5 * (1.0 + k), k.sqrt());
-    let mut c = 0.5 * (1.0 - k);
-    let mut quotient = 0.25 * (1.0 - k) / (1.0 + k);
-    let mut weight = 1.0;
-    let mut sum = 0.5 + quotient;
-    while c > f64::EPSILON * a {
-        let a_next = 0.5 * (a + g);
-        quotient *= (c / (4.0 * a_next)).powi(2);
-        c = c * c / (4.0 * a_next);
-        g = (a * g).sqrt();
-        a = a_next;
-        weight *= 2.0;
-        sum += weight * quotient;
-    }
-    let k_integral = PI / (a + g);
-    (k_integral, k_integral * sum)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
-
-    /// b/a, A/B, A a²E*/(p0 b), B a²E*/(p0 b), K, E; own computation with 20 digits after Johnson 1985, chapter 4.
-    const TABLE: [[f64; 6]; 12] = [
-        [1.0, 1.0, FRAC_PI_4, FRAC_PI_4, FRAC_PI_2, FRAC_PI_2],
-        [0.9, 0.853799, 0.849087, 0.994481, 1.654617, 1.493290],
-        [0.8, 0.715418, 0.924084, 1.291671, 1.750754, 1.418083],
-        [0.7, 0.585250, 1.013821, 1.732286, 1.862641, 1.345592],
-        [0.6, 0.463807, 1.123364, 2.422053, 1.995303, 1.276350],
-        [0.5, 0.351772, 1.260613, 3.583611, 2.156516, 1.211056],
-        [0.4, 0.250109, 1.438819, 5.752779, 2.359264, 1.150656],
-        [0.3, 0.160256, 1.682743, 10.500341, 2.627773, 1.096478],
-        [0.2, 0.084555, 2.047511, 24.215045, 3.016112, 1.050502],
-        [0.1, 0.027370, 2.706711, 98.892644, 3.695637, 1.015994],
-        [0.05, 0.008500, 3.387756, 398.554806, 4.384143, 1.004856],
-        [0.01, 0.000499, 4.991814, 9997.754010, 5.991589, 1.000275],
-    ];
-
-    #[test]
-    fn integrals_agree_with_the_table() {
-        for [k, curvature_ratio, a, b, k_expected, e_expected] in TABLE {
-            let (k_integral, d) = complete_integrals(k);
-            let e = k_integral - (1.0 - k * k) * d;
-            assert!(
-                (k_integral - k_expected).abs() < 6e-7,
-                "K({k}) = {k_integral}"
-            );
-            assert!((e - e_expected).abs() < 6e-7, "E({k}) = {e}");
-            assert!((d - a).abs() < 6e-7, "D({k}) = {d}");
-            assert!(((k_integral - d) / (k * k) - b).abs() < 6e-7 * b.max(1.0));
-            assert!((d * k * k / (k_integral - d) - curvature_ratio).abs() < 6e-7);
-        }
-    }
-
-    #[test]
-    fn integrals_satisfy_legendres_relation() {
-        // K E' + E K' − K K' = π/2 ties k to its complement (Abramowitz and Stegun 1964, 17.3.13).
-        for k in [1e-6_f64, 1e-3, 0.1, 0.5, 0.7, 0.999, 1.0 - 1e-9] {
-            let complement = ((1.0 - k) * (1.0 + k)).sqrt();
-            let ((k1, d1), (k2, d2)) = (complete_integrals(k), complete_integrals(complement));
-            let (e1, e2) = (k1 - complement.powi(2) * d1, k2 - k * k * d2);
-            assert!(
-                (k1 * e2 + e1 * k2 - k1 * k2 - PI / 2.0).abs() < 1e-13 * k1 * k2,
-                "{k}"
-            );
-        }
-    }
-
-    #[test]
-    fn the_axis_ratio_inverts_the_curvature_ratio() {
-        for exponent in -160..=0 {
-            let ratio = 10.0_f64.powf(f64::from(exponent) / 10.0);
-            let k = axis_ratio(ratio);
-            let (k_integral, d) = complete_integrals(k);
-            let back = k * k * d / (k_integral - d);
-            assert!(
-                (back / ratio - 1.0).abs() < 1e-13,
-                "A/B = {ratio}: k = {k}, back {back}"
-            );
-        }
-        for distance in [0.0_f64, 1e-15, 1e-12, 1e-8, 1e-4] {
-            // Near the circle A/B = k^{3/2} to first order.
-            let k = axis_ratio(1.0 - distance);
-            assert!(
-                (1.0 - k - distance * 2.0 / 3.0).abs() < 1e-15 + distance * distance,
-                "{distance}: {k}"
-            );
-        }
-    }
 
     #[test]
     fn the_shape_of_radii_has_the_semi_axes_of_the_ellipse() {

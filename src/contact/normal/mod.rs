@@ -1,5 +1,6 @@
 //! The normal problem: which patches touch, and with what pressure.
 
+pub(crate) mod axis_ratio;
 pub mod footprint;
 pub mod gap;
 pub mod hertz;

@@ -3,10 +3,10 @@
 /// Weights of the values at the nodes in the value at `at` of the polynomial through them. No two nodes are equal.
 pub(crate) fn weights<const N: usize>(nodes: &[f64; N], at: f64) -> [f64; N] {
     std::array::from_fn(|i| {
-        (0..N)
-            .filter(|j| *j != i)
-            .map(|j| (at - nodes[j]) / (nodes[i] - nodes[j]))
-            .product()
+        let others = || (0..N).filter(|j| *j != i);
+        let above: f64 = others().map(|j| at - nodes[j]).product();
+        let below: f64 = others().map(|j| nodes[i] - nodes[j]).product();
+        above / below
     })
 }
 

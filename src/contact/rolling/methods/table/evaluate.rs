@@ -1,6 +1,6 @@
 //! The table as a function: creep forces, the share that sticks, and derivatives, of one ellipse and any creepage.
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::contact::rolling::methods::table::axis::{Axis, Weights};
 use crate::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
@@ -271,7 +271,7 @@ impl EllipseTable<'_> {
         let combined = |rows: &[f32; NEAR], weights: &[f64; 4]| self.combined(rows, weights);
         let arch = Arch::new();
         if SLOPES {
-            let [value, by_pole, by_direction] = arch.dispatch(|| near.with_slopes());
+            let [value, by_pole, by_direction] = arch.dispatch(ValueAndSlopes(near));
             Sums {
                 value: combined(&value, &size.value),
                 by_size: combined(&value, &size.slope),
@@ -279,7 +279,7 @@ impl EllipseTable<'_> {
                 by_direction: combined(&by_direction, &size.value),
             }
         } else {
-            let value = arch.dispatch(|| near.value());
+            let value = arch.dispatch(Value(near));
             Sums {
                 value: combined(&value, &size.value),
                 ..Sums::default()
@@ -393,5 +393,29 @@ impl NearNodes<'_> {
             }
         }
         sums
+    }
+}
+
+/// What is compiled for each level of SIMD. A closure would not be: the compiler does not inline one of this length.
+struct Value<'a>(NearNodes<'a>);
+
+impl WithSimd for Value<'_> {
+    type Output = [f32; NEAR];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> [f32; NEAR] {
+        self.0.value()
+    }
+}
+
+/// The same with the derivatives.
+struct ValueAndSlopes<'a>(NearNodes<'a>);
+
+impl WithSimd for ValueAndSlopes<'_> {
+    type Output = [[f32; NEAR]; 3];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> [[f32; NEAR]; 3] {
+        self.0.with_slopes()
     }
 }
