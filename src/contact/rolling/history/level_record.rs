@@ -124,6 +124,14 @@ impl LevelRun<'_> {
         }
     }
 
+    /// Bounds of the last step over the whole mesh.
+    fn bounds_of_mesh(&self) -> Vec<f64> {
+        match self.parity {
+            Some(_) => self.level.unfold(&self.bound, 1.0),
+            None => self.bound[..self.level.mesh.cells()].to_vec(),
+        }
+    }
+
     /// Values of the unknowns over the whole mesh.
     pub(super) fn expand(&self, values: &[f64]) -> [Vec<f64>; 2] {
         let (x, y) = values.split_at(values.len() / 2);

@@ -103,10 +103,11 @@ impl<'a> LevelRun<'a> {
         };
         let (bound, area) = (resized(&level.bound), resized(&level.normalised.areas()));
         let forces = area.iter().zip(&bound).take(cells);
-        let mut run = LevelRun {
+        let law = task.friction.along();
+        Ok(LevelRun {
             cells,
             limit: forces.map(|(area, bound)| area * bound).sum(),
-            track: None,
+            track: law.map(|law| TrackFriction::new(law, &level.mesh, cells, &bound)),
             edges: LeadingEdges::new(&level.normalised, level.poisson_ratio(), parity),
             bound,
             area,
@@ -128,9 +129,7 @@ impl<'a> LevelRun<'a> {
             tolerance,
             workspace,
             monitor,
-        };
-        run.track = run.track_friction();
-        Ok(run)
+        })
     }
 
     /// Solves all points with steps of at most `longest` mm.
@@ -205,7 +204,9 @@ impl<'a> LevelRun<'a> {
         step: &HistoryStep,
         search: &mut StepSearch,
     ) -> Result<(), LevelFailure> {
-        self.lay_bounds(step);
+        if let Some(track) = &self.track {
+            track.lay(step.travelled(self.history), &mut self.bound);
+        }
         if of.kind == StepKind::Press {
             return self.press(of);
         }

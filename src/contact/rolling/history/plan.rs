@@ -42,6 +42,17 @@ pub struct HistoryStep {
     pub last: bool,
 }
 
+impl HistoryStep {
+    /// Distance in mm rolled since the start of a history when this step of it ends.
+    pub(super) fn travelled(&self, history: &HistoryTask) -> f64 {
+        let before = (self.point.checked_sub(1)).map_or(0.0, |k| history.distances[k]);
+        match self.kind {
+            StepKind::Roll { .. } => before + self.share * history.rolled(self.point),
+            StepKind::Steady | StepKind::Press | StepKind::Shift => before,
+        }
+    }
+}
+
 /// Weights of a backward difference, over the length of the step: of the displacement at its end, at its beginning, and a step earlier.
 #[must_use]
 pub fn weights(growth: f64) -> [f64; 3] {

@@ -1,9 +1,7 @@
-//! Friction that lies still on the track while the patch passes over it: bounds of the cells, step by step.
+//! Friction that lies still on the track while the patch passes over it: bounds of the cells by the distance rolled.
 
 use crate::contact::friction::along::AlongLaw;
-use crate::contact::rolling::history::level_run::LevelRun;
-use crate::contact::rolling::history::plan::{HistoryStep, StepKind};
-use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::mesh::strips::Mesh;
 
 /// What the bounds of the cells are taken from.
 pub(super) struct TrackFriction {
@@ -14,49 +12,25 @@ pub(super) struct TrackFriction {
     largest: Vec<f64>,
 }
 
-impl HistoryTask {
-    /// Distance in mm rolled since the start when a step ends.
-    fn travelled(&self, step: &HistoryStep) -> f64 {
-        let before = (step.point.checked_sub(1)).map_or(0.0, |k| self.distances[k]);
-        match step.kind {
-            StepKind::Roll { .. } => before + step.share * self.rolled(step.point),
-            StepKind::Steady | StepKind::Press | StepKind::Shift => before,
-        }
-    }
-}
-
-impl LevelRun<'_> {
-    /// The friction of the track, where it varies; bounds are still those of the largest coefficient.
-    pub(super) fn track_friction(&self) -> Option<TrackFriction> {
-        let mesh = &self.level.mesh;
-        let edges = mesh.left.iter().zip(&mesh.right).take(self.cells);
-        Some(TrackFriction {
-            law: self.task.friction.along()?.clone(),
+impl TrackFriction {
+    /// The friction of a track under the first cells of a mesh in mm, as many as have unknowns, which would have these bounds with the
+    /// largest coefficient everywhere.
+    pub(super) fn new(law: &AlongLaw, mesh: &Mesh, cells: usize, largest: &[f64]) -> TrackFriction {
+        let edges = mesh.left.iter().zip(&mesh.right).take(cells);
+        TrackFriction {
+            law: law.clone(),
             cells: edges.map(|(left, right)| [*left, *right]).collect(),
-            largest: self.bound.clone(),
-        })
-    }
-
-    /// Takes the coefficients that lie under the cells when a step ends: rolling goes towards larger x.
-    pub(super) fn lay_bounds(&mut self, step: &HistoryStep) {
-        let Some(track) = &self.track else {
-            return;
-        };
-        let travelled = self.history.travelled(step);
-        let largest = track.law.largest();
-        for ((bound, most), [left, right]) in
-            self.bound.iter_mut().zip(&track.largest).zip(&track.cells)
-        {
-            let mean = track.law.mean(left + travelled, right + travelled);
-            *bound = most * (mean / largest);
+            largest: largest.to_vec(),
         }
     }
 
-    /// Bounds of the last step over the whole mesh.
-    pub(super) fn bounds_of_mesh(&self) -> Vec<f64> {
-        match self.parity {
-            Some(_) => self.level.unfold(&self.bound, 1.0),
-            None => self.bound[..self.level.mesh.cells()].to_vec(),
+    /// Sets the bounds to those of the coefficients under the cells after so many mm; rolling goes towards larger x.
+    pub(super) fn lay(&self, travelled: f64, bounds: &mut [f64]) {
+        let most = self.law.largest();
+        let cells = self.cells.iter().zip(&self.largest);
+        for (bound, ([left, right], largest)) in bounds.iter_mut().zip(cells) {
+            let mean = self.law.mean(left + travelled, right + travelled);
+            *bound = largest * (mean / most);
         }
     }
 }
