@@ -166,15 +166,8 @@ fn left_and_right_are_mirror_images_in_every_number() {
     let close = |a: f64, b: f64, scale: f64| assert!((a - b).abs() < 1e-3 * scale, "{a} {b}");
     for (a, b) in right.patches.iter().zip(left.patches.iter().rev()) {
         close(a.normal_force_n, b.normal_force_n, b.normal_force_n);
-        eprintln!(
-            "DBG {} {} {} {} {:?}",
-            a.area_mm2,
-            b.area_mm2,
-            a.pressure_max_mpa / b.pressure_max_mpa - 1.0,
-            a.normal_force_n / b.normal_force_n - 1.0,
-            a.extent_mm
-        );
-        close(a.area_mm2, b.area_mm2, 10.0 * b.area_mm2);
+        // Rounding decides which heights are tried on the way; of all numbers the area feels most which ones they were.
+        close(a.area_mm2, b.area_mm2, 3.0 * b.area_mm2);
         let (here, there) = (position(a), position(b));
         close(here.contact_angle_rad, -there.contact_angle_rad, 1.0);
         close(here.track_mm[1], -there.track_mm[1], 1.0);

@@ -34,15 +34,17 @@ pub(crate) fn axis_ratio_and_integral(curvature_ratio: f64) -> (f64, f64) {
     )
 }
 
-/// For A/B from exp(−10) to 1, `ln k/ln(A/B)` is 2/3 at the circle and falls slowly: a quotient of two polynomials of `ln²(A/B)`, fitted
-/// to our own inverse of A/B so that the largest error of ln k (1.0e-6) is least.
+/// The smallest ratio of curvatures that the quotient below was fitted to is exp of minus this.
 const LN_CURVATURES_FITTED: f64 = 10.0;
+/// For A/B from exp(−10) to 1, `ln k/ln(A/B)` is 2/3 at the circle and falls slowly: a quotient of two polynomials of `ln²(A/B)`, fitted
+/// to our own inverse of A/B so that the largest error of ln k (1.0e-6) is least. Its numerator.
 const POWER_ABOVE: [f64; 4] = [
     2.0 / 3.0,
     0.052_821_991_585_557_69,
     9.364_049_705_523_599e-4,
     2.630_387_036_952_323e-6,
 ];
+/// The denominator that belongs to [`POWER_ABOVE`].
 const POWER_BELOW: [f64; 4] = [
     1.0,
     0.083_860_695_138_854_51,
