@@ -86,14 +86,15 @@ impl SlicedCase {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use serde_json::json;
 
     use super::*;
     use crate::contact;
     use crate::contact::case::limits::Limits;
 
-    fn checked_case() -> CheckedCase {
+    /// Seven motions with all fields.
+    pub(crate) fn checked_case() -> CheckedCase {
         let case = json!({
             "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
             "friction": { "coefficient": 0.3 },

@@ -206,26 +206,14 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
     use super::*;
-    use crate::contact;
-    use crate::contact::case::limits::Limits;
     use crate::contact::monitor::Unmonitored;
+    use crate::jobs::attempts::slices::tests::checked_case;
     use crate::jobs::engine::Engine;
 
     #[test]
     fn parts_read_from_where_they_were_stored_are_the_answer_bit_for_bit() {
-        let case = json!({
-            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
-            "friction": { "coefficient": 0.3 },
-            "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
-            "load": { "normal_force_n": 100_000 },
-            "motion": { "sweep": { "creepage_x": { "from": 0.0005, "to": 0.003, "points": 7 } } },
-            "solver": { "mesh": { "strips": 6, "cells": 6 } },
-            "outputs": ["resultants", "zones", "tractions", "slip", "pressure"]
-        });
-        let checked = contact::check(&case, &Limits::default()).unwrap();
+        let checked = checked_case();
         let engine = Engine::contact();
         let mut parts = Vec::new();
         let mut whole: Option<(Solution, Fields)> = None;

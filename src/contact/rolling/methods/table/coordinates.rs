@@ -33,7 +33,8 @@ pub fn spin_factor(root: f64, [c11, c22]: [f64; 2]) -> f64 {
 /// Steps of the search for θ, each of third order. With 3 angles are right to 3e-9, with 4 to rounding (`angles_of_a_creepage`).
 /// Always as many, without a test in between as the common root finders make: the start is never far off, and rows are evaluated by the million.
 const STEPS: usize = 4;
-/// Squares of creepages beside spin of this size, relative to its square, turn θ by less than 1e-9.
+/// Squares of creepages beside spin of this size, relative to its square, turn θ by less than 1e-9: θ differs
+/// from a right angle by about the square root of this.
 const SPIN_ALONE: f64 = 1e-20;
 /// Where derivatives at spin alone are taken: creepages of this part of the spin, by size.
 const BESIDE_SPIN: f64 = 1e-3;
