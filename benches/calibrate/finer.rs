@@ -17,11 +17,11 @@ use railhead::contact::rolling::refinement::regime::regime;
 use railhead::contact::rolling::refinement::state::RefinementState;
 use railhead::contact::rolling::resolution::Resolution;
 use railhead::contact::rolling::resultants::Resultants;
-use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
+use crate::patches::{self, PatchAnswer};
 use crate::population::Class;
-use crate::truth::{Frame, Truth, distance, estimate, print, tangential};
+use crate::truth::{Frame, TrueResultants, Truth, distance, print};
 
 /// Cells of the two meshes that make a truth.
 const CELLS: [u32; 2] = [1024, 2048];
@@ -30,6 +30,8 @@ const LEAST: f64 = 2e-5;
 /// Targets that stand for region and pressure of a gap much finer than asked for, and for all of a wheel on a rail.
 const TARGET_GAP: f64 = 4e-4;
 const TARGET_PROFILES: f64 = 4e-4;
+/// Share of the estimate of a wheel on a rail that its truth is taken to be off by.
+const SHARE_PROFILES: f64 = 0.5;
 
 /// Finds the truth of a case.
 ///
@@ -63,11 +65,14 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
     }
     Ok(Truth {
         print: print(case),
-        value,
-        uncertainty,
-        centre: frame.centre,
-        length: frame.length,
-        limit: frame.limit,
+        whole: TrueResultants {
+            value,
+            uncertainty,
+            centre: frame.centre,
+            length: frame.length,
+            limit: frame.limit,
+        },
+        patches: Vec::new(),
     })
 }
 
@@ -145,30 +150,33 @@ fn one_mesh(
     Ok((sum, state.levels.get(solved.point.level).mesh.cells()))
 }
 
-/// Tangential forces of a wheel on a rail, summed over the frames of its patches, from a fine target.
+/// Tangential resultants of a wheel on a rail, patch by patch, from a fine target.
 fn of_profiles(case: &Value) -> Result<Truth, String> {
     let mut fine = case.clone();
     fine["solver"] = json!({ "target_error": TARGET_PROFILES });
     let checked = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
     let (solution, _) = contact::solve(&checked, &Unmonitored).map_err(|e| e.to_string())?;
-    let limit = checked.problem.friction.largest() * normal_force(&solution);
-    let value = tangential(&solution).map(|force| force / limit);
-    let estimate = estimate(&solution).ok_or("no estimate")? / limit;
+    let found = PatchAnswer::of_solution(&solution).ok_or("no estimate")?;
+    let several = found.iter().filter(|_| found.len() > 1);
     Ok(Truth {
         print: print(case),
-        value: [value[0], value[1], 0.0],
-        uncertainty: 0.5 * estimate,
-        centre: [0.0; 2],
-        length: 1.0,
-        limit,
+        whole: of_patch(&patches::sum(&found)),
+        patches: several.map(of_patch).collect(),
     })
 }
 
-/// Sum of the normal forces in N.
-fn normal_force(solution: &Solution) -> f64 {
-    solution
-        .patches
-        .iter()
-        .map(|patch| patch.normal_force_n)
-        .sum()
+/// The resultants of a patch as its truth.
+fn of_patch(patch: &PatchAnswer) -> TrueResultants {
+    let frame = Frame {
+        centre: [0.0; 2],
+        length: patch.moment_limit / patch.limit,
+        limit: patch.limit,
+    };
+    TrueResultants {
+        value: frame.relative(patch.resultants),
+        uncertainty: SHARE_PROFILES * patch.estimate / patch.limit,
+        centre: frame.centre,
+        length: frame.length,
+        limit: frame.limit,
+    }
 }

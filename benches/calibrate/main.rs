@@ -1,7 +1,7 @@
 //! Is the error estimate right? Solves random contacts for three targets and compares with meshes much finer.
 //!
 //! `cargo bench --bench calibrate` prints the tables for the halves of every class (the first for fitting, the second for
-//! checking); with names of classes (`ellipse smooth jump gap profiles`) those alone. Truths come from
+//! checking; of wheels on rails every patch counts); with names of classes (`ellipse smooth jump gap profiles`) those alone. Truths come from
 //! `tests/data/finer_meshes.json`; `-- truths [classes]` finds the missing ones, some seconds each; `-- continuity`
 //! prints how the estimate changes along a sweep, `-- case gap 42` one case as JSON.
 
@@ -9,6 +9,7 @@ extern crate railhead_contact as railhead;
 
 mod continuity;
 mod finer;
+mod patches;
 mod population;
 #[path = "../../tests/physics/profile_shapes.rs"]
 mod profile_shapes;
@@ -20,10 +21,11 @@ use cpu_time::ThreadTime;
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::solution::words::answer::Solution;
 use serde_json::json;
 
 use population::{Class, case};
-use truth::{Truths, judged};
+use truth::{Judged, Truths, judged};
 
 const CLASSES: [Class; 5] = [
     Class::Ellipse,
@@ -92,12 +94,11 @@ fn find_truths(class: Class) {
     }
 }
 
-/// One answer against its truth.
+/// One estimate against the truth.
 struct Outcome {
-    error: f64,
-    uncertainty: f64,
-    estimate: f64,
+    judged: Judged,
     met: bool,
+    /// Of the whole answer.
     seconds: f64,
 }
 
@@ -107,7 +108,7 @@ fn tables(class: Class, truths: &Truths, each: bool) {
         return;
     };
     println!(
-        "\n| {} | target | cases | within target | covered | 2x too small | certified | estimate/error | error median, 90 % | ms mean, median |",
+        "\n| {} | target | estimates | within target | covered | 2x too small | certified | estimate/error | error median, 90 % | ms mean, median |",
         class.name()
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
@@ -127,26 +128,18 @@ fn tables(class: Class, truths: &Truths, each: bool) {
                 }
             };
             let seconds = began.elapsed().as_secs_f64();
-            let [error, estimate] = judged(class, truth, &solution).unwrap_or([f64::NAN; 2]);
-            let outcome = Outcome {
-                error,
-                uncertainty: truth.uncertainty,
-                estimate,
-                met: estimate <= target,
-                seconds,
-            };
-            if each || error - truth.uncertainty > estimate {
-                let mesh = solution.patches[0].points[0].solver.mesh.expect("a mesh");
-                println!(
-                    "  {} {number} at {target}: error {error:.5} ± {:.5}, estimate {estimate:.5}, {} x {}, {:.1} ms",
-                    class.name(),
-                    truth.uncertainty,
-                    mesh.strips,
-                    mesh.cells,
-                    1e3 * seconds
-                );
+            let half = &mut halves[usize::from(2 * *number >= class.count())];
+            for judged in judged(class, truth, &solution).expect("an estimate") {
+                let outcome = Outcome {
+                    judged,
+                    met: judged.estimate <= target,
+                    seconds,
+                };
+                if each || judged.error - judged.uncertainty > judged.estimate {
+                    print_one((class, *number, target), &outcome, &solution);
+                }
+                half.push(outcome);
             }
-            halves[usize::from(2 * *number >= class.count())].push(outcome);
         }
         for (name, half) in ["fit", "check"].iter().zip(&halves) {
             row(name, target, half);
@@ -155,6 +148,23 @@ fn tables(class: Class, truths: &Truths, each: bool) {
         both.extend(check);
         row("both", target, &both);
     }
+}
+
+/// One outcome, with the mesh of the first patch.
+fn print_one((class, number, target): (Class, usize, f64), found: &Outcome, solution: &Solution) {
+    let mesh = solution.patches[0].points[0].solver.mesh.expect("a mesh");
+    let Judged {
+        error,
+        estimate,
+        uncertainty,
+    } = found.judged;
+    println!(
+        "  {} {number} at {target}: error {error:.5} ± {uncertainty:.5}, estimate {estimate:.5}, {} x {}, {:.1} ms",
+        class.name(),
+        mesh.strips,
+        mesh.cells,
+        1e3 * found.seconds
+    );
 }
 
 fn row(name: &str, target: f64, outcomes: &[Outcome]) {
@@ -173,16 +183,18 @@ fn row(name: &str, target: f64, outcomes: &[Outcome]) {
         let [low, high] = [place.floor(), place.ceil()].map(value);
         low + (place - place.floor()) * (high - low)
     };
-    let clear = outcomes.iter().filter(|o| o.error > o.uncertainty);
-    let ratios = sorted(clear.map(|o| o.estimate / o.error).collect());
-    let errors = sorted(outcomes.iter().map(|o| o.error).collect());
+    let clear = outcomes
+        .iter()
+        .filter(|o| o.judged.error > o.judged.uncertainty);
+    let ratios = sorted(clear.map(|o| o.judged.estimate / o.judged.error).collect());
+    let errors = sorted(outcomes.iter().map(|o| o.judged.error).collect());
     let times = sorted(outcomes.iter().map(|o| 1e3 * o.seconds).collect());
     println!(
         "| {name} | {target} | {} | {:.3} | {:.3} | {:.3} | {:.2} | {:.1} | {:.5}, {:.5} | {:.1}, {:.1} |",
         outcomes.len(),
-        count(&|o| o.error <= target + o.uncertainty),
-        count(&|o| o.error <= o.estimate + o.uncertainty),
-        count(&|o| o.error > 2.0 * o.estimate + o.uncertainty),
+        count(&|o| o.judged.error <= target + o.judged.uncertainty),
+        count(&|o| o.judged.error <= o.judged.estimate + o.judged.uncertainty),
+        count(&|o| o.judged.error > 2.0 * o.judged.estimate + o.judged.uncertainty),
         count(&|o| o.met),
         at(&ratios, 0.5),
         at(&errors, 0.5),

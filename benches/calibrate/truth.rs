@@ -4,22 +4,34 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use railhead::contact::rolling::resultants::Resultants;
-use railhead::contact::solution::words::answer::{PointSolution, Solution};
+use railhead::contact::solution::words::answer::Solution;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::patches::{self, PatchAnswer};
 use crate::population::Class;
 
-/// Resultants relative to μN, about a centre in mm.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+/// What is known of a case.
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Truth {
     /// Fingerprint of the case.
     pub print: u64,
+    /// The resultants; for several patches of a wheel on a rail their sums, moments about the load centre of each patch.
+    #[serde(flatten)]
+    pub whole: TrueResultants,
+    /// The patches of a wheel on a rail one by one, if there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub patches: Vec<TrueResultants>,
+}
+
+/// Resultants relative to μN, about a centre in mm.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct TrueResultants {
     /// F_x, F_y over μN and M_z over μN times `length`.
     pub value: [f64; 3],
     /// What they may be off by.
     pub uncertainty: f64,
-    /// Where moments are about.
+    /// Where moments are about; zero for a wheel on a rail, where it is the load centre that the answer gives.
     pub centre: [f64; 2],
     /// √(A/π) in mm.
     pub length: f64,
@@ -79,33 +91,21 @@ impl Frame {
     }
 }
 
-/// Sums of the tangential forces along and across in the frames of the patches.
-pub fn tangential(solution: &Solution) -> [f64; 2] {
-    let sum = |of: fn(&PointSolution) -> f64| {
-        solution
-            .patches
-            .iter()
-            .map(|patch| of(&patch.points[0]))
-            .sum()
-    };
-    [sum(|p| p.force_x_n), sum(|p| p.force_y_n)]
+/// One error estimate of an answer and what it is an estimate of, relative to μN.
+#[derive(Debug, Clone, Copy)]
+pub struct Judged {
+    /// Largest difference of the resultants from the truth.
+    pub error: f64,
+    /// What the answer says of it.
+    pub estimate: f64,
+    /// What the truth may be off by.
+    pub uncertainty: f64,
 }
 
-/// Sum of the estimates of the patches in N.
-pub fn estimate(solution: &Solution) -> Option<f64> {
-    let all = solution
-        .patches
-        .iter()
-        .map(|patch| patch.points[0].error_estimate);
-    all.map(|e| e.map(|e| e.force_x_n)).sum()
-}
-
-/// True and estimated error of an answer, relative to μN.
-pub fn judged(class: Class, truth: &Truth, solution: &Solution) -> Option<[f64; 2]> {
+/// The estimates of an answer beside its errors: that of the sum, or of each patch of a wheel on a rail. None without an estimate.
+pub fn judged(class: Class, truth: &Truth, solution: &Solution) -> Option<Vec<Judged>> {
     if class == Class::Profiles {
-        let [x, y] = tangential(solution).map(|force| force / truth.limit);
-        let error = distance([x, y, 0.0], truth.value);
-        return Some([error, estimate(solution)? / truth.limit]);
+        return PatchAnswer::of_solution(solution).map(|found| patches::judged(truth, &found));
     }
     let total = &solution.total[0];
     let sum = Resultants {
@@ -113,11 +113,15 @@ pub fn judged(class: Class, truth: &Truth, solution: &Solution) -> Option<[f64; 
         force_y: total.force_y_n,
         moment_z: total.moment_z_n_mm,
     };
+    let whole = &truth.whole;
     let frame = Frame {
-        centre: truth.centre,
-        length: truth.length,
-        limit: truth.limit,
+        centre: whole.centre,
+        length: whole.length,
+        limit: whole.limit,
     };
-    let estimate = total.error_estimate?.force_x_n / truth.limit;
-    Some([distance(frame.relative(sum), truth.value), estimate])
+    Some(vec![Judged {
+        error: distance(frame.relative(sum), whole.value),
+        estimate: total.error_estimate?.force_x_n / whole.limit,
+        uncertainty: whole.uncertainty,
+    }])
 }

@@ -43,6 +43,8 @@ mod maintenance;
 mod many_rows;
 mod memory;
 mod paper_figures;
+#[path = "../../benches/calibrate/patches.rs"]
+mod patches;
 #[path = "../../benches/calibrate/population.rs"]
 mod population;
 mod power;
