@@ -157,7 +157,7 @@ fn solve_motions(
     let answer = match &case.problem.task {
         NormalTask::Wheel(wheel) => match case.problem.pull() {
             None => trust::solve(operators, case, wheel, monitor)?,
-            Some(force) => pulled_wheel::solve(operators, case, wheel, force, monitor)?,
+            Some(pull) => pulled_wheel::solve(operators, case, wheel, pull, monitor)?,
         },
         NormalTask::Wheelset(wheelset) => {
             wheelset::solve::solve(operators, case, wheelset, monitor)?

@@ -1,16 +1,20 @@
-//! Solves a wheel whose rail is to carry a longitudinal force: the creepage, or the angular velocity of the wheelset, that gives it is found.
+//! Solves a wheel whose rail is to carry a longitudinal or a lateral force: the creepage, or the angular velocity of the wheelset, that gives it is found.
 //!
 //! Everything is in the search: where the wheel rests, its patches, and how the load is shared between them depend on the force of friction, so
 //! that every trial brings the wheel to rest and solves all patches. The unknown is a place, as in the search for the creepages of one
 //! patch: by the cubic law with the stiffness of all patches the creepage at r gives about the force r μN.
+//!
+//! A lateral force contains the lateral part of the normal forces, which grow and shrink with friction under a vertical load: between which forces it lies
+//! is found by two coarse solves in full slip, to the right and to the left.
 
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel_height::task::WheelTask;
-use crate::contact::numerics::bracketed_root::{RootExit, find_root};
+use crate::contact::numerics::bracketed_root::{FRACTION_MAX, RootExit, find_root};
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::problem::physics::Pull;
 use crate::contact::problem::run::Run;
 use crate::contact::profile_trust::{settle, trust};
 use crate::contact::remark::list::Remark;
@@ -20,7 +24,7 @@ use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::answer::{PatchSolution, Solution};
 use crate::contact::solution::words::fields::Fields;
-use crate::contact::wheel_on_rail::SolvedWheel;
+use crate::contact::wheel_on_rail::{BALANCE, SolvedWheel};
 
 /// A force may be missed by this part of the target, and by this part of μN at least: what the normal problem leaves open from trial to
 /// trial is noise to the search. Chosen by judgement; how much it matters was not measured.
@@ -36,15 +40,15 @@ const PROGRESS: [f64; 2] = [0.1, 0.8];
 /// Chosen by judgement; how much it matters was not measured.
 const TRIALS_USUAL: f64 = 6.0;
 
-/// Solves a wheel on a rail that carries `force` in N along x, at the creepage or the angular velocity that gives it.
+/// Solves a wheel on a rail that carries the force of `pull`, at the creepage or the angular velocity that gives it.
 ///
 /// # Errors
-/// Why there is no answer: friction does not carry the force, or a trial failed.
+/// Why there is no answer: the rail cannot carry the force, or a trial failed.
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     contact: &WheelTask,
-    force: f64,
+    pull: Pull,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
     let settled = settle::settled(case, contact, monitor)?;
@@ -53,18 +57,15 @@ pub(crate) fn solve(
         operators,
         case,
         contact,
+        pull,
         monitor,
     };
     let first = search.first()?;
-    if force.abs() > first.limit {
-        return Err(SolveError::NormalProblem {
-            reason: format!(
-                "a longitudinal force of {force} N was asked for; friction carries at most {:.1} N under this load",
-                first.limit
-            ),
-        });
-    }
-    search.to(force, &first)
+    let reach = match pull.component {
+        0 => first.along(pull.force)?,
+        _ => search.across(&first)?,
+    };
+    search.to(&first, &reach)
 }
 
 /// What the first estimate says of the contact.
@@ -74,32 +75,77 @@ struct FirstEstimate {
     law: CubicLaw,
     /// Mean rolling radius of the patches in mm, weighted with their loads.
     radius: f64,
+    /// Lateral force in N without lateral creepage, normal forces included.
+    lateral: f64,
+    /// Sum of the magnitudes of the lateral parts of the normal forces in N.
+    lateral_normal: f64,
+}
+
+/// Where a search starts, and what is known of the forces it may meet.
+struct Reach {
+    /// Place to start from.
+    start: f64,
+    /// Force in N by which the force changes about when the place changes by 1.
+    unit: f64,
+    /// Force in N that the balance of the vertical force leaves open.
+    open: f64,
+    /// Lateral forces in N in full slip to the right and to the left, where the wheel comes to rest there.
+    ends: [Option<f64>; 2],
 }
 
 impl FirstEstimate {
     fn of(solution: &Solution, case: &CheckedCase) -> FirstEstimate {
         let elasticity = &case.problem.elasticity;
         let modulus = case.problem.interface.reduction * elasticity.shear_modulus;
-        let (mut limit, mut stiffness, mut load, mut moment) = (0.0, 0.0, 0.0, 0.0);
+        let (mut limit, mut load, mut moment, mut lateral_normal) = (0.0, 0.0, 0.0, 0.0);
+        let mut stiffness = [0.0; 2];
         for patch in &solution.patches {
             limit += patch.friction_limit_n.unwrap_or(0.0);
             let [x_min, x_max, y_min, y_max] = patch.extent_mm;
-            let [c11, ..] = linear_theory::coefficients(
+            let c = linear_theory::coefficients(
                 (x_max - x_min) / (y_max - y_min),
                 elasticity.poisson_ratio,
             );
-            stiffness += c11 * modulus * patch.area_mm2 / std::f64::consts::PI;
+            for (stiffness, c) in stiffness.iter_mut().zip(c) {
+                *stiffness += c * modulus * patch.area_mm2 / std::f64::consts::PI;
+            }
             load += patch.normal_force_n;
+            lateral_normal += patch.normal_force_n * angle_of(patch).sin().abs();
             moment += patch.normal_force_n * radius_of(patch);
         }
         FirstEstimate {
             limit,
             law: CubicLaw {
-                stiffness: [stiffness / limit.max(f64::MIN_POSITIVE); 2],
+                stiffness: stiffness.map(|stiffness| stiffness / limit.max(f64::MIN_POSITIVE)),
             },
             radius: moment / load,
+            lateral: solution.total[0].force_y_n,
+            lateral_normal,
         }
     }
+
+    /// Where the search for a longitudinal force in N starts.
+    fn along(&self, force: f64) -> Result<Reach, SolveError> {
+        if force.abs() > self.limit {
+            return Err(SolveError::NormalProblem {
+                reason: format!(
+                    "a longitudinal force of {force} N was asked for; friction carries at most {:.1} N under this load",
+                    self.limit
+                ),
+            });
+        }
+        Ok(Reach {
+            start: force / self.limit,
+            unit: self.limit,
+            open: 0.0,
+            ends: [None; 2],
+        })
+    }
+}
+
+fn angle_of(patch: &PatchSolution) -> f64 {
+    let position = patch.position.as_ref();
+    position.map_or(0.0, |position| position.contact_angle_rad)
 }
 
 fn radius_of(patch: &PatchSolution) -> f64 {
@@ -112,20 +158,25 @@ struct PullSearch<'a> {
     operators: &'a Arc<OperatorStore>,
     case: &'a CheckedCase,
     contact: &'a WheelTask,
+    pull: Pull,
     monitor: &'a dyn Monitor,
 }
 
 impl PullSearch<'_> {
-    /// The case at a longitudinal creepage, which a wheelset has by its angular velocity, at a rolling radius in mm.
+    /// The case at a creepage in the direction of the force, which a wheelset has by its angular velocity, at a rolling radius in mm.
     fn at(&self, creepage: f64, radius: f64, run: &Run) -> CheckedCase {
         let problem = &self.case.problem;
         let wheelset = problem.wheelset.map(|mut wheelset| {
             wheelset.angular_velocity = wheelset.speed * (1.0 - creepage) / radius;
             wheelset
         });
-        let motion = match wheelset {
-            Some(_) => problem.motions[0],
-            None => Motion {
+        let motion = match (wheelset, self.pull.component) {
+            (Some(_), _) => problem.motions[0],
+            (None, 1) => Motion {
+                creepage_y: creepage,
+                ..problem.motions[0]
+            },
+            (None, _) => Motion {
                 creepage_x: creepage,
                 ..problem.motions[0]
             },
@@ -155,13 +206,104 @@ impl PullSearch<'_> {
         Ok(FirstEstimate::of(&found.solution, self.case))
     }
 
+    /// The force of an answer in N that is sought.
+    fn force_of(&self, solution: &Solution) -> f64 {
+        match self.pull.component {
+            0 => solution.total[0].force_x_n,
+            _ => solution.total[0].force_y_n,
+        }
+    }
+
+    /// Where the search for a lateral force starts.
+    fn across(&self, first: &FirstEstimate) -> Result<Reach, SolveError> {
+        let force = self.pull.force;
+        let ends = match first.limit > 0.0 {
+            true => [
+                self.end(-FRACTION_MAX, first)?,
+                self.end(FRACTION_MAX, first)?,
+            ],
+            false => [Some(first.lateral); 2],
+        };
+        let slack = TARGET_FIRST * first.limit;
+        let beyond = ends[0].is_some_and(|least| force < least - slack)
+            || ends[1].is_some_and(|most| force > most + slack);
+        if beyond || first.limit <= 0.0 {
+            return Err(self.unreached(ends));
+        }
+        let half = ends[0]
+            .zip(ends[1])
+            .map(|(least, most)| 0.5 * (most - least));
+        let unit = half.unwrap_or(0.0).max(first.limit);
+        Ok(Reach {
+            start: ((force - first.lateral) / unit).clamp(-1.0, 1.0),
+            unit,
+            open: BALANCE * first.lateral_normal,
+            ends,
+        })
+    }
+
+    /// The lateral force in N at a place in full slip; nothing where the wheel does not come to rest.
+    fn end(&self, place: f64, first: &FirstEstimate) -> Result<Option<f64>, SolveError> {
+        let part = MonitorPart {
+            inner: self.monitor,
+            before: PROGRESS[0],
+            own: 0.0,
+        };
+        let run = self.case.run.for_resultants(TARGET_FIRST);
+        let creepage = first.law.creepage(self.pull.component, place);
+        match self.judged(&self.at(creepage, first.radius, &run), part) {
+            Ok(found) => Ok(Some(self.force_of(&found.solution))),
+            Err(SolveError::NormalProblem { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The error of a lateral force that the rail does not carry.
+    fn unreached(&self, ends: [Option<f64>; 2]) -> SolveError {
+        let force = self.pull.force;
+        let reach = match ends {
+            [Some(least), Some(most)] => format!("from {least:.1} N to {most:.1} N"),
+            [Some(least), None] => format!("at least {least:.1} N"),
+            [None, Some(most)] => format!("at most {most:.1} N"),
+            [None, None] => "within limits that were not found".to_owned(),
+        };
+        SolveError::NormalProblem {
+            reason: format!(
+                "a lateral force force_y_n of {force} N was asked for; normal forces and friction carry {reach} across the track in this position \
+                 under this load"
+            ),
+        }
+    }
+
+    /// The error of a search that ended without the force.
+    fn missed(&self, exit: RootExit, reach: &Reach) -> SolveError {
+        if self.pull.component == 1 && exit == RootExit::SignKept {
+            return self.unreached(reach.ends);
+        }
+        let (force, reason) = (self.pull.force, exit.reason());
+        let (direction, beside) = match self.pull.component {
+            0 => ("along", "lateral"),
+            _ => ("across", "longitudinal"),
+        };
+        SolveError::NormalProblem {
+            reason: format!(
+                "no creepage was found at which the rail carries {force} N {direction} the track: {reason}; friction may not carry it beside the {beside} \
+                 creepage and the spin"
+            ),
+        }
+    }
+
     /// The answer at the force.
-    fn to(&self, force: f64, first: &FirstEstimate) -> Result<(Solution, Fields), SolveError> {
+    fn to(&self, first: &FirstEstimate, reach: &Reach) -> Result<(Solution, Fields), SolveError> {
+        let component = self.pull.component;
         let target = self.case.run.resolution.target_or_usual();
+        let allowed = (MISSED_OF_TARGET * target)
+            .max(MISSED_LEAST)
+            .max(reach.open / first.limit);
         // Outputs never change forces, so that trials need none.
         let run = self.case.run.for_resultants(0.0);
         let (mut trials, mut nearest) = (0.0, f64::INFINITY);
-        let root = find_root(force / first.limit, |place, tolerance: &mut f64| {
+        let root = find_root(reach.start, |place, tolerance: &mut f64| {
             let share = (PROGRESS[1] - PROGRESS[0]) / TRIALS_USUAL;
             let part = MonitorPart {
                 inner: self.monitor,
@@ -169,29 +311,24 @@ impl PullSearch<'_> {
                 own: share,
             };
             trials += 1.0;
-            let creepage = first.law.creepage(0, place);
+            let creepage = first.law.creepage(component, place);
             let found = self.judged(&self.at(creepage, first.radius, &run), part)?;
-            *tolerance = (MISSED_OF_TARGET * target).max(MISSED_LEAST);
-            let off = (found.solution.total[0].force_x_n - force) / first.limit;
+            let off = (self.force_of(&found.solution) - self.pull.force) / first.limit;
             nearest = nearest.min(off.abs());
-            Ok::<f64, SolveError>(off)
+            let units = first.limit / reach.unit;
+            *tolerance = allowed * units;
+            Ok::<f64, SolveError>(off * units)
         })?;
         // Where the trials alternate between two meshes the force jumps by what both are allowed to miss.
         if !root.exit.converged() && (root.exit == RootExit::SignKept || nearest > target) {
-            return Err(SolveError::NormalProblem {
-                reason: format!(
-                    "no creepage was found at which the rail carries {force} N along the track: {}; friction may not carry it beside the lateral \
-                     creepage and the spin",
-                    root.exit.reason()
-                ),
-            });
+            return Err(self.missed(root.exit, reach));
         }
         let part = MonitorPart {
             inner: self.monitor,
             before: PROGRESS[1],
             own: 1.0 - PROGRESS[1],
         };
-        let creepage = first.law.creepage(0, root.place);
+        let creepage = first.law.creepage(component, root.place);
         let case = self.at(creepage, first.radius, &self.case.run);
         let mut found = self.judged(&case, part)?;
         if !root.exit.converged() {
@@ -199,7 +336,7 @@ impl PullSearch<'_> {
                 iteration: "the search for the creepages of the prescribed force",
                 reason: root.exit.reason(),
                 residual: nearest,
-                tolerance: (MISSED_OF_TARGET * target).max(MISSED_LEAST),
+                tolerance: allowed,
             };
             found.solution.remarks.push(remark.into());
         }

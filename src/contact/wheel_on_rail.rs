@@ -30,7 +30,7 @@ use crate::contact::time_limit::TimeLimit;
 
 /// The vertical force may be missed by this fraction; it bounds the change of friction's share in one round. Chosen by judgement; how much it
 /// matters was not measured.
-const BALANCE: f64 = 5e-4;
+pub(crate) const BALANCE: f64 = 5e-4;
 /// Upper limit of that fraction, relative to the target error. Chosen by judgement; how much it matters was not measured.
 const BALANCE_OF_TARGET: f64 = 0.1;
 /// When the rounds are used up, a share that still changes by no more than this is answered with a remark. Chosen by judgement; how much it matters

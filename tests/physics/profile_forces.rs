@@ -1,4 +1,4 @@
-//! A longitudinal force prescribed under a wheel on a rail: its creepage or angular velocity is found, with the wheel at rest under its load.
+//! A longitudinal or a lateral force prescribed under a wheel on a rail: its creepage or angular velocity is found, with the wheel at rest under its load.
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
@@ -73,26 +73,122 @@ fn a_wheelset_turns_as_fast_as_the_force_of_two_patches_needs() {
 #[test]
 fn forces_that_a_wheel_cannot_have_are_refused_by_name() {
     assert_fault(
-        &moving(json!({ "force_y_n": 100 })),
+        &moving(json!({ "force_x_n": 100, "force_y_n": 100 })),
         "/motion/force_y_n",
-        &["profiles", "creepage_y"],
+        &["force_x_n", "creepage_y"],
     );
-    let several = json!([{ "force_x_n": 100 }, { "creepage_x": 0.001 }]);
-    assert_fault(&moving(several), "/motion/0/force_x_n", &["one motion"]);
+    for name in ["force_x_n", "force_y_n"] {
+        let several = json!([{ name: 100 }, { "creepage_x": 0.001 }]);
+        assert_fault(
+            &moving(several),
+            &format!("/motion/0/{name}"),
+            &["one motion"],
+        );
+    }
     let both = json!({ "wheelset": { "speed_mm_per_s": 1e4, "force_x_n": 100, "free_rolling_radius_mm": 460 } });
     assert_fault(
         &moving(both),
         "/motion/wheelset/force_x_n",
         &["free_rolling_radius_mm"],
     );
-    let too_much = moving(json!({ "force_x_n": 30_000 }));
-    let checked =
-        contact::check(&too_much, &Limits::default()).expect("the normal force is not known yet");
-    let Err(SolveError::NormalProblem { reason }) = contact::solve(&checked, &Unmonitored) else {
-        panic!("friction does not carry it")
-    };
+    let reason = refusal(&moving(json!({ "force_x_n": 30_000 })));
     assert!(
         reason.contains("30000 N") && reason.contains("22"),
         "{reason}"
     );
+}
+
+/// Why a case that passes the checks has no answer.
+fn refusal(case: &Value) -> String {
+    let checked =
+        contact::check(case, &Limits::default()).expect("the normal force is not known yet");
+    let Err(SolveError::NormalProblem { reason }) = contact::solve(&checked, &Unmonitored) else {
+        panic!("the rail does not carry it")
+    };
+    reason
+}
+
+/// The same place of the wheel on the right rail (1) or, mirrored, on the left (−1).
+fn at_shift(shift: f64, side: f64, motion: Value) -> Value {
+    let name = if side > 0.0 { "right" } else { "left" };
+    put(
+        &moving(motion),
+        "contact",
+        json!({ "lateral_shift_mm": side * shift, "side": name }),
+    )
+}
+
+#[test]
+fn the_lateral_force_of_a_creepage_gives_the_creepage_back() {
+    // Tread, gauge corner, and tread with flange.
+    for (shift, y) in [
+        (0.0, -0.0015),
+        (0.0, 0.0004),
+        (-5.5, 0.001),
+        (-6.45, -0.0008),
+    ] {
+        let free = json!({ "creepage_x": 0.0005, "creepage_y": y, "spin_per_mm": 0.0001 });
+        let given = answer(&at_shift(shift, 1.0, free));
+        let force = given.total[0].force_y_n;
+        let asked = json!({ "creepage_x": 0.0005, "force_y_n": force, "spin_per_mm": 0.0001 });
+        let found = answer(&at_shift(shift, 1.0, asked));
+        let own = found.total[0].force_y_n;
+        assert!((own - force).abs() < 2e-3 * LIMIT, "{shift}: {own} {force}");
+        assert_eq!(found.patches.len(), given.patches.len());
+        let creepage = found.patches[0].points[0].motion.creepage_y;
+        assert!((creepage / y - 1.0).abs() < 0.02, "{shift}: {creepage} {y}");
+        // The creepage in the other direction stays, and all forces balance the load.
+        assert_eq!(found.patches[0].points[0].motion.creepage_x, 0.0005);
+        let vertical = found.total[0].force_z_n.expect("of profiles");
+        assert!((vertical / 75_000.0 + 1.0).abs() < 1e-3, "{vertical}");
+    }
+}
+
+#[test]
+fn a_mirrored_wheel_needs_the_mirrored_lateral_creepage() {
+    let of = |side: f64| {
+        let motion =
+            json!({ "force_y_n": 9000.0 * side, "creepage_x": 0.0, "spin_per_mm": 0.0002 * side });
+        let found = answer(&at_shift(-5.5, side, motion));
+        assert!((found.total[0].force_y_n - 9000.0 * side).abs() < 2e-3 * LIMIT);
+        found.patches[0].points[0].motion.creepage_y * side
+    };
+    let [right, left] = [of(1.0), of(-1.0)];
+    assert!((right / left - 1.0).abs() < 0.02, "{right} {left}");
+}
+
+#[test]
+fn a_lateral_force_is_found_up_to_full_slip_and_refused_beyond() {
+    // In full slip friction adds its angle to that of the contact: V tan(α ± φ) where one angle is that of all patches.
+    let still = answer(&moving(json!({ "creepage_y": 0.0 })));
+    let position = still.patches[0].position.as_ref().expect("of profiles");
+    let angle = position.contact_angle_rad;
+    for side in [-1.0, 1.0] {
+        let most = 75_000.0 * (angle + side * f64::atan(0.3)).tan();
+        let slipping = answer(&moving(json!({ "creepage_y": 0.2 * side })));
+        let force = slipping.total[0].force_y_n;
+        assert!((force / most - 1.0).abs() < 0.01, "{force} {most}");
+        let near = answer(&moving(json!({ "force_y_n": 0.97 * force })));
+        assert!((near.total[0].force_y_n - 0.97 * force).abs() < 2e-3 * LIMIT);
+        for part in [1.02, 1.5] {
+            let reason = refusal(&moving(json!({ "force_y_n": part * force })));
+            let told: Vec<f64> = reason
+                .split_whitespace()
+                .filter_map(|word| word.parse().ok())
+                .collect();
+            let [asked, least, open] = told[..] else {
+                panic!("{reason}")
+            };
+            assert!(reason.contains("force_y_n"), "{reason}");
+            assert_eq!(asked, part * force);
+            let end = if side < 0.0 { least } else { open };
+            assert!((end / force - 1.0).abs() < 0.01, "{reason}");
+        }
+    }
+    let smooth = put(
+        &moving(json!({ "force_y_n": 5000 })),
+        "friction",
+        json!({ "coefficient": 0.0 }),
+    );
+    assert!(refusal(&smooth).contains("5000 N"));
 }

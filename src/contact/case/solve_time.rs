@@ -179,6 +179,9 @@ const STEP_TRIALS: f64 = 2.0;
 /// Solves of a wheel whose rail is to carry a longitudinal force: a coarse look, three to five trials and the answer.
 /// Chosen by judgement; how much it matters was not measured.
 const ROUNDS_PULL: f64 = 6.0;
+/// The same for a lateral force, with coarse looks at both ends.
+/// Chosen by judgement; how much it matters was not measured.
+const ROUNDS_PULL_ACROSS: f64 = 8.0;
 
 /// The estimated time of a case, in s on one core of the machine the figures were taken on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -212,9 +215,10 @@ impl CheckedCase {
         }
     }
 
-    /// Solves of a wheel whose rail is to carry a longitudinal force.
+    /// Solves of a wheel whose rail is to carry a force.
     fn pull_times(&self) -> f64 {
         match self.problem.pull() {
+            Some(pull) if pull.component == 1 => ROUNDS_PULL_ACROSS,
             Some(_) => ROUNDS_PULL,
             None => 1.0,
         }
