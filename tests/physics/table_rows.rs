@@ -117,3 +117,58 @@ fn rows_outside_the_table_or_above_the_target_say_so_and_faults_name_row_and_col
     assert_eq!(pointers, known, "{faults:?}");
     assert!(faults[0].detail.contains("-1 given"), "{faults:?}");
 }
+
+#[test]
+fn many_rows_of_one_material_are_answered_as_a_few_are() {
+    // From 4096 rows on the table of their Poisson's ratio is made first; a column of that ratio leaves no such table.
+    let count = 4200;
+    let spread = |low: f64, high: f64, step: f64| -> Vec<f64> {
+        let part = |row: usize| (step * row as f64).fract();
+        (0..count)
+            .map(|row| low + (high - low) * part(row))
+            .collect()
+    };
+    let mut columns = vec![
+        ("/load/normal_force_n", spread(2e4, 1.2e5, 0.618)),
+        ("/contact/lateral_mm", spread(60.0, 3000.0, 0.731)),
+        ("/motion/creepage_x", spread(-4e-3, 4e-3, 0.414)),
+        ("/motion/spin_per_mm", spread(-1e-3, 1e-3, 0.236)),
+        ("/friction/coefficient", spread(0.05, 0.5, 0.317)),
+    ];
+    let contact = json!({ "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 });
+    for within in [1e-6, 0.0] {
+        if within == 0.0 {
+            columns.push(("/material/poisson_ratio", spread(0.0, 0.5, 0.557)));
+        }
+        let answer = |from: usize, to: usize| {
+            let part: Vec<_> = columns
+                .iter()
+                .map(|(pointer, values)| (*pointer, values[from..to].to_vec()))
+                .collect();
+            rows("table", contact.clone(), &part).1.expect("sound rows")
+        };
+        let whole = answer(0, count);
+        let halves = [answer(0, count / 2), answer(count / 2, count)];
+        let (mut worst, mut equal) = (0.0_f64, 0);
+        for row in 0..count {
+            let half = &halves[row / (count / 2)];
+            let at = row % (count / 2);
+            let limit = columns[0].1[row] * columns[4].1[row];
+            let off = [
+                (whole.force_x_n[row] - half.force_x_n[at]) / limit,
+                (whole.force_y_n[row] - half.force_y_n[at]) / limit,
+                whole.stick_share[row] - half.stick_share[at],
+            ];
+            worst = off.iter().fold(worst, |worst, off| worst.max(off.abs()));
+            equal += usize::from(off == [0.0; 3]);
+            assert_eq!(whole.error_estimate[row], half.error_estimate[at], "{row}");
+            assert_eq!(whole.status[row], half.status[at], "{row}");
+        }
+        assert!(worst <= within, "{worst}");
+        assert_eq!(
+            equal == count,
+            within == 0.0,
+            "{equal} of {count} are equal"
+        );
+    }
+}

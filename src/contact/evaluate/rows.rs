@@ -13,8 +13,12 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::methods::fastsim::{self, EllipseMesh};
 use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
 use crate::contact::rolling::methods::table::file::table;
+use crate::contact::rolling::methods::table::material::MaterialTable;
 use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
 use crate::contact::rolling::resolution::Resolution;
+
+/// From so many rows on it is worth making the table of their material, which takes about as long as it saves here.
+const MATERIAL_ROWS: usize = 4096;
 
 /// Rows that can be evaluated.
 #[derive(Debug)]
@@ -117,7 +121,12 @@ impl Rows {
             gradients: self.gradients.then(|| std::array::from_fn(|_| column())),
             status: Vec::with_capacity(self.rows),
         };
-        let mut state = Shapes::default();
+        let material = self.material_table();
+        let mut state = Shapes {
+            material: material.as_ref(),
+            hertz: None,
+            table: None,
+        };
         for number in 0..self.rows {
             let mut row = self.fixed;
             for (variable, values) in &self.varied {
@@ -128,21 +137,31 @@ impl Rows {
         answer
     }
 
-    fn answer_row(&self, row: &Row, shapes: &mut Shapes, answer: &mut RowsAnswer) -> [f64; 2] {
+    /// The table at the rows' Poisson's ratio, if it is one and they are many.
+    fn material_table(&self) -> Option<MaterialTable<'static>> {
+        let by_table = matches!(self.method, RowMethod::Table { .. });
+        let varied = |(variable, _): &(Variable, _)| *variable == Variable::PoissonRatio;
+        let wanted = by_table && self.rows >= MATERIAL_ROWS && !self.varied.iter().any(varied);
+        wanted.then(|| MaterialTable::new(table(), self.material(&self.fixed)[1]))
+    }
+
+    fn answer_row(&self, row: &Row, shapes: &mut Shapes<'_>, answer: &mut RowsAnswer) -> [f64; 2] {
         let at = |variable: Variable| row[variable as usize];
         let [modulus, poisson] = self.material(row);
         let force = at(Variable::NormalForce);
-        let [a, b] = if self.radii {
+        let ([a, b], ratio) = if self.radii {
             let radii = [at(Variable::Rolling), at(Variable::Lateral)];
             let shape = shapes.hertz(radii);
-            shape.semi_axes(force, modulus / (1.0 - poisson))
+            let axes = shape.semi_axes(force, modulus / (1.0 - poisson));
+            (axes, shape.ratio())
         } else {
-            [at(Variable::SemiAxisA), at(Variable::SemiAxisB)]
+            let [a, b] = [at(Variable::SemiAxisA), at(Variable::SemiAxisB)];
+            ([a, b], a / b)
         };
         let patch = RowPatch {
             limit: at(Variable::Friction) * force,
             c: (a * b).sqrt(),
-            ratio: a / b,
+            ratio,
             modulus,
             poisson,
         };
@@ -178,7 +197,7 @@ impl Rows {
     }
 
     /// What the method says of a patch.
-    fn creep(&self, patch: &RowPatch, motion: [f64; 3], shapes: &mut Shapes) -> RowCreep {
+    fn creep(&self, patch: &RowPatch, motion: [f64; 3], shapes: &mut Shapes<'_>) -> RowCreep {
         if patch.limit == 0.0 {
             let still = motion == [0.0; 3];
             return RowCreep::ok(Creep {
@@ -301,13 +320,15 @@ fn push(answer: &mut RowsAnswer, patch: &RowPatch, motion: [f64; 3], found: &Row
 }
 
 /// What neighbouring rows often share.
-#[derive(Debug, Default)]
-struct Shapes {
+#[derive(Debug)]
+struct Shapes<'a> {
+    /// The table at the Poisson's ratio of all rows.
+    material: Option<&'a MaterialTable<'a>>,
     hertz: Option<([f64; 2], HertzShape)>,
-    table: Option<([f64; 2], EllipseTable<'static>)>,
+    table: Option<([f64; 2], EllipseTable<'a>)>,
 }
 
-impl Shapes {
+impl<'a> Shapes<'a> {
     fn hertz(&mut self, radii: [f64; 2]) -> HertzShape {
         match self.hertz {
             Some((known, shape)) if known == radii => shape,
@@ -319,11 +340,14 @@ impl Shapes {
         }
     }
 
-    fn table(&mut self, ratio: f64, poisson: f64) -> EllipseTable<'static> {
+    fn table(&mut self, ratio: f64, poisson: f64) -> EllipseTable<'a> {
         match self.table {
             Some((known, ellipse)) if known == [ratio, poisson] => ellipse,
             _ => {
-                let ellipse = table().ellipse(ratio, poisson);
+                let ellipse = match self.material {
+                    Some(material) => material.ellipse(ratio),
+                    None => table().ellipse(ratio, poisson),
+                };
                 self.table = Some(([ratio, poisson], ellipse));
                 ellipse
             }

@@ -208,6 +208,16 @@ impl HertzShape {
         }
     }
 
+    /// a/b, the semi-axis along rolling by that across; the same under every load.
+    #[must_use]
+    pub fn ratio(&self) -> f64 {
+        if self.long {
+            1.0 / self.ratio
+        } else {
+            self.ratio
+        }
+    }
+
     /// Semi-axes along and across rolling in mm under a normal force in N, with the contact modulus `E*` in MPa.
     #[must_use]
     pub fn semi_axes(&self, force: f64, contact_modulus: f64) -> [f64; 2] {

@@ -1,24 +1,21 @@
 //! The table as a function: creep forces, the share that sticks, and derivatives, of one ellipse and any creepage.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::Arch;
 
 use crate::contact::rolling::methods::table::axis::{Axis, Weights};
 use crate::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
 use crate::contact::rolling::methods::table::grid::{
-    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, cell, ln_ratio_max,
-    sigma,
+    DIRECTIONS, POLES, RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, cell, ln_ratio_max, sigma,
+};
+use crate::contact::rolling::methods::table::material::MaterialTable;
+use crate::contact::rolling::methods::table::near_nodes::{
+    NEAR, NearNodes, SIZE_ROW, Value, ValueAndSlopes,
 };
 use crate::contact::rolling::methods::table::shape_coefficients::{
     ShapeCoefficients, poisson_weights,
 };
-use crate::contact::rolling::methods::table::spline::{
-    DIRECTION_COEFFICIENTS, OUTPUTS, POLE_COEFFICIENTS, ROW, coefficients,
-};
+use crate::contact::rolling::methods::table::spline::{OUTPUTS, coefficients};
 
-/// Numbers of one size: Poisson's ratios, functions.
-const SIZE_ROW: usize = POISSON_RATIOS.len() * OUTPUTS;
-/// Numbers of the four sizes around a creepage.
-const NEAR: usize = 4 * SIZE_ROW;
 /// The size at which everything slips without spin: f(r) = 1 from here on (Vermeulen and Johnson 1964).
 const SIZE_FULL: f64 = 3.0;
 
@@ -29,13 +26,13 @@ const BESIDE_SPIN: f64 = 0.05;
 #[derive(Debug)]
 pub struct CreepTable {
     /// `[a/b][pole][direction][size][ν][function]`, in units of `unit`.
-    spline: Vec<i16>,
-    unit: [f32; OUTPUTS],
+    pub(super) spline: Vec<i16>,
+    pub(super) unit: [f32; OUTPUTS],
     ratio: Axis,
     pole: Axis,
     direction: Axis,
     size: Axis,
-    shapes: ShapeCoefficients,
+    pub(super) shapes: ShapeCoefficients,
     /// Of every cell between nodes.
     bounds: Vec<f32>,
 }
@@ -55,6 +52,8 @@ pub struct Creep {
 #[derive(Debug, Clone, Copy)]
 pub struct EllipseTable<'a> {
     table: &'a CreepTable,
+    /// The same numbers at this Poisson's ratio, if they are at hand.
+    material: Option<&'a MaterialTable<'a>>,
     shape: Shape,
     /// C11, C22, C23, C33.
     kalker: [f64; 4],
@@ -130,11 +129,23 @@ impl CreepTable {
     #[inline(always)]
     pub fn ellipse(&self, ratio: f64, poisson_ratio: f64) -> EllipseTable<'_> {
         let ln_ratio = ratio.ln();
-        let (kalker, quarter) = self.shapes.at(ln_ratio, &poisson_weights(poisson_ratio));
+        let coefficients = self.shapes.at(ln_ratio, &poisson_weights(poisson_ratio));
+        self.ellipse_with(ratio, ln_ratio, coefficients, parabola(poisson_ratio))
+    }
+
+    /// The table for an ellipse with `[C11, C22, C23, C33]` of its material and `[C11, C22]` of ν = 1/4.
+    #[inline(always)]
+    pub(super) fn ellipse_with(
+        &self,
+        ratio: f64,
+        ln_ratio: f64,
+        (kalker, quarter): ([f64; 4], [f64; 2]),
+        poisson: [f64; 3],
+    ) -> EllipseTable<'_> {
         let root = ratio.sqrt();
-        let nu = 4.0 * poisson_ratio;
         EllipseTable {
             table: self,
+            material: None,
             shape: Shape::new(root, quarter),
             scale: [
                 kalker[0],
@@ -144,16 +155,21 @@ impl CreepTable {
             kalker,
             ln_ratio,
             ratio: self.ratio.at(ln_ratio),
-            poisson: [
-                0.5 * (1.0 - nu) * (2.0 - nu),
-                nu * (2.0 - nu),
-                0.5 * nu * (nu - 1.0),
-            ],
+            poisson,
         }
     }
 }
 
-impl EllipseTable<'_> {
+impl<'a> EllipseTable<'a> {
+    /// The same, evaluated with the numbers of its material.
+    #[inline(always)]
+    pub(super) fn of_material(self, material: &'a MaterialTable<'a>) -> EllipseTable<'a> {
+        EllipseTable {
+            material: Some(material),
+            ..self
+        }
+    }
+
     /// `[C11, C22, C23, C33]` of the ellipse.
     #[must_use]
     pub fn kalker(&self) -> [f64; 4] {
@@ -262,7 +278,6 @@ impl EllipseTable<'_> {
         let (pole, direction) = (table.pole.at(theta), table.direction.at(chi));
         let size = table.size.at(sigma);
         let near = NearNodes {
-            spline: &table.spline,
             ratio: self.ratio,
             pole,
             direction,
@@ -271,15 +286,20 @@ impl EllipseTable<'_> {
         let combined = |rows: &[f32; NEAR], weights: &[f64; 4]| self.combined(rows, weights);
         let arch = Arch::new();
         if SLOPES {
-            let [value, by_pole, by_direction] = arch.dispatch(ValueAndSlopes(near));
+            let [value, by_pole, by_direction] = arch.dispatch(ValueAndSlopes(&table.spline, near));
             Sums {
                 value: combined(&value, &size.value),
                 by_size: combined(&value, &size.slope),
                 by_pole: combined(&by_pole, &size.value),
                 by_direction: combined(&by_direction, &size.value),
             }
+        } else if let Some(material) = self.material {
+            Sums {
+                value: material.value(&near, &size.value),
+                ..Sums::default()
+            }
         } else {
-            let value = arch.dispatch(Value(near));
+            let value = arch.dispatch(Value(&table.spline, near));
             Sums {
                 value: combined(&value, &size.value),
                 ..Sums::default()
@@ -305,6 +325,18 @@ impl EllipseTable<'_> {
     }
 }
 
+/// Weights of the values at [`POISSON_RATIOS`](crate::contact::rolling::methods::table::grid::POISSON_RATIOS) in those of a Poisson's
+/// ratio: a parabola.
+#[inline(always)]
+pub(super) fn parabola(poisson_ratio: f64) -> [f64; 3] {
+    let nu = 4.0 * poisson_ratio;
+    [
+        0.5 * (1.0 - nu) * (2.0 - nu),
+        nu * (2.0 - nu),
+        0.5 * nu * (nu - 1.0),
+    ]
+}
+
 /// A creepage mirrored to x, z ≥ 0, and the signs that its forces get back.
 struct Quarter {
     inside: [f64; 3],
@@ -325,97 +357,5 @@ impl Quarter {
             inside: [x.abs(), spin * y, z.abs()],
             signs: [along, spin, spin],
         }
-    }
-}
-
-/// The coefficients around a place.
-#[derive(Clone, Copy)]
-struct NearNodes<'a> {
-    spline: &'a [i16],
-    ratio: Weights,
-    pole: Weights,
-    direction: Weights,
-    size: usize,
-}
-
-impl NearNodes<'_> {
-    /// The rows of one a/b and pole, at the four directions.
-    #[inline(always)]
-    fn row(&self, i: usize, j: usize, k: usize) -> &[i16; NEAR] {
-        let pole = (self.ratio.first + i) * POLE_COEFFICIENTS + self.pole.first + j;
-        let place = pole * DIRECTION_COEFFICIENTS + self.direction.first + k;
-        let start = place * ROW + self.size * SIZE_ROW;
-        match self.spline[start..start + NEAR].try_into() {
-            Ok(row) => row,
-            Err(_) => unreachable!("a slice of that length"),
-        }
-    }
-
-    #[inline(always)]
-    fn value(&self) -> [f32; NEAR] {
-        let mut sum = [0.0_f32; NEAR];
-        for i in 0..4 {
-            for j in 0..4 {
-                let outer = self.ratio.value[i] * self.pole.value[j];
-                for k in 0..4 {
-                    let weight = (outer * self.direction.value[k]) as f32;
-                    let row = self.row(i, j, k);
-                    for n in 0..NEAR {
-                        sum[n] += weight * f32::from(row[n]);
-                    }
-                }
-            }
-        }
-        sum
-    }
-
-    /// The value, and the derivatives by pole and direction.
-    #[inline(always)]
-    fn with_slopes(&self) -> [[f32; NEAR]; 3] {
-        let mut sums = [[0.0_f32; NEAR]; 3];
-        for i in 0..4 {
-            for j in 0..4 {
-                let outer = self.ratio.value[i] * self.pole.value[j];
-                let sloped = self.ratio.value[i] * self.pole.slope[j];
-                for k in 0..4 {
-                    let weights = [
-                        (outer * self.direction.value[k]) as f32,
-                        (sloped * self.direction.value[k]) as f32,
-                        (outer * self.direction.slope[k]) as f32,
-                    ];
-                    let row = self.row(i, j, k);
-                    for (sum, weight) in sums.iter_mut().zip(weights) {
-                        for n in 0..NEAR {
-                            sum[n] += weight * f32::from(row[n]);
-                        }
-                    }
-                }
-            }
-        }
-        sums
-    }
-}
-
-/// What is compiled for each level of SIMD. A closure would not be: the compiler does not inline one of this length.
-struct Value<'a>(NearNodes<'a>);
-
-impl WithSimd for Value<'_> {
-    type Output = [f32; NEAR];
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> [f32; NEAR] {
-        self.0.value()
-    }
-}
-
-/// The same with the derivatives.
-struct ValueAndSlopes<'a>(NearNodes<'a>);
-
-impl WithSimd for ValueAndSlopes<'_> {
-    type Output = [[f32; NEAR]; 3];
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> [[f32; NEAR]; 3] {
-        self.0.with_slopes()
     }
 }

@@ -5,6 +5,8 @@ pub mod coordinates;
 pub mod evaluate;
 pub mod file;
 pub mod grid;
+pub mod material;
+pub mod near_nodes;
 pub mod shape_coefficients;
 pub mod solve;
 pub mod spline;
