@@ -79,7 +79,8 @@ impl Cubic {
         })
     }
 
-    fn value(&self, s: f64) -> f64 {
+    /// Value at a fraction of the interval, 0 at its start and 1 at its end.
+    pub(crate) fn value(&self, s: f64) -> f64 {
         let [c0, c1, c2, c3] = self.coefficients;
         if s == 1.0 {
             return self.end;

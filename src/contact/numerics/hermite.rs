@@ -1,18 +1,46 @@
 //! Curves through samples: a cubic in every interval, with slopes at the nodes that the functions here choose by different rules.
 
-use crate::contact::numerics::cubic::{Cubic, interval, tangent};
+use crate::contact::numerics::cubic::{Cubic, interval};
 
 /// Value of the curve with these values and slopes at the nodes of an ascending axis, at least 2; beyond its ends that of the
 /// outermost cubics.
 pub(crate) fn value(axis: &[f64], values: &[f64], slopes: &[f64], at: f64) -> f64 {
-    let i = interval(axis, at);
-    Cubic::with_slopes(
-        axis,
-        i,
-        [values[i], values[i + 1]],
-        [slopes[i], slopes[i + 1]],
-    )
-    .at(at)
+    value_at(axis, values, slopes, &Place::new(axis, at))
+}
+
+/// A place on an axis, found once for the curves of many rows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    /// The node at the start of its interval.
+    pub(crate) node: usize,
+    /// How far along the interval it lies: 0 at its start, 1 at its end.
+    share: f64,
+}
+
+impl Place {
+    /// A place on an ascending axis of at least 2 nodes; beyond the ends it is counted from the outermost intervals.
+    pub(crate) fn new(axis: &[f64], at: f64) -> Place {
+        let node = interval(axis, at);
+        Place {
+            node,
+            share: (at - axis[node]) / (axis[node + 1] - axis[node]),
+        }
+    }
+
+    /// The same on the axis without its first nodes, of which there are `fewer`.
+    pub(crate) fn on_part(self, fewer: usize) -> Place {
+        Place {
+            node: self.node - fewer,
+            ..self
+        }
+    }
+}
+
+/// The same as [`value`] at a place.
+pub(crate) fn value_at(axis: &[f64], values: &[f64], slopes: &[f64], place: &Place) -> f64 {
+    let i = place.node;
+    let ends = |of: &[f64]| [of[i], of[i + 1]];
+    Cubic::with_slopes(axis, i, ends(values), ends(slopes)).value(place.share)
 }
 
 /// Values at any places of the curve that has no extreme between its nodes (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat.
@@ -83,12 +111,15 @@ fn monotone_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
     slopes
 }
 
+/// How many nodes away the last value lies that a slope of [`limited_slopes`] depends on.
+pub(crate) const SLOPE_REACH: usize = 2;
+
 /// Slopes at the nodes of a curve through at least 2 values, limited where the values jump or have a kink.
 ///
 /// A slope is that of the parabola through the node and its two neighbours, unless this parabola is curved more than a fixed
 /// number of times as strongly as those of both neighbouring nodes. There the slope is blended with the harmonic mean of the
 /// adjoining chords' slopes, 0 where these differ in sign (the limiter of van Leer 1974), which keeps the curve from overshooting
-/// the values. At the ends the parabola of the adjacent node is used.
+/// the values. At the ends the parabola of the adjacent node is used. A slope inside depends on [`SLOPE_REACH`] values on either side.
 pub(crate) fn limited_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
     /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
     const SLOPE_LIMIT: f64 = 8.0;
@@ -114,12 +145,8 @@ pub(crate) fn limited_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
     };
     let slope = |k: usize| {
         let (before, after) = (rises[k - 1], rises[k]);
-        let parabola = tangent(
-            axis[k] - axis[k - 1],
-            axis[k + 1] - axis[k],
-            values[k] - values[k - 1],
-            values[k + 1] - values[k],
-        );
+        let widths = [axis[k] - axis[k - 1], axis[k + 1] - axis[k]];
+        let parabola = (before * widths[1] + after * widths[0]) / (widths[0] + widths[1]);
         let trust = trust(k);
         if trust == 1.0 {
             return parabola;

@@ -1,7 +1,7 @@
 //! The gap between the undeformed bodies: samples, and a smooth surface through them.
 
 use crate::contact::numerics::cubic::{Cubic, interval};
-use crate::contact::numerics::hermite;
+use crate::contact::numerics::hermite::{self, Place, SLOPE_REACH};
 
 /// Distance of the undeformed surfaces in mm, both bodies together, over the contact plane.
 #[derive(Debug, Clone, PartialEq)]
@@ -243,22 +243,28 @@ impl SampledSurface {
 
     fn on(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         let width = self.x.len();
+        let places: Vec<Place> = x.iter().map(|x| Place::new(&self.x, *x)).collect();
+        // Only these columns decide on the values.
+        let first = places.iter().map(|place| place.node).min();
+        let last = places.iter().map(|place| place.node + 1).max();
+        let from = first.unwrap_or(0).saturating_sub(SLOPE_REACH);
+        let to = (last.unwrap_or(1) + SLOPE_REACH).min(width - 1);
+        let columns = &self.x[from..=to];
         let mut out = Vec::with_capacity(x.len() * y.len());
         for y in y {
             let j = interval(&self.y, *y);
             let (here, next) = (j * width, (j + 1) * width);
-            let line: Vec<f64> = (0..width)
+            let line: Vec<f64> = (from..=to)
                 .map(|i| {
                     let values = [here, next].map(|row| self.values[row + i]);
                     let slopes = [here, next].map(|row| self.slopes[row + i]);
                     Cubic::with_slopes(&self.y, j, values, slopes).at(*y)
                 })
                 .collect();
-            let slopes = hermite::limited_slopes(&self.x, &line);
-            out.extend(
-                x.iter()
-                    .map(|x| hermite::value(&self.x, &line, &slopes, *x)),
-            );
+            let slopes = hermite::limited_slopes(columns, &line);
+            let value =
+                |place: &Place| hermite::value_at(columns, &line, &slopes, &place.on_part(from));
+            out.extend(places.iter().map(value));
         }
         out
     }
@@ -300,6 +306,33 @@ mod tests {
                     (found - paraboloid(*x, *y)).abs() < 1e-14,
                     "{x} {y} {found}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn a_part_of_the_window_has_the_values_of_the_whole() {
+        // With kinks and jumps, where slopes are limited: equal to the last bit, from wherever the part begins.
+        let axis: Vec<f64> = (0..24)
+            .map(|k| f64::from(k) + 0.3 * f64::from(k).sin())
+            .collect();
+        let height = |x: f64, y: f64| (x - 9.0).abs() + if x > 14.5 { 5.0 } else { 0.01 * x * y };
+        let rows: Vec<Vec<f64>> = axis
+            .iter()
+            .map(|y| axis.iter().map(|x| height(*x, *y)).collect())
+            .collect();
+        let gap = GapSurface::grid(&axis, &axis, &rows);
+        let places: Vec<f64> = (0..=115).map(|k| 0.2 * f64::from(k)).collect();
+        let across = [0.7, 11.1, 22.9];
+        let whole = gap.on(&places, &across);
+        for first in 0..places.len() {
+            for count in [1, 4, 30] {
+                let part = &places[first..(first + count).min(places.len())];
+                let found = gap.on(part, &across);
+                for (j, row) in found.chunks_exact(part.len()).enumerate() {
+                    let known = &whole[j * places.len() + first..];
+                    assert_eq!(row, &known[..part.len()], "{first} {count}");
+                }
             }
         }
     }
