@@ -138,11 +138,11 @@ impl Rows {
     }
 
     /// The table at the rows' Poisson's ratio, if it is one and they are many.
-    fn material_table(&self) -> Option<MaterialTable<'static>> {
+    fn material_table(&self) -> Option<MaterialTable> {
         let by_table = matches!(self.method, RowMethod::Table { .. });
         let varied = |(variable, _): &(Variable, _)| *variable == Variable::PoissonRatio;
         let wanted = by_table && self.rows >= MATERIAL_ROWS && !self.varied.iter().any(varied);
-        wanted.then(|| MaterialTable::new(table(), self.material(&self.fixed)[1]))
+        wanted.then(|| table().of_material(self.material(&self.fixed)[1]))
     }
 
     fn answer_row(&self, row: &Row, shapes: &mut Shapes<'_>, answer: &mut RowsAnswer) -> [f64; 2] {
@@ -323,7 +323,7 @@ fn push(answer: &mut RowsAnswer, patch: &RowPatch, motion: [f64; 3], found: &Row
 #[derive(Debug)]
 struct Shapes<'a> {
     /// The table at the Poisson's ratio of all rows.
-    material: Option<&'a MaterialTable<'a>>,
+    material: Option<&'a MaterialTable>,
     hertz: Option<([f64; 2], HertzShape)>,
     table: Option<([f64; 2], EllipseTable<'a>)>,
 }
@@ -345,7 +345,7 @@ impl<'a> Shapes<'a> {
             Some((known, ellipse)) if known == [ratio, poisson] => ellipse,
             _ => {
                 let ellipse = match self.material {
-                    Some(material) => material.ellipse(ratio),
+                    Some(material) => table().ellipse_of(material, ratio),
                     None => table().ellipse(ratio, poisson),
                 };
                 self.table = Some(([ratio, poisson], ellipse));

@@ -7,7 +7,7 @@ use crate::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
 use crate::contact::rolling::methods::table::grid::{
     DIRECTIONS, POLES, RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, cell, ln_ratio_max, sigma,
 };
-use crate::contact::rolling::methods::table::material::MaterialTable;
+use crate::contact::rolling::methods::table::material::{MaterialTable, parabola};
 use crate::contact::rolling::methods::table::near_nodes::{
     NEAR, NearNodes, SIZE_ROW, Value, ValueAndSlopes,
 };
@@ -26,13 +26,13 @@ const BESIDE_SPIN: f64 = 0.05;
 #[derive(Debug)]
 pub struct CreepTable {
     /// `[a/b][pole][direction][size][ν][function]`, in units of `unit`.
-    pub(super) spline: Vec<i16>,
-    pub(super) unit: [f32; OUTPUTS],
+    spline: Vec<i16>,
+    unit: [f32; OUTPUTS],
     ratio: Axis,
     pole: Axis,
     direction: Axis,
     size: Axis,
-    pub(super) shapes: ShapeCoefficients,
+    shapes: ShapeCoefficients,
     /// Of every cell between nodes.
     bounds: Vec<f32>,
 }
@@ -53,7 +53,7 @@ pub struct Creep {
 pub struct EllipseTable<'a> {
     table: &'a CreepTable,
     /// The same numbers at this Poisson's ratio, if they are at hand.
-    material: Option<&'a MaterialTable<'a>>,
+    material: Option<&'a MaterialTable>,
     shape: Shape,
     /// C11, C22, C23, C33.
     kalker: [f64; 4],
@@ -133,9 +133,27 @@ impl CreepTable {
         self.ellipse_with(ratio, ln_ratio, coefficients, parabola(poisson_ratio))
     }
 
+    /// The table at one Poisson's ratio, 0 to 0.5, for [`CreepTable::ellipse_of`].
+    #[must_use]
+    pub fn of_material(&self, poisson_ratio: f64) -> MaterialTable {
+        MaterialTable::new(&self.spline, self.unit, &self.shapes, poisson_ratio)
+    }
+
+    /// As [`CreepTable::ellipse`], of a material whose table this table made.
+    #[must_use]
+    #[inline(always)]
+    pub fn ellipse_of<'a>(&'a self, material: &'a MaterialTable, ratio: f64) -> EllipseTable<'a> {
+        let ln_ratio = ratio.ln();
+        let coefficients = material.shapes.at(ln_ratio);
+        EllipseTable {
+            material: Some(material),
+            ..self.ellipse_with(ratio, ln_ratio, coefficients, material.poisson)
+        }
+    }
+
     /// The table for an ellipse with `[C11, C22, C23, C33]` of its material and `[C11, C22]` of ν = 1/4.
     #[inline(always)]
-    pub(super) fn ellipse_with(
+    fn ellipse_with(
         &self,
         ratio: f64,
         ln_ratio: f64,
@@ -160,16 +178,7 @@ impl CreepTable {
     }
 }
 
-impl<'a> EllipseTable<'a> {
-    /// The same, evaluated with the numbers of its material.
-    #[inline(always)]
-    pub(super) fn of_material(self, material: &'a MaterialTable<'a>) -> EllipseTable<'a> {
-        EllipseTable {
-            material: Some(material),
-            ..self
-        }
-    }
-
+impl EllipseTable<'_> {
     /// `[C11, C22, C23, C33]` of the ellipse.
     #[must_use]
     pub fn kalker(&self) -> [f64; 4] {
@@ -323,18 +332,6 @@ impl<'a> EllipseTable<'a> {
         }
         sums
     }
-}
-
-/// Weights of the values at [`POISSON_RATIOS`](crate::contact::rolling::methods::table::grid::POISSON_RATIOS) in those of a Poisson's
-/// ratio: a parabola.
-#[inline(always)]
-pub(super) fn parabola(poisson_ratio: f64) -> [f64; 3] {
-    let nu = 4.0 * poisson_ratio;
-    [
-        0.5 * (1.0 - nu) * (2.0 - nu),
-        nu * (2.0 - nu),
-        0.5 * nu * (nu - 1.0),
-    ]
 }
 
 /// A creepage mirrored to x, z ≥ 0, and the signs that its forces get back.

@@ -2,33 +2,38 @@
 
 use pulp::Arch;
 
-use crate::contact::rolling::methods::table::evaluate::{CreepTable, EllipseTable, parabola};
 use crate::contact::rolling::methods::table::near_nodes::{NearNodes, SIZE_ROW, ValueOfMaterial};
 use crate::contact::rolling::methods::table::shape_coefficients::{
-    MaterialCoefficients, poisson_weights,
+    MaterialCoefficients, ShapeCoefficients, poisson_weights,
 };
 use crate::contact::rolling::methods::table::spline::OUTPUTS;
 
 /// The table of a material: the sums over Poisson's ratios are taken once, at every coefficient.
 ///
-/// Values differ from those of [`CreepTable::ellipse`] by the rounding of single precision, some 1e-7 of what they may be at most.
+/// Values differ from those of the whole table by the rounding of single precision, some 1e-7 of what they may be at most.
 #[derive(Debug, Clone)]
-pub struct MaterialTable<'a> {
-    table: &'a CreepTable,
+pub struct MaterialTable {
     /// `[a/b][pole][direction][size][function]`.
     spline: Vec<[f32; OUTPUTS]>,
-    shapes: MaterialCoefficients,
-    poisson: [f64; 3],
+    pub(super) shapes: MaterialCoefficients,
+    /// Weights of the values at Poisson's ratios of the nodes.
+    pub(super) poisson: [f64; 3],
 }
 
-impl<'a> MaterialTable<'a> {
-    /// The table at a Poisson's ratio from 0 to 0.5: 1.4 MB, made in the time of some thousand values.
+impl MaterialTable {
+    /// The table at a Poisson's ratio from 0 to 0.5, from the numbers of all `[a/b][pole][direction][size][ν][function]`, their units and
+    /// Kalker's coefficients: 1.4 MB, made in the time of some thousand values.
     #[must_use]
-    pub fn new(table: &'a CreepTable, poisson_ratio: f64) -> MaterialTable<'a> {
+    pub fn new(
+        spline: &[i16],
+        unit: [f32; OUTPUTS],
+        shapes: &ShapeCoefficients,
+        poisson_ratio: f64,
+    ) -> MaterialTable {
         let poisson = parabola(poisson_ratio);
-        let (rows, _) = table.spline.as_chunks::<SIZE_ROW>();
+        let (rows, _) = spline.as_chunks::<SIZE_ROW>();
         let weights: [[f64; OUTPUTS]; 3] =
-            poisson.map(|weight| table.unit.map(|unit| weight * f64::from(unit)));
+            poisson.map(|weight| unit.map(|unit| weight * f64::from(unit)));
         let combined = |row: &[i16; SIZE_ROW]| -> [f32; OUTPUTS] {
             std::array::from_fn(|k| {
                 let part = |n: usize| weights[n][k] * f64::from(row[n * OUTPUTS + k]);
@@ -36,22 +41,10 @@ impl<'a> MaterialTable<'a> {
             })
         };
         MaterialTable {
-            table,
             spline: rows.iter().map(combined).collect(),
-            shapes: table.shapes.of_material(&poisson_weights(poisson_ratio)),
+            shapes: shapes.of_material(&poisson_weights(poisson_ratio)),
             poisson,
         }
-    }
-
-    /// The table for semi-axes of the ratio a/b, as [`CreepTable::ellipse`].
-    #[must_use]
-    #[inline(always)]
-    pub fn ellipse(&'a self, ratio: f64) -> EllipseTable<'a> {
-        let ln_ratio = ratio.ln();
-        let coefficients = self.shapes.at(ln_ratio);
-        self.table
-            .ellipse_with(ratio, ln_ratio, coefficients, self.poisson)
-            .of_material(self)
     }
 
     /// The functions at a place, with the weights of its four sizes.
@@ -66,4 +59,16 @@ impl<'a> MaterialTable<'a> {
         }
         sums
     }
+}
+
+/// Weights of the values at `POISSON_RATIOS` in those of a Poisson's
+/// ratio: a parabola.
+#[inline(always)]
+pub(super) fn parabola(poisson_ratio: f64) -> [f64; 3] {
+    let nu = 4.0 * poisson_ratio;
+    [
+        0.5 * (1.0 - nu) * (2.0 - nu),
+        nu * (2.0 - nu),
+        0.5 * nu * (nu - 1.0),
+    ]
 }
