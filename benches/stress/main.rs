@@ -1,7 +1,7 @@
 //! Stability: thousands of cases from all over the allowed ground, every answer held against the laws of contact.
 //!
 //! `cargo bench --bench stress [-- cases seed]` prints the table and writes it to `docs/stability.md`; it ends with an error if a
-//! case crashes, hangs or breaks a law. `-- --only` with `times`, `after`, `physics`, `maintenance`, `rows`, `creep-map`, `sweep-with-zones` or
+//! case crashes, hangs or breaks a law. `-- --only` with `times`, `after`, `physics`, `maintenance`, `histories`, `rows`, `creep-map`, `sweep-with-zones` or
 //! `damaged-profile` prints one section, `-- --case 1511` one case as JSON.
 
 extern crate railhead_contact as railhead;
@@ -12,6 +12,7 @@ mod contacts;
 mod damaged;
 mod damaged_table;
 mod damaged_trials;
+mod histories;
 mod laws;
 mod maintenance;
 mod physics;
@@ -71,13 +72,14 @@ fn main() -> ExitCode {
             Some("after") => after::table(),
             Some("physics") => physics::table(SEED),
             Some("maintenance") => maintenance::table(SEED),
+            Some("histories") => histories::table(SEED),
             Some("rows") => rows::table(SEED),
             Some("creep-map") => sweeps::creep_maps(),
             Some("sweep-with-zones") => sweeps::with_zones(),
             Some("damaged-profile") => damaged_table::tables(SEED),
             _ => {
                 eprintln!(
-                    "--only takes times, after, physics, maintenance, rows, creep-map, sweep-with-zones or damaged-profile"
+                    "--only takes times, after, physics, maintenance, histories, rows, creep-map, sweep-with-zones or damaged-profile"
                 );
                 return ExitCode::FAILURE;
             }
@@ -115,6 +117,7 @@ fn main() -> ExitCode {
     text.push_str(&damaged_table::tables(SEED));
     text.push_str(&physics::table(SEED));
     text.push_str(&maintenance::table(SEED));
+    text.push_str(&histories::table(SEED));
     println!("{text}");
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/stability.md");
     std::fs::write(path, text).expect("docs can be written");

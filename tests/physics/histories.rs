@@ -308,6 +308,33 @@ fn a_long_way_ends_in_steady_rolling_and_steady_rolling_stays() {
     }
 }
 
+/// Under small creepages a step changes so little that tractions far from those of steady rolling nearly solve it.
+#[test]
+fn small_creepages_that_no_longer_change_end_in_steady_rolling() {
+    let a = 7.43;
+    let contact = json!({ "type": "ellipse", "a_mm": a, "b_mm": 3.37 });
+    let last = -2.35e-5;
+    let history = json!({ "history": { "distance_mm": [2.2, 9.6, 11.0, 13.8, 13.8 + 10.0 * a],
+        "creepage_x": [4.9e-5, -3.5e-5, 1.25e-4, last, last] }, "start": "steady" });
+    let [rolled, steady] = [history, json!({ "creepage_x": last })].map(|motion| {
+        let mut case = sphere(0.28, motion);
+        case["contact"] = contact.clone();
+        case["load"] = json!({ "normal_force_n": 87_600 });
+        case["solver"] = json!({ "target_error": 0.02 });
+        let (solution, _) = solve(&case);
+        solution.patches[0].points.last().unwrap().clone()
+    });
+    let estimate = |point: &PointSolution| point.error_estimate.unwrap().force_x_n;
+    let off = (rolled.force_x_n - steady.force_x_n).abs();
+    assert!(
+        off < estimate(&rolled) + estimate(&steady),
+        "{} {}",
+        rolled.force_x_n,
+        steady.force_x_n
+    );
+    assert!(off < 0.1 * steady.force_x_n.abs());
+}
+
 /// Keeps what a solve says of its progress.
 #[derive(Default)]
 struct Listener(RefCell<Vec<f64>>);

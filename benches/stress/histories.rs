@@ -1,0 +1,281 @@
+//! Rolling that changes: random histories held against laws.
+
+use std::fmt::Write as _;
+
+use railhead::contact;
+use railhead::contact::case::limits::Limits;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::solution::words::answer::PointSolution;
+use serde_json::{Value, json};
+
+use crate::physics;
+use crate::random::Random;
+
+/// A class, how many histories of it are solved, and how one is made.
+type Class = (&'static str, usize, fn(&mut Random, &mut Value));
+
+const CLASSES: [Class; 5] = [
+    ("creepages that change", 40, creepages),
+    ("forces that change", 10, forces),
+    ("shifts, then rolling", 20, shifts),
+    ("friction varies along", 40, along),
+    ("bodies differ, pressed together", 2, pressed),
+];
+
+/// Contact lengths of rolling with nothing that changes, after which rolling is steady.
+const LENGTHS_STEADY: f64 = 4.0;
+/// By how much the work of friction may fall from point to point, over friction limit times half-length and over the work so far: it is the
+/// difference of two terms that are as exact as forces.
+const DISSIPATION: [f64; 2] = [2e-4, 0.01];
+/// How far forces may be beyond the friction limit, or beside the force that was prescribed, of the limit.
+const FORCES: [f64; 2] = [0.02, TARGET];
+
+/// Target of the histories: a finer one takes seconds each.
+const TARGET: f64 = 0.02;
+
+/// What a history showed.
+struct Shown {
+    target_met: bool,
+    /// Distance of the last point from steady rolling over the sum of their estimates, where it is one.
+    from_steady: Option<f64>,
+}
+
+/// Half the length of the patch of `physics::base` in mm.
+fn half_length(case: &Value) -> f64 {
+    case["contact"]["a_mm"].as_f64().unwrap_or(1.0)
+}
+
+/// Distances in mm: some points at random, then one far behind, where rolling is steady.
+fn distances(random: &mut Random, a: f64, first: f64) -> Vec<f64> {
+    let mut all = vec![first * a];
+    for _ in 0..3 + random.below(8) {
+        all.push(all[all.len() - 1] + a * random.decades(0.05, 3.0));
+    }
+    all.push(all[all.len() - 1] + 2.0 * LENGTHS_STEADY * a);
+    all
+}
+
+/// Random values, the last two of them equal.
+fn values(random: &mut Random, count: usize, size: f64) -> Vec<f64> {
+    let mut all: Vec<f64> = (0..count).map(|_| random.between(-size, size)).collect();
+    all[count - 1] = all[count - 2];
+    all
+}
+
+/// A creepage that makes a patch slip in part: up to three times what saturates.
+fn size(random: &mut Random) -> f64 {
+    random.decades(1e-4, 0.02)
+}
+
+fn start(random: &mut Random) -> Value {
+    json!(["rest", "steady"][random.below(2)])
+}
+
+fn creepages(random: &mut Random, case: &mut Value) {
+    let distance = distances(random, half_length(case), 0.3);
+    let count = distance.len();
+    let size = size(random);
+    case["motion"] = json!({
+        "history": {
+            "distance_mm": distance, "creepage_x": values(random, count, size),
+            "creepage_y": values(random, count, size), "spin_per_mm": values(random, count, 0.1 * size),
+        },
+        "start": start(random),
+    });
+}
+
+fn forces(random: &mut Random, case: &mut Value) {
+    let distance = distances(random, half_length(case), 0.3);
+    let count = distance.len();
+    let limit = 0.3 * case["load"]["normal_force_n"].as_f64().unwrap_or(0.0);
+    let size = limit * random.between(0.1, 0.65);
+    case["motion"] = json!({
+        "history": { "distance_mm": distance, "force_x_n": values(random, count, size), "force_y_n": values(random, count, size) },
+        "start": "rest",
+    });
+}
+
+/// There and back without rolling, as in fretting, then rolling.
+fn shifts(random: &mut Random, case: &mut Value) {
+    let a = half_length(case);
+    let mut distance = vec![0.0; 2 + random.below(3)];
+    let still = distance.len();
+    distance.extend(distances(random, a, 0.3));
+    let count = distance.len();
+    let slip = a * size(random);
+    let of_shift = |random: &mut Random| -> Vec<f64> {
+        (0..count)
+            .map(|k| {
+                if k < still {
+                    random.between(-slip, slip)
+                } else {
+                    0.0
+                }
+            })
+            .collect()
+    };
+    let creepage = size(random);
+    case["motion"] = json!({
+        "history": {
+            "distance_mm": distance, "shift_x_mm": of_shift(random), "shift_y_mm": of_shift(random),
+            "creepage_x": values(random, count, creepage),
+        },
+        "start": "rest",
+    });
+}
+
+fn along(random: &mut Random, case: &mut Value) {
+    creepages(random, case);
+    let a = half_length(case);
+    let mut x: Vec<f64> = (0..4).map(|_| a * random.between(-1.0, 8.0)).collect();
+    x.sort_by(f64::total_cmp);
+    x[2] = x[1];
+    let mu: Vec<f64> = (0..4).map(|_| random.decades(0.02, 0.6)).collect();
+    case["friction"] = json!({ "along": { "x_mm": x, "coefficient": mu } });
+}
+
+fn pressed(random: &mut Random, case: &mut Value) {
+    let body = |random: &mut Random| json!({ "shear_modulus_mpa": random.decades(2e4, 2e5), "poisson_ratio": random.between(0.2, 0.4) });
+    case["material"] = json!({ "upper": body(random), "lower": body(random) });
+    case["motion"] = json!({ "history": { "distance_mm": 0 }, "start": "pressed" });
+}
+
+/// The table; cases that failed or broke a law are written out below it.
+pub fn table(seed: u64) -> String {
+    let mut text = String::from(
+        "## Rolling that changes\n\n*Laws*: forces are finite, and within the largest coefficient times the load; friction takes no work back; forces that are prescribed \
+         are met within the target; rolling that no longer changes has the forces of the steady solver within both estimates (*steady in the end*).\n\n\
+         | histories | tried | refused | solved | target met | steady in the end, of | failed |\n|---|---|---|---|---|---|---|\n",
+    );
+    let mut troubles = String::new();
+    for (name, count, make) in CLASSES {
+        let mut random = Random(seed);
+        let [
+            mut refused,
+            mut solved,
+            mut met,
+            mut ended,
+            mut steady,
+            mut failed,
+        ] = [0; 6];
+        for _ in 0..count {
+            let mut case = physics::base(&mut random);
+            case["solver"] = json!({ "target_error": TARGET });
+            make(&mut random, &mut case);
+            match one(&case) {
+                Ok(None) => refused += 1,
+                Ok(Some(shown)) => {
+                    solved += 1;
+                    met += usize::from(shown.target_met);
+                    if let Some(distance) = shown.from_steady {
+                        ended += 1;
+                        steady += usize::from(distance <= 1.0);
+                        if distance > 1.0 {
+                            let _ = writeln!(
+                                troubles,
+                                "- {distance:.2} estimates from steady rolling: `{case}`"
+                            );
+                        }
+                    }
+                }
+                Err(why) => {
+                    failed += 1;
+                    let _ = writeln!(troubles, "- {why}: `{case}`");
+                }
+            }
+        }
+        let _ = writeln!(
+            text,
+            "| {name} | {count} | {refused} | {solved} | {met} | {steady} of {ended} | {failed} |"
+        );
+    }
+    text + "\n" + &troubles
+}
+
+/// Solves a history and holds it against the laws; nothing if it was refused.
+fn one(case: &Value) -> Result<Option<Shown>, String> {
+    let Some(points) = solved(case)? else {
+        return Ok(None);
+    };
+    let load = case["load"]["normal_force_n"].as_f64().unwrap_or(0.0);
+    let limit = load * largest_coefficient(&case["friction"]);
+    let history = &case["motion"]["history"];
+    let mut taken = 0.0;
+    for (k, point) in points.iter().enumerate() {
+        let force = point.force_x_n.hypot(point.force_y_n);
+        if !force.is_finite() || force > (1.0 + FORCES[0]) * limit {
+            return Err(format!(
+                "point {k}: a force of {force} N of at most {limit} N"
+            ));
+        }
+        let work = point
+            .history
+            .as_ref()
+            .map_or(f64::NAN, |h| h.dissipated_n_mm);
+        let allowed = DISSIPATION[0] * limit * half_length(case);
+        if !(work >= taken - allowed.max(DISSIPATION[1] * taken)) {
+            return Err(format!(
+                "point {k}: friction took {work} N mm after {taken} N mm"
+            ));
+        }
+        taken = work;
+        for (name, found) in [
+            ("force_x_n", point.force_x_n),
+            ("force_y_n", point.force_y_n),
+        ] {
+            let asked = history[name][k].as_f64();
+            let off = asked.map_or(0.0, |asked| (found - asked).abs());
+            if off > FORCES[1] * limit {
+                return Err(format!("point {k}: {name} is off by {off} N"));
+            }
+        }
+    }
+    let target_met = points.iter().all(|point| point.target_met == Some(true));
+    let from_steady = steady_distance(case, &points[points.len() - 1], limit)?;
+    Ok(Some(Shown {
+        target_met,
+        from_steady,
+    }))
+}
+
+fn solved(case: &Value) -> Result<Option<Vec<PointSolution>>, String> {
+    let Ok(checked) = contact::check(case, &Limits::default()) else {
+        return Ok(None);
+    };
+    let (mut solution, _) =
+        contact::solve(&checked, &Unmonitored).map_err(|error| error.to_string())?;
+    Ok(Some(solution.patches.swap_remove(0).points))
+}
+
+/// How far the last point is from steady rolling with its motion, over the sum of both estimates.
+fn steady_distance(case: &Value, last: &PointSolution, limit: f64) -> Result<Option<f64>, String> {
+    if case["motion"]["start"] == json!("pressed") {
+        return Ok(None);
+    }
+    let mut steady = case.clone();
+    if let Some(table) = case["friction"]["along"]["coefficient"].as_array() {
+        steady["friction"] = json!({ "coefficient": table[table.len() - 1] });
+    }
+    steady["motion"] = json!({
+        "creepage_x": last.motion.creepage_x, "creepage_y": last.motion.creepage_y, "spin_per_mm": last.motion.spin_per_mm
+    });
+    let Some(points) = solved(&steady)? else {
+        return Ok(None);
+    };
+    let estimate = |point: &PointSolution| point.error_estimate.map_or(0.0, |e| e.force_x_n);
+    let off = (last.force_x_n - points[0].force_x_n)
+        .abs()
+        .max((last.force_y_n - points[0].force_y_n).abs());
+    Ok(Some(
+        off / (estimate(last) + estimate(&points[0])).max(1e-6 * limit),
+    ))
+}
+
+/// The largest coefficient of a table along the track, or the one there is.
+fn largest_coefficient(friction: &Value) -> f64 {
+    let table = friction["along"]["coefficient"].as_array();
+    let of_table = table.map(|values| values.iter().filter_map(Value::as_f64).fold(0.0, f64::max));
+    of_table
+        .or(friction["coefficient"].as_f64())
+        .unwrap_or(f64::NAN)
+}
