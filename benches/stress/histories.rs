@@ -213,7 +213,7 @@ fn one(case: &Value) -> Result<Option<Shown>, String> {
             .as_ref()
             .map_or(f64::NAN, |h| h.dissipated_n_mm);
         let allowed = DISSIPATION[0] * limit * half_length(case);
-        if !(work >= taken - allowed.max(DISSIPATION[1] * taken)) {
+        if work.is_nan() || work < taken - allowed.max(DISSIPATION[1] * taken) {
             return Err(format!(
                 "point {k}: friction took {work} N mm after {taken} N mm"
             ));
