@@ -31,6 +31,8 @@ use std::fmt::Write as _;
 use std::process::ExitCode;
 
 use contacts::{Sample, samples};
+use serde_json::Value;
+use times::{CaseTimes, told};
 use trial::{End, Trial, trial};
 
 const CASES: usize = 5000;
@@ -106,7 +108,9 @@ fn main() -> ExitCode {
     let mut troubles = Troubles::default();
     for sample in samples(count, seed) {
         let found = trial(&sample);
-        rows.entry(sample.kind).or_default().add(&found);
+        rows.entry(sample.kind)
+            .or_default()
+            .add(&sample.case, &found);
         troubles.add(&sample, found);
         if (sample.number + 1) % 500 == 0 {
             eprintln!("{} cases", sample.number + 1);
@@ -129,7 +133,7 @@ fn main() -> ExitCode {
 }
 
 impl Row {
-    fn add(&mut self, trial: &Trial) {
+    fn add(&mut self, case: &Value, trial: &Trial) {
         self.cases += 1;
         match &trial.end {
             End::Solved => self.solved += 1,
@@ -142,7 +146,12 @@ impl Row {
         self.energy.extend(trial.energy.map(f64::abs));
         self.from_liu_hsu.extend(trial.from_liu_hsu);
         self.errors.extend(trial.error);
-        self.times.extend(trial.times);
+        self.times
+            .extend(trial.times.map(|[taken, formulas]| CaseTimes {
+                taken,
+                formulas,
+                told: told(case),
+            }));
     }
 }
 
@@ -239,6 +248,7 @@ fn report(count: usize, seed: u64, rows: &BTreeMap<&str, Row>, troubles: &Troubl
     text.push_str(&accuracy(rows));
     text.push_str(&times::section(
         rows.iter().map(|(kind, row)| (*kind, &row.times)),
+        seed,
     ));
     text.push_str(&sweeps::creep_maps());
     text.push_str(&sweeps::with_zones());

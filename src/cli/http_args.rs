@@ -101,6 +101,10 @@ pub(super) struct HttpArgs {
     #[arg(long, env = "RAILHEAD_BATCH_MAX_CASES", default_value_t = 200_000, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub batch_max_cases: u32,
+    /// Milliseconds for which `/v1/cases/check` solves a case to find out how long it takes; 0: it is told by formulas alone.
+    #[arg(long, env = "RAILHEAD_CHECK_TRIAL_MS", default_value_t = 200, value_name = "MS",
+          value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    pub check_trial_ms: u32,
     /// Pictures, grids and tables made at the same time [default: half of the cores, at least 1].
     #[arg(long, env = "RAILHEAD_RENDERINGS", value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub renderings: Option<u16>,
@@ -164,6 +168,7 @@ impl HttpArgs {
             memory_max_bytes: bytes(self.request_memory_mb),
             tenant_memory_max_bytes: bytes(self.tenant_request_memory_mb),
             parsed_max_bytes: bytes(self.parsed_case_max_mb),
+            check_trial: Duration::from_millis(self.check_trial_ms.into()),
             renderings: self.renderings.map_or(default.renderings, usize::from),
             renderings_waiting_max: count(self.renderings_waiting_max),
             body_max_bytes: bytes(self.body_max_mib),

@@ -54,6 +54,7 @@ pub mod rolling_stage;
 pub mod slices;
 pub mod solution;
 pub mod time_limit;
+pub mod trial;
 pub mod unlike_bodies;
 pub mod wheel_on_rail;
 pub mod wheelset;

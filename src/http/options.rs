@@ -4,6 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::contact::trial::USUAL_LIMIT;
+
 /// The limits of a service; every one is a flag of `serve`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HttpOptions {
@@ -37,6 +39,8 @@ pub struct HttpOptions {
     pub tenant_memory_max_bytes: usize,
     /// Estimated memory of one parsed case in bytes.
     pub parsed_max_bytes: usize,
+    /// How long a case is solved to find out how long it takes; 0: not at all.
+    pub check_trial: Duration,
     /// Pictures, grids and tables that are made at the same time, large grids apart.
     pub renderings: usize,
     /// Requests that wait for one of these; of one tenant half as many.
@@ -88,6 +92,7 @@ impl Default for HttpOptions {
             memory_max_bytes: 512 << 20,
             tenant_memory_max_bytes: 256 << 20,
             parsed_max_bytes: 96 << 20,
+            check_trial: USUAL_LIMIT,
             renderings: std::thread::available_parallelism()
                 .map_or(1, |cores| (cores.get() / 2).max(1)),
             renderings_waiting_max: 512,

@@ -9,6 +9,7 @@ use uuid::Uuid;
 
 use crate::contact::error::CaseError;
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::trial::{TriedTime, tried};
 use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::batch::Batch;
@@ -70,6 +71,16 @@ impl Jobs {
     /// Every fault of the case.
     pub fn check(&self, case: &Value) -> Result<CheckedCase, CaseError> {
         (self.shared.engine.check)(case, &self.shared.options.limits)
+    }
+
+    /// How long a case takes here, solved for at most about so long.
+    #[must_use]
+    pub fn tried(&self, checked: &CheckedCase, limit: Duration) -> TriedTime {
+        let engine = &self.shared.engine;
+        tried(checked, limit, |monitor| {
+            let mut slices = (engine.slices)(checked).into_iter();
+            slices.try_for_each(|slice| (engine.solve)(checked, slice, monitor).map(drop))
+        })
     }
 
     /// A job.

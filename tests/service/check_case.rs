@@ -1,9 +1,11 @@
 //! What `cases/check` says it understood, against what is solved.
 
-use serde_json::Value;
+use std::time::Duration;
+
+use serde_json::{Value, json};
 
 use crate::results::{number, numbers};
-use crate::server::{Server, example};
+use crate::server::{Server, Setup, example};
 
 async fn understood(server: &Server, case: &Value) -> Value {
     let answer = server.post("/v1/cases/check", case).await;
@@ -111,4 +113,46 @@ async fn wheel_and_rail_are_placed_where_they_touch_when_solved() {
             "{file}: {ratio} of {lowering} mm"
         );
     }
+}
+
+#[tokio::test]
+async fn the_time_is_that_of_a_solve_where_one_ends_soon() {
+    let case = example("hertz-steel.case.json");
+    let mut longer = example("sweep.case.json");
+    let range = json!({ "from": 0.0, "to": 0.01, "points": 5000 });
+    longer["motion"] = json!({ "sweep": { "creepage_x": range } });
+    longer["outputs"] = json!(["resultants"]);
+    for (trial_ms, case, found_by) in [
+        (3_600_000, &case, "solve"),
+        (1, &longer, "part_of_solve"),
+        (0, &case, "formulas"),
+    ] {
+        let mut setup = Setup::new();
+        setup.http.check_trial = Duration::from_millis(trial_ms);
+        let server = setup.start().await;
+        let answer = server.post("/v1/cases/check", case).await;
+        assert_eq!(answer.status, 200, "{}", answer.text);
+        let estimate = &answer.json["estimate"];
+        assert_eq!(estimate["found_by"], found_by, "{estimate}");
+        assert!(number(&estimate["seconds"]) > 0.0, "{estimate}");
+    }
+}
+
+#[tokio::test]
+async fn a_solve_that_fails_while_it_is_tried_is_told() {
+    let mut setup = Setup::new();
+    setup.http.check_trial = Duration::from_secs(3600);
+    let server = setup.start().await;
+    let mut case = example("uic60-crown.case.json");
+    // Overlaps so deeply that the contact reaches the ends of the samples.
+    case["load"] = json!({ "normal_force_n": 1e9 });
+    let answer = server.post("/v1/cases/check", &case).await;
+    assert_eq!(answer.status, 200, "{}", answer.text);
+    assert_eq!(
+        answer.json["estimate"]["found_by"], "failed_solve",
+        "{}",
+        answer.json
+    );
+    let job = server.solve(&case).await;
+    assert_eq!(job["state"], "failed", "{job}");
 }

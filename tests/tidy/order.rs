@@ -35,6 +35,7 @@ const ORDER: &[&str] = &[
     "contact::pulled_wheel",
     "contact::wheelset",
     "contact::slices",
+    "contact::trial",
     "contact::evaluate",
     "contact",
     "contact::evaluate::many",
@@ -142,6 +143,7 @@ pub const DOOR: &[&str] = &[
     "contact::rolling::operator_store",
     "contact::slices",
     "contact::solution",
+    "contact::trial",
 ];
 
 /// The place of a module in the order; nothing if it has none.

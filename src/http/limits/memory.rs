@@ -30,6 +30,8 @@ pub struct Memory {
     /// Turns for large cases: half of the cores, so that small cases need not wait for large ones.
     large: Arc<Semaphore>,
     small: Arc<Semaphore>,
+    /// Turns for solves that find out how long a case takes: half of the cores, beside the workers.
+    trials: Arc<Semaphore>,
     /// Turns for large grids.
     grids: Arc<Semaphore>,
     /// Turns for pictures, small grids and tables, which therefore need not wait for large grids.
@@ -82,6 +84,7 @@ impl Memory {
             answers: part(4),
             large: turns(cores / 2),
             small: turns(cores),
+            trials: turns(cores / 2),
             grids: turns(options.renderings),
             renderings: turns(options.renderings),
             waiting: Shares::new(waiting, waiting.div_ceil(2)),
@@ -123,6 +126,12 @@ impl Memory {
             &self.small
         };
         in_turn(turns).await
+    }
+
+    /// A turn to solve a case for a moment; none if it does not come within that time.
+    pub async fn trial(&self, within: Duration) -> Option<OwnedSemaphorePermit> {
+        let turn = tokio::time::timeout(within, self.trials.clone().acquire_owned());
+        turn.await.ok()?.ok()
     }
 
     /// Memory for an answer that exists already. It does not wait, since the answer would be held in the meantime.

@@ -3,6 +3,7 @@
 pub mod answer;
 pub mod damage;
 pub mod fields;
+pub mod found_by;
 pub mod maintenance;
 pub mod profile_quality;
 pub mod understanding;

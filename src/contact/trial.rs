@@ -1,0 +1,175 @@
+//! How long a case takes, found by solving it for a moment: whoever plans by a time wants it of this machine and this case, and the
+//! formulas of `case/solve_time.rs` know neither how often a mesh is refined nor how fast the machine is.
+//!
+//! Most cases end within the limit. Of one that does not, the formulas tell the rest, set right by what was solved meanwhile.
+
+use std::cell::Cell;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use crate::contact::error::SolveError;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::solution::words::found_by::FoundBy;
+
+/// Cases that are thought to take more memory of their own are not tried, in bytes: they are checked beside the workers.
+const BYTES_MAX: u64 = 128 << 20;
+
+/// How long a case is tried where nothing else is asked: 98 of 100 cases of the stress bench end within it, and nobody waits for it long.
+pub const USUAL_LIMIT: Duration = Duration::from_millis(200);
+
+/// A single motion, or the first of several, that was not done in time takes at least so many times as long as it was given. Of the 27 such
+/// cases of `cargo bench --bench stress -- --only times` 25 are within a factor of 3.
+const REST_TIMES: f64 = 2.0;
+/// Motions done from which on they tell how long the others take.
+const MOTIONS_MIN: usize = 3;
+
+/// The time of a case, and how it was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TriedTime {
+    /// Solve time in s on one core.
+    pub seconds: f64,
+    /// How it was found.
+    pub found_by: FoundBy,
+}
+
+struct TrialClock {
+    began: Instant,
+    limit: Duration,
+    progress: Cell<f64>,
+}
+
+impl Monitor for TrialClock {
+    fn tick(&self, progress: f64) -> ControlFlow<Stop> {
+        self.progress.set(progress);
+        if self.elapsed() > self.limit {
+            return ControlFlow::Break(Stop::OutOfTime);
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.began.elapsed()
+    }
+}
+
+/// The time of a case, solved for at most about so long by `solve`.
+pub fn tried(
+    case: &CheckedCase,
+    limit: Duration,
+    solve: impl FnOnce(&dyn Monitor) -> Result<(), SolveError>,
+) -> TriedTime {
+    let cost = case.cost();
+    if limit.is_zero() || cost.own_bytes() > BYTES_MAX {
+        return TriedTime {
+            seconds: cost.seconds,
+            found_by: FoundBy::Formulas,
+        };
+    }
+    let clock = TrialClock {
+        began: Instant::now(),
+        limit,
+        progress: Cell::new(0.0),
+    };
+    let end = solve(&clock);
+    let taken = clock.elapsed().as_secs_f64();
+    let (seconds, found_by) = match end {
+        Ok(()) => (taken, FoundBy::Solve),
+        Err(SolveError::OutOfTime { .. } | SolveError::Cancelled) => {
+            let seconds = from_part(case, cost.seconds, taken, clock.progress.get());
+            (seconds, FoundBy::PartOfSolve)
+        }
+        Err(_) => (taken, FoundBy::FailedSolve),
+    };
+    TriedTime { seconds, found_by }
+}
+
+/// The time of a case from the formulas, the time taken so far and the progress then.
+fn from_part(case: &CheckedCase, formulas: f64, taken: f64, progress: f64) -> f64 {
+    let motions = case.problem.motions.len();
+    let done = (progress * motions as f64) as usize;
+    if case.problem.history.is_some() || done < MOTIONS_MIN {
+        return formulas.max(REST_TIMES * taken);
+    }
+    let expected = case.slice(0..done).cost().seconds;
+    formulas.max(expected) * taken / expected
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::contact::case::limits::Limits;
+    use crate::contact::{check, solve};
+
+    fn checked(motion: &Value, solver: &Value) -> CheckedCase {
+        let case = json!({
+            "material": { "shear_modulus_mpa": 82_000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+            "load": { "normal_force_n": 100_000 },
+            "motion": motion,
+            "solver": solver,
+            "outputs": ["resultants"],
+        });
+        check(&case, &Limits::default()).unwrap()
+    }
+
+    fn motion() -> Value {
+        json!({ "creepage_x": 0.001, "creepage_y": 0.0, "spin_per_mm": 0.0 })
+    }
+
+    fn sweep(points: u32) -> CheckedCase {
+        let range = json!({ "from": 0.0, "to": 0.01, "points": points });
+        let sweep = json!({ "sweep": { "creepage_x": range } });
+        checked(&sweep, &json!({ "target_error": 0.005 }))
+    }
+
+    fn try_for(case: &CheckedCase, limit: Duration) -> TriedTime {
+        tried(case, limit, |monitor| solve(case, monitor).map(drop))
+    }
+
+    #[test]
+    fn a_case_that_ends_in_time_is_told_as_solved() {
+        let found = try_for(&sweep(3), Duration::from_secs(3600));
+        assert_eq!(found.found_by, FoundBy::Solve);
+        assert!(found.seconds > 0.0);
+    }
+
+    #[test]
+    fn without_time_or_with_too_much_memory_the_formulas_tell() {
+        let case = sweep(3);
+        let formulas = TriedTime {
+            seconds: case.cost().seconds,
+            found_by: FoundBy::Formulas,
+        };
+        assert_eq!(try_for(&case, Duration::ZERO), formulas);
+        let mesh = json!({ "strips": 70, "cells": 60 });
+        let large = checked(&motion(), &json!({ "mesh": mesh }));
+        assert!(large.cost().own_bytes() > BYTES_MAX);
+        let found = try_for(&large, Duration::from_secs(3600));
+        assert_eq!(found.found_by, FoundBy::Formulas);
+    }
+
+    #[test]
+    fn motions_done_in_time_tell_how_long_the_others_take() {
+        let case = sweep(5000);
+        let found = try_for(&case, Duration::from_millis(2));
+        assert_eq!(found.found_by, FoundBy::PartOfSolve);
+        assert!(found.seconds > 2e-3, "{found:?}");
+        // Each of like motions takes what those done took, whatever the formulas expect of one.
+        let formulas = case.cost().seconds;
+        let done = 1000;
+        let share = case.slice(0..done).cost().seconds / formulas;
+        let told = from_part(&case, formulas, 7.0, done as f64 / 5000.0);
+        assert!((told * share - 7.0).abs() < 1e-9, "{told} {share}");
+    }
+
+    #[test]
+    fn a_single_motion_takes_longer_than_the_trial() {
+        let case = checked(&motion(), &json!({ "target_error": 0.005 }));
+        let told = from_part(&case, case.cost().seconds, 7.0, 0.5);
+        assert_eq!(told, REST_TIMES * 7.0);
+    }
+}
