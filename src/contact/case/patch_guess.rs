@@ -115,6 +115,26 @@ impl Tractions {
     }
 }
 
+/// What is expected of a motion on a patch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct MotionGuess {
+    pub(crate) tractions: Tractions,
+    /// Time in s of the motion alone.
+    pub(crate) seconds: f64,
+    /// Creepages and spin, normalised as in an answer.
+    normalised: [f64; 3],
+}
+
+impl MotionGuess {
+    /// How far the tractions of two motions are apart: the change of creepages and spin in units of what saturates, or of the spin where
+    /// that is more, which is then the way of the pole in units of the patch.
+    pub(crate) fn distance(&self, other: &MotionGuess) -> f64 {
+        let changes = self.normalised.iter().zip(&other.normalised);
+        let change: f64 = changes.map(|(a, b)| (a - b).powi(2)).sum();
+        change.sqrt() / self.normalised[2].abs().max(1.0)
+    }
+}
+
 /// A patch as far as it is known before region and pressure are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PatchGuess {
@@ -181,7 +201,7 @@ impl PatchGuess {
         PatchGuess::of_ellipse(&ellipse)
     }
 
-    /// Time in s of a motion alone, solved to a target.
+    /// What is expected of a motion alone, solved to a target.
     pub(crate) fn seconds(
         &self,
         target: f64,
@@ -189,7 +209,7 @@ impl PatchGuess {
         friction: f64,
         motion: &Motion,
         prescribed: bool,
-    ) -> (Tractions, f64) {
+    ) -> MotionGuess {
         let c = (self.half[0] * self.half[1]).sqrt();
         let bound = (friction * self.force).max(f64::MIN_POSITIVE);
         let unit =
@@ -219,10 +239,15 @@ impl PatchGuess {
         } else {
             1.0
         };
-        (
+        MotionGuess {
             tractions,
-            self.times * trials * far * slender * tractions.time().at(target),
-        )
+            seconds: self.times * trials * far * slender * tractions.time().at(target),
+            normalised: [
+                unit * motion.creepage_x,
+                unit * motion.creepage_y,
+                unit * c * motion.spin_per_mm,
+            ],
+        }
     }
 }
 
@@ -279,8 +304,8 @@ mod tests {
                     force,
                     times: 1.0,
                 };
-                let (_, seconds) = patch.seconds(0.005, &elasticity, 0.3, &motion, force == 1.0);
-                assert!(seconds.is_finite(), "{patch:?}: {seconds}");
+                let guess = patch.seconds(0.005, &elasticity, 0.3, &motion, force == 1.0);
+                assert!(guess.seconds.is_finite(), "{patch:?}: {guess:?}");
             }
         }
     }

@@ -9,7 +9,9 @@
 //! `benches/calibrate` at three targets; the bench shows another seed. How far the share within a factor of 3 depends on each of them was
 //! not measured.
 
-use crate::contact::case::patch_guess::{PatchGuess, TARGET_LEAST, TARGET_USUAL, Tractions};
+use crate::contact::case::patch_guess::{
+    MotionGuess, PatchGuess, TARGET_LEAST, TARGET_USUAL, Tractions,
+};
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::method::Method;
 use crate::contact::normal::gap::task::GapTask;
@@ -18,18 +20,25 @@ use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::profile_points;
 use crate::contact::rolling::history::solve::usual_work;
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_MAX;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::task::precision_of;
 
-/// The time of a motion within a sweep relative to a single one: a start from the motion before saves work, but with spin every motion
-/// wants a mesh about its own pole, which costs the more the finer it is: times this power of how much finer the target is than 0.005.
+/// The time of a motion within a sweep relative to a single one, because tractions of the motion before are a start: where that is near, for
+/// motions with and without spin, and elsewhere. Read off 60 creep curves of 20 to 3000 motions (`cargo bench --bench stress -- --only times`,
+/// in view).
+const NEAR_SHARES: [f64; 2] = [0.25, 0.12];
+/// See [`NEAR_SHARES`].
 const SWEEP_SHARE: f64 = 0.7;
-/// For motions with spin. Raised so that sweeps take what they did with another time of a single motion; not measured anew.
+/// Motions no farther apart are near (see `MotionGuess::distance`): a mesh serves the next motion as well.
+const NEAR: f64 = 0.01;
+/// Elsewhere, motions with spin want a mesh about their own pole, which costs the more the finer it is: times this power of how much finer
+/// the target is than 0.005. Raised so that sweeps take what they did with another time of a single motion; not measured anew.
 const SWEEP_SHARE_SPIN: f64 = 1.1;
 /// See [`SWEEP_SHARE_SPIN`].
 const SWEEP_SPIN_POWER: f64 = 0.9;
+/// Least time in s of a motion within a sweep, on every patch.
+const MOTION_SECONDS_MIN: f64 = 6e-5;
 /// How many times longer motions take where a given pressure jumps. Where a sample may be anything beside its
 /// neighbours, the number grows below `JUMP_TARGET` with this power of how much finer the target is: errors fall more slowly with the cells
 /// than those of a smooth pressure. Of 63 jumping pressures of the seed 20261122 of the bench 76 % are within a factor of 3
@@ -301,27 +310,34 @@ impl CheckedCase {
         };
         let problem = &self.problem;
         let friction = problem.friction.largest();
-        let one = |k: usize, motion: &Motion| {
-            let prescribed = self.is_prescribed(k);
-            let each = patches.iter().map(|patch| {
-                patch.seconds(target, &problem.elasticity, friction, motion, prescribed)
-            });
-            each.fold((Tractions::Stick, 0.0), |(_, sum), (tractions, seconds)| {
-                (tractions, sum + seconds)
-            })
-        };
         let crowd = crowd_seconds(patches.len());
         let finer = (TARGET_USUAL / target.max(TARGET_LEAST)).max(1.0);
         let spin_share = SWEEP_SHARE_SPIN * finer.powf(SWEEP_SPIN_POWER);
+        let fields = FIELDS_SECONDS_PER_CELL * self.field_cells();
+        let mut before: Option<Vec<MotionGuess>> = None;
         let motions = problem.motions.iter().enumerate().map(|(k, motion)| {
-            let (tractions, seconds) = one(k, motion);
-            let share = match tractions {
-                _ if k == 0 => 1.0,
-                Tractions::Spin => spin_share,
-                _ => SWEEP_SHARE,
+            let prescribed = self.is_prescribed(k);
+            let guess = |patch: &PatchGuess| {
+                patch.seconds(target, &problem.elasticity, friction, motion, prescribed)
             };
-            let fields = FIELDS_SECONDS_PER_CELL * self.field_cells();
-            share * (precise * seconds).max(crowd) + fields
+            let guesses: Vec<MotionGuess> = patches.iter().map(guess).collect();
+            let of_patch = |(at, guess): (usize, &MotionGuess)| {
+                let Some(before) = &before else {
+                    return precise * guess.seconds;
+                };
+                let spins = guess.tractions == Tractions::Spin;
+                let share = if !prescribed && guess.distance(&before[at]) < NEAR {
+                    NEAR_SHARES[usize::from(spins)]
+                } else if spins {
+                    spin_share
+                } else {
+                    SWEEP_SHARE
+                };
+                precise * (share * guess.seconds).max(MOTION_SECONDS_MIN)
+            };
+            let seconds: f64 = guesses.iter().enumerate().map(of_patch).sum();
+            before = Some(guesses);
+            seconds.max(crowd) + fields
         });
         SECONDS_MIN + motions.sum::<f64>()
     }
