@@ -19,8 +19,9 @@ use crate::contact::rolling::methods::table::spline::{OUTPUTS, coefficients};
 /// The size at which everything slips without spin: f(r) = 1 from here on (Vermeulen and Johnson 1964).
 const SIZE_FULL: f64 = 3.0;
 
-/// Derivatives by creepages below this part of the spin, by size, are differences. From 0.02 to 0.1 they change by less than 0.01 of C.
-const BESIDE_SPIN: f64 = 0.05;
+/// Derivatives by creepages below this part of the spin, by size, are differences. From 0.02 to 0.05 those of long ellipses change by up to
+/// 0.02 of C; 0.01 is chosen by judgement, near the limit and above the rounding of values.
+const BESIDE_SPIN: f64 = 0.01;
 
 /// The table, ready to be evaluated.
 #[derive(Debug)]

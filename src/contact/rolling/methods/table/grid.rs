@@ -3,19 +3,20 @@
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 
 /// Nodes in ln(a/b), uniform from 1/10 to 10.
-pub const RATIOS: usize = 11;
+pub const RATIOS: usize = 10;
 /// Nodes in Poisson's ratio, between which values are parabolas.
 pub const POISSON_RATIOS: [f64; 3] = [0.0, 0.25, 0.5];
 /// Nodes in the place of the spin pole, uniform from no spin (θ = 0) to spin alone (θ = π/2).
-pub const POLES: usize = 22;
+pub const POLES: usize = 18;
 /// Nodes in the direction, uniform from χ = −π/2 to π/2 (χ = 0: creepage along rolling).
-pub const DIRECTIONS: usize = 17;
-/// Nodes in the size, in 24ths of σ: closer where the last of the patch begins to slip.
-pub const SIZES: [u8; 18] = [
-    0, 2, 4, 6, 8, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 22, 24,
+pub const DIRECTIONS: usize = 21;
+/// Nodes in the size, in 48ths of σ: closest where the last of the patch begins to slip, and one near full slip, which is approached
+/// slowly while the spin pole is within the patch.
+pub const SIZES: [u8; 22] = [
+    0, 5, 10, 15, 19, 21, 22, 23, 24, 25, 26, 27, 28, 30, 32, 34, 36, 38, 40, 44, 46, 48,
 ];
 /// What the nodes of [`SIZES`] count.
-pub const SIZE_STEPS: f64 = 24.0;
+pub const SIZE_STEPS: f64 = 48.0;
 /// The size of creepage at σ = 1/2.
 pub const SIZE_HALF: f64 = 1.5;
 
@@ -59,7 +60,7 @@ pub fn size(sigma: f64) -> f64 {
 /// Cells between nodes: in a/b, pole, direction and size.
 pub const CELLS: usize = (RATIOS - 1) * (POLES - 1) * (DIRECTIONS - 1) * (SIZES.len() - 1);
 
-/// The last node at or before each of the 24ths of σ.
+/// The last node at or before each of the 48ths of σ.
 const SIZE_CELL: [u8; SIZE_STEPS as usize] = {
     let mut cells = [0; SIZE_STEPS as usize];
     let mut node = 0;

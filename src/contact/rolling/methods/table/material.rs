@@ -22,7 +22,7 @@ pub struct MaterialTable {
 
 impl MaterialTable {
     /// The table at a Poisson's ratio from 0 to 0.5, from the numbers of all `[a/b][pole][direction][size][ν][function]`, their units and
-    /// Kalker's coefficients: 1.4 MB, made in the time of some thousand values.
+    /// Kalker's coefficients: 1.6 MB, made in the time of some thousand values.
     #[must_use]
     pub fn new(
         spline: &[i16],
