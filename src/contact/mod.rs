@@ -158,7 +158,7 @@ fn solve_motions(
     let answer = match &case.problem.task {
         NormalTask::Wheel(wheel) => match case.problem.pull() {
             None => trust::solve(operators, case, wheel, monitor)?,
-            Some(pull) => pulled_wheel::solve(operators, case, wheel, pull, monitor)?,
+            Some(forces) => pulled_wheel::solve(operators, case, wheel, forces, monitor)?,
         },
         NormalTask::Wheelset(wheelset) => {
             wheelset::solve::solve(operators, case, wheelset, monitor)?

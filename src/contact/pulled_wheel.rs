@@ -1,4 +1,5 @@
-//! Solves a wheel whose rail is to carry a longitudinal or a lateral force: the creepage, or the angular velocity of the wheelset, that gives it is found.
+//! Solves a wheel whose rail is to carry a longitudinal or a lateral force, or both: the creepages, or the angular velocity of the wheelset, that
+//! give them are found.
 //!
 //! Everything is in the search: where the wheel rests, its patches, and how the load is shared between them depend on the force of friction, so
 //! that every trial brings the wheel to rest and solves all patches. The unknown is a place, as in the search for the creepages of one
@@ -13,14 +14,14 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::numerics::bracketed_root::{FRACTION_MAX, RootExit, find_root};
+use crate::contact::numerics::pair_root::{PairRoot, find_pair};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::physics::Pull;
 use crate::contact::problem::run::Run;
 use crate::contact::profile_trust::{settle, trust};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::cubic_law::CubicLaw;
 use crate::contact::rolling::linear_theory;
-use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::answer::{PatchSolution, Solution};
 use crate::contact::solution::words::fields::Fields;
@@ -40,7 +41,7 @@ const PROGRESS: [f64; 2] = [0.1, 0.8];
 /// Chosen by judgement; how much it matters was not measured.
 const TRIALS_USUAL: f64 = 6.0;
 
-/// Solves a wheel on a rail that carries the force of `pull`, at the creepage or the angular velocity that gives it.
+/// Solves a wheel on a rail that carries `forces`, at the creepages or the angular velocity that give them.
 ///
 /// # Errors
 /// Why there is no answer: the rail cannot carry the force, or a trial failed.
@@ -48,7 +49,7 @@ pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     contact: &WheelTask,
-    pull: Pull,
+    forces: PrescribedForces,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
     let settled = settle::settled(case, contact, monitor)?;
@@ -57,14 +58,11 @@ pub(crate) fn solve(
         operators,
         case,
         contact,
-        pull,
+        forces,
         monitor,
     };
     let first = search.first()?;
-    let reach = match pull.component {
-        0 => first.along(pull.force)?,
-        _ => search.across(&first)?,
-    };
+    let reach = search.reach(&first)?;
     search.to(&first, &reach)
 }
 
@@ -83,11 +81,11 @@ struct FirstEstimate {
 
 /// Where a search starts, and what is known of the forces it may meet.
 struct Reach {
-    /// Place to start from.
-    start: f64,
-    /// Force in N by which the force changes about when the place changes by 1.
-    unit: f64,
-    /// Force in N that the balance of the vertical force leaves open.
+    /// Places to start from.
+    start: [f64; 2],
+    /// Forces in N by which the forces change about when their places change by 1.
+    units: [f64; 2],
+    /// Lateral force in N that the balance of the vertical force leaves open.
     open: f64,
     /// Lateral forces in N in full slip to the right and to the left, where the wheel comes to rest there.
     ends: [Option<f64>; 2],
@@ -123,24 +121,6 @@ impl FirstEstimate {
             lateral_normal,
         }
     }
-
-    /// Where the search for a longitudinal force in N starts.
-    fn along(&self, force: f64) -> Result<Reach, SolveError> {
-        if force.abs() > self.limit {
-            return Err(SolveError::NormalProblem {
-                reason: format!(
-                    "a longitudinal force of {force} N was asked for; friction carries at most {:.1} N under this load",
-                    self.limit
-                ),
-            });
-        }
-        Ok(Reach {
-            start: force / self.limit,
-            unit: self.limit,
-            open: 0.0,
-            ends: [None; 2],
-        })
-    }
 }
 
 fn angle_of(patch: &PatchSolution) -> f64 {
@@ -158,29 +138,36 @@ struct PullSearch<'a> {
     operators: &'a Arc<OperatorStore>,
     case: &'a CheckedCase,
     contact: &'a WheelTask,
-    pull: Pull,
+    forces: PrescribedForces,
     monitor: &'a dyn Monitor,
 }
 
 impl PullSearch<'_> {
-    /// The case at a creepage in the direction of the force, which a wheelset has by its angular velocity, at a rolling radius in mm.
-    fn at(&self, creepage: f64, radius: f64, run: &Run) -> CheckedCase {
+    /// The case at creepages in the directions of the forces, of which a wheelset has that along by its angular velocity, at a
+    /// rolling radius in mm.
+    fn at(&self, creepages: [f64; 2], radius: f64, run: &Run) -> CheckedCase {
         let problem = &self.case.problem;
         let wheelset = problem.wheelset.map(|mut wheelset| {
-            wheelset.angular_velocity = wheelset.speed * (1.0 - creepage) / radius;
+            wheelset.angular_velocity = wheelset.speed * (1.0 - creepages[0]) / radius;
             wheelset
         });
-        let motion = match (wheelset, self.pull.component) {
-            (Some(_), _) => problem.motions[0],
-            (None, 1) => Motion {
-                creepage_y: creepage,
-                ..problem.motions[0]
-            },
-            (None, _) => Motion {
-                creepage_x: creepage,
-                ..problem.motions[0]
-            },
-        };
+        let mut motion = problem.motions[0];
+        if wheelset.is_none() {
+            let [along, across] = self.forces.map(|force| force.is_some());
+            motion = Motion {
+                creepage_x: if along {
+                    creepages[0]
+                } else {
+                    motion.creepage_x
+                },
+                creepage_y: if across {
+                    creepages[1]
+                } else {
+                    motion.creepage_y
+                },
+                ..motion
+            };
+        }
         CheckedCase {
             problem: problem.moving(motion, wheelset),
             run: run.clone(),
@@ -200,46 +187,80 @@ impl PullSearch<'_> {
         };
         let run = self.case.run.for_resultants(TARGET_FIRST);
         let found = self.judged(
-            &self.at(0.0, self.contact.geometry.placement.rolling_radius, &run),
+            &self.at(
+                [0.0; 2],
+                self.contact.geometry.placement.rolling_radius,
+                &run,
+            ),
             part,
         )?;
         Ok(FirstEstimate::of(&found.solution, self.case))
     }
 
-    /// The force of an answer in N that is sought.
-    fn force_of(&self, solution: &Solution) -> f64 {
-        match self.pull.component {
-            0 => solution.total[0].force_x_n,
-            _ => solution.total[0].force_y_n,
+    /// Where the search starts, if the forces may be within reach.
+    fn reach(&self, first: &FirstEstimate) -> Result<Reach, SolveError> {
+        let limit = first.limit;
+        if limit <= 0.0 {
+            let asked = self.asked();
+            return Err(SolveError::NormalProblem {
+                reason: format!(
+                    "{asked} was asked for under a wheel without friction, where no creepage changes it; give creepages"
+                ),
+            });
         }
+        if let Some(force) = self.forces[0].filter(|force| force.abs() > limit) {
+            return Err(SolveError::NormalProblem {
+                reason: format!(
+                    "a longitudinal force force_x_n of {force} N was asked for; friction carries at most {limit:.1} N under this load"
+                ),
+            });
+        }
+        let mut reach = Reach {
+            start: [self.forces[0].unwrap_or(0.0) / limit, 0.0],
+            units: [limit; 2],
+            open: 0.0,
+            ends: [None; 2],
+        };
+        if let Some(across) = self.forces[1] {
+            self.reach_across(across, first, &mut reach)?;
+        }
+        Ok(reach)
     }
 
-    /// Where the search for a lateral force starts.
-    fn across(&self, first: &FirstEstimate) -> Result<Reach, SolveError> {
-        let force = self.pull.force;
-        let ends = match first.limit > 0.0 {
-            true => [
-                self.end(-FRACTION_MAX, first)?,
-                self.end(FRACTION_MAX, first)?,
-            ],
-            false => [Some(first.lateral); 2],
-        };
+    /// Adds to a reach where the search for a lateral force in N starts. Both forces share the friction: in full slip they lie on an
+    /// ellipse, or on a sum of such, that is as wide as the range of the lateral force and not longer.
+    fn reach_across(
+        &self,
+        force: f64,
+        first: &FirstEstimate,
+        reach: &mut Reach,
+    ) -> Result<(), SolveError> {
+        let ends = [
+            self.end(-FRACTION_MAX, first)?,
+            self.end(FRACTION_MAX, first)?,
+        ];
+        reach.ends = ends;
         let slack = TARGET_FIRST * first.limit;
-        let beyond = ends[0].is_some_and(|least| force < least - slack)
-            || ends[1].is_some_and(|most| force > most + slack);
-        if beyond || first.limit <= 0.0 {
-            return Err(self.unreached(ends));
-        }
         let half = ends[0]
             .zip(ends[1])
             .map(|(least, most)| 0.5 * (most - least));
+        let mut beyond = ends[0].is_some_and(|least| force < least - slack)
+            || ends[1].is_some_and(|most| force > most + slack);
+        if let (Some(half), Some(least), Some(along)) = (half, ends[0], self.forces[0]) {
+            beyond |= along.hypot(force - least - half) > half + slack;
+        }
+        if beyond {
+            return Err(self.unreached(ends));
+        }
         let unit = half.unwrap_or(0.0).max(first.limit);
-        Ok(Reach {
-            start: ((force - first.lateral) / unit).clamp(-1.0, 1.0),
-            unit,
-            open: BALANCE * first.lateral_normal,
-            ends,
-        })
+        let place = ((force - first.lateral) / unit).clamp(-1.0, 1.0);
+        reach.units[1] = unit;
+        reach.open = BALANCE * first.lateral_normal;
+        reach.start[1] = place;
+        if self.forces[0].is_some() {
+            reach.start = first.law.places_of_forces(reach.start);
+        }
+        Ok(())
     }
 
     /// The lateral force in N at a place in full slip; nothing where the wheel does not come to rest.
@@ -250,52 +271,85 @@ impl PullSearch<'_> {
             own: 0.0,
         };
         let run = self.case.run.for_resultants(TARGET_FIRST);
-        let creepage = first.law.creepage(self.pull.component, place);
-        match self.judged(&self.at(creepage, first.radius, &run), part) {
-            Ok(found) => Ok(Some(self.force_of(&found.solution))),
+        let creepages = [0.0, first.law.creepage(1, place)];
+        match self.judged(&self.at(creepages, first.radius, &run), part) {
+            Ok(found) => Ok(Some(found.solution.total[0].force_y_n)),
             Err(SolveError::NormalProblem { .. }) => Ok(None),
             Err(error) => Err(error),
         }
     }
 
-    /// The error of a lateral force that the rail does not carry.
+    /// The forces asked for, in words.
+    fn asked(&self) -> String {
+        match self.forces {
+            [Some(along), None] => format!("a longitudinal force force_x_n of {along} N"),
+            [None, across] => {
+                format!(
+                    "a lateral force force_y_n of {} N",
+                    across.unwrap_or_default()
+                )
+            }
+            [Some(along), Some(across)] => {
+                format!("force_x_n of {along} N together with force_y_n of {across} N")
+            }
+        }
+    }
+
+    /// The error of a lateral force that the rail does not carry, or not beside the longitudinal one.
     fn unreached(&self, ends: [Option<f64>; 2]) -> SolveError {
-        let force = self.pull.force;
+        let asked = self.asked();
         let reach = match ends {
             [Some(least), Some(most)] => format!("from {least:.1} N to {most:.1} N"),
             [Some(least), None] => format!("at least {least:.1} N"),
             [None, Some(most)] => format!("at most {most:.1} N"),
             [None, None] => "within limits that were not found".to_owned(),
         };
-        SolveError::NormalProblem {
-            reason: format!(
-                "a lateral force force_y_n of {force} N was asked for; normal forces and friction carry {reach} across the track in this position \
-                 under this load"
-            ),
-        }
-    }
-
-    /// The error of a search that ended without the force.
-    fn missed(&self, exit: RootExit, reach: &Reach) -> SolveError {
-        if self.pull.component == 1 && exit == RootExit::SignKept {
-            return self.unreached(reach.ends);
-        }
-        let (force, reason) = (self.pull.force, exit.reason());
-        let (direction, beside) = match self.pull.component {
-            0 => ("along", "lateral"),
-            _ => ("across", "longitudinal"),
+        let beside = match self.forces[0] {
+            Some(_) => ", and less beside a longitudinal force",
+            None => "",
         };
         SolveError::NormalProblem {
             reason: format!(
-                "no creepage was found at which the rail carries {force} N {direction} the track: {reason}; friction may not carry it beside the {beside} \
-                 creepage and the spin"
+                "{asked} was asked for; normal forces and friction carry {reach} across the track in this position under this load{beside}"
             ),
         }
     }
 
-    /// The answer at the force.
+    /// The error of a search that ended without the forces.
+    fn missed(&self, exit: RootExit, reach: &Reach) -> SolveError {
+        if self.forces[1].is_some() && exit == RootExit::SignKept {
+            return self.unreached(reach.ends);
+        }
+        let (asked, reason) = (self.asked(), exit.reason());
+        SolveError::NormalProblem {
+            reason: format!(
+                "no creepage was found that gives what was asked for, {asked}: {reason}; friction may not carry it beside what else is given"
+            ),
+        }
+    }
+
+    /// Finds the places at which the forces are as prescribed, from trials that answer how far they are off and by how much they may be.
+    fn find(
+        &self,
+        start: [f64; 2],
+        mut trial: impl FnMut([f64; 2], &mut f64) -> Result<[f64; 2], SolveError>,
+    ) -> Result<PairRoot, SolveError> {
+        if let [Some(_), Some(_)] = self.forces {
+            return find_pair(start, trial);
+        }
+        let k = usize::from(self.forces[0].is_none());
+        let mut place = start;
+        let root = find_root(start[k], |at, tolerance: &mut f64| {
+            place[k] = at;
+            Ok::<f64, SolveError>(trial(place, tolerance)?[k])
+        })?;
+        place[k] = root.place;
+        let exit = root.exit;
+        Ok(PairRoot { place, exit })
+    }
+
+    /// The answer at the forces.
     fn to(&self, first: &FirstEstimate, reach: &Reach) -> Result<(Solution, Fields), SolveError> {
-        let component = self.pull.component;
         let target = self.case.run.resolution.target_or_usual();
         let allowed = (MISSED_OF_TARGET * target)
             .max(MISSED_LEAST)
@@ -303,7 +357,8 @@ impl PullSearch<'_> {
         // Outputs never change forces, so that trials need none.
         let run = self.case.run.for_resultants(0.0);
         let (mut trials, mut nearest) = (0.0, f64::INFINITY);
-        let root = find_root(reach.start, |place, tolerance: &mut f64| {
+        let creepages_at = |place: [f64; 2]| [0, 1].map(|k| first.law.creepage(k, place[k]));
+        let root = self.find(reach.start, |place, tolerance| {
             let share = (PROGRESS[1] - PROGRESS[0]) / TRIALS_USUAL;
             let part = MonitorPart {
                 inner: self.monitor,
@@ -311,13 +366,18 @@ impl PullSearch<'_> {
                 own: share,
             };
             trials += 1.0;
-            let creepage = first.law.creepage(component, place);
-            let found = self.judged(&self.at(creepage, first.radius, &run), part)?;
-            let off = (self.force_of(&found.solution) - self.pull.force) / first.limit;
-            nearest = nearest.min(off.abs());
-            let units = first.limit / reach.unit;
-            *tolerance = allowed * units;
-            Ok::<f64, SolveError>(off * units)
+            let case = self.at(creepages_at(place), first.radius, &run);
+            let total = self.judged(&case, part)?.solution.total[0];
+            let found = [total.force_x_n, total.force_y_n];
+            let off = [0, 1].map(|k| {
+                let missed = self.forces[k].map(|force| found[k] - force);
+                missed.unwrap_or(0.0) / first.limit
+            });
+            nearest = nearest.min(off[0].hypot(off[1]));
+            let units = reach.units.map(|unit| first.limit / unit);
+            let sought = usize::from(self.forces[1].is_some());
+            *tolerance = allowed * units[sought];
+            Ok([off[0] * units[0], off[1] * units[1]])
         })?;
         // Where the trials alternate between two meshes the force jumps by what both are allowed to miss.
         if !root.exit.converged() && (root.exit == RootExit::SignKept || nearest > target) {
@@ -328,8 +388,7 @@ impl PullSearch<'_> {
             before: PROGRESS[1],
             own: 1.0 - PROGRESS[1],
         };
-        let creepage = first.law.creepage(component, root.place);
-        let case = self.at(creepage, first.radius, &self.case.run);
+        let case = self.at(creepages_at(root.place), first.radius, &self.case.run);
         let mut found = self.judged(&case, part)?;
         if !root.exit.converged() {
             let remark = Remark::IterationInexact {

@@ -1,4 +1,6 @@
-//! A longitudinal or a lateral force prescribed under a wheel on a rail: its creepage or angular velocity is found, with the wheel at rest under its load.
+//! Longitudinal and lateral forces prescribed under a wheel on a rail: creepages or angular velocity are found, with the wheel at rest under its load.
+
+use std::time::Instant;
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
@@ -9,6 +11,7 @@ use serde_json::{Value, json};
 
 use crate::cases::assert_fault;
 use crate::profile_cases::{generated, put};
+use crate::random::Random;
 use crate::reference::solve;
 
 const LIMIT: f64 = 0.3 * 75_000.0;
@@ -72,11 +75,6 @@ fn a_wheelset_turns_as_fast_as_the_force_of_two_patches_needs() {
 
 #[test]
 fn forces_that_a_wheel_cannot_have_are_refused_by_name() {
-    assert_fault(
-        &moving(json!({ "force_x_n": 100, "force_y_n": 100 })),
-        "/motion/force_y_n",
-        &["force_x_n", "creepage_y"],
-    );
     for name in ["force_x_n", "force_y_n"] {
         let several = json!([{ name: 100 }, { "creepage_x": 0.001 }]);
         assert_fault(
@@ -184,10 +182,122 @@ fn a_lateral_force_is_found_up_to_full_slip_and_refused_beyond() {
             assert!((end / force - 1.0).abs() < 0.01, "{reason}");
         }
     }
-    let smooth = put(
-        &moving(json!({ "force_y_n": 5000 })),
-        "friction",
-        json!({ "coefficient": 0.0 }),
+}
+
+#[test]
+fn without_friction_no_force_is_sought() {
+    for motion in [json!({ "force_x_n": 0 }), json!({ "force_y_n": 5000 })] {
+        let smooth = put(&moving(motion), "friction", json!({ "coefficient": 0.0 }));
+        let reason = refusal(&smooth);
+        assert!(reason.contains("without friction"), "{reason}");
+    }
+}
+
+#[test]
+fn both_forces_of_a_motion_give_both_creepages_back() {
+    // Tread, nearly sliding, and tread with flange.
+    for (shift, x, y) in [
+        (0.0, -0.0006, 0.0009),
+        (0.0, 0.002, -0.002),
+        (-6.45, 0.0005, -0.0008),
+    ] {
+        let free = json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": -0.0001 });
+        let given = answer(&at_shift(shift, 1.0, free));
+        let [along, across] = [given.total[0].force_x_n, given.total[0].force_y_n];
+        let asked = json!({ "force_x_n": along, "force_y_n": across, "spin_per_mm": -0.0001 });
+        let found = answer(&at_shift(shift, 1.0, asked));
+        let own = found.total[0];
+        let missed = (own.force_x_n - along).hypot(own.force_y_n - across);
+        assert!(missed < 3e-3 * LIMIT, "{shift}: {missed}");
+        assert_eq!(found.patches.len(), given.patches.len());
+        let motion = found.patches[0].points[0].motion;
+        let off = (motion.creepage_x - x).hypot(motion.creepage_y - y);
+        assert!(off < 0.03 * x.hypot(y), "{shift}: {motion:?}");
+        let vertical = own.force_z_n.expect("of profiles");
+        assert!((vertical / 75_000.0 + 1.0).abs() < 1e-3, "{vertical}");
+    }
+}
+
+#[test]
+fn a_force_of_0_along_beside_one_across_is_that_force_alone_where_nothing_drives() {
+    let alone = answer(&moving(json!({ "creepage_x": 0.0, "force_y_n": 6000 })));
+    let both = answer(&moving(json!({ "force_x_n": 0, "force_y_n": 6000 })));
+    let [alone, both] = [alone, both].map(|found| found.patches[0].points[0].motion);
+    assert!(
+        (both.creepage_y / alone.creepage_y - 1.0).abs() < 0.01,
+        "{both:?} {alone:?}"
     );
-    assert!(refusal(&smooth).contains("5000 N"));
+    assert!(
+        both.creepage_x.abs() < 0.01 * both.creepage_y.abs(),
+        "{both:?}"
+    );
+}
+
+#[test]
+fn two_forces_that_friction_carries_one_by_one_but_not_together_are_refused() {
+    let asked = json!({ "force_x_n": 0.8 * LIMIT, "force_y_n": 0.8 * LIMIT });
+    let reason = refusal(&moving(asked));
+    assert!(
+        reason.contains("force_x_n") && reason.contains("force_y_n"),
+        "{reason}"
+    );
+    assert!(reason.contains("beside a longitudinal force"), "{reason}");
+}
+
+/// How many times as long as its creepages forces take, and are told to take: the median over random motions on tread and flange.
+/// `RAILHEAD_PULLS=40 cargo test --locked --test physics -- forces_take --nocapture` prints it for 40.
+#[test]
+fn forces_take_about_the_time_told_for_them() {
+    let named = std::env::var("RAILHEAD_PULLS").ok();
+    let count = named.map_or(3, |count| count.parse().expect("a number"));
+    for names in [
+        &["force_x_n"][..],
+        &["force_y_n"],
+        &["force_x_n", "force_y_n"],
+    ] {
+        let mut random = Random(15);
+        let mut ratios: Vec<[f64; 2]> = (0..count)
+            .map(|_| ratio_of_times(&mut random, names))
+            .collect();
+        ratios.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let [taken, _] = ratios[ratios.len() / 2];
+        let told = ratios[0][1];
+        let [least, most] = [ratios[0][0], ratios[ratios.len() - 1][0]];
+        println!("{names:?}: {taken:.1} times, {least:.1} to {most:.1}; told {told:.1}");
+        assert!(
+            (0.25..4.0).contains(&(taken / told)),
+            "{names:?}: {ratios:?}"
+        );
+    }
+}
+
+/// Times of a random motion by forces over that by creepages: taken and told.
+fn ratio_of_times(random: &mut Random, names: &[&str]) -> [f64; 2] {
+    let [x, y] = [0, 1].map(|_| random.between(-0.002, 0.002));
+    let spin = random.between(-2e-4, 2e-4);
+    let shift = random.between(-6.45, 0.0);
+    let mut motion = json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": spin });
+    let free = at_shift(shift, 1.0, motion.clone());
+    let timed = |case: &Value| {
+        let checked = contact::check(case, &Limits::default()).expect("a case");
+        let began = Instant::now();
+        let answer = contact::solve(&checked, &Unmonitored).expect("within reach");
+        (
+            answer.0,
+            began.elapsed().as_secs_f64(),
+            checked.cost().seconds,
+        )
+    };
+    let (given, once, told) = timed(&free);
+    let members = motion.as_object_mut().expect("an object");
+    for name in names {
+        let (force, creepage) = match *name {
+            "force_x_n" => (given.total[0].force_x_n, "creepage_x"),
+            _ => (given.total[0].force_y_n, "creepage_y"),
+        };
+        members.remove(creepage);
+        members.insert((*name).to_owned(), json!(force));
+    }
+    let (_, sought, told_sought) = timed(&at_shift(shift, 1.0, motion));
+    [sought / once, told_sought / told]
 }

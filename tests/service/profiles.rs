@@ -62,6 +62,46 @@ async fn gauge_corner_and_flange_are_two_patches_with_their_own_creepages() {
 }
 
 #[tokio::test]
+async fn a_wheel_steered_by_forces_is_answered_with_its_creepages_or_told_the_range() {
+    let server = Server::start().await;
+    let mut case = example("wheel-rail.case.json");
+    let load = number(&case["load"]["vertical_force_n"]);
+    let limit = load * number(&case["friction"]["coefficient"]);
+    for motion in [
+        json!({ "creepage_x": 0.0, "force_y_n": 0.2 * limit, "spin_per_mm": 0.0 }),
+        json!({ "force_x_n": -0.3 * limit, "force_y_n": 0.2 * limit, "spin_per_mm": 0.0 }),
+    ] {
+        case["motion"] = motion;
+        let job = server.solve(&case).await;
+        assert_eq!(job["state"], "succeeded", "{job}");
+        let (result, asked) = (&job["result"], &case["motion"]);
+        for name in ["force_x_n", "force_y_n"] {
+            let Some(force) = asked[name].as_f64() else {
+                continue;
+            };
+            let found = number(&result["total"][0][name]);
+            assert!((found - force).abs() < 2e-3 * limit, "{name}: {job}");
+        }
+        let point = &result["patches"][0]["points"][0];
+        let (along, across) = (
+            &point["motion"]["creepage_x"],
+            &point["motion"]["creepage_y"],
+        );
+        assert!(number(across) > 0.0, "{point}");
+        let driven = asked["force_x_n"].is_number();
+        assert_eq!(number(along) < 0.0, driven, "{point}");
+    }
+    case["motion"] = json!({ "creepage_x": 0.0, "force_y_n": 2.0 * limit, "spin_per_mm": 0.0 });
+    let job = server.solve(&case).await;
+    assert_eq!(job["state"], "failed", "{job}");
+    let detail = job["error"]["detail"].as_str().expect("a reason");
+    assert!(
+        detail.contains("force_y_n") && detail.contains(" N to "),
+        "{job}"
+    );
+}
+
+#[tokio::test]
 async fn checking_a_wheel_on_a_rail_names_its_cost_and_its_faults() {
     let server = Server::idle().await;
     let mut case = example("wheel-rail.case.json");

@@ -73,15 +73,7 @@ impl ExpandedMotions {
             let pointer = pointer(given, index, ["force_x_n", "force_y_n"][k]);
             let [x, y] = forces.map(|force| force.unwrap_or(0.0));
             let length = x.hypot(y);
-            let both = of_profiles && !forces.contains(&None);
-            let pointer = match both {
-                true => self::pointer(given, index, "force_y_n"),
-                false => pointer,
-            };
-            let detail = if both {
-                "given together with force_x_n, of which profiles take one; give creepage_x or creepage_y in place of the other"
-                    .to_owned()
-            } else if of_profiles && self.forces.len() > 1 {
+            let detail = if of_profiles && self.forces.len() > 1 {
                 "given with profiles in several motions, which share their patches; give one motion"
                     .to_owned()
             } else if let Some(limit) =

@@ -191,6 +191,8 @@ const ROUNDS_PULL: f64 = 6.0;
 /// The same for a lateral force, with coarse looks at both ends.
 /// Chosen by judgement; how much it matters was not measured.
 const ROUNDS_PULL_ACROSS: f64 = 8.0;
+/// The same for both forces.
+const ROUNDS_PULL_BOTH: f64 = 12.0;
 
 /// The estimated time of a case, in s on one core of the machine the figures were taken on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -224,10 +226,11 @@ impl CheckedCase {
         }
     }
 
-    /// Solves of a wheel whose rail is to carry a force.
+    /// Solves of a wheel whose rail is to carry forces.
     fn pull_times(&self) -> f64 {
         match self.problem.pull() {
-            Some(pull) if pull.component == 1 => ROUNDS_PULL_ACROSS,
+            Some([Some(_), Some(_)]) => ROUNDS_PULL_BOTH,
+            Some([None, _]) => ROUNDS_PULL_ACROSS,
             Some(_) => ROUNDS_PULL,
             None => 1.0,
         }

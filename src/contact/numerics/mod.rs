@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | a root between two bounds, with slopes | [`monotone_root`] |
 //! | a root of an increasing function without bounds, without slopes | [`bracketed_root`] |
+//! | two arguments at which two values are 0, without bounds, without slopes | [`pair_root`] |
 //! | the boundary of a condition | [`bisection`] |
 //! | the largest value in an interval | [`maximum`] |
 //! | values between nodes | [`cubic`] (one interval), [`hermite`] (given slopes, or slopes without overshoot), [`spline`] (smoothing), [`lagrange`] (one polynomial) |
@@ -23,8 +24,8 @@
 //!   between, because it is evaluated for millions of rows.
 //! - The [bracket](crate::contact::normal::wheel_height::bracket) of a wheel's height has ends at which there is no value, because the gap
 //!   could not be solved. Each value costs the solve of a gap, which gives a slope too, and values of different grids differ.
-//! - [`force_control`](crate::contact::rolling::force_control) and the [search](crate::contact::rolling::history::search) of a history
-//!   look for two creepages at once; the latter keeps its compliance from step to step.
+//! - The [search](crate::contact::rolling::history::search) of a history looks for two creepages at once as [`pair_root`] does, and keeps its
+//!   compliance from step to step.
 
 pub mod bisection;
 pub mod bracketed_root;
@@ -37,6 +38,7 @@ pub mod lagrange;
 pub mod least_squares;
 pub mod maximum;
 pub mod monotone_root;
+pub mod pair_root;
 pub mod quadrature;
 pub mod simd_ln;
 pub mod spline;

@@ -54,15 +54,6 @@ pub struct MotionPart {
     pub all: usize,
 }
 
-/// A force that the rail is to carry under one wheel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Pull {
-    /// 0 along x, 1 across in track axes.
-    pub(crate) component: usize,
-    /// In N, on the rail; across with the normal forces.
-    pub(crate) force: f64,
-}
-
 /// Proof that a problem went through the checks. `tests/tidy` allows it, and literals of [`Problem`], in `case/` and here only.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Checked(());
@@ -97,18 +88,15 @@ impl Problem {
         }
     }
 
-    /// The force that the rail is to carry under one wheel, if it is prescribed.
-    pub(crate) fn pull(&self) -> Option<Pull> {
+    /// The forces in N that the rail is to carry under one wheel, along and across the track, if any is prescribed. That across
+    /// contains the lateral part of the normal forces.
+    pub(crate) fn pull(&self) -> Option<PrescribedForces> {
         let NormalTask::Wheel(_) = self.task else {
             return None;
         };
         let [along, across] = *self.forces.first()?;
-        let along = self.longitudinal_force.or(along);
-        let (component, force) = match (along, across) {
-            (Some(force), _) => (0, force),
-            (None, force) => (1, force?),
-        };
-        Some(Pull { component, force })
+        let forces = [self.longitudinal_force.or(along), across];
+        (forces != [None; 2]).then_some(forces)
     }
 
     /// The same question about a wheel that moves as given.

@@ -52,6 +52,17 @@ impl CubicLaw {
         (inside + beyond).min(FRACTION_MAX).copysign(creepage)
     }
 
+    /// Places of the creepages that give forces relative to μN by the cubic law without spin, where both share the friction.
+    pub(crate) fn places_of_forces(&self, force: [f64; 2]) -> [f64; 2] {
+        let length = force[0].hypot(force[1]);
+        let linear = if length > 0.0 {
+            CubicLaw::linear(length.min(1.0)) / length
+        } else {
+            0.0
+        };
+        [0, 1].map(|k| self.place(k, linear * force[k] / self.stiffness[k]))
+    }
+
     pub(crate) fn places(&self, motion: &Motion) -> [f64; 2] {
         [
             self.place(0, motion.creepage_x),

@@ -1,8 +1,8 @@
 //! Which creepages give the tangential forces that were asked for?
 //!
 //! The friction law is monotone: while the other components are kept, a force grows with its creepage. A single force is therefore
-//! bracketed between a creepage that gives too little and one that gives too much; for two forces the search for the first runs
-//! inside the search for the second. The unknown is not the creepage but its *place*, see `force_places`.
+//! bracketed between a creepage that gives too little and one that gives too much; two forces are sought together, see
+//! `numerics::pair_root`. The unknown is not the creepage but its *place*, see `force_places`.
 
 use std::time::Duration;
 
@@ -10,6 +10,7 @@ use crate::contact::error::SolveError;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::numerics::bracketed_root::{RootExit, find_root};
+use crate::contact::numerics::pair_root::find_pair;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::force_places::{ForcePlaces, total};
@@ -39,15 +40,6 @@ const NEAR_LIMIT: f64 = 10.0;
 /// No force is sought more closely than this, relative to μN or, if they are smaller, to the forces of the first motion tried: where
 /// everything slips, elastic slip still turns the tractions by this much. Chosen by judgement; how much it matters was not measured.
 const MISSED_LEAST: f64 = 2e-7;
-/// Motions tried for two forces at once. Chosen by judgement; how much it matters was not measured.
-const TRIALS_AT_ONCE: u32 = 14;
-/// Longest step of a place when two are searched at once. Chosen by judgement; how much it matters was not measured.
-const STEP_MAX: f64 = 0.4;
-/// Trials in a row without improvement after which the search for two places at once is given up. Keeps the numbers safe; not tuned.
-const WORSE_MAX: u32 = 3;
-/// Tolerance of the inner one of two nested searches over that of the outer one, to which the error of the inner one is noise. Chosen by
-/// judgement; how much it matters was not measured.
-const INNER_TOLERANCE: f64 = 0.3;
 /// How often the levels are chosen anew because the motion that was found does not meet its target on them. Keeps the numbers safe; not tuned.
 const LEVEL_CHOICES_MAX: u32 = 3;
 /// How often a search is corrected by what the answer judged at its end was extrapolated. Keeps the numbers safe; not tuned: the
@@ -198,10 +190,13 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
     fn find(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
         match self.forces {
             [Some(_), Some(_)] => {
-                if let Some(place) = self.both_at_once(start)? {
-                    return Ok(place);
-                }
-                self.one_in_the_other(start)
+                let root = find_pair(start, |place, tolerance| {
+                    let off = self.trial(place)?;
+                    *tolerance = self.tolerance();
+                    Ok::<[f64; 2], SolveError>(off)
+                })?;
+                self.end(root.exit);
+                Ok(root.place)
             }
             forces => {
                 let k = usize::from(forces[0].is_none());
@@ -217,70 +212,6 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
                 Ok(place)
             }
         }
-    }
-
-    /// Broyden's iteration for both places; nothing if it does not settle.
-    fn both_at_once(&mut self, start: [f64; 2]) -> Result<Option<[f64; 2]>, SolveError> {
-        let (mut place, mut off) = (start, self.trial(start)?);
-        let mut inverse = [[1.0, 0.0], [0.0, 1.0]];
-        let mut worse = 0;
-        for _ in 0..TRIALS_AT_ONCE {
-            if length(off) <= self.tolerance() {
-                self.end(RootExit::Found);
-                return Ok(Some(place));
-            }
-            let mut step = times(&inverse, off).map(|s| -s);
-            let factor = (STEP_MAX / length(step)).min(1.0);
-            step = step.map(|s| factor * s);
-            let next = [place[0] + step[0], place[1] + step[1]];
-            let found = self.trial(next)?;
-            let change = times(&inverse, [found[0] - off[0], found[1] - off[1]]);
-            let denominator = step[0] * change[0] + step[1] * change[1];
-            if denominator.abs() > 1e-12 * length(step).powi(2) {
-                let row = [0, 1].map(|j| step[0] * inverse[0][j] + step[1] * inverse[1][j]);
-                for i in 0..2 {
-                    for j in 0..2 {
-                        inverse[i][j] += (step[i] - change[i]) * row[j] / denominator;
-                    }
-                }
-            }
-            if length(found) < length(off) {
-                (place, off, worse) = (next, found, 0);
-            } else {
-                worse += 1;
-                if worse == WORSE_MAX {
-                    break;
-                }
-            }
-        }
-        Ok(None)
-    }
-
-    /// For every trial of the place across, finds the place along x that gives the force along x. Both searches are bracketed: slow but
-    /// sure.
-    fn one_in_the_other(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
-        let mut along = start[0];
-        let mut exit_along = RootExit::Found;
-        let root = find_root(start[1], |across, tolerance| {
-            let mut off = [0.0; 2];
-            let inner = find_root(along, |at, tolerance| {
-                off = self.trial([at, across])?;
-                *tolerance = INNER_TOLERANCE * self.tolerance();
-                Ok::<f64, SolveError>(off[0])
-            })?;
-            (along, exit_along) = (inner.place, inner.exit);
-            *tolerance = self.tolerance();
-            Ok::<f64, SolveError>(off[1])
-        })?;
-        // A force whose error keeps its sign is out of reach, however the other search ended.
-        let exits = [root.exit, exit_along];
-        let worse = exits.into_iter().find(|exit| *exit == RootExit::SignKept);
-        self.end(worse.unwrap_or(if root.exit.converged() {
-            exit_along
-        } else {
-            root.exit
-        }));
-        Ok([along, root.place])
     }
 
     fn end(&mut self, exit: RootExit) {
@@ -426,8 +357,4 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
 
 fn length([x, y]: [f64; 2]) -> f64 {
     x.hypot(y)
-}
-
-fn times(matrix: &[[f64; 2]; 2], [x, y]: [f64; 2]) -> [f64; 2] {
-    matrix.map(|[a, b]| a * x + b * y)
 }

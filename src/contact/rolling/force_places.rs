@@ -78,13 +78,7 @@ impl<'a> ForcePlaces<'a> {
 
     /// Places of the creepages that give forces relative to μN: by the table with the rest of a motion, or by the cubic law without spin.
     fn guess(&self, force: [f64; 2], rest: &Motion) -> [f64; 2] {
-        let length = force[0].hypot(force[1]);
-        let linear = if length > 0.0 {
-            CubicLaw::linear(length.min(1.0)) / length
-        } else {
-            0.0
-        };
-        let cubic = [0, 1].map(|k| self.law.place(k, linear * force[k] / self.law.stiffness[k]));
+        let cubic = self.law.places_of_forces(force);
         self.by_table(force, rest, cubic).unwrap_or(cubic)
     }
 

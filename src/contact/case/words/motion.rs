@@ -40,7 +40,7 @@ pub struct AskedMotion {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub force_x_n: Option<f64>,
-    /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`; with `profiles` in one motion alone, without `force_x_n`: in track axes, with the normal forces.
+    /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`; with `profiles` in one motion alone: in track axes, with the normal forces.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub force_y_n: Option<f64>,
