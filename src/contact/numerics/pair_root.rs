@@ -142,8 +142,8 @@ mod tests {
             let (root, trials) = search(shared(place));
             assert_eq!(root.exit, RootExit::Found, "{place:?}");
             assert!(trials <= most, "{place:?}: {trials}");
-            for k in 0..2 {
-                assert!((root.place[k] - place[k]).abs() < 1e-5, "{root:?}");
+            for (found, wanted) in root.place.iter().zip(place) {
+                assert!((found - wanted).abs() < 1e-5, "{root:?}");
             }
         }
     }
