@@ -97,7 +97,7 @@ fn line_contact_on_the_axis() {
 #[test]
 fn the_field_is_in_equilibrium() {
     let contact = Ellipse::steel(1.5, 0.3).normalised(0.5, 0.3, 0.8);
-    // Cells are divided otherwise at another point, so that differences need room.
+    // Cells have other points of quadrature at another place, so that differences need room.
     let step = 0.25;
     let centre = [0.6, -1.1, 0.9];
     let mut places = Vec::new();
@@ -217,8 +217,8 @@ impl StressReference {
     }
 }
 
-/// At default settings, every component and von Mises' stress: within 0.5 % of the largest pressure at a depth of 0.1 semi-axes and below
-/// on ellipses, within 1.2 % on gaps, whose pressure is computed too, and within 1 % above; beyond the reference's uncertainty.
+/// At default settings, every component and von Mises' stress: within 0.3 % of the largest pressure at a depth of 0.1 semi-axes and below
+/// on ellipses, within 1.2 % on gaps, whose pressure is computed too, and within 0.8 % above; beyond the reference's uncertainty.
 #[test]
 fn stresses_are_those_of_contact() {
     let mut failures = Vec::new();
@@ -244,8 +244,8 @@ fn stresses_are_those_of_contact() {
             worst[1],
             found.len()
         );
-        let allowed = if case.gap.is_some() { 0.012 } else { 0.005 };
-        if worst[0] > 0.01 || worst[1] > allowed {
+        let allowed = if case.gap.is_some() { 0.012 } else { 0.003 };
+        if worst[0] > 0.008 || worst[1] > allowed {
             failures.push(format!("{}: {worst:.4?}", case.id));
         }
     }
@@ -275,6 +275,41 @@ fn places_are_answered_in_their_order_and_a_plane_is_a_product() {
     let (found, again) = stresses(&asking(&contact, below));
     assert_eq!(again, Some(worst));
     assert!((found[1].von_mises_mpa / worst.von_mises_mpa - 1.0).abs() < 1e-9);
+}
+
+/// Points are answered side by side; what is asked beside a point changes nothing of it, to the last bit.
+#[test]
+fn a_stress_does_not_depend_on_what_is_asked_beside_it() {
+    let contact = Ellipse::steel(2.0, 0.28).normalised(0.4, 0.2, 0.7);
+    let places: Vec<[f64; 3]> = (0..90)
+        .map(|k| {
+            let k = f64::from(k);
+            [
+                4.0 * (1.3 * k).sin(),
+                3.0 * (2.1 * k).cos(),
+                0.04 * 1.06_f64.powf(k),
+            ]
+        })
+        .collect();
+    let at = |places: &[[f64; 3]]| {
+        stresses(&asking(
+            &contact,
+            json!({ "points_mm": places, "worst": false }),
+        ))
+        .0
+    };
+    let all = at(&places);
+    for (k, place) in places.iter().enumerate().step_by(17) {
+        assert_eq!(
+            components(&at(&[*place])[0]),
+            components(&all[k]),
+            "{place:?}"
+        );
+    }
+    let backward: Vec<[f64; 3]> = places.iter().rev().copied().collect();
+    for (one, other) in all.iter().zip(at(&backward).iter().rev()) {
+        assert_eq!(components(one), components(other));
+    }
 }
 
 #[test]

@@ -1,12 +1,11 @@
 //! Stresses below a uniformly loaded rectangle on a half-space: closed forms.
 //!
-//! This is the slow reference implementation; [`corner_sums`](crate::contact::half_space::corner_sums) evaluates the same forms in bulk.
+//! Tests compare the sums of [`point_loads`](crate::contact::half_space::point_loads) with it.
 //!
 //! Axes: x, y in the surface, z into the body. Tension is positive. Pressure acts into the body, shear tractions along +x and +y.
 //! Sources: Love (1929) for pressure; Johnson 1985, §3.2 and 3.6, for the point loads that the forms for shear are the integrals of.
 
-/// Stresses `xx, yy, zz, xy, xz, yz`.
-pub type Stress = [f64; 6];
+use crate::contact::half_space::point_loads::Stress;
 
 /// The primitives of one corner at `p = x − x_edge`, `q = y − y_edge` and depth z: the stress of a quarter plane under pressure 1, under
 /// shear 1 along x and under shear 1 along y, each times 2π. Four-corner differences of them are the stresses of a rectangle.

@@ -156,6 +156,10 @@ impl Ellipse {
         if half <= 0.0 {
             return 0.0;
         }
+        if x0 == x1 {
+            let root = ((half - x0) * (half + x0)).max(0.0).sqrt();
+            return self.pressure_max * root / self.a;
+        }
         // On the chord x = half cos θ, so that the pressure is p0 (half/a) sin θ and its integral over x that of
         // sin² θ; written with the width and middle of the interval of θ it has no cancellation near the ends.
         let angle = |x: f64| {
@@ -164,13 +168,6 @@ impl Ellipse {
         };
         let scale = self.pressure_max * half / self.a;
         let (theta0, theta1) = (angle(x0), angle(x1));
-        if x0 == x1 {
-            return if x0.abs() <= half {
-                scale * theta0.sin()
-            } else {
-                0.0
-            };
-        }
         let (width, middle) = (theta0 - theta1, 0.5 * (theta0 + theta1));
         let integral = 0.5 * ((width - width.sin()) + 2.0 * width.sin() * middle.sin().powi(2));
         scale * half * integral / (x1 - x0)

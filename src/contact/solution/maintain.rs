@@ -14,8 +14,9 @@ use crate::contact::post::damage::figures::DamageTask;
 use crate::contact::post::heat::{ThermalTask, heating};
 use crate::contact::post::local_power::{CellPower, PowerTask, cell_power};
 use crate::contact::post::subsurface::enclosing_ball::GAP;
+use crate::contact::post::subsurface::seen_parts::LoadResolution;
 use crate::contact::post::subsurface::states::{STORED, in_patch_axes, point, stored};
-use crate::contact::post::subsurface::surface_load::{LoadResolution, LoadWorkspace, SurfaceLoad};
+use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 use crate::contact::post::subsurface::task::{LoadedBody, StressPlaces, SubsurfaceTask};
 use crate::contact::post::subsurface::worst::worst_place;
 use crate::contact::post::subsurface::worst_passage::{PassagesOf, passage};
@@ -34,7 +35,7 @@ use crate::contact::solution::words::maintenance::{SubsurfaceSummary, Temperatur
 /// (`cargo test --test physics -- stresses_are --nocapture`).
 const LEAST_DEPTH: f64 = 0.01;
 /// Points between two looks at the monitor.
-const POINTS_UNASKED: usize = 16;
+const POINTS_UNASKED: usize = 1024;
 
 /// What follows from the cells of a motion beside the summaries of its points.
 #[derive(Default)]
@@ -222,18 +223,16 @@ fn subsurface(
     let depths = patches.iter().map(least_depth);
     let least = depths.fold(f64::INFINITY, f64::min);
     let workspace = &mut load.workspace();
-    let stress = |at: [f64; 3], workspace: &mut LoadWorkspace| {
-        let stress = load.stress(at, LoadResolution::FINE, workspace);
-        in_patch_axes(stress, task.body)
-    };
     let evaluate = |places: &[[f64; 3]], workspace: &mut LoadWorkspace| {
         let mut values = Vec::with_capacity(places.len() * STORED);
-        for (k, [x, y, depth]) in places.iter().enumerate() {
-            if k % POINTS_UNASKED == 0 {
-                ask(monitor)?;
+        for places in places.chunks(POINTS_UNASKED) {
+            ask(monitor)?;
+            let deep = |[x, y, depth]: &[f64; 3]| [*x, *y, depth.max(least)];
+            let places: Vec<[f64; 3]> = places.iter().map(deep).collect();
+            let stresses = load.stresses(&places, LoadResolution::FINE, workspace);
+            for (at, stress) in places.into_iter().zip(stresses) {
+                values.extend(stored(at, in_patch_axes(stress, task.body)));
             }
-            let at = [*x, *y, depth.max(least)];
-            values.extend(stored(at, stress(at, workspace)));
         }
         Ok(values)
     };
@@ -267,9 +266,12 @@ fn subsurface(
         let summary = SubsurfaceSummary {
             body,
             least_depth_mm: least,
-            worst: worst
-                .filter(|_| task.worst || below_worst)
-                .map(|at| point(at, stress(at, workspace))),
+            worst: worst.filter(|_| task.worst || below_worst).map(|at| {
+                point(
+                    at,
+                    in_patch_axes(load.stress(at, LoadResolution::FINE, workspace), task.body),
+                )
+            }),
             passage: judged.map(|judged| judged.summary),
         };
         found.push(PatchStresses {

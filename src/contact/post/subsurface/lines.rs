@@ -1,6 +1,6 @@
-//! The true outline of a strip: its chords on lines at dyadic places across it, looked up once each.
+//! The true outline of a strip: its chords on lines across it, looked up once each.
 
-use std::cell::OnceCell;
+use std::collections::HashMap;
 
 use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::footprint::Footprint;
@@ -14,7 +14,7 @@ pub struct StripPart {
     /// How often the strip was halved.
     pub level: u32,
     /// Which part, counted from smaller y.
-    pub index: usize,
+    pub index: u32,
 }
 
 impl StripPart {
@@ -29,96 +29,131 @@ impl StripPart {
             index: 2 * self.index + k,
         })
     }
+
+    /// A place in the part, from 0 to 1, as one in the strip.
+    #[must_use]
+    pub fn share(self, inside: f64) -> f64 {
+        (f64::from(self.index) + inside) / f64::from(1_u32 << self.level)
+    }
+
+    /// Its width over that of the strip.
+    #[must_use]
+    pub fn width(self) -> f64 {
+        1.0 / f64::from(1_u32 << self.level)
+    }
 }
 
+/// Lines across the strips of one mesh that were looked up, by the strip and the place in it.
+#[derive(Debug, Default)]
+pub struct KnownLines(HashMap<(usize, u64), Option<Chord>>);
+
+/// Lines that are kept; 80 bytes each.
+const LINES_MAX: usize = 200_000;
+
 /// Chords of the region on lines across one strip.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct StripLines<'a> {
     footprint: &'a Footprint,
     patch: usize,
+    /// Which of the segments of the mesh.
+    number: usize,
     /// Smaller y of the strip, and its width.
     low: f64,
     width: f64,
-    /// At `k / 2^(HALVINGS_MAX + 1)` of the width; nothing where the line does not have exactly one chord.
-    known: Vec<OnceCell<Option<Chord>>>,
 }
 
 impl<'a> StripLines<'a> {
-    /// Of the strip about a chord.
+    /// Of the strip about a chord, with its number in the mesh.
     #[must_use]
-    pub fn new(footprint: &'a Footprint, chord: &Chord) -> StripLines<'a> {
+    pub fn new(footprint: &'a Footprint, chord: &Chord, number: usize) -> StripLines<'a> {
         StripLines {
             footprint,
             patch: chord.patch,
+            number,
             low: chord.y - 0.5 * chord.dy,
             width: chord.dy,
-            known: vec![OnceCell::new(); (1 << (HALVINGS_MAX + 1)) + 1],
         }
     }
 
-    /// Both sides of a part in y, in mm.
+    /// y in mm of a place in the strip, from 0 to 1.
     #[must_use]
-    pub fn sides(&self, part: StripPart) -> [f64; 2] {
-        let each = self.width / f64::from(1 << part.level);
-        let low = self.low + each * part.index as f64;
-        [low, low + each]
-    }
-
-    /// The chord on the mid-line of a part, if there is exactly one.
-    #[must_use]
-    pub fn middle(&self, part: StripPart) -> Option<Chord> {
-        self.at((2 * part.index + 1) << (HALVINGS_MAX - part.level))
+    pub fn y(&self, share: f64) -> f64 {
+        self.low + self.width * share
     }
 
     /// Load of the true outline between the angles `u`, over the width of the strip, in N/mm: the mean over four lines. Mid-lines alone
     /// carry too much where the pressure bends. Nothing if a line does not have exactly one chord.
     #[must_use]
-    pub fn load(&self, u: [f64; 2]) -> Option<f64> {
-        let parts = (0..4).map(|index| StripPart { level: 2, index });
-        let load = |part| {
-            let chord = self.middle(part)?;
-            let centre = 0.5 * (chord.left + chord.right);
-            let half = 0.5 * (chord.right - chord.left);
-            let [x0, x1] = u.map(|u| centre - half * u.cos());
-            Some((x1 - x0) * self.footprint.mean_pressure(&chord, x0, x1))
-        };
-        let sum: Option<f64> = parts.map(load).sum();
-        sum.map(|sum| 0.25 * sum)
+    pub fn load(&self, u: [f64; 2], known: &mut KnownLines) -> Option<f64> {
+        let mut sum = 0.0;
+        for k in 0..4 {
+            let chord = self.chord(0.25 * (f64::from(k) + 0.5), known)?;
+            let [x0, x1] = u.map(|u| along(&chord, u));
+            sum += 0.25 * (x1 - x0) * self.footprint.mean_pressure(&chord, x0, x1);
+        }
+        Some(sum)
     }
 
-    /// How far the places at angles `u` of the outline move along x between the two sides of a part. Where the region ends inside the
-    /// part, its end stands for the missing chord.
+    /// From where to where in x the outline's places at angles `u` move between the two sides of a part and its middle, and by how much at
+    /// most. Where the region ends inside the part, its end stands for the missing chord.
     #[must_use]
-    pub fn skew(&self, part: StripPart, u: [f64; 2]) -> f64 {
-        let Some(middle) = self.middle(part) else {
-            return 0.0;
-        };
+    pub fn reach(
+        &self,
+        piece: StripPart,
+        u: [f64; 2],
+        known: &mut KnownLines,
+    ) -> Option<PartReach> {
+        let middle = self.chord(piece.share(0.5), known)?;
         let centre = 0.5 * (middle.left + middle.right);
-        let ends = [0, 1].map(|side| {
-            let line = self.at((2 * (part.index + side)) << (HALVINGS_MAX - part.level));
-            line.map_or([centre, 0.0], |line| {
-                [
-                    0.5 * (line.left + line.right),
-                    0.5 * (line.right - line.left),
-                ]
-            })
+        let ends = [0.0, 1.0].map(|side| {
+            let line = self.chord(piece.share(side), known);
+            u.map(|u| line.map_or(centre, |line| along(&line, u)))
         });
-        let shift = |u: f64| {
-            let [low, high] = ends.map(|[centre, half]| centre - half * u.cos());
-            (high - low).abs()
-        };
-        shift(u[0]).max(shift(u[1]))
-    }
-
-    fn at(&self, place: usize) -> Option<Chord> {
-        *self.known[place].get_or_init(|| {
-            let share = place as f64 / f64::from(1 << (HALVINGS_MAX + 1));
-            let y = self.low + self.width * share;
-            let chords = self.footprint.chords(self.patch, &[(y, self.width)]);
-            match chords[..] {
-                [chord] => Some(chord),
-                _ => None,
-            }
+        let own = u.map(|u| along(&middle, u));
+        let [low, high] = ends;
+        Some(PartReach {
+            from: own[0].min(low[0]).min(high[0]),
+            to: own[1].max(low[1]).max(high[1]),
+            length: own[1] - own[0],
+            skew: (low[0] - high[0]).abs().max((low[1] - high[1]).abs()),
         })
     }
+
+    /// The chord on the line at a place from 0 to 1, if there is exactly one.
+    pub fn chord(&self, share: f64, known: &mut KnownLines) -> Option<Chord> {
+        let KnownLines(known) = known;
+        if known.len() > LINES_MAX {
+            known.clear();
+        }
+        *known
+            .entry((self.number, share.to_bits()))
+            .or_insert_with(|| {
+                let chords = self
+                    .footprint
+                    .chords(self.patch, &[(self.y(share), self.width)]);
+                match chords[..] {
+                    [chord] => Some(chord),
+                    _ => None,
+                }
+            })
+    }
+}
+
+/// How far a part reaches along x, in mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartReach {
+    /// Smallest and largest x.
+    pub from: f64,
+    /// See `from`.
+    pub to: f64,
+    /// Length in its middle.
+    pub length: f64,
+    /// By how much its ends move along x between its sides.
+    pub skew: f64,
+}
+
+/// x at the angle `u` of a chord: `centre − half cos u`.
+#[must_use]
+pub fn along(chord: &Chord, u: f64) -> f64 {
+    0.5 * (chord.left + chord.right) - 0.5 * (chord.right - chord.left) * u.cos()
 }

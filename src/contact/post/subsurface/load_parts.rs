@@ -1,136 +1,156 @@
-//! The parts of cells that were looked at, kept from point to point.
+//! The parts of cells that were looked at, and their points of quadrature, kept from point to point.
 //!
 //! A part is halved along its larger side, whatever the point: only how far the halving goes depends on the distance. So the parts of a cell
 //! are a tree that is the same for all points, and each part is worked out once.
 
+use std::ops::Range;
+
+use crate::contact::half_space::point_loads::PointLoad;
 use crate::contact::post::subsurface::lines::{HALVINGS_MAX, StripPart};
+use crate::contact::post::subsurface::seen_parts::{ORDERS, PartBox};
 
-/// Parts that are kept; 200 bytes each, so that they take at most 40 MB.
-const KEPT_MAX: usize = 200_000;
+/// Parts, and points of quadrature, that are kept: 70 MB.
+const PARTS_MAX: usize = 100_000;
+/// See [`PARTS_MAX`].
+const POINTS_MAX: usize = 1_000_000;
 
-/// A part of a cell: a piece of the strip between two angles of the outline.
-#[derive(Debug, Clone)]
+/// A part of a cell: a piece of the strip between two places along it.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadPart {
-    /// The angles.
+    /// The cell, and the strip it belongs to.
+    pub cell: usize,
+    /// See `cell`.
+    pub strip: usize,
+    /// The places: angles of the outline, or x in mm where the strip is not refined.
     pub u: [f64; 2],
     /// The piece across the strip.
-    pub part: StripPart,
-    /// `[x0, x1, y0, y1]` in mm.
-    pub sides: [f64; 4],
-    /// The larger of its sides in mm.
-    pub size: f64,
-    halved_along: bool,
-    loads: Option<[f64; 3]>,
-    halves: Option<[Option<u32>; 2]>,
+    pub piece: StripPart,
 }
 
 impl LoadPart {
-    /// A part with this width across, which counts the shift of its ends.
+    /// Its halves, along the strip or across it.
     #[must_use]
-    pub fn new(u: [f64; 2], part: StripPart, sides: [f64; 4], across: f64) -> LoadPart {
-        let along = sides[1] - sides[0];
-        // A part that is halved across no more counts with its length alone.
-        let halved_along = along >= across || part.level >= HALVINGS_MAX;
-        LoadPart {
-            u,
-            part,
-            sides,
-            size: if halved_along { along } else { across },
-            halved_along,
-            loads: None,
-            halves: None,
+    pub fn halves(self, along: bool) -> [LoadPart; 2] {
+        if along {
+            let [from, to] = self.u;
+            let middle = 0.5 * (from + to);
+            return [[from, middle], [middle, to]].map(|u| LoadPart { u, ..self });
         }
-    }
-
-    /// Distance of a point from the rectangle.
-    #[must_use]
-    pub fn distance(&self, [x, y, z]: [f64; 3]) -> f64 {
-        let [x0, x1, y0, y1] = self.sides;
-        let outside = |low: f64, high: f64, at: f64| (low - at).max(at - high).max(0.0);
-        let (dx, dy) = (outside(x0, x1, x), outside(y0, y1, y));
-        (dx * dx + dy * dy + z * z).sqrt()
-    }
-
-    fn cut(&self) -> [([f64; 2], StripPart); 2] {
-        if self.halved_along {
-            let middle = 0.5 * (self.u[0] + self.u[1]);
-            return [
-                ([self.u[0], middle], self.part),
-                ([middle, self.u[1]], self.part),
-            ];
-        }
-        self.part.halves().map(|half| (self.u, half))
+        self.piece.halves().map(|piece| LoadPart { piece, ..self })
     }
 }
 
-/// The parts of all cells of a mesh.
+/// A part with what was worked out for it.
+#[derive(Debug)]
+struct Node {
+    part: LoadPart,
+    seen: PartBox,
+    /// Points of quadrature, by the rules along and across.
+    points: [[Option<[u32; 2]>; ORDERS]; ORDERS],
+    /// The first of its halves, of which the second is the next node.
+    halves: Option<u32>,
+}
+
+/// The parts of all cells of a mesh; the first ones are the cells.
 #[derive(Debug)]
 pub struct LoadParts {
-    nodes: Vec<LoadPart>,
-    /// Of every cell; the outer `None` means that it was not looked at yet.
-    roots: Vec<Option<Option<u32>>>,
+    nodes: Vec<Node>,
+    cells: usize,
+    points: Vec<PointLoad>,
 }
 
 impl LoadParts {
-    /// None yet, of so many cells.
+    /// The whole cells.
     #[must_use]
-    pub fn new(cells: usize) -> LoadParts {
+    pub fn new(cells: impl Iterator<Item = (LoadPart, PartBox)>) -> LoadParts {
+        let nodes: Vec<Node> = cells.map(|(part, seen)| Node::new(part, seen)).collect();
         LoadParts {
-            nodes: Vec::new(),
-            roots: vec![None; cells],
+            cells: nodes.len(),
+            nodes,
+            points: Vec::new(),
         }
     }
 
-    /// Forgets all parts if there are too many. Called between points.
+    /// Forgets all parts of cells and all points if there are too many. Called between points.
     pub fn trim(&mut self) {
-        if self.nodes.len() > KEPT_MAX {
-            self.nodes.clear();
-            self.roots.fill(None);
+        if self.nodes.len() > PARTS_MAX.max(2 * self.cells) || self.points.len() > POINTS_MAX {
+            self.nodes.truncate(self.cells);
+            for node in &mut self.nodes {
+                *node = Node::new(node.part, node.seen);
+            }
+            self.points.clear();
         }
     }
 
-    /// The part that is the whole cell; it is made if it was not looked at yet.
-    pub fn root(&mut self, cell: usize, make: impl FnOnce() -> Option<LoadPart>) -> Option<u32> {
-        if let Some(known) = self.roots[cell] {
-            return known;
-        }
-        let number = make().map(|part| self.add(part));
-        self.roots[cell] = Some(number);
-        number
-    }
-
-    /// A part by its number.
+    /// Number of cells.
     #[must_use]
-    pub fn node(&self, number: u32) -> &LoadPart {
-        &self.nodes[number as usize]
+    pub fn cells(&self) -> usize {
+        self.cells
     }
 
-    /// The halves of a part; nothing of a half that the region does not reach.
+    /// How large a part is.
+    #[must_use]
+    pub fn seen(&self, number: usize) -> PartBox {
+        self.nodes[number].seen
+    }
+
+    /// Can only halving along the strip make a part smaller?
+    #[must_use]
+    pub fn narrow(&self, number: usize) -> bool {
+        self.nodes[number].part.piece.level >= HALVINGS_MAX
+    }
+
+    /// All points of quadrature.
+    #[must_use]
+    pub fn points(&self) -> &[PointLoad] {
+        &self.points
+    }
+
+    /// The halves of a part.
     pub fn halves(
         &mut self,
-        number: u32,
-        make: impl FnOnce([([f64; 2], StripPart); 2]) -> [Option<LoadPart>; 2],
-    ) -> [Option<u32>; 2] {
-        if let Some(known) = self.node(number).halves {
-            return known;
-        }
-        let halves = make(self.node(number).cut()).map(|half| half.map(|part| self.add(part)));
-        self.nodes[number as usize].halves = Some(halves);
-        halves
+        number: usize,
+        mut make: impl FnMut(&LoadPart) -> PartBox,
+    ) -> [usize; 2] {
+        let first = if let Some(first) = self.nodes[number].halves {
+            first as usize
+        } else {
+            let Node { part, seen, .. } = self.nodes[number];
+            let along = seen.squares[0] >= seen.squares[1] || self.narrow(number);
+            let first = self.nodes.len();
+            for half in part.halves(along) {
+                self.nodes.push(Node::new(half, make(&half)));
+            }
+            self.nodes[number].halves = Some(first as u32);
+            first
+        };
+        [first, first + 1]
     }
 
-    /// The loads of a part: pressure, and tractions along x and along y.
-    pub fn loads(&mut self, number: u32, make: impl FnOnce(&LoadPart) -> [f64; 3]) -> [f64; 3] {
-        if let Some(known) = self.node(number).loads {
-            return known;
-        }
-        let loads = make(self.node(number));
-        self.nodes[number as usize].loads = Some(loads);
-        loads
+    /// The points of a part for these rules along and across.
+    pub fn quadrature(
+        &mut self,
+        number: usize,
+        [along, across]: [usize; 2],
+        make: impl FnOnce(&LoadPart, &mut Vec<PointLoad>),
+    ) -> Range<usize> {
+        let node = &mut self.nodes[number];
+        let [first, end] = *node.points[along][across].get_or_insert_with(|| {
+            let first = self.points.len();
+            make(&node.part, &mut self.points);
+            [first as u32, self.points.len() as u32]
+        });
+        first as usize..end as usize
     }
+}
 
-    fn add(&mut self, part: LoadPart) -> u32 {
-        self.nodes.push(part);
-        (self.nodes.len() - 1) as u32
+impl Node {
+    fn new(part: LoadPart, seen: PartBox) -> Node {
+        Node {
+            part,
+            seen,
+            points: [[None; ORDERS]; ORDERS],
+            halves: None,
+        }
     }
 }

@@ -1,10 +1,12 @@
 //! Stresses below the surface: tensors at chosen points, the worst point of a patch, and what a passage of the contact does.
 
+pub mod blocks;
 pub mod enclosing_ball;
 pub mod lines;
 pub mod load_parts;
 pub mod passage;
 pub mod principal;
+pub mod seen_parts;
 pub mod states;
 pub mod surface_load;
 pub mod task;

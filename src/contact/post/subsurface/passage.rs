@@ -11,7 +11,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
-use crate::contact::half_space::rectangle_stress::Stress;
+use crate::contact::half_space::point_loads::Stress;
 use crate::contact::post::subsurface::enclosing_ball::{Deviator, enclosing_ball};
 use crate::contact::post::subsurface::principal::principal;
 

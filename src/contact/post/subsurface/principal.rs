@@ -1,6 +1,6 @@
 //! Principal stresses and their directions.
 
-use crate::contact::half_space::rectangle_stress::Stress;
+use crate::contact::half_space::point_loads::Stress;
 
 /// Sweeps of rotations; a symmetric 3 × 3 matrix is diagonal to rounding after five.
 const SWEEPS_MAX: usize = 12;

@@ -1,6 +1,6 @@
 //! From a stress tensor to what is read off it.
 
-use crate::contact::half_space::rectangle_stress::Stress;
+use crate::contact::half_space::point_loads::Stress;
 use crate::contact::post::subsurface::principal::{Principal, principal};
 use crate::contact::post::subsurface::task::LoadedBody;
 use crate::contact::solution::words::maintenance::{StressPoint, StressTensor};

@@ -1,43 +1,30 @@
-//! The loads on the surface of a body, cell by cell, and the stress that they cause at a point below it.
+//! The loads on the surface of a body, and the stresses that they cause at points below it.
 //!
-//! Every cell is a rectangle with constant pressure and traction, whose stress is known in closed form. Seen from near, such steps are
-//! artefacts of the mesh. So cells that are large beside their distance are halved, along or across, until they are not: a part of a
-//! cell carries the mean pressure over its piece of the true outline, and that times traction over pressure, which is interpolated
-//! between the cells. The shift of its ends between its two sides counts as width, so that refined cells fill the outline.
+//! Every cell is a piece of a strip between two angles of the true outline. What it carries acts as point loads at the points of Gauss's
+//! quadrature, in the angle along and in y across, where the pressure of a smooth patch is smooth up to its edge; traction over pressure is
+//! interpolated between the cells. How many points there are follows from the size of the cell over its distance; cells that are too near for
+//! the rule with most points are halved until they are not. The shift of its ends between its two sides counts as width, so that refined cells
+//! fill the outline.
 
 use std::f64::consts::PI;
 
-use crate::contact::half_space::corner_sums::CornerSums;
-use crate::contact::half_space::rectangle_stress::Stress;
-use crate::contact::mesh::strips::Segment;
+use crate::contact::half_space::point_loads::{
+    FeltLoads, LANES, Lanes, PointLoad, Stress, stresses,
+};
+use crate::contact::mesh::strips::{Chord, Segment};
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::post::subsurface::lines::{StripLines, StripPart};
+use crate::contact::numerics::quadrature::RULES;
+use crate::contact::post::subsurface::blocks;
+use crate::contact::post::subsurface::lines::{KnownLines, StripLines, StripPart, along};
 use crate::contact::post::subsurface::load_parts::{LoadPart, LoadParts};
+use crate::contact::post::subsurface::seen_parts::{
+    LoadResolution, ORDERS, PartBox, PartCodes, look, orders,
+};
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
-/// How finely the loads are resolved, by size over distance.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LoadResolution {
-    /// Cells larger than this are halved.
-    pub halved_from: f64,
-    /// Neighbours along a strip that together are not larger than this act as one.
-    pub joined_to: f64,
-}
-
-impl LoadResolution {
-    /// For stresses that are answered: the largest error in the reference cases is 0.36 % of the largest pressure on ellipses and 1.0 % under
-    /// a gap of two radii (`cargo test --test physics -- stresses_are --nocapture`).
-    pub const FINE: LoadResolution = LoadResolution {
-        halved_from: 0.25,
-        joined_to: 0.15,
-    };
-    /// For the search of the worst point: a few per cent.
-    pub const COARSE: LoadResolution = LoadResolution {
-        halved_from: 1.0,
-        joined_to: 0.3,
-    };
-}
+/// Points of the rule with most of them.
+const POINTS_MAX: usize = RULES[ORDERS - 1].len();
 
 /// The loads on one body.
 #[derive(Debug)]
@@ -45,35 +32,34 @@ pub struct SurfaceLoad<'a> {
     strips: Vec<LoadedStrip<'a>>,
     footprint: &'a Footprint,
     poisson_ratio: f64,
-    /// Cells of the mesh.
-    cells: usize,
+    /// Where single precision counts x and y from, in mm.
+    origin: [f64; 2],
+    /// The whole cells.
+    cells: Vec<(LoadPart, PartBox)>,
 }
 
-/// What is kept from point to point of one [`SurfaceLoad`]: buffers, and the parts of cells that were worked out. The caller owns it.
+/// What is kept from point to point of one [`SurfaceLoad`]. The caller owns it.
 #[derive(Debug)]
 pub struct LoadWorkspace {
-    corners: CornerSums,
     parts: LoadParts,
+    lines: KnownLines,
+    codes: Vec<PartCodes>,
+    felt: Vec<FeltLoads>,
 }
 
 /// The loads on a segment of a strip.
 #[derive(Debug)]
 struct LoadedStrip<'a> {
     segment: &'a Segment,
-    /// The number of its first cell in the mesh.
-    first_root: usize,
     lines: StripLines<'a>,
-    /// Is it the only segment of its strip? Others are not refined.
+    /// Is it the only segment of its strip? The outline of others is not followed: their cells are rectangles with constant loads.
     alone: bool,
-    /// Edges of the cells: x in mm, and the angle u with `x = centre − half cos u`.
-    edges: Vec<f64>,
-    angles: Vec<f64>,
+    /// Where the cells end: u.
+    places: Vec<f64>,
     /// u of the nodes.
     nodes: Vec<f64>,
-    /// Larger of width across and skew, cell by cell.
-    widths: Vec<f64>,
-    /// Pressure and tractions on the body in MPa, cell by cell.
-    loads: Vec<[f64; 3]>,
+    /// Load over the width of the strip in N/mm, cell by cell.
+    loads: Vec<f64>,
     /// Tractions over pressure.
     ratios: Vec<[f64; 2]>,
 }
@@ -88,239 +74,328 @@ impl<'a> SurfaceLoad<'a> {
         sign: f64,
         poisson_ratio: f64,
     ) -> SurfaceLoad<'a> {
-        let strips = &level.mesh.segments;
+        let segments = &level.mesh.segments;
         let alike = |a: &Segment, b: &Segment| {
             a.chord.patch == b.chord.patch && a.chord.strip == b.chord.strip
         };
-        let strip = |segment: &'a Segment| {
-            let alone = strips.iter().filter(|other| alike(segment, other)).count() == 1;
-            LoadedStrip::new(level, footprint, segment, alone, answer, sign)
-        };
-        let cells = level.mesh.cells();
-        SurfaceLoad {
-            strips: strips.iter().map(strip).collect(),
+        let extents = footprint.patches().iter().map(|patch| patch.extent);
+        let count = footprint.patches().len() as f64;
+        let sum = extents.fold([0.0; 2], |sum, [x0, x1, y0, y1]| {
+            [sum[0] + 0.5 * (x0 + x1), sum[1] + 0.5 * (y0 + y1)]
+        });
+        let mut load = SurfaceLoad {
+            strips: Vec::with_capacity(segments.len()),
             footprint,
             poisson_ratio,
-            cells,
+            origin: sum.map(|sum| sum / count),
+            cells: Vec::with_capacity(level.mesh.cells()),
+        };
+        let known = &mut KnownLines::default();
+        let unit = sign * level.scale.traction;
+        for (number, segment) in segments.iter().enumerate() {
+            let beside = segments.iter().filter(|other| alike(segment, other));
+            let lines = StripLines::new(footprint, &segment.chord, number);
+            let alone = beside.count() == 1;
+            let strip = LoadedStrip::new(level, segment, lines, alone, known);
+            load.strips.push(strip.loaded(level, answer, unit));
+            for (k, cell) in segment.cells.clone().enumerate() {
+                let part = LoadPart {
+                    cell,
+                    strip: number,
+                    u: load.strips[number].ends(k),
+                    piece: StripPart::WHOLE,
+                };
+                let seen = load.seen(&part, known);
+                load.cells.push((part, seen));
+            }
         }
+        load
     }
 
     /// A workspace for this load, which serves no other.
     #[must_use]
     pub fn workspace(&self) -> LoadWorkspace {
         LoadWorkspace {
-            corners: CornerSums::default(),
-            parts: LoadParts::new(self.cells),
+            parts: LoadParts::new(self.cells.iter().copied()),
+            lines: KnownLines::default(),
+            codes: Vec::new(),
+            felt: Vec::new(),
         }
     }
 
-    /// The stress at `[x, y, depth]` in mm, in axes with z into the body.
+    /// The stress at one place, see [`SurfaceLoad::stresses`].
     pub fn stress(
         &self,
         at: [f64; 3],
         resolution: LoadResolution,
         workspace: &mut LoadWorkspace,
     ) -> Stress {
-        workspace.corners.clear();
-        workspace.parts.trim();
-        for j in 0..self.strips.len() {
-            self.push_strip(j, at, resolution, workspace);
-        }
-        workspace.corners.stress(at[2], self.poisson_ratio)
+        let mut found = [[0.0; 6]; LANES];
+        self.stresses_of_block(&[at], resolution, workspace, &mut found);
+        found[0]
     }
 
-    fn push_strip(
+    /// The stresses at places `[x, y, depth]` in mm, in axes with z into the body. What is found at a place does not depend on the
+    /// others.
+    pub fn stresses(
         &self,
-        j: usize,
-        at: [f64; 3],
+        places: &[[f64; 3]],
         resolution: LoadResolution,
         workspace: &mut LoadWorkspace,
-    ) {
-        let corners = &mut workspace.corners;
-        let strip = &self.strips[j];
-        let chord = &strip.segment.chord;
-        let sides = [chord.y - 0.5 * chord.dy, chord.y + 0.5 * chord.dy];
-        let across = (sides[0] - at[1]).max(at[1] - sides[1]).max(0.0);
-        let off_line = across.hypot(at[2]);
-        // Where rectangles meet, the difference of their loads counts.
-        let mut push_edge = |place: usize, load: [f64; 3]| {
-            let p = at[0] - strip.edges[place];
-            corners.push(p, at[1] - sides[0], load);
-            corners.push(p, at[1] - sides[1], load.map(|load| -load));
-        };
-        let mut near = Vec::new();
-        let mut before = [0.0; 3];
-        let cells = strip.loads.len();
-        let mut k = 0;
-        while k < cells {
-            let distance = |k: usize| {
-                let along = (strip.edges[k] - at[0]).max(at[0] - strip.edges[k + 1]);
-                along.max(0.0).hypot(off_line)
-            };
-            let size = |k: usize| strip.widths[k].max(strip.edges[k + 1] - strip.edges[k]);
-            if strip.alone && size(k) > resolution.halved_from * distance(k) {
-                push_edge(k, before.map(|load| -load));
-                before = [0.0; 3];
-                near.push(k);
-                k += 1;
-                continue;
+    ) -> Vec<Stress> {
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        blocks::gather(places, &mut order);
+        let mut stresses = vec![[0.0; 6]; places.len()];
+        let mut found = [[0.0; 6]; LANES];
+        for block in order.chunks(LANES) {
+            let own: Vec<[f64; 3]> = block.iter().map(|k| places[*k]).collect();
+            self.stresses_of_block(&own, resolution, workspace, &mut found);
+            for (k, stress) in block.iter().zip(found) {
+                stresses[*k] = stress;
             }
-            let first = k;
-            let width = |last: usize| strip.edges[last + 1] - strip.edges[first];
-            let mut load = [0.0; 3];
-            loop {
-                let own = strip.edges[k + 1] - strip.edges[k];
-                for (sum, load) in load.iter_mut().zip(strip.loads[k]) {
-                    *sum += load * own;
-                }
-                k += 1;
-                let joins = |k: usize| {
-                    width(k) <= resolution.joined_to * distance(k).min(distance(first))
-                        && (!strip.alone || size(k) <= resolution.halved_from * distance(k))
-                };
-                if k >= cells || !joins(k) {
-                    break;
-                }
-            }
-            let joined = width(k - 1);
-            let load = load.map(|load| load / joined);
-            push_edge(first, [0, 1, 2].map(|c| load[c] - before[c]));
-            before = load;
         }
-        push_edge(cells, before.map(|load| -load));
-        for k in near {
-            self.push_parts(j, k, at, resolution, workspace);
-        }
+        stresses
     }
 
-    /// A cell of a strip from near: its parts down to those that are small beside their distance.
-    fn push_parts(
+    /// At most [`LANES`] places side by side.
+    fn stresses_of_block(
         &self,
-        j: usize,
-        cell: usize,
-        at: [f64; 3],
+        places: &[[f64; 3]],
         resolution: LoadResolution,
-        LoadWorkspace { corners, parts }: &mut LoadWorkspace,
+        LoadWorkspace {
+            parts,
+            lines,
+            codes,
+            felt,
+        }: &mut LoadWorkspace,
+        found: &mut [Stress; LANES],
     ) {
-        let root = self.strips[j].first_root + cell;
-        let u = [0, 1].map(|k| self.strips[j].angles[cell + k]);
-        let mut open = match parts.root(root, || self.part(j, u, StripPart::WHOLE)) {
-            Some(first) => vec![first],
-            None => return,
-        };
-        while let Some(number) = open.pop() {
-            let node = parts.node(number);
-            if node.size > resolution.halved_from * node.distance(at) {
-                let cut = |halves: [([f64; 2], StripPart); 2]| {
-                    halves.map(|(u, part)| self.part(j, u, part))
-                };
-                open.extend(parts.halves(number, cut).into_iter().flatten());
-                continue;
+        parts.trim();
+        felt.clear();
+        let mut points: [Lanes; 3] = [[0.0; LANES]; 3];
+        for lane in 0..LANES {
+            let [x, y, z] = places[lane.min(places.len() - 1)];
+            points[0][lane] = (x - self.origin[0]) as f32;
+            points[1][lane] = (y - self.origin[1]) as f32;
+            points[2][lane] = z as f32;
+        }
+        let asked = u16::MAX >> (LANES - places.len());
+        let mut open: Vec<(usize, u16)> = (0..parts.cells()).map(|k| (k, asked)).collect();
+        let mut next = Vec::new();
+        while !open.is_empty() {
+            codes.clear();
+            let seen = open.iter().map(|(k, _)| parts.seen(*k));
+            look(seen, &points, resolution, codes);
+            for ((number, lanes), codes) in open.drain(..).zip(codes.iter()) {
+                for_each_code(codes, lanes, |code, lanes| {
+                    let [along, mut across] = orders(code);
+                    if parts.narrow(number) {
+                        across = across.min(ORDERS - 1);
+                    }
+                    if along == ORDERS || across == ORDERS {
+                        let make = |part: &LoadPart| self.seen(part, lines);
+                        let halves = parts.halves(number, make);
+                        next.extend(halves.map(|half| (half, lanes)));
+                        return;
+                    }
+                    let make = |part: &LoadPart, to: &mut Vec<PointLoad>| {
+                        self.quadrature(part, [along, across], lines, to);
+                    };
+                    let loads = parts.quadrature(number, [along, across], make);
+                    felt.push(FeltLoads { loads, lanes });
+                });
             }
-            let loads = parts.loads(number, |node| self.carried(j, node));
-            let sides = parts.node(number).sides;
-            corners.push_rectangle([at[0], at[1]], sides, loads);
+            std::mem::swap(&mut open, &mut next);
+        }
+        *found = stresses(parts.points(), felt, &points, self.poisson_ratio);
+    }
+
+    /// How large a part is.
+    fn seen(&self, part: &LoadPart, known: &mut KnownLines) -> PartBox {
+        let strip = &self.strips[part.strip];
+        let [y0, y1] = [0.0, 1.0].map(|side| strip.lines.y(part.piece.share(side)));
+        let [u0, u1] = part.u;
+        let (x, length, skew) = if strip.alone {
+            match strip.lines.reach(part.piece, part.u, known) {
+                Some(reach) => ([reach.from, reach.to], reach.length, reach.skew),
+                // The region does not reach the middle of the part.
+                None => (
+                    [strip.segment.chord.left, strip.segment.chord.right],
+                    0.0,
+                    0.0,
+                ),
+            }
+        } else {
+            ([u0, u1], u1 - u0, 0.0)
+        };
+        let [centre_x, centre_y] = self.origin;
+        let across = (y1 - y0).max(skew);
+        PartBox {
+            sides: [
+                x[0] - centre_x,
+                x[1] - centre_x,
+                y0 - centre_y,
+                y1 - centre_y,
+            ]
+            .map(|side| side as f32),
+            squares: [length * length, across * across].map(|square| square as f32),
         }
     }
 
-    /// A part of a strip over the angles `u`; nothing where the region does not reach it.
-    fn part(&self, j: usize, u: [f64; 2], part: StripPart) -> Option<LoadPart> {
-        let lines = &self.strips[j].lines;
-        let chord = lines.middle(part)?;
-        let centre = 0.5 * (chord.left + chord.right);
-        let half = 0.5 * (chord.right - chord.left);
-        let [x0, x1] = u.map(|u| centre - half * u.cos());
-        let [y0, y1] = lines.sides(part);
-        let across = (y1 - y0).max(lines.skew(part, u));
-        Some(LoadPart::new(u, part, [x0, x1, y0, y1], across))
-    }
-
-    /// Mean pressure of a part, and that times traction over pressure.
-    fn carried(&self, j: usize, part: &LoadPart) -> [f64; 3] {
-        let Some(chord) = self.strips[j].lines.middle(part.part) else {
-            return [0.0; 3];
+    /// Appends what a part carries as point loads, for rules along and across.
+    fn quadrature(
+        &self,
+        part: &LoadPart,
+        [along_rule, across_rule]: [usize; 2],
+        known: &mut KnownLines,
+        to: &mut Vec<PointLoad>,
+    ) {
+        let strip = &self.strips[part.strip];
+        let number = part.cell - strip.segment.cells.start;
+        let [u0, u1] = part.u;
+        let (middle, half) = (0.5 * (u0 + u1), 0.5 * (u1 - u0));
+        let width = strip.segment.chord.dy * part.piece.width();
+        let mut push = |x: f64, y: f64, load: f64, ratio: [f64; 2]| {
+            let [centre_x, centre_y] = self.origin;
+            to.push(PointLoad {
+                at: [(x - centre_x) as f32, (y - centre_y) as f32],
+                force: [load * ratio[0], load * ratio[1], load].map(|force| force as f32),
+            });
         };
-        let [x0, x1, ..] = part.sides;
-        let pressure = self.footprint.mean_pressure(&chord, x0, x1);
-        let ratio = self.ratio(j, 0.5 * (part.u[0] + part.u[1]), chord.y);
-        [pressure, pressure * ratio[0], pressure * ratio[1]]
+        let mut turns = [(0.0, 0.0, 0.0, 0.0, [0.0; 2]); POINTS_MAX];
+        for (turn, (at, weight)) in turns.iter_mut().zip(RULES[along_rule]) {
+            let u = middle + half * at;
+            let (sine, cosine) = u.sin_cos();
+            *turn = (u, sine, cosine, *weight, strip.ratio(u));
+        }
+        for (at, weight) in RULES[across_rule] {
+            let share = part.piece.share(0.5 * (1.0 + at));
+            let (y, across) = (strip.lines.y(share), 0.5 * weight * width);
+            if !strip.alone {
+                let pressure = strip.mean_pressure(number);
+                for (at, weight) in RULES[along_rule] {
+                    let load = pressure * across * weight * half;
+                    push(middle + half * at, y, load, strip.ratios[number]);
+                }
+                continue;
+            }
+            let Some(chord) = strip.lines.chord(share, known) else {
+                continue;
+            };
+            let beside = self.beside(part.strip, y);
+            // Linear between the nodes in u and y, and constant beyond the outermost.
+            let ratio = |u: f64, here: [f64; 2]| match beside {
+                Some((other, share)) => {
+                    let there = other.ratio(u);
+                    [0, 1].map(|k| (1.0 - share) * here[k] + share * there[k])
+                }
+                None => here,
+            };
+            if along_rule == 0 {
+                let [x0, x1] = part.u.map(|u| along(&chord, u));
+                let whole = across_rule == 0 && part.piece == StripPart::WHOLE;
+                let load = if whole && part.u == strip.ends(number) {
+                    strip.loads[number]
+                } else {
+                    self.footprint.mean_pressure(&chord, x0, x1) * (x1 - x0)
+                };
+                let x = middle_of_load(&chord, part.u);
+                push(x, y, load * across, ratio(middle, strip.ratio(middle)));
+                continue;
+            }
+            for (u, sine, cosine, weight, here) in &turns[..RULES[along_rule].len()] {
+                let reach = 0.5 * (chord.right - chord.left);
+                let x = 0.5 * (chord.left + chord.right) - reach * cosine;
+                let pressure = self.footprint.mean_pressure(&chord, x, x);
+                let load = pressure * reach * sine * weight * half * across;
+                push(x, y, load, ratio(*u, *here));
+            }
+        }
     }
 
-    /// Traction over pressure, linear between the nodes in u and y, and constant beyond the outermost.
-    fn ratio(&self, j: usize, u: f64, y: f64) -> [f64; 2] {
-        let own = &self.strips[j];
-        let here = own.ratio(u);
-        let from = own.segment.chord.y;
-        let beside = if y < from {
+    /// The strip beside, below or above a line, whose tractions count on it, and its share.
+    fn beside(&self, j: usize, y: f64) -> Option<(&LoadedStrip<'a>, f64)> {
+        let own = &self.strips[j].segment.chord;
+        let beside = if y < own.y {
             j.checked_sub(1)
         } else {
             Some(j + 1)
         };
-        let beside = beside.and_then(|k| self.strips.get(k));
-        let patch = own.segment.chord.patch;
-        let Some(other) = beside.filter(|s| s.alone && s.segment.chord.patch == patch) else {
-            return here;
-        };
-        let share = (y - from) / (other.segment.chord.y - from);
-        let there = other.ratio(u);
-        [0, 1].map(|k| (1.0 - share) * here[k] + share * there[k])
+        let beside = beside.and_then(|k| self.strips.get(k))?;
+        let chord = &beside.segment.chord;
+        let counts = beside.alone && chord.patch == own.patch;
+        counts.then(|| (beside, (y - own.y) / (chord.y - own.y)))
     }
 }
 
 impl<'a> LoadedStrip<'a> {
+    /// A segment with its loads; tractions come with [`LoadedStrip::loaded`].
     fn new(
-        level: &'a StripMesh,
-        footprint: &'a Footprint,
+        level: &StripMesh,
         segment: &'a Segment,
+        lines: StripLines<'a>,
         alone: bool,
-        answer: &LevelAnswer,
-        sign: f64,
+        known: &mut KnownLines,
     ) -> LoadedStrip<'a> {
         let (mesh, cells) = (&level.mesh, segment.cells.clone());
         let mut edges = mesh.left[cells.clone()].to_vec();
         edges.push(mesh.right[cells.end - 1]);
+        let length = |(k, i): (usize, usize)| level.pressure[i] * (edges[k + 1] - edges[k]);
+        let own = cells.clone().enumerate().map(length);
+        let nodes = &mesh.node[cells.clone()];
+        if !alone {
+            return LoadedStrip {
+                segment,
+                lines,
+                alone,
+                nodes: nodes.to_vec(),
+                loads: own.collect(),
+                places: edges,
+                ratios: Vec::new(),
+            };
+        }
         let [left, right] = [edges[0], edges[edges.len() - 1]];
         let (centre, half) = (0.5 * (left + right), 0.5 * (right - left));
         let angle = |x: &f64| ((centre - x) / half).clamp(-1.0, 1.0).acos();
-        let mut angles: Vec<f64> = edges.iter().map(angle).collect();
+        let mut places: Vec<f64> = edges.iter().map(angle).collect();
         // Exactly the ends of the outline.
-        angles[0] = 0.0;
-        angles[cells.len()] = PI;
-        let lines = StripLines::new(footprint, &segment.chord);
-        let widths = angles.windows(2).map(|u| {
-            segment
-                .chord
-                .dy
-                .max(lines.skew(StripPart::WHOLE, [u[0], u[1]]))
-        });
-        let unit = sign * level.scale.traction;
+        places[0] = 0.0;
+        places[cells.len()] = PI;
+        let pairs = places.windows(2).zip(own);
+        let loads = pairs.map(|(u, own)| lines.load([u[0], u[1]], known).unwrap_or(own));
+        LoadedStrip {
+            segment,
+            lines,
+            alone,
+            nodes: nodes.iter().map(angle).collect(),
+            loads: loads.collect(),
+            places,
+            ratios: Vec::new(),
+        }
+    }
+
+    /// The same with the tractions of an answer, which are in `unit` MPa.
+    fn loaded(mut self, level: &StripMesh, answer: &LevelAnswer, unit: f64) -> LoadedStrip<'a> {
         let ratio = |i: usize| match level.pressure[i] {
             p if p > 0.0 => [0, 1].map(|k| unit * answer.traction[k][i] / p),
             _ => [0.0; 2],
         };
-        let ratios: Vec<[f64; 2]> = cells.clone().map(ratio).collect();
-        let load = |(k, i): (usize, usize)| {
-            let u = [angles[k], angles[k + 1]];
-            let carried = alone.then(|| lines.load(u)).flatten();
-            let length = edges[k + 1] - edges[k];
-            let pressure = carried.map_or(level.pressure[i], |load| load / length);
-            [pressure, pressure * ratios[k][0], pressure * ratios[k][1]]
-        };
-        let loads: Vec<[f64; 3]> = cells.clone().enumerate().map(load).collect();
-        LoadedStrip {
-            segment,
-            first_root: segment.cells.start,
-            alone,
-            nodes: mesh.node[cells].iter().map(angle).collect(),
-            widths: widths.collect(),
-            ratios,
-            lines,
-            edges,
-            angles,
-            loads,
-        }
+        self.ratios = self.segment.cells.clone().map(ratio).collect();
+        self
     }
 
+    /// Where a cell ends: u.
+    fn ends(&self, number: usize) -> [f64; 2] {
+        [self.places[number], self.places[number + 1]]
+    }
+
+    /// Over a cell that is a rectangle, in MPa.
+    fn mean_pressure(&self, number: usize) -> f64 {
+        let [x0, x1] = self.ends(number);
+        self.loads[number] / (x1 - x0)
+    }
+
+    /// Traction over pressure, linear between the nodes and constant beyond the outermost.
     fn ratio(&self, u: f64) -> [f64; 2] {
         let after = self.nodes.partition_point(|node| *node < u);
         if after == 0 {
@@ -332,5 +407,28 @@ impl<'a> LoadedStrip<'a> {
         let (low, high) = (self.nodes[after - 1], self.nodes[after]);
         let share = (u - low) / (high - low);
         [0, 1].map(|k| (1.0 - share) * self.ratios[after - 1][k] + share * self.ratios[after][k])
+    }
+}
+
+/// x of the centre of the load of a chord between two angles, for a pressure proportional to sin u as Hertz's is.
+fn middle_of_load(chord: &Chord, [u0, u1]: [f64; 2]) -> f64 {
+    let load = 0.5 * ((u1 - u0) - (u1 - u0).sin() * (u1 + u0).cos());
+    let moment = (u1.sin().powi(3) - u0.sin().powi(3)) / 3.0;
+    let (nearer, farther) = (u1.cos(), u0.cos());
+    let cosine = (moment / load).clamp(nearer, farther);
+    0.5 * (chord.left + chord.right) - 0.5 * (chord.right - chord.left) * cosine
+}
+
+/// Calls with every code of these lanes, and with the lanes that have it.
+fn for_each_code(codes: &PartCodes, lanes: u16, mut with: impl FnMut(u8, u16)) {
+    let mut left = lanes;
+    while left != 0 {
+        let code = codes[left.trailing_zeros() as usize];
+        let mut alike = 0_u16;
+        for (lane, other) in codes.iter().enumerate() {
+            alike |= u16::from(*other == code) << lane;
+        }
+        with(code, left & alike);
+        left &= !alike;
     }
 }

@@ -1,16 +1,16 @@
 //! The lines along x below a patch on which a passage of the contact is worst.
 //!
-//! A scan over y and depth with the loads resolved coarsely; from its worst place a search in `(y/b, ln depth)` with the loads
-//! resolved finely and more states beside those that decide.
+//! A scan over y and depth; from its worst place a search in `(y/b, ln depth)` with more states beside those that decide.
 
 use std::ops::ControlFlow;
 
-use crate::contact::half_space::rectangle_stress::Stress;
+use crate::contact::half_space::point_loads::Stress;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::post::subsurface::passage::{PassageMeasure, judge};
+use crate::contact::post::subsurface::seen_parts::LoadResolution;
 use crate::contact::post::subsurface::states::von_mises;
-use crate::contact::post::subsurface::surface_load::{LoadResolution, LoadWorkspace, SurfaceLoad};
+use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 use crate::contact::post::subsurface::task::PassageTask;
 use crate::contact::solution::words::maintenance::{PassagePlace, PassageSummary};
 
@@ -151,14 +151,21 @@ impl<'a> Lines<'a> {
         resolution: LoadResolution,
         workspace: &mut LoadWorkspace,
     ) -> Vec<(f64, Stress)> {
+        self.states_at(&self.stations, at, resolution, workspace)
+    }
+
+    /// x and stress at these x in mm.
+    fn states_at(
+        &self,
+        stations: &[f64],
+        at: [f64; 2],
+        resolution: LoadResolution,
+        workspace: &mut LoadWorkspace,
+    ) -> Vec<(f64, Stress)> {
         let [y, depth] = self.place(at);
-        let state = |x: &f64| {
-            (
-                *x,
-                self.of.load.stress([*x, y, depth], resolution, workspace),
-            )
-        };
-        self.stations.iter().map(state).collect()
+        let places: Vec<[f64; 3]> = stations.iter().map(|x| [*x, y, depth]).collect();
+        let stresses = self.of.load.stresses(&places, resolution, workspace);
+        stations.iter().copied().zip(stresses).collect()
     }
 
     /// The measure of one line and the gap of its ball, with states added beside those that decide.
@@ -168,7 +175,6 @@ impl<'a> Lines<'a> {
         at: [f64; 2],
         workspace: &mut LoadWorkspace,
     ) -> (f64, f64) {
-        let [y, depth] = self.place(at);
         let mut states = self.states(at, LoadResolution::FINE, workspace);
         let judged = |states: &[(f64, Stress)]| {
             let stresses: Vec<Stress> = states.iter().map(|(_, state)| *state).collect();
@@ -181,11 +187,11 @@ impl<'a> Lines<'a> {
             between.retain(|k| k + 1 < states.len());
             between.sort_unstable();
             between.dedup();
-            for k in between {
-                let x = 0.5 * (states[k].0 + states[k + 1].0);
-                let stress = (self.of.load).stress([x, y, depth], LoadResolution::FINE, workspace);
-                states.push((x, stress));
-            }
+            let between = between.into_iter();
+            let added: Vec<f64> = between
+                .map(|k| 0.5 * (states[k].0 + states[k + 1].0))
+                .collect();
+            states.extend(self.states_at(&added, at, LoadResolution::FINE, workspace));
             states.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         let found = judged(&states);

@@ -1,0 +1,204 @@
+//! Stresses of many point loads at several points of a half-space at once, in the machine's lanes and in single precision.
+//!
+//! Axes: x, y in the surface, z into the body. Tension is positive. Sources: Boussinesq's and Cerruti's point loads (Johnson 1985, §3.2 and 3.6).
+
+use std::f64::consts::FRAC_1_PI;
+use std::ops::Range;
+
+use pulp::{Arch, NullaryFnOnce};
+
+/// Stresses `xx, yy, zz, xy, xz, yz`.
+pub type Stress = [f64; 6];
+
+/// Points that are answered side by side.
+pub const LANES: usize = 16;
+
+/// One number for each of the points.
+pub type Lanes = [f32; LANES];
+
+/// A force on the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointLoad {
+    /// Where it acts, in mm.
+    pub at: [f32; 2],
+    /// Its components along x, along y and into the body, in N.
+    pub force: [f32; 3],
+}
+
+/// Loads that some of the points feel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FeltLoads {
+    /// Of the list of all loads.
+    pub loads: Range<usize>,
+    /// A bit for each point that feels them.
+    pub lanes: u16,
+}
+
+/// The stresses in MPa at the points `x, y, z` in mm, z more than 0, for Poisson's ratio `nu`. Lanes to which no load is felt get 0.
+///
+/// A point's stress does not depend on the points beside it: what it does not feel adds exactly 0.
+#[must_use]
+pub fn stresses(
+    loads: &[PointLoad],
+    felt: &[FeltLoads],
+    points: &[Lanes; 3],
+    nu: f64,
+) -> [Stress; LANES] {
+    let sums = Arch::new().dispatch(Sum {
+        loads,
+        felt,
+        points,
+        rest: (1.0 - 2.0 * nu) as f32,
+    });
+    std::array::from_fn(|lane| sums.map(|sum| f64::from(sum[lane]) * (0.5 * FRAC_1_PI)))
+}
+
+struct Sum<'a> {
+    loads: &'a [PointLoad],
+    felt: &'a [FeltLoads],
+    points: &'a [Lanes; 3],
+    /// 1 − 2ν.
+    rest: f32,
+}
+
+impl NullaryFnOnce for Sum<'_> {
+    type Output = [Lanes; 6];
+
+    #[inline(always)]
+    fn call(self) -> [Lanes; 6] {
+        let mut sums = [[0.0; LANES]; 6];
+        for FeltLoads { loads, lanes } in self.felt {
+            let share: Lanes =
+                std::array::from_fn(|lane| if lanes >> lane & 1 == 1 { 1.0 } else { 0.0 });
+            for load in &self.loads[loads.clone()] {
+                self.add(load, &share, &mut sums);
+            }
+        }
+        sums
+    }
+}
+
+impl Sum<'_> {
+    /// Adds 2π times the stresses of one load.
+    ///
+    /// With r from the load to the point, ρ its length and F the force: −3 (F·r) r_i r_j/ρ⁵, and 1 − 2ν times what has only the components
+    /// in the surface.
+    #[inline(always)]
+    fn add(&self, load: &PointLoad, share: &Lanes, sums: &mut [Lanes; 6]) {
+        let [xs, ys, zs] = self.points;
+        let [x_load, y_load] = load.at;
+        let [along, across, down] = load.force;
+        for lane in 0..LANES {
+            let (x, y, z) = (xs[lane] - x_load, ys[lane] - y_load, zs[lane]);
+            let (along, across) = (along * share[lane], across * share[lane]);
+            let down = down * share[lane];
+            let (xx, yy) = (x * x, y * y);
+            let square = xx + yy + z * z;
+            let distance = square.sqrt();
+            let near = 1.0 / distance;
+            let below = 1.0 / (distance + z);
+            let cube = near * near * near;
+            let sheared = along * x + across * y;
+            let all = -3.0 * (sheared + down * z) * cube * near * near;
+            // 1/(ρ (ρ + z)²), and what multiplies the squares of the coordinates.
+            let turned = near * below * below;
+            let squares = cube * below * below;
+            let squares =
+                squares * (down * (2.0 * distance + z) + sheared * (3.0 * distance + z) * below);
+            let even = down * (cube * z - near * below) + sheared * (cube - turned);
+            let both = all + self.rest * squares;
+            let terms = [
+                both * xx + self.rest * (even - 2.0 * turned * along * x),
+                both * yy + self.rest * (even - 2.0 * turned * across * y),
+                all * z * z,
+                both * x * y - self.rest * turned * (along * y + across * x),
+                all * x * z,
+                all * y * z,
+            ];
+            for (sum, term) in sums.iter_mut().zip(terms) {
+                sum[lane] += term;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::half_space::rectangle_stress::add_rectangle;
+
+    /// A rectangle of a hundredth of the distance acts as its load in the middle.
+    #[test]
+    fn a_small_rectangle_is_a_point_load() {
+        let places = [
+            [0.3, -0.2, 0.4],
+            [1.4, 0.0, 0.5],
+            [-6.0, 3.0, 2.0],
+            [0.1, -0.3, 4.0],
+            [2.0, 2.0, 0.1],
+        ];
+        let mut points = [[1.0; LANES]; 3];
+        for (lane, place) in places.iter().enumerate() {
+            for k in 0..3 {
+                points[k][lane] = place[k] as f32;
+            }
+        }
+        for force in [
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.3, -0.2, 0.9],
+        ] {
+            let side = 0.004;
+            let load = PointLoad {
+                at: [0.0; 2],
+                force: force.map(|f: f64| f as f32),
+            };
+            let felt = FeltLoads {
+                loads: 0..1,
+                lanes: u16::MAX,
+            };
+            let found = stresses(&[load], &[felt], &points, 0.28);
+            for (place, found) in places.iter().zip(found) {
+                let mut known = [0.0; 6];
+                let [x, y, z] = force.map(|f| f / (side * side));
+                let half = 0.5 * side;
+                add_rectangle(
+                    *place,
+                    [-half, half, -half, half],
+                    [z, x, y],
+                    0.28,
+                    &mut known,
+                );
+                let size = known.iter().fold(0.0_f64, |size, s| size.max(s.abs()));
+                for k in 0..6 {
+                    let error = (found[k] - known[k]).abs();
+                    assert!(
+                        error < 5e-4 * size,
+                        "{place:?} {force:?} {k}: {found:?} {known:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_point_feels_its_own_loads_alone() {
+        let load = |x: f32| PointLoad {
+            at: [x, 0.2],
+            force: [0.1, 0.2, 1.0],
+        };
+        let loads = [load(0.0), load(0.7), load(-0.4)];
+        let points = [
+            std::array::from_fn(|lane| lane as f32),
+            [0.3; LANES],
+            [0.5; LANES],
+        ];
+        let felt = |loads: Range<usize>, lanes: u16| FeltLoads { loads, lanes };
+        let all = stresses(&loads, &[felt(0..1, 0b11), felt(1..3, 0b01)], &points, 0.3);
+        let first = stresses(&loads, &[felt(0..1, 0b01), felt(1..3, 0b01)], &points, 0.3);
+        let second = stresses(&loads, &[felt(0..1, 0b10)], &points, 0.3);
+        assert_eq!((all[0], all[1]), (first[0], second[1]));
+        assert_eq!(all[2], [0.0; 6]);
+    }
+}
