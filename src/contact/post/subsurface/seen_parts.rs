@@ -110,6 +110,7 @@ mod tests {
             squares: [4.0, 1.0],
         };
         let depths = std::array::from_fn(|lane| 0.1 * 1.6_f32.powi(lane as i32));
+        let points = [[0.0; LANES], [0.0; LANES], depths];
         let mut codes = Vec::new();
         look(
             [part].into_iter(),
