@@ -1,5 +1,7 @@
 //! What error to expect where: how far each node is from a cubic through its neighbours, and a factor from held-out motions.
 
+use std::ops::Range;
+
 use railhead::contact::rolling::methods::table::evaluate::growth;
 use railhead::contact::rolling::methods::table::grid::{
     DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, size,
@@ -8,6 +10,24 @@ use railhead::contact::rolling::methods::table::spline::OUTPUTS;
 
 /// Nodes along a/b, pole, direction and size.
 const NODES: [usize; 4] = [RATIOS, POLES, DIRECTIONS, SIZES.len()];
+
+/// Parts of the sizes that have bounds of their own: partial slip, and from σ = 0.79 on, where nearly all slips and errors are smaller beside the
+/// indicators. Of six divisions tried on the other half of the contacts too, which chose between them.
+pub const PARTS: [Range<usize>; 2] = [0..17, 17..SIZES.len()];
+
+/// Which of the sizes a cell between nodes begins with.
+pub fn size_of(cell: usize) -> usize {
+    cell % (SIZES.len() - 1)
+}
+
+/// Which of the parts a cell between nodes is in.
+pub fn part_of(cell: usize) -> usize {
+    let size = size_of(cell);
+    PARTS
+        .iter()
+        .position(|part| part.contains(&size))
+        .expect("a part")
+}
 
 /// Indicators of the cells between nodes, `[a/b][pole][direction][size]`: the mean over the corners of a cell of how far their values are
 /// from a cubic through two neighbouring sizes on each side, largest over ν, forces and moment. Differences along the other axes were

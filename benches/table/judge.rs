@@ -6,6 +6,8 @@ use railhead::contact::rolling::methods::table::evaluate::CreepTable;
 
 use railhead::contact::rolling::methods::table::grid::{cell, sigma};
 
+use serde_json::{Value, json};
+
 use crate::held_out::{CONTACTS, contact, name};
 use crate::solver::read;
 
@@ -175,6 +177,11 @@ pub struct Law {
 impl Law {
     pub fn of(&self, indicator: f32) -> f64 {
         self.factor * f64::from(indicator).max(self.floor).powf(self.power)
+    }
+
+    /// As the file of the table names it.
+    pub fn described(&self) -> Value {
+        json!({ "floor": self.floor, "power": self.power, "factor": self.factor })
     }
 
     /// The law whose bound holds for this part of the motions and has the smallest median of bound over error.

@@ -65,14 +65,26 @@ fn write() {
     let indicators = bound::indicators(&values);
     let without = judge::all(&CreepTable::new(&values, &vec![0.0; CELLS]));
     let half: Vec<_> = without.iter().filter(|j| j.contact % 2 == 0).collect();
-    let law = judge::Law::sharpest(&FLOORS, &POWERS, HELD, &half, &indicators);
-    let bounds: Vec<f32> = indicators.iter().map(|i| law.of(*i) as f32).collect();
+    let laws: Vec<judge::Law> = bound::PARTS
+        .iter()
+        .map(|part| {
+            let own: Vec<_> = half
+                .iter()
+                .copied()
+                .filter(|j| part.contains(&bound::size_of(j.cell)))
+                .collect();
+            judge::Law::sharpest(&FLOORS, &POWERS, HELD, &own, &indicators)
+        })
+        .collect();
+    let bounds: Vec<f32> = (indicators.iter().enumerate())
+        .map(|(cell, indicator)| laws[bound::part_of(cell)].of(*indicator) as f32)
+        .collect();
     judge::print_bounds(&judge::all(&CreepTable::new(&values, &bounds)));
     let about = json!({
         "solver_revision": SOLVER_REVISION,
         "targets": (0..RATIOS).map(nodes::target).collect::<Vec<f64>>(),
         "held_out": { "contacts": held_out::CONTACTS, "motions": held_out::MOTIONS, "target": held_out::TARGET },
-        "bound": { "held": HELD, "floor": law.floor, "power": law.power, "factor": law.factor },
+        "bound": { "held": HELD, "laws": laws.iter().map(judge::Law::described).collect::<Vec<_>>() },
     });
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let file = root.join("src/contact/rolling/methods/table/table.bin");
