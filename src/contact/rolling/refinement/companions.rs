@@ -76,10 +76,13 @@ impl Companion {
             Err(error) => return Err(error),
         };
         let (fine, level) = (state.levels.get(number), state.levels.get(companion));
-        let start = nested_tractions(&fine, &answer.traction, &level);
+        let (levels, motion) = ([number, companion], level.scale.motion(&asked.motion));
+        let nested = nested_tractions(&fine, &answer.traction, &level);
+        let sweep = &mut state.sweep;
+        let start = sweep.companion_start(levels, &motion, nested.clone(), &level.bound);
         let of_level = LevelTask {
             level: &level,
-            motion: &level.scale.motion(&asked.motion),
+            motion: &motion,
             fall: task.bound_fall(asked.index, level.scale.slip()),
             passage: task
                 .passage(asked.index)
@@ -88,6 +91,7 @@ impl Companion {
         };
         match boundary_element::trapezoid(of_level, &start, &mut state.workspace, monitor) {
             Ok((traction, work)) => {
+                sweep.remember_companion(levels, motion, &nested, &traction);
                 let patches = task.footprint.patches().len();
                 let found = (0..patches)
                     .map(|p| Resultants::of_patch(&level, &traction, p))

@@ -27,6 +27,7 @@ pub struct SweepState {
     pub path: Vec<usize>,
     /// The mesh on which the next motion may begin.
     pub begin: Option<MeshPlan>,
+    companions: Vec<RememberedCompanion>,
 }
 
 #[derive(Debug)]
@@ -36,6 +37,17 @@ struct Remembered {
     motion: Motion,
     three_point: [Vec<f64>; 2],
     trapezoid: [Vec<f64>; 2],
+}
+
+/// How the last answer on a companion differs from that on its level.
+#[derive(Debug)]
+struct RememberedCompanion {
+    /// The numbers of the level and of the companion.
+    levels: [usize; 2],
+    /// Dimensionless, about the companion's origin.
+    motion: Motion,
+    /// Tractions of the companion less those interpolated from the level.
+    apart: [Vec<f64>; 2],
 }
 
 impl SweepState {
@@ -61,6 +73,47 @@ impl SweepState {
     pub fn forget(&mut self, number: usize) {
         self.steps.retain(|step| step.level != number);
         self.path.retain(|on_path| *on_path != number);
+        self.companions.retain(|c| !c.levels.contains(&number));
+    }
+
+    /// Remembers the answer `found` on a companion of a level; `nested` are the level's tractions, interpolated to the companion.
+    pub fn remember_companion(
+        &mut self,
+        levels: [usize; 2],
+        motion: Motion,
+        nested: &[Vec<f64>; 2],
+        found: &[Vec<f64>; 2],
+    ) {
+        self.companions.retain(|c| c.levels != levels);
+        let apart = [0, 1].map(|k| {
+            let pairs = found[k].iter().zip(&nested[k]);
+            pairs.map(|(found, nested)| found - nested).collect()
+        });
+        self.companions.push(RememberedCompanion {
+            levels,
+            motion,
+            apart,
+        });
+    }
+
+    /// A start on a companion of a level from the level's tractions, interpolated to it: if the last motion there is near, they differ
+    /// from those of the companion nearly as they did then.
+    #[must_use]
+    pub fn companion_start(
+        &self,
+        levels: [usize; 2],
+        motion: &Motion,
+        mut nested: [Vec<f64>; 2],
+        bound: &[f64],
+    ) -> [Vec<f64>; 2] {
+        let last = self.companions.iter().find(|c| c.levels == levels);
+        if let Some(last) = last.filter(|last| is_near(motion, &last.motion)) {
+            for (nested, apart) in nested.iter_mut().zip(&last.apart) {
+                nested.iter_mut().zip(apart).for_each(|(t, d)| *t += d);
+            }
+            shrink(&mut nested, bound);
+        }
+        nested
     }
 
     /// A start for a motion on a level: the last two answers extrapolated, or the last answer itself if its motion is near.
@@ -90,12 +143,17 @@ impl SweepState {
                 trapezoid: Some(beyond(&last.trapezoid, &before.trapezoid)),
             });
         }
-        let whole = components(motion);
-        (dot(to_go, to_go) <= NEAR * NEAR * dot(whole, whole)).then(|| Start {
+        is_near(motion, &last.motion).then(|| Start {
             three_point: last.three_point.clone(),
             trapezoid: Some(last.trapezoid.clone()),
         })
     }
+}
+
+/// Is a motion so near the last one that what was found there serves it?
+fn is_near(motion: &Motion, last: &Motion) -> bool {
+    let (whole, to_go) = (components(motion), difference(motion, last));
+    dot(to_go, to_go) <= NEAR * NEAR * dot(whole, whole)
 }
 
 /// Brings tractions into their discs.
@@ -150,4 +208,36 @@ pub(crate) fn nested_tractions(
         values.iter_mut().zip(&to.bound).for_each(|(t, g)| *t *= g);
         values
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_companion_starts_as_far_from_its_level_as_the_last_near_motion_was_and_within_its_discs() {
+        let motion = |creepage_x: f64| Motion {
+            creepage_x,
+            creepage_y: 0.0,
+            spin_per_mm: 0.1,
+        };
+        let mut sweep = SweepState::default();
+        let nested = [vec![0.2, 0.9], vec![0.1, 0.0]];
+        let found = [vec![0.25, 1.0], vec![0.05, 0.0]];
+        sweep.remember_companion([3, 4], motion(1.0), &nested, &found);
+        let bound = [1.0, 1.0];
+        let now = [vec![0.3, 0.95], vec![0.2, 0.0]];
+        let start = |levels, creepage| {
+            sweep.companion_start(levels, &motion(creepage), now.clone(), &bound)
+        };
+        let near = start([3, 4], 1.1);
+        let known = [[0.35, 1.0], [0.15, 0.0]];
+        for (near, known) in near.iter().flatten().zip(known.as_flattened()) {
+            assert!((near - known).abs() < 1e-12, "{near} {known}");
+        }
+        assert_eq!(start([3, 4], 2.0), now);
+        assert_eq!(start([4, 3], 1.1), now);
+        sweep.forget(4);
+        assert!(sweep.companions.is_empty());
+    }
 }

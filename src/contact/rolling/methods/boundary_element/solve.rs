@@ -54,8 +54,16 @@ pub fn solve(
     if let Some(force_change) = three_point.other {
         remarks.push(Remark::SeveralSolutions { force_change });
     }
-    let warm = start.and_then(|start| start.trapezoid.as_ref());
-    let warm = warm.map(|warm| solve.start(Some(warm)));
+    // The rules differ nearly as they do in the start.
+    let warm = start.and_then(|start| {
+        let [mut warm, before] =
+            [start.trapezoid.as_ref()?, &start.three_point].map(|of| solve.start(Some(of)));
+        let moves = t.iter().zip(before).map(|(now, before)| now - before);
+        warm.iter_mut()
+            .zip(moves)
+            .for_each(|(warm, by)| *warm += by);
+        Some(warm)
+    });
     let (slips, second) = match solve.trapezoid(&mut t, warm)? {
         Some(slips) => (slips, Some(by_mirror)),
         None => {
