@@ -12,7 +12,7 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::half_space::unlike_bodies::opening;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::gap::pilot::PilotOnce;
+use crate::contact::normal::gap::seen::GapSeen;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
@@ -86,7 +86,7 @@ pub(crate) fn solve(
         before = Some(force);
         let task = GapTask {
             gap,
-            pilot: PilotOnce::default(),
+            seen: GapSeen::default(),
             ..task.clone()
         };
         solved = normal_stage::solve_gap(case, &task, workspace, watch)?;
@@ -133,7 +133,7 @@ fn gap_task(case: &CheckedCase) -> GapTask {
         gap: paraboloid(&ellipse, modulus),
         loading,
         contact_modulus: modulus,
-        pilot: PilotOnce::default(),
+        seen: GapSeen::default(),
     }
 }
 

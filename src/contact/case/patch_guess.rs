@@ -3,7 +3,7 @@
 
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::gap::pilot::PilotPatch;
-use crate::contact::normal::gap::summits::GapOutlook;
+use crate::contact::normal::gap::seen::GapOutlook;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::patch::Patch;

@@ -10,6 +10,7 @@ pub mod outcome;
 pub mod pilot;
 pub mod pilot_solve;
 pub mod search_box;
+pub mod seen;
 pub mod solve;
 pub mod solve_from;
 pub mod start;

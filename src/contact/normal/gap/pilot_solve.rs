@@ -5,7 +5,7 @@ use crate::contact::monitor::Unmonitored;
 use crate::contact::normal::gap::constants::{CELLS_FIRST, LEVEL_BEYOND, NEAR, RESOLUTION};
 use crate::contact::normal::gap::grid::PressureGrid;
 use crate::contact::normal::gap::pilot::{GapPilot, PilotPatch};
-use crate::contact::normal::gap::search_box::{reach, reach_of_level};
+use crate::contact::normal::gap::search_box::reach_of_level;
 use crate::contact::normal::gap::task::GapTask;
 
 /// Boxes tried: each is larger than the one before. A product on the coarse grid takes 20 µs, and an iteration one or two of them,
@@ -15,13 +15,16 @@ const BOXES_MAX: usize = 3;
 impl GapTask {
     /// The contact on a coarse grid, solved at the first call; none if that has no answer.
     pub fn pilot(&self) -> Option<&GapPilot> {
-        self.pilot.get_or_make(|| self.solve_coarsely())
+        self.seen
+            .pilot
+            .get_or_make(|| self.solve_coarsely())
+            .as_ref()
     }
 
     fn solve_coarsely(&self) -> Option<GapPilot> {
         let limits = self.gap.window();
         let mut workspace = GridWorkspace::default();
-        let mut reach = reach(&self.gap, self.loading, self.contact_modulus);
+        let mut reach = self.reach();
         for _ in 0..BOXES_MAX {
             let grid = PressureGrid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored());
             let pressed = self
@@ -55,7 +58,7 @@ impl GapTask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::normal::gap::pilot::PilotOnce;
+    use crate::contact::normal::gap::seen::GapSeen;
     use crate::contact::normal::gap::surface::GapSurface;
     use crate::contact::normal::hertz::NormalLoad;
 
@@ -68,7 +71,7 @@ mod tests {
             gap: GapSurface::profile(460.0, &y, &gap),
             loading: NormalLoad::Force(30_000.0),
             contact_modulus: 115_000.0,
-            pilot: PilotOnce::default(),
+            seen: GapSeen::default(),
         };
         let Some(GapPilot {
             patches,

@@ -16,7 +16,7 @@ use crate::contact::normal::gap::constants::{
     TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
-use crate::contact::normal::gap::search_box::{SearchBox, reach, reach_of_level};
+use crate::contact::normal::gap::search_box::{SearchBox, reach_of_level};
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
 use crate::contact::normal::hertz::NormalLoad;
@@ -86,7 +86,7 @@ impl GapTask {
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
-        let mut reach = reach(&self.gap, self.loading, self.contact_modulus);
+        let mut reach = self.reach();
         if let NormalLoad::Approach(approach) = self.loading
             && approach <= reach.least
         {

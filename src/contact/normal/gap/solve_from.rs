@@ -145,7 +145,7 @@ mod tests {
     use super::*;
     use crate::contact::monitor::Unmonitored;
     use crate::contact::normal::gap::answer::NormalAnswer;
-    use crate::contact::normal::gap::pilot::PilotOnce;
+    use crate::contact::normal::gap::seen::GapSeen;
     use crate::contact::normal::gap::surface::GapSurface;
     use crate::contact::normal::pressure_field::field::PressureField;
 
@@ -162,7 +162,7 @@ mod tests {
             gap: GapSurface::grid(&x, &y, &gap),
             loading: NormalLoad::Approach(approach),
             contact_modulus: 115_000.0,
-            pilot: PilotOnce::default(),
+            seen: GapSeen::default(),
         }
     }
 

@@ -1,7 +1,8 @@
 //! What will the contact of a gap be like? A look at the samples, before anything is solved.
 
 use crate::contact::normal::gap::constants::{TARGET_POWER, TARGET_USUAL};
-use crate::contact::normal::gap::search_box::reach;
+use crate::contact::normal::gap::search_box::{SearchBox, reach};
+use crate::contact::normal::gap::seen::GapOutlook;
 use crate::contact::normal::gap::task::GapTask;
 
 /// Valleys less deep than this part of the approach are pressed flat.
@@ -14,26 +15,21 @@ const CONTACT_OVER_BOX: f64 = 0.62;
 /// The sum of second differences of a parabola's samples over the depth of the box, times their number.
 const TURNS_SMOOTH: f64 = 8.0;
 
-/// What is known of a contact before it is solved.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GapOutlook {
-    /// Half-length along rolling and half-width of everything that touches, in mm.
-    pub half: [f64; 2],
-    /// Approach beyond the least gap, in mm.
-    pub depth: f64,
-    /// Summits of the bodies that are likely to touch, at least 1.
-    pub summits: usize,
-    /// How much the gap turns across rolling, over a parabola, its sharpest bend left out.
-    pub turns: f64,
-    /// Mean height of its teeth over the depth, of a saw that bends as much.
-    pub teeth: f64,
-}
-
 impl GapTask {
     /// What the contact will be like: its size, and how many summits touch, with valleys between them that are not pressed flat.
     #[must_use]
     pub fn outlook(&self) -> GapOutlook {
-        let reach = reach(&self.gap, self.loading, self.contact_modulus);
+        *self.seen.outlook.get_or_make(|| self.look())
+    }
+
+    /// The box in which contact can be.
+    pub(crate) fn reach(&self) -> SearchBox {
+        let found = || reach(&self.gap, self.loading, self.contact_modulus);
+        *self.seen.reach.get_or_make(found)
+    }
+
+    fn look(&self) -> GapOutlook {
+        let reach = self.reach();
         let depth = reach.level - reach.least;
         let samples = self.gap.samples();
         let within = |k: usize| -> Vec<f64> {

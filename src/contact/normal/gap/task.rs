@@ -1,6 +1,6 @@
 //! What is asked of a gap: the surfaces, and how hard they are pressed together.
 
-use crate::contact::normal::gap::pilot::PilotOnce;
+use crate::contact::normal::gap::seen::GapSeen;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::hertz::NormalLoad;
 
@@ -13,6 +13,6 @@ pub struct GapTask {
     pub loading: NormalLoad,
     /// Contact modulus `E* = G/(1−ν)` in MPa.
     pub contact_modulus: f64,
-    /// A first look at the contact, kept once it was taken; starts empty.
-    pub pilot: PilotOnce,
+    /// First looks at the contact, kept once they were taken; starts empty.
+    pub seen: GapSeen,
 }

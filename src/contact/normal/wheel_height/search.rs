@@ -11,7 +11,7 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::gap::grid::GridFineness;
-use crate::contact::normal::gap::pilot::PilotOnce;
+use crate::contact::normal::gap::seen::GapSeen;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::Tile;
@@ -348,7 +348,7 @@ impl WheelTask {
             gap: GapSurface::grid(&gap.x, &gap.y, &above),
             loading: NormalLoad::Approach(depth),
             contact_modulus: self.contact_modulus,
-            pilot: PilotOnce::default(),
+            seen: GapSeen::default(),
         };
         let resolution = match fineness.detail {
             GapSampling::Coarse => GridFineness::coarse(),
