@@ -1,8 +1,9 @@
 // Compose: every example, the form and the JSON as faces of one document, faults, files, the result while typing.
 import assert from 'node:assert/strict';
 import { readdirSync } from 'node:fs';
+import { join } from 'node:path';
 import { test } from 'node:test';
-import { drawn, example, setUp } from './harness.mjs';
+import { drawn, example, OUTPUT, setUp } from './harness.mjs';
 
 const { service, onPage } = setUp();
 const EXAMPLES = readdirSync(new URL('../../../api/examples/', import.meta.url)).filter((name) => name.endsWith('.case.json'));
@@ -54,6 +55,31 @@ test('faults stand at their fields and in a list that leads to them', () => onPa
     return value.slice(selectionStart, selectionEnd);
   });
   assert.equal(chosen, '"creepage_z"');
+}));
+
+test('rolling that changes is written in the form, and its forces stand over the distance rolled', () => onPage('', async (page) => {
+  await sound(page);
+  await page.locator('.seg').filter({ hasText: 'While it rolls' }).click();
+  await page.getByLabel('Distances rolled').fill('0  1; 2 4,5 9');
+  await page.getByLabel('Creepage along').fill('0 0,2 0.2 0.2 0');
+  await page.locator('#field-motion-history-spin_per_mm').fill('0.2');
+  await page.screenshot({ path: join(OUTPUT, 'compose-history.png'), fullPage: true });
+  await page.locator('.seg').filter({ hasText: 'Steady rolling' }).click();
+  const { motion } = await json(page);
+  assert.deepEqual(motion, { history: { distance_mm: [0, 1, 2, 4.5, 9], creepage_x: [0, 0.002, 0.002, 0.002, 0], spin_per_mm: 0.0002 }, start: 'steady' });
+  await sound(page);
+  await page.getByLabel('Distances rolled').fill('0 3 2');
+  await page.locator('#field-motion-history-distance_mm-fault').waitFor();
+  await page.getByLabel('Distances rolled').fill('0 1 2 4.5 9');
+  await sound(page);
+  await page.getByRole('button', { name: /^Solve/ }).click();
+  const curve = page.locator('creep-curve');
+  await curve.locator('canvas').waitFor();
+  const data = () => curve.evaluate((element) => /** @type {HTMLElement & { plot: { data: number[][] } }} */ (element).plot.data);
+  assert.deepEqual((await data())[0], [0, 1, 2, 4.5, 9]);
+  await page.locator('.seg').filter({ hasText: 'Creepages' }).click();
+  await page.screenshot({ path: join(OUTPUT, 'result-history.png'), fullPage: true });
+  assert.deepEqual((await data())[1].map((value) => Number(value.toFixed(6))), [0, 0.2, 0.2, 0.2, 0]);
 }));
 
 test('form and JSON are faces of one document, and broken JSON loses nothing', () => onPage('', async (page) => {

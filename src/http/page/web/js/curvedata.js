@@ -1,4 +1,5 @@
-// The values of a creep curve: forces or the moment of a patch against the component of motion that varies most.
+// The values of a creep curve: forces or the moment of a patch against the component of motion that varies most, or, of rolling that
+// changes, against the distance rolled.
 
 /** @typedef {import('./api.js').Patch} Patch */
 
@@ -20,20 +21,57 @@ const MOTIONS = /** @type {const} */ ([
   { key: 'spin_per_mm', label: 'spin / (1/m)', factor: 0.001 },
 ]);
 
+/** @typedef {'forces' | 'moment' | 'creepages'} CurveKind */
+
+/** Do the motions of a patch follow each other? @param {Patch} patch */
+export const isHistory = ({ points }) => points.every(({ history }) => history);
+
 /**
- * The curve of a patch against the component of motion that varies most.
+ * What stands on the axis: the motions in their order with their places.
  * @param {Patch} patch
- * @param {'forces' | 'moment'} kind
+ * @returns {{ xLabel: string, x: number[], order: number[] }}
+ */
+function places(patch) {
+  const { points } = patch;
+  if (isHistory(patch)) return { xLabel: 'distance rolled / mm', x: points.map(({ history }) => history?.distance_mm ?? 0), order: [...points.keys()] };
+  const values = MOTIONS.map(({ key, factor }) => points.map(({ motion }) => (motion[key] ?? 0) / factor));
+  const spreads = values.map((of) => Math.max(...of) - Math.min(...of));
+  const most = spreads.indexOf(Math.max(...spreads));
+  const order = [...points.keys()].sort((one, two) => values[most][one] - values[most][two]);
+  return { xLabel: MOTIONS[most].label, x: order.map((at) => values[most][at]), order };
+}
+
+/**
+ * Creepages, given or found, over the distance rolled.
+ * @param {Patch} patch
+ * @returns {Curve}
+ */
+function creepageCurve(patch) {
+  const { points } = patch;
+  const known = (/** @type {number | null | undefined} */ value) => (typeof value === 'number' ? 100 * value : null);
+  return {
+    ...places(patch),
+    yLabel: 'creepage / %',
+    lines: [
+      { label: 'along', unit: '%', colour: '--c1', y: points.map(({ motion }) => 100 * (motion.creepage_x ?? 0)), error: points.map(({ history }) => known(history?.creepage_x_error)) },
+      { label: 'across', unit: '%', colour: '--c2', dash: [7, 4], y: points.map(({ motion }) => 100 * (motion.creepage_y ?? 0)), error: points.map(({ history }) => known(history?.creepage_y_error)) },
+    ],
+    bound: NaN,
+  };
+}
+
+/**
+ * The curve of a patch.
+ * @param {Patch} patch
+ * @param {CurveKind} kind Creepages for rolling that changes only.
  * @param {number} friction
  * @returns {Curve | null} Null for fewer than three motions.
  */
 export function curveOf(patch, kind, friction) {
   const { points } = patch;
   if (points.length < 3) return null;
-  const values = MOTIONS.map(({ key, factor }) => points.map(({ motion }) => (motion[key] ?? 0) / factor));
-  const spreads = values.map((of) => Math.max(...of) - Math.min(...of));
-  const most = spreads.indexOf(Math.max(...spreads));
-  const order = [...points.keys()].sort((one, two) => values[most][one] - values[most][two]);
+  if (kind === 'creepages' && isHistory(patch)) return creepageCurve(patch);
+  const { xLabel, x, order } = places(patch);
   /** @type {(name: 'force_x_n' | 'force_y_n' | 'moment_z_n_mm', look: Pick<Line, 'label' | 'unit' | 'colour' | 'dash'>) => Line} */
   const line = (name, look) => ({
     ...look,
@@ -45,9 +83,9 @@ export function curveOf(patch, kind, friction) {
   });
   const moment = kind === 'moment';
   return {
-    xLabel: MOTIONS[most].label,
+    xLabel,
     yLabel: moment ? 'moment on the rail / N·m' : 'force on the rail / kN',
-    x: order.map((at) => values[most][at]),
+    x,
     order,
     lines: moment
       ? [line('moment_z_n_mm', { label: 'M z', unit: 'N·m', colour: '--c3' })]

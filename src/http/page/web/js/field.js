@@ -4,10 +4,10 @@ import { html, nothing } from '../vendor/lit-html.js';
 import { at } from './document.js';
 import { change } from './editing.js';
 import { number } from './format.js';
+import { parse, parseList, textOf } from './written.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./api.js').Fault} Fault */
-/** @typedef {import('./document.js').JsonValue} JsonValue */
 
 /**
  * @typedef {object} FieldLook
@@ -15,6 +15,7 @@ import { number } from './format.js';
  * @property {string} [hint]
  * @property {string} [empty] Shown where nothing is given.
  * @property {boolean} [text] Takes any text, not only numbers.
+ * @property {boolean} [list] Takes one number or several.
  */
 
 /** The id of the field of a pointer. @param {string} pointer */
@@ -44,12 +45,12 @@ export function field(app, pointer, label, unit, look = {}) {
   const write = (/** @type {InputEvent} */ event) => {
     const { value } = /** @type {HTMLInputElement} */ (event.target);
     app.compose({ typing: { pointer, text: value } });
-    change(app, pointer, look.text ? value || undefined : parse(value, look.factor));
+    change(app, pointer, look.text ? value || undefined : look.list ? parseList(value, look.factor) : parse(value, look.factor));
   };
   return html`<div class=${fault ? 'field bad' : 'field'}>
     <label for=${id}>${label}</label>
     <span class="input">
-      <input id=${id} inputmode=${look.text ? 'text' : 'decimal'} autocomplete="off" .value=${shown} placeholder=${look.empty ?? ''}
+      <input id=${id} inputmode=${look.text || look.list ? 'text' : 'decimal'} autocomplete="off" .value=${shown} placeholder=${look.empty ?? ''}
         aria-invalid=${fault ? 'true' : 'false'} aria-describedby=${fault ? `${id}-fault` : nothing}
         @input=${write} @blur=${() => app.compose({ typing: null })}>
       ${unit ? html`<span class="unit">${unit}</span>` : nothing}
@@ -71,24 +72,4 @@ function faultText(fault, factor, unit) {
   const low = typeof minimum === 'number' ? `${excluded ? 'more than' : 'at least'} ${number(minimum / factor)}` : '';
   const high = typeof maximum === 'number' ? `at most ${number(maximum / factor)}` : '';
   return `A number of ${[low, high].filter(Boolean).join(' and ')} ${unit} is needed.`;
-}
-
-/** @param {JsonValue | undefined} value @param {number} [factor] */
-function textOf(value, factor) {
-  if (value === undefined || value === null) return '';
-  if (typeof value !== 'number') return String(value);
-  return String(factor ? Number((value / factor).toPrecision(12)) : value);
-}
-
-/**
- * What was written as a number, or as text where it is none: then the service says what is wrong with it.
- * @param {string} written
- * @param {number} [factor]
- * @returns {JsonValue | undefined}
- */
-export function parse(written, factor = 1) {
-  const text = written.trim().replace(',', '.').replaceAll('\u2212', '-');
-  if (!text) return undefined;
-  const value = Number(text);
-  return Number.isFinite(value) ? Number((value * factor).toPrecision(12)) : written;
 }

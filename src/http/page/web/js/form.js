@@ -6,6 +6,7 @@ import { change, editDocument } from './editing.js';
 import { contactFields } from './contactform.js';
 import { ALL_OUTPUTS, hasSections, withContact, withoutNameOf } from './starts.js';
 import { faultAt, field } from './field.js';
+import { FIRST_HISTORY, historyFields } from './historyform.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./document.js').JsonObject} JsonObject */
@@ -67,12 +68,12 @@ function loadField(app, type) {
 function motionFields(app, type) {
   const { motion } = app.store.get().compose.document ?? {};
   const kind = Array.isArray(motion) ? 'list' : isObject(motion) && 'sweep' in motion ? 'sweep' : isObject(motion) && 'wheelset' in motion ? 'wheelset' : isObject(motion) && 'history' in motion ? 'history' : 'one';
-  const kinds = [...(hasSections(type) ? [['wheelset', 'Wheelset']] : []), ['one', 'Creepages'], ['sweep', 'Creep curve']];
+  const kinds = [...(hasSections(type) ? [['wheelset', 'Wheelset']] : []), ['one', 'Creepages'], ['sweep', 'Creep curve'], ...(hasSections(type) ? [] : [['history', 'While it rolls']])];
   return html`
     <div class="segs" role="group" aria-label="Kind of motion">${kinds.map(([key, label]) => html`<label class="seg">
       <input type="radio" name="motion" .checked=${key === kind} @change=${() => change(app, '/motion', startMotion(key, motion))}><span>${label}</span></label>`)}</div>
     ${kind === 'list' ? html`<p class="hint">${/** @type {JsonValue[]} */ (motion).length} motions on the same patch; change them in the JSON.</p>` : nothing}
-    ${kind === 'history' ? html`<p class="hint">A motion that changes as the bodies roll; change it in the JSON.</p>` : nothing}
+    ${kind === 'history' ? historyFields(app) : nothing}
     ${kind === 'one' ? html`<div class="triple">${COMPONENTS.map(({ key, label, unit, factor }) => field(app, `/motion/${key}`, label, unit, { factor }))}</div>` : nothing}
     ${kind === 'wheelset' ? html`<div class="pair">
       ${field(app, '/motion/wheelset/speed_mm_per_s', 'Speed', 'km/h', { factor: 1e6 / 3600 })}
@@ -108,9 +109,10 @@ function sweepFields(app, sweep) {
  */
 function startMotion(kind, before) {
   if (kind === 'wheelset') return { wheelset: { speed_mm_per_s: 20000, free_rolling_radius_mm: 460 } };
+  if (kind === 'history') return FIRST_HISTORY;
   if (kind === 'sweep') return { sweep: { creepage_x: { from: 0, to: 0.006, points: 13 } } };
   const first = Array.isArray(before) ? before[0] : before;
-  const alone = isObject(first) && !('sweep' in first) && !('wheelset' in first);
+  const alone = isObject(first) && !('sweep' in first) && !('wheelset' in first) && !('history' in first);
   return alone ? first : { creepage_x: 0.001, creepage_y: 0, spin_per_mm: 0 };
 }
 

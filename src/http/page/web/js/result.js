@@ -32,7 +32,7 @@ import { formatRoute } from './routes.js';
  * @property {boolean} border
  * @property {boolean} arrows
  * @property {boolean} mesh
- * @property {'forces' | 'moment'} curve
+ * @property {import('./curvedata.js').CurveKind} curve
  * @property {import('./wheelsetdata.js').Kind} wheelset
  */
 

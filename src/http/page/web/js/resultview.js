@@ -2,7 +2,7 @@
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { cancel } from './api.js';
-import { curveOf } from './curvedata.js';
+import { curveOf, isHistory } from './curvedata.js';
 import { put } from './document.js';
 import { downloads } from './downloads.js';
 import { drawProfiles } from './drawing/profiles.js';
@@ -247,8 +247,9 @@ function curvePanel(app, looked, patch) {
   const pick = (/** @type {number} */ point) => choose(app, { point });
   const at = curve.order.indexOf(looked.point);
   const slide = (/** @type {Event} */ event) => pick(curve.order[Number(/** @type {HTMLInputElement} */ (event.target).value)]);
-  const kinds = /** @type {const} */ ([['forces', 'Forces'], ['moment', 'Moment']]);
-  return html`<section class="panel" aria-labelledby="h-curve"><header class="bar"><h2 id="h-curve">Creep curve</h2>
+  const rolled = isHistory(patch);
+  const kinds = /** @type {const} */ ([['forces', 'Forces'], ['moment', 'Moment'], ...(rolled ? [/** @type {const} */ (['creepages', 'Creepages'])] : [])]);
+  return html`<section class="panel" aria-labelledby="h-curve"><header class="bar"><h2 id="h-curve">${rolled ? 'While it rolls' : 'Creep curve'}</h2>
     <div class="segs" role="group" aria-label="Curve">${kinds.map(([kind, label]) => html`<label class="seg">
       <input type="radio" name="curve" .checked=${looked.curve === kind} @change=${() => choose(app, { curve: kind })}><span>${label}</span></label>`)}</div></header>
     <creep-curve .shown=${{ curve, chosen: looked.point, pick }}></creep-curve>
@@ -281,11 +282,13 @@ function totalPanel(answer, point, patch) {
 
 /** @param {JobResult} answer @param {Patch} patch @param {Point} point */
 function factsPanel(answer, patch, point) {
-  const { motion, solver } = point;
+  const { motion, solver, history } = point;
   const { position } = patch;
   return html`<section class="panel facts" aria-labelledby="h-facts"><header class="bar"><h2 id="h-facts">How it was computed</h2></header><dl class="table">
     ${row('creepage along, across', `${number(100 * (motion.creepage_x ?? 0))} %, ${number(100 * (motion.creepage_y ?? 0))} %`)}
     ${row('spin', `${number(1000 * (motion.spin_per_mm ?? 0))} 1/m`)}
+    ${history ? row('rolled, dissipated since the start', `${number(history.distance_mm)} mm, ${number(history.dissipated_n_mm / 1000)} J`) : nothing}
+    ${typeof history?.shift_x_mm === 'number' ? row('shifted along, across', `${number(1000 * history.shift_x_mm)} μm, ${number(1000 * (history.shift_y_mm ?? 0))} μm`) : nothing}
     ${patch.semi_axes_mm ? row('semi-axes', `${patch.semi_axes_mm.map((axis) => number(axis)).join(' × ')} mm`) : nothing}
     ${typeof patch.approach_mm === 'number' ? row('approach', `${number(1000 * patch.approach_mm)} μm`) : nothing}
     ${position ? row('contact angle, rolling radius', `${degrees(position.contact_angle_rad)}, ${number(position.rolling_radius_mm)} mm`) : nothing}

@@ -1,0 +1,35 @@
+// The form of rolling that changes: what is rolled over, and what the motion is there.
+
+import { html } from '../vendor/lit-html.js';
+import { at } from './document.js';
+import { change } from './editing.js';
+import { faultAt, field } from './field.js';
+
+/** @typedef {import('./state.js').App} App */
+/** @typedef {import('./document.js').JsonObject} JsonObject */
+
+const STARTS = [['rest', 'Rest'], ['steady', 'Steady rolling'], ['pressed', 'Pressed together']];
+const COURSES = /** @type {const} */ ([
+  { key: 'creepage_x', label: 'Creepage along', unit: '%', factor: 0.01 },
+  { key: 'creepage_y', label: 'across', unit: '%', factor: 0.01 },
+  { key: 'force_x_n', label: 'or force along', unit: 'kN', factor: 1000 },
+  { key: 'force_y_n', label: 'or across', unit: 'kN', factor: 1000 },
+  { key: 'shift_x_mm', label: 'Shift along', unit: 'μm', factor: 0.001 },
+  { key: 'shift_y_mm', label: 'across', unit: 'μm', factor: 0.001 },
+]);
+
+/** A history to begin with: a creepage that begins at once. */
+export const FIRST_HISTORY = /** @type {JsonObject} */ ({ history: { distance_mm: [0.5, 1, 2, 3, 5, 8, 12, 20], creepage_x: 0.001 }, start: 'rest' });
+
+/** @param {App} app */
+export function historyFields(app) {
+  const start = String(at(app.store.get().compose.document ?? {}, '/motion/start') ?? 'rest');
+  const fault = faultAt(app, '/motion/start');
+  return html`
+    ${field(app, '/motion/history/distance_mm', 'Distances rolled', 'mm', { list: true, hint: 'One answer for each. Below, a number for all of them or one each.' })}
+    <div class="pair">${COURSES.map(({ key, label, unit, factor }) => field(app, `/motion/history/${key}`, label, unit, { factor, list: true }))}
+      ${field(app, '/motion/history/spin_per_mm', 'Spin', '1/m', { factor: 0.001, list: true })}</div>
+    <div class="segs" role="group" aria-label="Start of the history">${STARTS.map(([key, label]) => html`<label class="seg">
+      <input type="radio" name="start" .checked=${key === start} @change=${() => change(app, '/motion/start', key)}><span>${label}</span></label>`)}</div>
+    ${fault ? html`<p class="fault">${fault.detail}</p>` : ''}`;
+}
