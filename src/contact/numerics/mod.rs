@@ -9,7 +9,7 @@
 //! | the largest value in an interval | [`maximum`] |
 //! | values between nodes | [`cubic`] (one interval), [`hermite`] (given slopes, or slopes without overshoot), [`spline`] (smoothing), [`lagrange`] (one polynomial) |
 //! | integrals | [`quadrature`] |
-//! | linear equations | [`dense_lu`], [`gmres`]; few unknowns fitted to samples: [`least_squares`] |
+//! | linear equations | [`dense_lu`], up to 32 unknowns [`small_lu`], [`gmres`]; few unknowns fitted to samples: [`least_squares`] |
 //! | connected cells | [`flood_fill`] |
 //! | logarithms in bulk | [`simd_ln`] |
 //!
@@ -41,4 +41,5 @@ pub mod monotone_root;
 pub mod pair_root;
 pub mod quadrature;
 pub mod simd_ln;
+pub mod small_lu;
 pub mod spline;

@@ -7,6 +7,8 @@ use faer::linalg::lu::partial_pivoting::factor;
 use faer::{MatMut, Par};
 use pulp::{Arch, NullaryFnOnce};
 
+use crate::contact::numerics::small_lu;
+use crate::contact::numerics::small_lu::SMALL;
 use crate::contact::rolling::methods::boundary_element::falling_rows::{FallingRow, turn_rows};
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
 use crate::contact::rolling::own_blocks::OwnBlocks;
@@ -41,6 +43,35 @@ struct FactorScratch {
 impl std::fmt::Debug for FactorScratch {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Scratch")
+    }
+}
+
+impl FactorScratch {
+    /// Factors a matrix in place, stored column by column; the order of its rows is left in `pivots`.
+    fn factor(&mut self, matrix: &mut [f64], size: usize) {
+        self.pivots.resize(size, 0);
+        if size <= SMALL {
+            small_lu::factor(matrix, &mut self.pivots);
+            return;
+        }
+        self.pivots_inverse.resize(size, 0);
+        if self.stack.as_ref().is_none_or(|(most, _)| *most < size) {
+            // The buffer of the largest block so far serves all smaller ones.
+            let request =
+                factor::lu_in_place_scratch::<usize, f64>(size, size, Par::Seq, Default::default());
+            self.stack = Some((size, MemBuffer::new(request)));
+        }
+        let Some((_, stack)) = self.stack.as_mut() else {
+            return;
+        };
+        factor::lu_in_place(
+            MatMut::from_column_major_slice_mut(matrix, size, size),
+            &mut self.pivots,
+            &mut self.pivots_inverse,
+            Par::Seq,
+            MemStack::new(stack),
+            Default::default(),
+        );
     }
 }
 
@@ -96,30 +127,8 @@ impl StripFactors {
     fn close_block(&mut self, start: usize) {
         let size = self.places.len() - start;
         let scratch = &mut self.scratch;
-        scratch.pivots.resize(size, 0);
-        scratch.pivots_inverse.resize(size, 0);
-        if scratch
-            .stack
-            .as_ref()
-            .is_none_or(|(largest, _)| *largest < size)
-        {
-            // The buffer of the largest block so far serves all smaller ones.
-            let request =
-                factor::lu_in_place_scratch::<usize, f64>(size, size, Par::Seq, Default::default());
-            scratch.stack = Some((size, MemBuffer::new(request)));
-        }
-        let Some((_, stack)) = scratch.stack.as_mut() else {
-            return;
-        };
         let offset = self.offsets[self.offsets.len() - 1];
-        factor::lu_in_place(
-            MatMut::from_column_major_slice_mut(&mut self.factors[offset..], size, size),
-            &mut scratch.pivots[..size],
-            &mut scratch.pivots_inverse[..size],
-            Par::Seq,
-            MemStack::new(stack),
-            Default::default(),
-        );
+        scratch.factor(&mut self.factors[offset..], size);
         // The rows are exchanged while values are gathered, so that an application needs no permutation of its own.
         self.pivot_places
             .extend(scratch.pivots.iter().map(|row| self.places[start + row]));
