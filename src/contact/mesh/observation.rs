@@ -22,6 +22,7 @@ pub fn observe(mesh: &Mesh, segment: &Segment, points: &mut Vec<f64>) {
         segment.chord.left
     };
     points.clear();
+    points.reserve(n + 3);
     points.extend_from_slice(nodes);
     points.extend([edge, 2.0 * edge - last, 2.0 * edge - before]);
 }

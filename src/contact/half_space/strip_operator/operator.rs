@@ -91,8 +91,11 @@ impl StripOperator {
             .map(|s| s.cells.len())
             .sum::<usize>();
         let stride = cells_stored.next_multiple_of(LANES);
-        let mut first_row = vec![0];
-        let mut first_cell = vec![0];
+        let [mut first_row, mut first_cell] = [0; 2].map(|first| {
+            let mut places = Vec::with_capacity(stored + 1);
+            places.push(first);
+            places
+        });
         for segment in &mesh.segments[..stored] {
             first_row.push(first_row[first_row.len() - 1] + rows_of(segment.cells.len()));
             first_cell.push(segment.cells.end);

@@ -87,10 +87,12 @@ impl<'a> RuleSequence<'a> {
             tolerance,
         } = task;
         let padded = operator.influence.padded(parity);
-        let resized = |values: &[f64]| {
-            let mut values = values.to_vec();
-            values.resize(padded.max(values.len()), 0.0);
-            values
+        let padded_with_zeros = |values: &[f64]| {
+            let length = padded.max(values.len());
+            let mut all = Vec::with_capacity(length);
+            all.extend_from_slice(values);
+            all.resize(length, 0.0);
+            all
         };
         RuleSequence {
             level,
@@ -101,9 +103,9 @@ impl<'a> RuleSequence<'a> {
             steps_max: STEPS_MAX,
             operator,
             parity,
-            bound: resized(&level.bound),
+            bound: padded_with_zeros(&level.bound),
             slipping: None,
-            area: resized(&level.normalised.areas()),
+            area: padded_with_zeros(&level.normalised.areas()),
             control,
             work: Work::default(),
         }
@@ -346,15 +348,16 @@ impl<'a> RuleSequence<'a> {
     /// Which cells of the whole mesh slip; `newton` has evaluated `t` last.
     fn zones(&self, newton: &Newton, t: &[f64]) -> Vec<bool> {
         let slip = self.control.workspace.slip();
-        let slips: Vec<f64> = (0..newton.cells())
-            .map(|i| f64::from(u8::from(newton.slips(&self.bound, t, slip, i))))
-            .collect();
-        let slips = if self.parity.is_some() {
-            self.level.unfold(&slips, 1.0)
-        } else {
-            slips
-        };
-        slips.into_iter().map(|v| v > 0.5).collect()
+        let slips = |i: usize| newton.slips(&self.bound, t, slip, i);
+        let mut zones = Vec::with_capacity(self.level.mesh.cells());
+        zones.extend((0..newton.cells()).map(slips));
+        if self.parity.is_some() {
+            let segments = &self.level.mesh.segments;
+            for segment in segments[..segments.len() / 2].iter().rev() {
+                zones.extend_from_within(segment.cells.clone());
+            }
+        }
+        zones
     }
 
     fn upwind(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
