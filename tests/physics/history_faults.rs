@@ -75,7 +75,12 @@ fn what_a_history_does_not_go_with_is_refused_by_name() {
             "/solver/method",
             "boundary_element",
         ),
-        ("/friction", falling, "/friction/law", "history"),
+        (
+            "/friction",
+            falling,
+            "/motion/history/speed_mm_per_s",
+            "missing",
+        ),
         ("/friction/coefficient", json!(0), "/friction", "friction"),
         ("/outputs", json!(["damage"]), "/outputs", "damage"),
     ] {

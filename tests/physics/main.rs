@@ -33,6 +33,7 @@ mod golden;
 mod held_out;
 mod hertz;
 mod histories;
+mod history_falling;
 mod history_faults;
 mod kalker;
 mod kalker_table;

@@ -192,7 +192,7 @@ fn motion_faults(
     }
     if let Some(what) = given.friction.and_then(Friction::falls_with) {
         // Temperatures need speeds whatever they are for, see `AfterWords::faults`.
-        if expanded.history.is_none() && what == "slip" {
+        if what == "slip" {
             faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
         }
         faults.extend(expanded.force_fault(motion, what));

@@ -26,18 +26,17 @@ pub(crate) struct BesideHistory<'a> {
     pub(crate) patches: &'a [Patch],
 }
 
-/// The fault of friction whose bounds depend on slips.
+/// The fault of friction that depends on all the slip behind a place of the contact.
 fn friction_fault(friction: &Friction) -> Option<Fault> {
     let yields = friction
         .layer
         .is_some_and(|layer| layer.yield_mpa.is_some());
-    let pointer = match (friction.law, &friction.by_temperature) {
-        (Some(_), _) => "/friction/law",
-        (None, Some(_)) => "/friction/by_temperature",
-        (None, None) if yields => "/friction/layer/yield_mpa",
-        (None, None) => return None,
+    let pointer = match &friction.by_temperature {
+        Some(_) => "/friction/by_temperature",
+        None if yields => "/friction/layer/yield_mpa",
+        None => return None,
     };
-    let detail = "given with a history, which follows a coefficient that does not depend on slip or temperature and layers that do not yield";
+    let detail = "given with a history, which follows a coefficient that does not depend on temperature and layers that do not yield";
     Some(Fault::new(pointer, detail))
 }
 
@@ -56,6 +55,7 @@ fn pressed_fault(given: &BesideHistory) -> Option<Fault> {
             across: Some(_), ..
         } => ("/friction/across", "a coefficient that varies across"),
         Friction { along: Some(_), .. } => ("/friction/along", "a coefficient that varies along"),
+        Friction { law: Some(_), .. } => ("/friction/law", "a coefficient that falls with slip"),
         Friction { layer: Some(_), .. } => ("/friction/layer", "a layer"),
         _ => return None,
     };

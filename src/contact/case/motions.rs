@@ -197,7 +197,7 @@ fn point_by_point(history: &History) -> Vec<AskedMotion> {
             spin_per_mm: at(&spin).unwrap_or(0.0),
             force_x_n: at(&force_x),
             force_y_n: at(&force_y),
-            speed_mm_per_s: None,
+            speed_mm_per_s: history.speed_mm_per_s,
         }
     };
     (0..points).map(motion).collect()

@@ -15,6 +15,8 @@ const SPIN: AllowedRange = AllowedRange::closed(-1e6, 1e6, "1/mm");
 const FORCE: AllowedRange = AllowedRange::closed(-1e15, 1e15, "N");
 const SHIFT: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const TURN: AllowedRange = AllowedRange::closed(-10.0, 10.0, "rad");
+const SPEED: AllowedRange = AllowedRange::positive(1e9, "mm/s");
+const SPEED_NAME: &str = "speed_mm_per_s";
 /// Most points, before the limit of the service.
 const POINTS_MAX: u32 = 1_000_000;
 /// Components along x, across and about z; each force excludes its creepage and its shift.
@@ -55,7 +57,7 @@ pub(crate) fn read(block: &mut Object) -> Option<Motions> {
 }
 
 fn history(block: &mut Object, start: Option<HistoryStartName>) -> Option<History> {
-    let names = ["distance_mm"].into_iter();
+    let names = ["distance_mm", SPEED_NAME].into_iter();
     let names: Vec<&str> = names.chain(COMPONENTS.map(|(name, _)| name)).collect();
     block.only(&names, &[]);
     block.required("distance_mm", "an array of distances in mm")?;
@@ -69,6 +71,8 @@ fn history(block: &mut Object, start: Option<HistoryStartName>) -> Option<Histor
         }
     }
     let mut sound = !read.contains(&Some(None));
+    let speed_mm_per_s = block.number(SPEED_NAME, SPEED);
+    sound &= speed_mm_per_s.is_some() || !block.has(SPEED_NAME);
     for (force, others) in EXCLUSIVE {
         for other in others {
             if block.has(force) && block.has(other) {
@@ -111,6 +115,7 @@ fn history(block: &mut Object, start: Option<HistoryStartName>) -> Option<Histor
         spin_per_mm,
         force_x_n,
         force_y_n,
+        speed_mm_per_s,
         shift_x_mm,
         shift_y_mm,
         turn_rad,

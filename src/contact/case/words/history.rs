@@ -34,6 +34,10 @@ pub struct History {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub force_y_n: Option<HistoryCourse>,
+    /// Rolling speed in mm/s, which friction that falls with slip needs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub speed_mm_per_s: Option<f64>,
     /// Displacement of the upper body against the lower one along x in mm, from the point before; 0 where the bodies roll.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]

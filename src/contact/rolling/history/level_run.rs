@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use crate::contact::friction::falling::BoundFall;
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::answer::{LevelFailure, Work};
@@ -10,6 +11,7 @@ use crate::contact::rolling::displacement_memory::LeadingEdges;
 use crate::contact::rolling::history::plan::{HistoryStep, StepKind, steps, weights};
 use crate::contact::rolling::history::record::PointRecord;
 use crate::contact::rolling::history::search::StepSearch;
+use crate::contact::rolling::history::slip_friction::SlipFriction;
 use crate::contact::rolling::history::step_equations::{StepEquations, memory, steady};
 use crate::contact::rolling::history::task::HistoryTask;
 use crate::contact::rolling::history::track_friction::TrackFriction;
@@ -45,6 +47,7 @@ pub struct LevelRun<'a> {
     /// Of the last step.
     pub(super) bound: Vec<f64>,
     pub(super) track: Option<TrackFriction>,
+    pub(super) slip_friction: Option<SlipFriction>,
     /// Friction limit of the unknowns with the largest coefficient, dimensionless.
     pub(super) limit: f64,
     pub(super) area: Vec<f64>,
@@ -108,6 +111,8 @@ impl<'a> LevelRun<'a> {
             cells,
             limit: forces.map(|(area, bound)| area * bound).sum(),
             track: law.map(|law| TrackFriction::new(law, &level.mesh, cells, &bound)),
+            slip_friction: (task.bound_fall(0, level.scale.slip()))
+                .map(|fall| SlipFriction::new(fall, &bound)),
             edges: LeadingEdges::new(&level.normalised, level.poisson_ratio(), parity),
             bound,
             area,
@@ -147,7 +152,11 @@ impl<'a> LevelRun<'a> {
             let kind = alike[0].kind;
             let equations = steady(Rule::ThreePoint, (level, &operator, parity));
             let equations = equations.with_memory(memory(kind, &edges, level.scale.length));
-            let newton = Newton::new(&equations).far_reaching(&self.gain(&equations));
+            let gain = self.gain(&equations);
+            if let (Some(friction), StepKind::Roll { .. }) = (&mut self.slip_friction, kind) {
+                friction.damp(&gain, equations.memory_factor() / level.scale.length);
+            }
+            let newton = self.newton(kind, &equations).far_reaching(&gain);
             let of = StepEquations {
                 kind,
                 equations: &equations,
@@ -167,6 +176,19 @@ impl<'a> LevelRun<'a> {
             }
         }
         Ok(points)
+    }
+
+    /// A solver of a step, which follows a fall of the bounds where the step does so at once.
+    fn newton<'e>(&self, kind: StepKind, equations: &'e SlipEquations<'e>) -> Newton<'e> {
+        let newton = Newton::new(equations);
+        match self.fall(kind) {
+            Some(fall) => newton.falling(&self.bound, &fall),
+            None => newton,
+        }
+    }
+
+    fn fall(&self, kind: StepKind) -> Option<BoundFall> {
+        self.slip_friction.as_ref()?.at_once(kind)
     }
 
     /// By how much the displacements of a step make the slip of each cell fall if all tractions grow by one.
@@ -206,6 +228,9 @@ impl<'a> LevelRun<'a> {
     ) -> Result<(), LevelFailure> {
         if let Some(track) = &self.track {
             track.lay(step.travelled(self.history), &mut self.bound);
+        }
+        if let Some(friction) = &self.slip_friction {
+            friction.lay(of.kind, &mut self.bound);
         }
         if of.kind == StepKind::Press {
             return self.press(of);
@@ -314,7 +339,7 @@ impl<'a> LevelRun<'a> {
         let law = NewtonTask {
             rigid: &rigid,
             bound: &self.bound,
-            fall: None,
+            fall: self.fall(of.kind),
             area: &self.area,
             scale: 1.0,
             tolerance: self.tolerance[0],
@@ -330,7 +355,7 @@ impl<'a> LevelRun<'a> {
             if of.kind == StepKind::Steady {
                 let level = (self.level, &*self.operator, self.parity);
                 let equations = steady(Rule::Upwind, level);
-                let newton = Newton::new(&equations);
+                let newton = self.newton(of.kind, &equations);
                 let rigid = &self.rigid(
                     &StepEquations {
                         equations: &equations,
@@ -349,7 +374,12 @@ impl<'a> LevelRun<'a> {
         }
         if !report.exit.converged() {
             // Every cell slips along what the motion and the past ask for.
-            slide_along(&rigid, &self.bound[..self.cells], None, &mut tractions);
+            slide_along(
+                &rigid,
+                &self.bound[..self.cells],
+                law.fall.as_ref(),
+                &mut tractions,
+            );
             report = of
                 .newton
                 .solve(&law, &mut tractions, self.workspace, self.monitor)?;
@@ -395,6 +425,7 @@ impl<'a> LevelRun<'a> {
         let from = std::mem::replace(&mut state.tractions, tractions);
         state.motion = motion;
         self.dissipate(of, &from);
+        self.follow_slips(of);
     }
 }
 

@@ -6,6 +6,7 @@ pub mod plan;
 pub(crate) mod press;
 pub mod record;
 pub(crate) mod search;
+pub(crate) mod slip_friction;
 pub(crate) mod smaller_self;
 pub mod solve;
 pub(crate) mod step_equations;
