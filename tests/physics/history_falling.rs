@@ -139,6 +139,26 @@ fn a_law_without_a_fall_has_the_history_of_its_coefficient() {
     assert!(apart_before < 1e-9);
 }
 
+/// The example of `docs/rolling.md` has the forces that are shown there.
+#[test]
+fn the_example_has_the_forces_that_are_shown() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    let read = |file: &str| std::fs::read_to_string(format!("{root}/{file}")).unwrap();
+    let example: Value = serde_json::from_str(&read("api/examples/rolling.case.json")).unwrap();
+    let rolled = json!({
+        "distance_mm": [0, 2, 5, 10, 40], "creepage_x": [0, 0.004, 0.02, 0.02, 0.02], "speed_mm_per_s": 30_000,
+    });
+    let case = with(&example, "/motion", Some(json!({ "history": rolled })));
+    let case = with(&case, "/friction", Some(law("exponential", 0.2, 300.0)));
+    let forces = points(&case);
+    let shown: Vec<String> = forces[1..]
+        .iter()
+        .map(|point| format!("{:.1}", 1e-3 * point.force_x_n))
+        .collect();
+    let shown = shown.join(", ");
+    assert!(read("docs/rolling.md").contains(&shown), "{shown}");
+}
+
 /// Everything slides at once at the speed of the creepage, with a bound that follows within the distance of damping.
 #[test]
 fn after_a_jump_of_the_creepage_the_force_falls_to_that_of_full_slip() {
@@ -149,6 +169,14 @@ fn after_a_jump_of_the_creepage_the_force_falls_to_that_of_full_slip() {
     );
     let found = points(&case);
     let known = 0.1 + 0.2 * (-std::f64::consts::LN_2 * 3000.0 / 300.0).exp();
+    // The distance that the guide tells: four half-lengths times the stability number.
+    let pressure = 1.5 * 60_000.0 / (std::f64::consts::PI * 25.0);
+    let fall = 0.2 * std::f64::consts::LN_2 / 300.0;
+    let told = 4.0 * 5.0 * 1.7 * 30_000.0 * fall * pressure / 82_000.0;
+    let over = |k: usize| found[k].force_x_n.abs() / 60_000.0 - known;
+    let distance = 8.0 / (over(0) / over(1)).ln();
+    println!("{distance} {told}");
+    assert!((distance / told - 1.0).abs() < 0.2, "{distance} {told}");
     let force = found[2].force_x_n.abs() / 60_000.0;
     assert!((force - known).abs() < 1e-3, "{force} {known}");
     let sizes: Vec<f64> = found.iter().map(|p| p.force_x_n.abs()).collect();

@@ -36,7 +36,7 @@ pub struct History {
     pub force_y_n: Option<HistoryCourse>,
     /// Rolling speed in mm/s, which friction that falls with slip needs.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub speed_mm_per_s: Option<f64>,
     /// Displacement of the upper body against the lower one along x in mm, from the point before; 0 where the bodies roll.
     #[serde(skip_serializing_if = "Option::is_none")]

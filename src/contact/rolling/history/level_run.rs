@@ -3,7 +3,6 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use crate::contact::friction::falling::BoundFall;
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::answer::{LevelFailure, Work};
@@ -176,19 +175,6 @@ impl<'a> LevelRun<'a> {
             }
         }
         Ok(points)
-    }
-
-    /// A solver of a step, which follows a fall of the bounds where the step does so at once.
-    fn newton<'e>(&self, kind: StepKind, equations: &'e SlipEquations<'e>) -> Newton<'e> {
-        let newton = Newton::new(equations);
-        match self.fall(kind) {
-            Some(fall) => newton.falling(&self.bound, &fall),
-            None => newton,
-        }
-    }
-
-    fn fall(&self, kind: StepKind) -> Option<BoundFall> {
-        self.slip_friction.as_ref()?.at_once(kind)
     }
 
     /// By how much the displacements of a step make the slip of each cell fall if all tractions grow by one.
