@@ -49,25 +49,6 @@ impl LevelRun<'_> {
         }
     }
 
-    /// Lets bounds that fall with slip follow the slips of a step.
-    pub(super) fn follow_slips(&mut self, of: &StepEquations) {
-        let Some(friction) = &mut self.slip_friction else {
-            return;
-        };
-        let slip = self.workspace.slip();
-        let half = slip.len() / 2;
-        let slides = |i: usize| of.newton.slips(&self.bound, &self.state.tractions, slip, i);
-        let size = |i: usize| match slides(i) {
-            true => slip[i].hypot(slip[half + i]),
-            false => 0.0,
-        };
-        let sizes: Vec<f64> = (0..self.cells).map(size).collect();
-        friction.follow(of.kind, &sizes);
-        if of.kind == StepKind::Steady {
-            self.bound.copy_from_slice(friction.settled());
-        }
-    }
-
     /// Rigid slip of a motion, with that of the pressure of unlike bodies where they roll.
     pub(super) fn rigid(&self, of: &StepEquations, motion: &Motion) -> Vec<f64> {
         let rolls = matches!(of.kind, StepKind::Steady | StepKind::Roll { .. });

@@ -1,5 +1,6 @@
 //! Rolling that changes, and shift: one tangential problem per step of distance, each of which remembers the displacements before it.
 
+pub(crate) mod level_friction;
 pub(crate) mod level_record;
 pub mod level_run;
 pub mod plan;

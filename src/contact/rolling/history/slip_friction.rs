@@ -5,10 +5,7 @@
 //! of a cell follows `dg/dq = (μ(s) p − g)/D` in the distance q rolled, with the least D that damps disturbances. What is steady has s and g of the law.
 
 use crate::contact::friction::falling::BoundFall;
-use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan::StepKind;
-use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::slip_equations::SlipEquations;
 
 /// Distance in which bounds follow slips, over that above which disturbances die away; the weight of a step's own displacements, 1.5, counts
 /// against it. With 2 a mesh of 16 × 32 is off by up to 0.029 of the friction limit, with 4 by 0.016, in the three histories of
@@ -76,25 +73,5 @@ impl SlipFriction {
     /// Bounds that belong to the slips of steady rolling, which has been taken over last.
     pub(super) fn settled(&self) -> &[f64] {
         &self.next
-    }
-}
-
-impl LevelRun<'_> {
-    /// The fall that a step follows at once.
-    pub(super) fn fall(&self, kind: StepKind) -> Option<BoundFall> {
-        self.slip_friction.as_ref()?.at_once(kind)
-    }
-
-    /// A solver of such a step.
-    pub(super) fn newton<'e>(
-        &self,
-        kind: StepKind,
-        equations: &'e SlipEquations<'e>,
-    ) -> Newton<'e> {
-        let newton = Newton::new(equations);
-        match self.fall(kind) {
-            Some(fall) => newton.falling(&self.bound, &fall),
-            None => newton,
-        }
     }
 }
