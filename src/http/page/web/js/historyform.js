@@ -28,7 +28,8 @@ export function historyFields(app) {
   return html`
     ${field(app, '/motion/history/distance_mm', 'Distances rolled', 'mm', { list: true, hint: 'One answer for each. Below, a number for all of them or one each.' })}
     <div class="pair">${COURSES.map(({ key, label, unit, factor }) => field(app, `/motion/history/${key}`, label, unit, { factor, list: true }))}
-      ${field(app, '/motion/history/spin_per_mm', 'Spin', '1/m', { factor: 0.001, list: true })}</div>
+      ${field(app, '/motion/history/spin_per_mm', 'Spin', '1/m', { factor: 0.001, list: true })}
+      ${field(app, '/motion/history/speed_mm_per_s', 'Speed', 'km/h', { factor: 1e6 / 3600 })}</div>
     <div class="segs" role="group" aria-label="Start of the history">${STARTS.map(([key, label]) => html`<label class="seg">
       <input type="radio" name="start" .checked=${key === start} @change=${() => change(app, '/motion/start', key)}><span>${label}</span></label>`)}</div>
     ${fault ? html`<p class="fault">${fault.detail}</p>` : ''}`;
