@@ -14,11 +14,12 @@ use crate::random::Random;
 /// A class, how many histories of it are solved, and how one is made.
 type Class = (&'static str, usize, fn(&mut Random, &mut Value));
 
-const CLASSES: [Class; 5] = [
+const CLASSES: [Class; 6] = [
     ("creepages that change", 40, creepages),
     ("forces that change", 10, forces),
     ("shifts, then rolling", 20, shifts),
     ("friction varies along", 40, along),
+    ("friction falls with slip", 40, falling),
     ("bodies differ, pressed together", 2, pressed),
 ];
 
@@ -132,6 +133,29 @@ fn along(random: &mut Random, case: &mut Value) {
     x[2] = x[1];
     let mu: Vec<f64> = (0..4).map(|_| random.decades(0.02, 0.6)).collect();
     case["friction"] = json!({ "along": { "x_mm": x, "coefficient": mu } });
+}
+
+/// Creepages under a coefficient that falls, by stability numbers from a tenth of what is answered on; bounds lag by up to two contact lengths,
+/// so that rolling is steady later than elsewhere.
+fn falling(random: &mut Random, case: &mut Value) {
+    creepages(random, case);
+    let a = half_length(case);
+    let b = case["contact"]["b_mm"].as_f64().unwrap_or(1.0);
+    let load = case["load"]["normal_force_n"].as_f64().unwrap_or(0.0);
+    let pressure = 1.5 * load / (std::f64::consts::PI * a * b);
+    let (part, half_speed) = (random.between(0.05, 0.25), random.decades(30.0, 1000.0));
+    // 1.7 V max|μ′| p_max/G, of an exponential law.
+    let of_speed = 1.7 * std::f64::consts::LN_2 * part / half_speed * pressure / 82_000.0;
+    let speed = random.between(0.1, 0.95) / of_speed;
+    case["friction"] = json!({
+        "law": "exponential", "limit": 0.3 - part, "terms": [{ "coefficient": part, "half_speed_mm_per_s": half_speed }]
+    });
+    let history = &mut case["motion"]["history"];
+    history["speed_mm_per_s"] = json!(speed);
+    let distances = history["distance_mm"].as_array_mut().expect("distances");
+    let last = distances.last().and_then(Value::as_f64).unwrap_or(0.0);
+    distances.pop();
+    distances.push(json!(last + 16.0 * LENGTHS_STEADY * a));
 }
 
 fn pressed(random: &mut Random, case: &mut Value) {
@@ -259,6 +283,9 @@ fn steady_distance(case: &Value, last: &PointSolution, limit: f64) -> Result<Opt
     steady["motion"] = json!({
         "creepage_x": last.motion.creepage_x, "creepage_y": last.motion.creepage_y, "spin_per_mm": last.motion.spin_per_mm
     });
+    if let Some(speed) = case["motion"]["history"].get("speed_mm_per_s") {
+        steady["motion"]["speed_mm_per_s"] = speed.clone();
+    }
     let Some(points) = solved(&steady)? else {
         return Ok(None);
     };
@@ -271,8 +298,13 @@ fn steady_distance(case: &Value, last: &PointSolution, limit: f64) -> Result<Opt
     ))
 }
 
-/// The largest coefficient of a table along the track, or the one there is.
+/// The largest coefficient of a table along the track, the one at rest of a law, or the one there is.
 fn largest_coefficient(friction: &Value) -> f64 {
+    let terms = friction["terms"].as_array().into_iter().flatten();
+    let falls: f64 = terms.filter_map(|term| term["coefficient"].as_f64()).sum();
+    if let Some(limit) = friction["limit"].as_f64() {
+        return limit + falls;
+    }
     let table = friction["along"]["coefficient"].as_array();
     let of_table = table.map(|values| values.iter().filter_map(Value::as_f64).fold(0.0, f64::max));
     of_table
