@@ -187,15 +187,29 @@ test('gaps and pressures are taken from tables', () => onPage('', async (page) =
   await sound(page);
 }));
 
+/**
+ * Writes normal forces until there is another preview than before. One is enough, but where other work keeps the machine busy the check may take a
+ * cheap case for one that is not, and the next change asks again.
+ * @param {import('playwright-core').Page} page
+ * @param {string} before
+ * @param {string[]} forces None is written for an empty one.
+ */
+async function previewed(page, before, forces) {
+  const shown = (/** @type {string} */ text) => {
+    const preview = /** @type {HTMLElement | null} */ (document.querySelector('.preview'));
+    return preview?.querySelector('dd') && preview.innerText !== text;
+  };
+  for (const force of forces) {
+    if (force) await page.getByLabel('Normal force').fill(force);
+    if (await page.waitForFunction(shown, before, { timeout: 3000 }).then(() => true, () => false)) return;
+  }
+  assert.fail('no preview');
+}
+
 test('a cheap case is solved while it is written, and leaves no job behind', () => onPage('', async (page) => {
   const before = (await service.ask('/v1/jobs?limit=1000')).jobs.length;
-  await page.locator('.preview dd').first().waitFor();
-  const first = await page.locator('.preview').innerText();
-  await page.getByLabel('Normal force').fill('60');
-  await page.waitForFunction((text) => {
-    const shown = /** @type {HTMLElement | null} */ (document.querySelector('.preview'));
-    return shown && shown.innerText !== text;
-  }, first);
+  await previewed(page, '', ['', '100.1', '100.2', '100.3', '100.4']);
+  await previewed(page, await page.locator('.preview').innerText(), ['60', '60.1', '60.2', '60.3', '60.4']);
   await drawn(page, '.preview field-map');
   await page.getByRole('checkbox', { name: 'result while typing' }).uncheck();
   await page.locator('.preview').waitFor({ state: 'detached' });
