@@ -13,10 +13,11 @@ const MOTIONS: [[f64; 3]; 3] = [[8e-4, 0.0, 0.0], [1e-3, 5e-4, 2e-4], [2e-4, 0.0
 const REPEATED: usize = 3;
 
 /// Names of what is asked for, and its members of the case.
-fn options() -> [(&'static str, Value); 8] {
+fn options() -> [(&'static str, Value); 9] {
     let axis = |reach: f64, points: u32| json!({ "from": -reach, "to": reach, "points": points });
     let depths = json!({ "from": 0.2, "to": 8, "points": 25 });
-    let plane = json!({ "x_mm": axis(8.0, 40), "y_mm": 0.3, "depths_mm": depths });
+    let plane = |along| json!({ "x_mm": axis(8.0, along), "y_mm": 0.3, "depths_mm": depths });
+    let stresses = |along| json!({ "outputs": ["subsurface"], "subsurface": { "plane": plane(along), "worst": false } });
     let thermal = json!({
         "conductivity_w_per_mk": 50, "density_kg_per_m3": 7850, "specific_heat_j_per_kgk": 450, "bulk_c": 20
     });
@@ -30,10 +31,8 @@ fn options() -> [(&'static str, Value); 8] {
     ]);
     [
         ("nothing more", json!({})),
-        (
-            "1000 stresses",
-            json!({ "outputs": ["subsurface"], "subsurface": { "plane": plane, "worst": false } }),
-        ),
+        ("1000 stresses", stresses(40)),
+        ("20 000 stresses", stresses(800)),
         ("worst point", json!({ "outputs": ["subsurface"] })),
         (
             "passage",

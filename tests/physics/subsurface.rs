@@ -277,6 +277,36 @@ fn places_are_answered_in_their_order_and_a_plane_is_a_product() {
     assert!((found[1].von_mises_mpa / worst.von_mises_mpa - 1.0).abs() < 1e-9);
 }
 
+/// Of no point of a dense scan is von Mises' stress larger than of the worst point, whatever slips.
+#[test]
+fn the_worst_point_is_worse_than_all_of_a_scan() {
+    for ratio in [0.2, 0.5, 1.0, 2.0, 6.0] {
+        for [x, y, spin] in [[0.0, 0.0, 0.0], [0.4, 0.2, 0.7], [3.0, 0.0, 0.0]] {
+            let contact = Ellipse::steel(ratio, 0.28).normalised(x, y, spin);
+            let (a, b) = (contact.a_mm, contact.b_mm);
+            let axis =
+                |reach: f64, points: u32| json!({ "from": -reach, "to": reach, "points": points });
+            let depth = |k: u32| 0.012 * a.min(b) * 100_f64.powf(0.05 * f64::from(k));
+            let depths: Vec<f64> = (0..21).map(depth).collect();
+            let plane = json!({ "x_mm": axis(1.02 * a, 21), "y_mm": axis(0.95 * b, 17), "depths_mm": depths });
+            let (scan, worst) = stresses(&asking(&contact, json!({ "plane": plane })));
+            let most = scan
+                .iter()
+                .map(|point| point.von_mises_mpa)
+                .fold(0.0, f64::max);
+            let over = worst.expect("asked for").von_mises_mpa / most;
+            println!(
+                "a/b {ratio}, motion {x} {y} {spin}: {over:.5} of the largest of {}",
+                scan.len()
+            );
+            assert!(
+                over > 0.9999 && over < 1.02,
+                "{ratio} {x} {y} {spin}: {over}"
+            );
+        }
+    }
+}
+
 /// Points are answered side by side; what is asked beside a point changes nothing of it, to the last bit.
 #[test]
 fn a_stress_does_not_depend_on_what_is_asked_beside_it() {

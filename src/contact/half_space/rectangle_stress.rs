@@ -102,6 +102,7 @@ pub fn add_rectangle(at: [f64; 3], sides: [f64; 4], loads: [f64; 3], nu: f64, su
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::half_space::point_loads::{FeltLoads, LANES, PointLoad, stresses};
 
     fn rectangle(at: [f64; 3], sides: [f64; 4], loads: [f64; 3], nu: f64) -> Stress {
         let mut sum = [0.0; 6];
@@ -210,6 +211,61 @@ mod tests {
         let [xx, yy, zz, xy, xz, yz] = turned;
         for (found, known) in found.iter().zip([yy, xx, zz, xy, yz, xz]) {
             assert!((found - known).abs() < 1e-14);
+        }
+    }
+
+    /// A rectangle of a hundredth of the distance acts as its load in the middle.
+    #[test]
+    fn a_small_rectangle_is_a_point_load() {
+        let places = [
+            [0.3, -0.2, 0.4],
+            [1.4, 0.0, 0.5],
+            [-6.0, 3.0, 2.0],
+            [0.1, -0.3, 4.0],
+            [2.0, 2.0, 0.1],
+        ];
+        let mut points = [[1.0; LANES]; 3];
+        for (lane, place) in places.iter().enumerate() {
+            for k in 0..3 {
+                points[k][lane] = place[k] as f32;
+            }
+        }
+        for force in [
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.3, -0.2, 0.9],
+        ] {
+            let side = 0.004;
+            let load = PointLoad {
+                at: [0.0; 2],
+                force: force.map(|f: f64| f as f32),
+            };
+            let felt = FeltLoads {
+                loads: 0..1,
+                lanes: u16::MAX,
+            };
+            let found = stresses(&[load], &[felt], &points, 0.28);
+            for (place, found) in places.iter().zip(found) {
+                let mut known = [0.0; 6];
+                let [x, y, z] = force.map(|f| f / (side * side));
+                let half = 0.5 * side;
+                add_rectangle(
+                    *place,
+                    [-half, half, -half, half],
+                    [z, x, y],
+                    0.28,
+                    &mut known,
+                );
+                let size = known.iter().fold(0.0_f64, |size, s| size.max(s.abs()));
+                for k in 0..6 {
+                    let error = (found[k] - known[k]).abs();
+                    assert!(
+                        error < 5e-4 * size,
+                        "{place:?} {force:?} {k}: {found:?} {known:?}"
+                    );
+                }
+            }
         }
     }
 }

@@ -8,6 +8,9 @@ use crate::contact::normal::footprint::Footprint;
 /// A strip is halved at most so many times: of 16 strips a part is then a twentieth of the least depth that is answered.
 pub const HALVINGS_MAX: u32 = 8;
 
+/// Lines that are kept, at 80 bytes each; only memory depends on it.
+const LINES_MAX: usize = 200_000;
+
 /// A part of a strip: the `index`-th of its `2^level` equal parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StripPart {
@@ -46,9 +49,6 @@ impl StripPart {
 /// Lines across the strips of one mesh that were looked up, by the strip and the place in it.
 #[derive(Debug, Default)]
 pub struct KnownLines(HashMap<(usize, u64), Option<Chord>>);
-
-/// Lines that are kept; 80 bytes each.
-const LINES_MAX: usize = 200_000;
 
 /// Chords of the region on lines across one strip.
 #[derive(Debug, Clone, Copy)]

@@ -9,7 +9,7 @@ use crate::contact::half_space::point_loads::PointLoad;
 use crate::contact::post::subsurface::lines::{HALVINGS_MAX, StripPart};
 use crate::contact::post::subsurface::seen_parts::{ORDERS, PartBox};
 
-/// Parts, and points of quadrature, that are kept: 70 MB.
+/// Parts, and points of quadrature, that are kept, in 60 MB together; only memory depends on them.
 const PARTS_MAX: usize = 100_000;
 /// See [`PARTS_MAX`].
 const POINTS_MAX: usize = 1_000_000;

@@ -7,8 +7,8 @@ use crate::contact::post::subsurface::seen_parts::LoadResolution;
 use crate::contact::post::subsurface::states::von_mises;
 use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 
-// With the numbers below, measured on a prototype for four of the reference contacts (no friction to full slip): the stress found was
-// never less than the largest of a scan of 7854 points, and up to 0.9 % more.
+// With the numbers below the stress found is never less than the largest of a scan of 7497 points, and up to 0.42 % more, in 15 contacts with a/b
+// from 0.2 to 6 from no slip to full slip (`cargo test --test physics -- the_worst_point --nocapture`). How much each of them matters was not measured.
 
 /// Columns along and across, depths over the half-width of the patch.
 const ALONG: usize = 13;
@@ -22,6 +22,24 @@ const APART: f64 = 0.4;
 /// First steps in `x/a`, `y/b` and `ln depth`, and rounds of a search; a round is one block of points that are answered side by side.
 const STEPS: [f64; 3] = [0.12, 0.15, 0.2];
 const ROUNDS: usize = 16;
+/// The point itself, along the axes, and along the diagonals.
+const DIRECTIONS: [[f64; 3]; 15] = [
+    [0.0, 0.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+    [1.0, 1.0, 1.0],
+    [1.0, 1.0, -1.0],
+    [1.0, -1.0, 1.0],
+    [1.0, -1.0, -1.0],
+    [-1.0, 1.0, 1.0],
+    [-1.0, 1.0, -1.0],
+    [-1.0, -1.0, 1.0],
+    [-1.0, -1.0, -1.0],
+];
 
 /// The coordinates of the search in one patch.
 struct PatchColumns<'a> {
@@ -127,25 +145,6 @@ fn search_from(
     }
     best
 }
-
-/// The point itself, along the axes, and along the diagonals.
-const DIRECTIONS: [[f64; 3]; 15] = [
-    [0.0, 0.0, 0.0],
-    [1.0, 0.0, 0.0],
-    [-1.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0],
-    [0.0, -1.0, 0.0],
-    [0.0, 0.0, 1.0],
-    [0.0, 0.0, -1.0],
-    [1.0, 1.0, 1.0],
-    [1.0, 1.0, -1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, -1.0, -1.0],
-    [-1.0, 1.0, 1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [-1.0, -1.0, -1.0],
-];
 
 #[cfg(test)]
 mod tests {
