@@ -66,7 +66,7 @@ impl NullaryFnOnce for Sum<'_> {
 
     #[inline(always)]
     fn call(self) -> [Lanes; 6] {
-        let mut sums = [[0.0; LANES]; 6];
+        let mut sums = Sums::default();
         for FeltLoads { loads, lanes } in self.felt {
             let share: Lanes =
                 std::array::from_fn(|lane| if lanes >> lane & 1 == 1 { 1.0 } else { 0.0 });
@@ -74,50 +74,66 @@ impl NullaryFnOnce for Sum<'_> {
                 self.add(load, &share, &mut sums);
             }
         }
-        sums
+        let Sums { terms, even } = sums;
+        let [mut xx, mut yy, zz, xy, xz, yz] = terms;
+        for ((xx, yy), even) in xx.iter_mut().zip(&mut yy).zip(even) {
+            *xx += even;
+            *yy += even;
+        }
+        [xx, yy, zz, xy, xz, yz]
     }
+}
+
+/// 2π times the sums of the stresses.
+#[derive(Default)]
+struct Sums {
+    /// Without `even`.
+    terms: [Lanes; 6],
+    /// What xx and yy have in common.
+    even: Lanes,
 }
 
 impl Sum<'_> {
     /// Adds 2π times the stresses of one load.
     ///
     /// With r from the load to the point, ρ its length and F the force: −3 (F·r) r_i r_j/ρ⁵, and 1 − 2ν times what has only the components
-    /// in the surface.
+    /// in the surface. Written for few operations that depend on each other: one division, products added where they arise.
     #[inline(always)]
-    fn add(&self, load: &PointLoad, share: &Lanes, sums: &mut [Lanes; 6]) {
+    fn add(&self, load: &PointLoad, share: &Lanes, sums: &mut Sums) {
         let [xs, ys, zs] = self.points;
         let [x_load, y_load] = load.at;
         let [along, across, down] = load.force;
+        let Sums { terms, even } = sums;
+        let [xx, yy, zz, xy, xz, yz] = terms;
         for lane in 0..LANES {
             let (x, y, z) = (xs[lane] - x_load, ys[lane] - y_load, zs[lane]);
             let (along, across) = (along * share[lane], across * share[lane]);
             let down = down * share[lane];
-            let (xx, yy) = (x * x, y * y);
-            let square = xx + yy + z * z;
-            let distance = square.sqrt();
-            let near = 1.0 / distance;
-            let below = 1.0 / (distance + z);
-            let cube = near * near * near;
-            let sheared = along * x + across * y;
-            let all = -3.0 * (sheared + down * z) * cube * near * near;
+            let distance = x.mul_add(x, y.mul_add(y, z * z)).sqrt();
+            let deep = distance + z;
+            let inverse = 1.0 / (distance * deep);
+            // 1/ρ, 1/(ρ + z), 1/(ρ (ρ + z)).
+            let (near, below) = (inverse * deep, inverse * distance);
+            let square = near * near;
+            let cube = square * near;
+            let sheared = along.mul_add(x, across * y);
+            let all = -3.0 * down.mul_add(z, sheared) * (cube * square);
             // 1/(ρ (ρ + z)²), and what multiplies the squares of the coordinates.
-            let turned = near * below * below;
-            let squares = cube * below * below;
-            let squares =
-                squares * (down * (2.0 * distance + z) + sheared * (3.0 * distance + z) * below);
-            let even = down * (cube * z - near * below) + sheared * (cube - turned);
-            let both = all + self.rest * squares;
-            let terms = [
-                both * xx + self.rest * (even - 2.0 * turned * along * x),
-                both * yy + self.rest * (even - 2.0 * turned * across * y),
-                all * z * z,
-                both * x * y - self.rest * turned * (along * y + across * x),
-                all * x * z,
-                all * y * z,
-            ];
-            for (sum, term) in sums.iter_mut().zip(terms) {
-                sum[lane] += term;
-            }
+            let turned = inverse * below;
+            let rest = self.rest * turned;
+            let twice = distance + deep;
+            let squares = (sheared * below).mul_add(distance + twice, down * twice);
+            let both = (rest * square).mul_add(squares, all);
+            let flat = cube.mul_add(z, -inverse);
+            even[lane] += self.rest * sheared.mul_add(cube - turned, down * flat);
+            let (along, across) = (rest * along, rest * across);
+            xx[lane] = x.mul_add(both.mul_add(x, -2.0 * along), xx[lane]);
+            yy[lane] = y.mul_add(both.mul_add(y, -2.0 * across), yy[lane]);
+            xy[lane] = x.mul_add(both.mul_add(y, -across), y.mul_add(-along, xy[lane]));
+            let all = all * z;
+            zz[lane] = all.mul_add(z, zz[lane]);
+            xz[lane] = all.mul_add(x, xz[lane]);
+            yz[lane] = all.mul_add(y, yz[lane]);
         }
     }
 }

@@ -26,6 +26,14 @@ pub struct Chord {
     pub right: f64,
 }
 
+impl Chord {
+    /// x in mm of the place `−half · cosine` from the middle.
+    #[must_use]
+    pub fn along(&self, cosine: f64) -> f64 {
+        0.5 * (self.left + self.right) - 0.5 * (self.right - self.left) * cosine
+    }
+}
+
 /// How cells and nodes divide a chord that is mapped to `−1 … 1`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grading {

@@ -153,4 +153,32 @@ impl Footprint {
             FootprintShape::Sampled(field) => field.mean_pressure(chord, x0, x1),
         }
     }
+
+    /// Pressure in MPa at one point of a chord (not yet scaled to the patch's force): at `x` in mm, which lies `−half · cos u` from the middle
+    /// of the chord; `sine` is sin u.
+    #[must_use]
+    pub fn pressure(&self, chord: &Chord, x: f64, sine: f64) -> f64 {
+        match &self.shape {
+            FootprintShape::Hertz(ellipse) => ellipse.pressure(chord, sine),
+            FootprintShape::Sampled(field) => field.mean_pressure(chord, x, x),
+        }
+    }
+
+    /// The mean over chords of their loads in N/mm between two places, given by the angles u as in [`Footprint::pressure`] (not yet scaled to
+    /// the patch's force).
+    #[must_use]
+    pub fn mean_load(&self, chords: &[Chord], u: [f64; 2]) -> f64 {
+        let sum: f64 = match &self.shape {
+            FootprintShape::Hertz(ellipse) => ellipse.load(chords, u),
+            FootprintShape::Sampled(field) => {
+                let cosines = u.map(f64::cos);
+                let load = |chord: &Chord| {
+                    let [x0, x1] = cosines.map(|cosine| chord.along(cosine));
+                    (x1 - x0) * field.mean_pressure(chord, x0, x1)
+                };
+                chords.iter().map(load).sum()
+            }
+        };
+        sum / chords.len() as f64
+    }
 }

@@ -173,6 +173,24 @@ impl Ellipse {
         scale * half * integral / (x1 - x0)
     }
 
+    /// Pressure in MPa at the angle u on a chord, where x = −half cos u; `sine` is sin u.
+    #[must_use]
+    pub fn pressure(&self, chord: &Chord, sine: f64) -> f64 {
+        self.pressure_max * 0.5 * (chord.right - chord.left) / self.a * sine
+    }
+
+    /// The sum over chords of their loads in N/mm between two of these angles: the integral of sin² u, without cancellation near the ends.
+    #[must_use]
+    pub fn load(&self, chords: &[Chord], [u0, u1]: [f64; 2]) -> f64 {
+        let (width, middle) = (u1 - u0, 0.5 * (u0 + u1));
+        let integral = 0.5 * ((width - width.sin()) + 2.0 * width.sin() * middle.sin().powi(2));
+        let squares = chords.iter().map(|chord| {
+            let half = 0.5 * (chord.right - chord.left);
+            half * half
+        });
+        self.pressure_max / self.a * squares.sum::<f64>() * integral
+    }
+
     /// Half-length of the chord at y; 0 where the line misses the ellipse.
     fn half_chord(&self, y: f64) -> f64 {
         let t = y / self.b;

@@ -1,6 +1,7 @@
 //! The true outline of a strip: its chords on lines across it, looked up once each.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::footprint::Footprint;
@@ -48,7 +49,36 @@ impl StripPart {
 
 /// Lines across the strips of one mesh that were looked up, by the strip and the place in it.
 #[derive(Debug, Default)]
-pub struct KnownLines(HashMap<(usize, u64), Option<Chord>>);
+pub struct KnownLines(HashMap<(usize, u64), Option<Chord>, BuildHasherDefault<LineHasher>>);
+
+/// Hashes the number of a strip and a place in it. Nobody chooses these to collide, and they are looked up for every part of a cell.
+#[derive(Debug, Default)]
+pub struct LineHasher(u64);
+
+impl LineHasher {
+    /// Digits of the golden ratio, whose multiples are spread evenly (Knuth 1998, §6.4).
+    const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
+}
+
+impl Hasher for LineHasher {
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 32)
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.write_u64(u64::from(*byte));
+        }
+    }
+
+    fn write_u64(&mut self, word: u64) {
+        self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(LineHasher::SPREAD);
+    }
+
+    fn write_usize(&mut self, word: usize) {
+        self.write_u64(word as u64);
+    }
+}
 
 /// Chords of the region on lines across one strip.
 #[derive(Debug, Clone, Copy)]
@@ -85,13 +115,14 @@ impl<'a> StripLines<'a> {
     /// carry too much where the pressure bends. Nothing if a line does not have exactly one chord.
     #[must_use]
     pub fn load(&self, u: [f64; 2], known: &mut KnownLines) -> Option<f64> {
-        let mut sum = 0.0;
-        for k in 0..4 {
-            let chord = self.chord(0.25 * (f64::from(k) + 0.5), known)?;
-            let [x0, x1] = u.map(|u| along(&chord, u));
-            sum += 0.25 * (x1 - x0) * self.footprint.mean_pressure(&chord, x0, x1);
+        let mut chords = [None; 4];
+        for (k, chord) in (0..4).zip(&mut chords) {
+            *chord = self.chord(0.25 * (f64::from(k) + 0.5), known);
         }
-        Some(sum)
+        let [Some(a), Some(b), Some(c), Some(d)] = chords else {
+            return None;
+        };
+        Some(self.footprint.mean_load(&[a, b, c, d], u))
     }
 
     /// From where to where in x the outline's places at angles `u` move between the two sides of a part and its middle, and by how much at
@@ -105,11 +136,12 @@ impl<'a> StripLines<'a> {
     ) -> Option<PartReach> {
         let middle = self.chord(piece.share(0.5), known)?;
         let centre = 0.5 * (middle.left + middle.right);
+        let cosines = u.map(f64::cos);
         let ends = [0.0, 1.0].map(|side| {
             let line = self.chord(piece.share(side), known);
-            u.map(|u| line.map_or(centre, |line| along(&line, u)))
+            cosines.map(|cosine| line.map_or(centre, |line| line.along(cosine)))
         });
-        let own = u.map(|u| along(&middle, u));
+        let own = cosines.map(|cosine| middle.along(cosine));
         let [low, high] = ends;
         Some(PartReach {
             from: own[0].min(low[0]).min(high[0]),
@@ -150,10 +182,4 @@ pub struct PartReach {
     pub length: f64,
     /// By how much its ends move along x between its sides.
     pub skew: f64,
-}
-
-/// x at the angle `u` of a chord: `centre − half cos u`.
-#[must_use]
-pub fn along(chord: &Chord, u: f64) -> f64 {
-    0.5 * (chord.left + chord.right) - 0.5 * (chord.right - chord.left) * u.cos()
 }

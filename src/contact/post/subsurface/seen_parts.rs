@@ -18,10 +18,12 @@ pub struct LoadResolution {
 }
 
 impl LoadResolution {
-    /// For stresses that are answered: within 0.002 of the largest pressure of those with a third of these sizes, within 0.0002 in the median,
-    /// on ellipses with a/b from 0.2 to 6 from no slip to full slip, at 6300 points in depths from 0.012 to 1.5 half-widths.
+    /// For stresses that are answered: within 0.002 of the largest pressure of those with sizes of 0.05 to 0.67, within 0.0002 in the median,
+    /// on the 18 ellipses of `cargo bench --bench stress -- --only after`, at 6300 random points in depths from 0.012 to 1.5 half-widths.
+    /// The first size counts most: 0.22 leaves 0.003 and takes a twentieth less time, but doubles the errors against CONTACT to 0.0043.
+    /// Sizes of 0.5, 0.9, 1.3 and 2 in place of the others take an eighth more time and are no more exact.
     pub const FINE: LoadResolution = LoadResolution {
-        sizes: [0.16, 0.5, 0.9, 1.3, 2.0],
+        sizes: [0.16, 0.6, 1.1, 1.6, 2.5],
     };
     /// For scans before a search: within 0.001 in the median on the same points, and 0.07 at the worst, close to the surface.
     pub const COARSE: LoadResolution = LoadResolution {

@@ -15,7 +15,7 @@ use crate::contact::mesh::strips::{Chord, Segment};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::numerics::quadrature::RULES;
 use crate::contact::post::subsurface::blocks;
-use crate::contact::post::subsurface::lines::{KnownLines, StripLines, StripPart, along};
+use crate::contact::post::subsurface::lines::{KnownLines, StripLines, StripPart};
 use crate::contact::post::subsurface::load_parts::{LoadPart, LoadParts};
 use crate::contact::post::subsurface::seen_parts::{
     LoadResolution, ORDERS, PartBox, PartCodes, look, orders,
@@ -262,12 +262,11 @@ impl<'a> SurfaceLoad<'a> {
                 force: [load * ratio[0], load * ratio[1], load].map(|force| force as f32),
             });
         };
-        let mut turns = [(0.0, 0.0, 0.0, 0.0, [0.0; 2]); POINTS_MAX];
-        for (turn, (at, weight)) in turns.iter_mut().zip(RULES[along_rule]) {
-            let u = middle + half * at;
-            let (sine, cosine) = u.sin_cos();
-            *turn = (u, sine, cosine, *weight, strip.ratio(u));
-        }
+        let turns = strip.turns(along_rule, part.u, number);
+        let turns = &turns[..RULES[along_rule].len()];
+        // On the neighbour below or above at the same angles.
+        let mut there = [[0.0; 2]; POINTS_MAX];
+        let mut known_side = None;
         for (at, weight) in RULES[across_rule] {
             let share = part.piece.share(0.5 * (1.0 + at));
             let (y, across) = (strip.lines.y(share), 0.5 * weight * width);
@@ -282,33 +281,36 @@ impl<'a> SurfaceLoad<'a> {
             let Some(chord) = strip.lines.chord(share, known) else {
                 continue;
             };
-            let beside = self.beside(part.strip, y);
             // Linear between the nodes in u and y, and constant beyond the outermost.
-            let ratio = |u: f64, here: [f64; 2]| match beside {
-                Some((other, share)) => {
-                    let there = other.ratio(u);
-                    [0, 1].map(|k| (1.0 - share) * here[k] + share * there[k])
-                }
-                None => here,
+            let beside = self.beside(part.strip, y);
+            let share = beside.map_or(0.0, |(_, share)| share);
+            if let Some((other, share)) = beside
+                && share > 0.0
+                && known_side != Some(y < strip.segment.chord.y)
+            {
+                known_side = Some(y < strip.segment.chord.y);
+                let pairs = there.iter_mut().zip(turns);
+                pairs.for_each(|(there, turn)| *there = other.ratio(turn.u, number));
+            }
+            let ratio = |k: usize| {
+                let (here, there) = (turns[k].ratio, there[k]);
+                [0, 1].map(|c| (1.0 - share) * here[c] + share * there[c])
             };
             if along_rule == 0 {
-                let [x0, x1] = part.u.map(|u| along(&chord, u));
                 let whole = across_rule == 0 && part.piece == StripPart::WHOLE;
                 let load = if whole && part.u == strip.ends(number) {
                     strip.loads[number]
                 } else {
-                    self.footprint.mean_pressure(&chord, x0, x1) * (x1 - x0)
+                    self.footprint.mean_load(&[chord], part.u)
                 };
-                let x = middle_of_load(&chord, part.u);
-                push(x, y, load * across, ratio(middle, strip.ratio(middle)));
+                push(middle_of_load(&chord, part.u), y, load * across, ratio(0));
                 continue;
             }
-            for (u, sine, cosine, weight, here) in &turns[..RULES[along_rule].len()] {
-                let reach = 0.5 * (chord.right - chord.left);
-                let x = 0.5 * (chord.left + chord.right) - reach * cosine;
-                let pressure = self.footprint.mean_pressure(&chord, x, x);
-                let load = pressure * reach * sine * weight * half * across;
-                push(x, y, load, ratio(*u, *here));
+            let reach = 0.5 * (chord.right - chord.left) * half * across;
+            for (k, turn) in turns.iter().enumerate() {
+                let x = chord.along(turn.cosine);
+                let pressure = self.footprint.pressure(&chord, x, turn.sine);
+                push(x, y, pressure * reach * turn.sine * turn.weight, ratio(k));
             }
         }
     }
@@ -326,6 +328,17 @@ impl<'a> SurfaceLoad<'a> {
         let counts = beside.alone && chord.patch == own.patch;
         counts.then(|| (beside, (y - own.y) / (chord.y - own.y)))
     }
+}
+
+/// A point of the quadrature along a strip.
+#[derive(Debug, Clone, Copy, Default)]
+struct Turn {
+    u: f64,
+    sine: f64,
+    cosine: f64,
+    weight: f64,
+    /// Traction over pressure on the strip.
+    ratio: [f64; 2],
 }
 
 impl<'a> LoadedStrip<'a> {
@@ -395,9 +408,33 @@ impl<'a> LoadedStrip<'a> {
         self.loads[number] / (x1 - x0)
     }
 
-    /// Traction over pressure, linear between the nodes and constant beyond the outermost.
-    fn ratio(&self, u: f64) -> [f64; 2] {
-        let after = self.nodes.partition_point(|node| *node < u);
+    /// The points of a rule between two angles in a cell.
+    fn turns(&self, rule: usize, [u0, u1]: [f64; 2], cell: usize) -> [Turn; POINTS_MAX] {
+        let mut turns = [Turn::default(); POINTS_MAX];
+        for (turn, (at, weight)) in turns.iter_mut().zip(RULES[rule]) {
+            let u = 0.5 * (u0 + u1) + 0.5 * (u1 - u0) * at;
+            let (sine, cosine) = u.sin_cos();
+            *turn = Turn {
+                u,
+                sine,
+                cosine,
+                weight: *weight,
+                ratio: self.ratio(u, cell),
+            };
+        }
+        turns
+    }
+
+    /// Traction over pressure at a place that lies in or near a cell, linear between the nodes and constant beyond the outermost.
+    fn ratio(&self, u: f64, cell: usize) -> [f64; 2] {
+        let nodes = &self.nodes;
+        let mut after = cell.min(nodes.len());
+        while after < nodes.len() && nodes[after] < u {
+            after += 1;
+        }
+        while after > 0 && nodes[after - 1] >= u {
+            after -= 1;
+        }
         if after == 0 {
             return self.ratios[0];
         }
