@@ -33,32 +33,44 @@ impl Cylinders {
         2.0 * self.force_n_per_mm / (std::f64::consts::PI * self.half_length_mm)
     }
 
-    /// The creepage at which the middle strip carries the force, between creepages about one that is known.
-    fn found(&self, known: f64, cells: u32) -> f64 {
-        let (a, b) = (self.half_length_mm, WIDE * self.half_length_mm);
-        let load = self.pressure_max() * 2.0 * std::f64::consts::PI / 3.0 * a * b;
-        // Several motions: pressures that feel the tractions would need a gap of this length.
-        let motions: Vec<Value> = TRIED
-            .iter()
-            .map(
-                |part| json!({ "creepage_x": part * known, "creepage_y": 0.0, "spin_per_mm": 0.0 }),
-            )
-            .collect();
-        let (_, Fields { patches }) = solve(&json!({
-            "material": self.material,
-            "friction": { "coefficient": self.friction },
-            "contact": { "type": "ellipse", "a_mm": a, "b_mm": b },
-            "load": { "normal_force_n": load },
-            "motion": motions,
-            "solver": { "mesh": { "strips": STRIPS, "cells": cells } },
-            "outputs": ["tractions", "pressure"],
-        }));
-        let off = [0, 1, 2].map(|k| self.middle_force(&patches[0], k) - self.force);
+    /// The creepage at which the middle strip carries the force, between creepages about one that is known. Motions that are solved together
+    /// share pressures that do not feel their tractions; those of a motion alone do.
+    fn found(&self, known: f64, cells: u32, together: bool) -> f64 {
+        let motion = |part: &f64| json!({ "creepage_x": part * known, "creepage_y": 0.0, "spin_per_mm": 0.0 });
+        let forces = |patches: &[PatchFields]| -> Vec<f64> {
+            (0..patches[0].points.len())
+                .map(|k| self.middle_force(&patches[0], k))
+                .collect()
+        };
+        let forces: Vec<f64> = if together {
+            let motions: Vec<Value> = TRIED.iter().map(motion).collect();
+            forces(&self.solved(&json!(motions), cells))
+        } else {
+            let alone = |part| forces(&self.solved(&motion(part), cells));
+            TRIED.iter().flat_map(alone).collect()
+        };
+        let off = [0, 1, 2].map(|k| forces[k] - self.force);
         let [low, _, high] = off;
         assert!(low < 0.0 && high > 0.0, "{}: {off:?}", self.id);
         let k = usize::from(off[1] < 0.0);
         let part = TRIED[k] - off[k] * (TRIED[k + 1] - TRIED[k]) / (off[k + 1] - off[k]);
         part * known
+    }
+
+    /// The patches with one motion or several.
+    fn solved(&self, motion: &Value, cells: u32) -> Vec<PatchFields> {
+        let (a, b) = (self.half_length_mm, WIDE * self.half_length_mm);
+        let load = self.pressure_max() * 2.0 * std::f64::consts::PI / 3.0 * a * b;
+        let (_, Fields { patches }) = solve(&json!({
+            "material": self.material,
+            "friction": { "coefficient": self.friction },
+            "contact": { "type": "ellipse", "a_mm": a, "b_mm": b },
+            "load": { "normal_force_n": load },
+            "motion": motion,
+            "solver": { "mesh": { "strips": STRIPS, "cells": cells } },
+            "outputs": ["tractions", "pressure"],
+        }));
+        patches
     }
 
     /// Force of the middle strip over its friction limit.
@@ -72,8 +84,8 @@ impl Cylinders {
     }
 }
 
-/// Creepages that belong to forces, from hardly any friction to none of the slip (Bentall and Johnson 1967), though pressures do not feel
-/// tractions here: off by less than K μ, as far as friction counts.
+/// Creepages that belong to forces, from hardly any friction to none of the slip (Bentall and Johnson 1967). Of motions solved together
+/// they are off by less than K μ, as far as friction counts.
 #[test]
 fn unlike_cylinders_roll_with_the_creepage_of_their_force() {
     let mut failures = Vec::new();
@@ -81,12 +93,20 @@ fn unlike_cylinders_roll_with_the_creepage_of_their_force() {
         let known = case.creepage;
         // Without friction to speak of cells slip forward or backward as a whole, so that forces grow in steps.
         let cells = if case.friction < 1e-3 { 160 } else { 48 };
-        let found = case.found(known.value, cells) / known.value;
-        println!("{}: {found:.4} of the creepage", case.id);
+        let [alone, together] =
+            [false, true].map(|together| case.found(known.value, cells, together) / known.value);
+        println!(
+            "{}: {alone:.4} of the creepage, {together:.4} in first order",
+            case.id
+        );
+        let uncertain = known.unc / known.value.abs();
+        let sticks = case.friction > 1.0;
         let pull = (case.difference * case.friction).min(0.05);
-        let allowed = 0.01 + known.unc / known.value.abs() + 0.3 * pull;
-        if (found - 1.0).abs() > allowed {
-            failures.push(format!("{}: {found:.4}, {allowed:.4} allowed", case.id));
+        let allowed = [if sticks { 0.02 } else { 0.008 }, 0.01 + 0.3 * pull];
+        for (found, allowed) in [alone, together].into_iter().zip(allowed) {
+            if (found - 1.0).abs() > allowed + uncertain {
+                failures.push(format!("{}: {found:.4}, {allowed:.4} allowed", case.id));
+            }
         }
     }
     assert_none("creepages differ", &failures);
@@ -102,7 +122,7 @@ fn with_hardly_any_friction_the_creepage_is_that_of_half_the_load() {
         .find(|case| case.friction < 1e-3)
         .expect("there is one");
     let exact = -2.0 * case.difference * case.pressure_max() / case.shear_modulus_mpa * 0.9147;
-    let found = case.found(exact, 200) / exact;
+    let found = case.found(exact, 200, false) / exact;
     println!("{found:.4} of the creepage");
     assert!((found - 1.0).abs() < 0.01, "{found}");
 }

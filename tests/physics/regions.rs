@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 
 use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator::StripOperator;
-use railhead::contact::mesh::strips::{Chord, Grading, Mesh, equal_strips};
+use railhead::contact::mesh::chord::Chord;
+use railhead::contact::mesh::strips::{Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::{

@@ -223,7 +223,8 @@ impl CellHeat<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::strips::{Chord, Grading};
+    use crate::contact::mesh::chord::Chord;
+    use crate::contact::mesh::strips::Grading;
 
     fn strip(cells: usize) -> Mesh {
         let chord = Chord {

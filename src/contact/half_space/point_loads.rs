@@ -66,7 +66,7 @@ impl NullaryFnOnce for Sum<'_> {
 
     #[inline(always)]
     fn call(self) -> [Lanes; 6] {
-        let mut sums = Sums::default();
+        let mut sums = StressSums::default();
         for FeltLoads { loads, lanes } in self.felt {
             let share: Lanes =
                 std::array::from_fn(|lane| if lanes >> lane & 1 == 1 { 1.0 } else { 0.0 });
@@ -74,7 +74,7 @@ impl NullaryFnOnce for Sum<'_> {
                 self.add(load, &share, &mut sums);
             }
         }
-        let Sums { terms, even } = sums;
+        let StressSums { terms, even } = sums;
         let [mut xx, mut yy, zz, xy, xz, yz] = terms;
         for ((xx, yy), even) in xx.iter_mut().zip(&mut yy).zip(even) {
             *xx += even;
@@ -86,7 +86,7 @@ impl NullaryFnOnce for Sum<'_> {
 
 /// 2π times the sums of the stresses.
 #[derive(Default)]
-struct Sums {
+struct StressSums {
     /// Without `even`.
     terms: [Lanes; 6],
     /// What xx and yy have in common.
@@ -99,11 +99,11 @@ impl Sum<'_> {
     /// With r from the load to the point, ρ its length and F the force: −3 (F·r) r_i r_j/ρ⁵, and 1 − 2ν times what has only the components
     /// in the surface. Written for few operations that depend on each other: one division, products added where they arise.
     #[inline(always)]
-    fn add(&self, load: &PointLoad, share: &Lanes, sums: &mut Sums) {
+    fn add(&self, load: &PointLoad, share: &Lanes, sums: &mut StressSums) {
         let [xs, ys, zs] = self.points;
         let [x_load, y_load] = load.at;
         let [along, across, down] = load.force;
-        let Sums { terms, even } = sums;
+        let StressSums { terms, even } = sums;
         let [xx, yy, zz, xy, xz, yz] = terms;
         for lane in 0..LANES {
             let (x, y, z) = (xs[lane] - x_load, ys[lane] - y_load, zs[lane]);

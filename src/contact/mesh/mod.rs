@@ -1,5 +1,6 @@
 //! Strips along the rolling direction, divided into cells.
 
+pub mod chord;
 pub mod observation;
 #[cfg(test)]
 pub(crate) mod samples;

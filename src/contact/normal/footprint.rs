@@ -1,6 +1,6 @@
 //! The solved normal problem of one frame: its patches and their pressures.
 
-use crate::contact::mesh::strips::Chord;
+use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::load_across::{LoadAcross, LoadsOnce};
 use crate::contact::normal::patch::Patch;

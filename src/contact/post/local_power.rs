@@ -297,7 +297,8 @@ fn carry(power: &mut [f64], slips: &[bool], cells: Range<usize>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::strips::{Chord, Grading, strips_about};
+    use crate::contact::mesh::chord::Chord;
+    use crate::contact::mesh::strips::{Grading, strips_about};
     use crate::contact::monitor::Unmonitored;
 
     /// Whatever the tractions: the cells give the power of the forces, on strips of one width and of many.

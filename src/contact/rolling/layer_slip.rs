@@ -72,7 +72,8 @@ impl LayerSlip {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::strips::{Chord, Grading};
+    use crate::contact::mesh::chord::Chord;
+    use crate::contact::mesh::strips::Grading;
 
     /// A layer alone, in full stick: `w + L dT/dx = 0` gives tractions that grow from the leading edge, as in Kalker's simplified theory.
     #[test]

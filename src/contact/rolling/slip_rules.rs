@@ -160,8 +160,9 @@ fn three_point(points: &[f64], i: usize, n: usize) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::mesh::chord::Chord;
     use crate::contact::mesh::observation::observation_points;
-    use crate::contact::mesh::strips::{Chord, Grading};
+    use crate::contact::mesh::strips::Grading;
 
     fn mesh(n: usize) -> Mesh {
         let chord = Chord {

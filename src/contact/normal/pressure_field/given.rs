@@ -5,7 +5,7 @@
 //! reproduced exactly. The force of a patch is the sum of its samples times the areas they represent; the mesh scales the
 //! pressures on its strips to carry that force.
 
-use crate::contact::mesh::strips::Chord;
+use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::level_set::State;

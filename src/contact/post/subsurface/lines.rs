@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use crate::contact::mesh::strips::Chord;
+use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::footprint::Footprint;
 
 /// A strip is halved at most so many times: of 16 strips a part is then a twentieth of the least depth that is answered.

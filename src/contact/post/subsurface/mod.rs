@@ -4,6 +4,7 @@ pub mod blocks;
 pub mod enclosing_ball;
 pub mod lines;
 pub mod load_parts;
+pub(crate) mod loaded_strip;
 pub mod passage;
 pub mod principal;
 pub mod seen_parts;
