@@ -262,13 +262,11 @@ impl<'a> SurfaceLoad<'a> {
                 continue;
             };
             // Linear between the nodes in u and y, and constant beyond the outermost.
-            let beside = self.beside(part.strip, y);
+            let (side, beside) = (y < strip.segment.chord.y, self.beside(part.strip, y));
             let share = beside.map_or(0.0, |(_, share)| share);
-            if let Some((other, share)) = beside
-                && share > 0.0
-                && known_side != Some(y < strip.segment.chord.y)
+            if let Some((other, _)) = beside
+                && known_side.replace(side) != Some(side)
             {
-                known_side = Some(y < strip.segment.chord.y);
                 let pairs = there.iter_mut().zip(turns);
                 pairs.for_each(|(there, turn)| *there = other.ratio(turn.u, number));
             }
