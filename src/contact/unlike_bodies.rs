@@ -49,10 +49,11 @@ const LEFT: f64 = 0.25;
 const LEFT_BY_PRESSURE: f64 = 0.02;
 /// The change that is left has to be below this part of the target. Chosen by judgement; how much it matters was not measured.
 const PART_OF_TARGET: f64 = 0.3;
-/// The opening is sampled on so many points along each axis, over the patches and by this part of their size around them; beyond it
-/// is taken as constant. It is as smooth as displacements are. Both were chosen by judgement; how much they matter was not measured.
+/// The opening is sampled on so many points along each axis, over the patches and by a part of their size around them; beyond it
+/// is taken as constant. It is smooth but for the edges of the cells. On the 12 contacts of `tests/physics/unlike.rs` 81 points move forces by at
+/// most 0.0014 of μN; 25 take half the time, and the estimate of one contact no longer covers its error.
 const SAMPLES: usize = 41;
-/// See [`SAMPLES`].
+/// That part. Chosen by judgement; how much it matters was not measured.
 const AROUND: f64 = 0.25;
 /// Samples of the parabola across that stands for an ellipse, and how far they reach over its semi-axis. Parabolas are reproduced exactly.
 const PARABOLA: (i32, f64) = (8, 6.0);

@@ -4,7 +4,7 @@
 //! P moves the surfaces apart by `u_x = K P/(πG) [[p atan(q/p) + q ln r]]` and `u_y` with p and q exchanged, and tractions open the gap
 //! by minus the same sums (Kalker 1990, section 1.6; Johnson 1985, section 3.6).
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::contact::mesh::strips::{Mesh, Segment};
 
@@ -15,8 +15,10 @@ fn corner(p: f64, q: f64) -> [f64; 2] {
         return [0.0; 2];
     }
     let log = 0.5 * (p * p + q * q).ln();
-    // |p| atan(q/|p|) = p atan(q/p).
-    let [along, across] = [p_q * q.atan2(p_q), q_p * p.atan2(q_p)];
+    // p atan(q/p) = |p| atan(q/|p|), and the two angles of a triangle add up to π/2.
+    let angle = q_p.atan2(p_q);
+    let along = p_q * angle.copysign(q);
+    let across = q_p * (FRAC_PI_2 - angle).copysign(p);
     [along + q * log, across + p * log]
 }
 
