@@ -47,6 +47,7 @@ pub mod numerics;
 pub mod post;
 pub mod problem;
 pub mod profile_trust;
+pub(crate) mod pulled_rolling;
 pub(crate) mod pulled_wheel;
 pub mod remark;
 pub mod rolling;

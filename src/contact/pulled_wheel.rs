@@ -1,5 +1,5 @@
-//! Solves a wheel whose rail is to carry a longitudinal or a lateral force, or both: the creepages, or the angular velocity of the wheelset, that
-//! give them are found.
+//! Solves a wheel whose rail is to carry a longitudinal or a lateral force, or both: the creepages, or the angular and the lateral velocity of the
+//! wheelset, that give them are found.
 //!
 //! Everything is in the search: where the wheel rests, its patches, and how the load is shared between them depend on the force of friction, so
 //! that every trial brings the wheel to rest and solves all patches. The unknown is a place, as in the search for the creepages of one
@@ -18,12 +18,13 @@ use crate::contact::numerics::pair_root::{PairRoot, find_pair};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::run::Run;
 use crate::contact::profile_trust::{settle, trust};
+use crate::contact::pulled_rolling::{Rolling, angle_of};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::cubic_law::CubicLaw;
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::solution::words::answer::{PatchSolution, Solution};
+use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
 use crate::contact::wheel_on_rail::{BALANCE, SolvedWheel};
 
@@ -41,7 +42,7 @@ const PROGRESS: [f64; 2] = [0.1, 0.8];
 /// Chosen by judgement; how much it matters was not measured.
 const TRIALS_USUAL: f64 = 6.0;
 
-/// Solves a wheel on a rail that carries `forces`, at the creepages or the angular velocity that give them.
+/// Solves a wheel on a rail that carries `forces`, at the creepages or the velocities of the wheelset that give them.
 ///
 /// # Errors
 /// Why there is no answer: the rail cannot carry the force, or a trial failed.
@@ -71,9 +72,8 @@ struct FirstEstimate {
     /// Friction limit of all patches in N.
     limit: f64,
     law: CubicLaw,
-    /// Mean rolling radius of the patches in mm, weighted with their loads.
-    radius: f64,
-    /// Lateral force in N without lateral creepage, normal forces included.
+    rolling: Rolling,
+    /// Lateral force in N about without lateral creepage, normal forces included.
     lateral: f64,
     /// Sum of the magnitudes of the lateral parts of the normal forces in N.
     lateral_normal: f64,
@@ -92,10 +92,10 @@ struct Reach {
 }
 
 impl FirstEstimate {
-    fn of(solution: &Solution, case: &CheckedCase) -> FirstEstimate {
+    fn of(solution: &Solution, case: &CheckedCase, rolling: Rolling) -> FirstEstimate {
         let elasticity = &case.problem.elasticity;
         let modulus = case.problem.interface.reduction * elasticity.shear_modulus;
-        let (mut limit, mut load, mut moment, mut lateral_normal) = (0.0, 0.0, 0.0, 0.0);
+        let (mut limit, mut lateral_normal) = (0.0, 0.0);
         let mut stiffness = [0.0; 2];
         for patch in &solution.patches {
             limit += patch.friction_limit_n.unwrap_or(0.0);
@@ -107,30 +107,18 @@ impl FirstEstimate {
             for (stiffness, c) in stiffness.iter_mut().zip(c) {
                 *stiffness += c * modulus * patch.area_mm2 / std::f64::consts::PI;
             }
-            load += patch.normal_force_n;
             lateral_normal += patch.normal_force_n * angle_of(patch).sin().abs();
-            moment += patch.normal_force_n * radius_of(patch);
         }
         FirstEstimate {
             limit,
             law: CubicLaw {
                 stiffness: stiffness.map(|stiffness| stiffness / limit.max(f64::MIN_POSITIVE)),
             },
-            radius: moment / load,
+            rolling: rolling.of(&solution.patches),
             lateral: solution.total[0].force_y_n,
             lateral_normal,
         }
     }
-}
-
-fn angle_of(patch: &PatchSolution) -> f64 {
-    let position = patch.position.as_ref();
-    position.map_or(0.0, |position| position.contact_angle_rad)
-}
-
-fn radius_of(patch: &PatchSolution) -> f64 {
-    let position = patch.position.as_ref();
-    position.map_or(1.0, |position| position.rolling_radius_mm)
 }
 
 /// The search for the motion of one wheel.
@@ -143,14 +131,11 @@ struct PullSearch<'a> {
 }
 
 impl PullSearch<'_> {
-    /// The case at creepages in the directions of the forces, of which a wheelset has that along by its angular velocity, at a
-    /// rolling radius in mm.
-    fn at(&self, creepages: [f64; 2], radius: f64, run: &Run) -> CheckedCase {
+    /// The case at creepages in the directions of the forces, which a wheelset has by its angular and its lateral velocity.
+    fn at(&self, creepages: [f64; 2], rolling: Rolling, run: &Run) -> CheckedCase {
         let problem = &self.case.problem;
-        let wheelset = problem.wheelset.map(|mut wheelset| {
-            wheelset.angular_velocity = wheelset.speed * (1.0 - creepages[0]) / radius;
-            wheelset
-        });
+        let wheelset = problem.wheelset;
+        let wheelset = wheelset.map(|wheelset| rolling.at(wheelset, creepages, self.forces));
         let mut motion = problem.motions[0];
         if wheelset.is_none() {
             let [along, across] = self.forces.map(|force| force.is_some());
@@ -186,15 +171,9 @@ impl PullSearch<'_> {
             own: PROGRESS[0],
         };
         let run = self.case.run.for_resultants(TARGET_FIRST);
-        let found = self.judged(
-            &self.at(
-                [0.0; 2],
-                self.contact.geometry.placement.rolling_radius,
-                &run,
-            ),
-            part,
-        )?;
-        Ok(FirstEstimate::of(&found.solution, self.case))
+        let rolling = Rolling::about(&self.contact.geometry.placement);
+        let found = self.judged(&self.at([0.0; 2], rolling, &run), part)?;
+        Ok(FirstEstimate::of(&found.solution, self.case, rolling))
     }
 
     /// Where the search starts, if the forces may be within reach.
@@ -272,7 +251,7 @@ impl PullSearch<'_> {
         };
         let run = self.case.run.for_resultants(TARGET_FIRST);
         let creepages = [0.0, first.law.creepage(1, place)];
-        match self.judged(&self.at(creepages, first.radius, &run), part) {
+        match self.judged(&self.at(creepages, first.rolling, &run), part) {
             Ok(found) => Ok(Some(found.solution.total[0].force_y_n)),
             Err(SolveError::NormalProblem { .. }) => Ok(None),
             Err(error) => Err(error),
@@ -366,7 +345,7 @@ impl PullSearch<'_> {
                 own: share,
             };
             trials += 1.0;
-            let case = self.at(creepages_at(place), first.radius, &run);
+            let case = self.at(creepages_at(place), first.rolling, &run);
             let total = self.judged(&case, part)?.solution.total[0];
             let found = [total.force_x_n, total.force_y_n];
             let off = [0, 1].map(|k| {
@@ -388,7 +367,7 @@ impl PullSearch<'_> {
             before: PROGRESS[1],
             own: 1.0 - PROGRESS[1],
         };
-        let case = self.at(creepages_at(root.place), first.radius, &self.case.run);
+        let case = self.at(creepages_at(root.place), first.rolling, &self.case.run);
         let mut found = self.judged(&case, part)?;
         if !root.exit.converged() {
             let remark = Remark::IterationInexact {
@@ -401,8 +380,11 @@ impl PullSearch<'_> {
         }
         let found = trust::trusted(self.operators, &case, self.contact, found, self.monitor)?;
         let mut solution = found.solution;
-        let wheelset = case.problem.wheelset;
-        solution.angular_velocity_rad_per_s = wheelset.map(|wheelset| wheelset.angular_velocity);
+        if let Some(wheelset) = case.problem.wheelset {
+            let [along, across] = self.forces;
+            solution.angular_velocity_rad_per_s = along.map(|_| wheelset.angular_velocity);
+            solution.lateral_velocity_mm_per_s = across.map(|_| wheelset.lateral_velocity);
+        }
         Ok((solution, found.fields))
     }
 }

@@ -95,6 +95,7 @@ mod truth;
 mod unlike;
 mod watched;
 mod wheelset;
+mod wheelset_pulls;
 mod workspaces;
 
 #[global_allocator]

@@ -91,6 +91,20 @@ async fn a_wheel_steered_by_forces_is_answered_with_its_creepages_or_told_the_ra
         let driven = asked["force_x_n"].is_number();
         assert_eq!(number(along) < 0.0, driven, "{point}");
     }
+    case["motion"] = json!({ "wheelset": { "speed_mm_per_s": 2e4, "force_x_n": -0.3 * limit, "force_y_n": 0.2 * limit } });
+    let job = server.solve(&case).await;
+    assert_eq!(job["state"], "succeeded", "{job}");
+    let (result, asked) = (&job["result"], &case["motion"]["wheelset"]);
+    for name in ["force_x_n", "force_y_n"] {
+        let missed = number(&result["total"][0][name]) - number(&asked[name]);
+        assert!(missed.abs() < 2e-3 * limit, "{name}: {job}");
+    }
+    // Without yaw the lateral creepage is that of the velocity found.
+    let point = &result["patches"][0]["points"][0];
+    let across = number(&point["motion"]["creepage_y"]);
+    let lateral = number(&result["lateral_velocity_mm_per_s"]);
+    assert!((lateral / 2e4 - across).abs() < 1e-4, "{job}");
+    assert!(number(&result["angular_velocity_rad_per_s"]) > 0.0);
     case["motion"] = json!({ "creepage_x": 0.0, "force_y_n": 2.0 * limit, "spin_per_mm": 0.0 });
     let job = server.solve(&case).await;
     assert_eq!(job["state"], "failed", "{job}");

@@ -32,6 +32,7 @@ const ORDER: &[&str] = &[
     "contact::wheel_on_rail",
     "contact::unlike_bodies",
     "contact::profile_trust",
+    "contact::pulled_rolling",
     "contact::pulled_wheel",
     "contact::wheelset",
     "contact::slices",

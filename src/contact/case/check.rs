@@ -79,7 +79,7 @@ impl CheckedCase {
             history,
             wheelset: wheel_task::wheelset(&case.motion),
             drive_torque: wheel_task::drive_torque(&case.motion),
-            longitudinal_force: wheel_task::longitudinal_force(&case.motion),
+            wheelset_forces: wheel_task::wheelset_forces(&case.motion),
             checked: Checked::without_faults(),
         };
         let run = run(case, limits);

@@ -202,13 +202,19 @@ fn motion_faults(
     faults
 }
 
-/// The fault of a longitudinal force under a wheel, where friction falls and two angular velocities may give it.
+/// The fault of a force under a wheelset's wheel, where friction falls and two velocities may give it.
 fn pull_fault(motion: &Motions, what: &str) -> Option<Fault> {
-    wheel_task::longitudinal_force(motion)?;
+    let [along, across] = wheel_task::wheelset_forces(motion);
+    let (name, velocity, several) = match (along, across) {
+        (Some(_), _) => ("force_x_n", "angular velocity", "angular velocities"),
+        (None, Some(_)) => ("force_y_n", "lateral velocity", "lateral velocities"),
+        (None, None) => return None,
+    };
     let detail = format!(
-        "given with friction that falls with {what}, where two angular velocities may give one force; give the angular velocity instead"
+        "given with friction that falls with {what}, where two {several} may give one force; give the {velocity} instead"
     );
-    Some(Fault::new("/motion/wheelset/force_x_n", detail))
+    let pointer = format!("/motion/wheelset/{name}");
+    Some(Fault::new(pointer, detail))
 }
 
 /// Faults of a case that the table does not cover, as far as that is known before patches are found.

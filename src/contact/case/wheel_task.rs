@@ -14,6 +14,7 @@ use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
 use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::rolling::motion::PrescribedForces;
 
 /// The task of a wheel on a rail with its remarks; `None` without faults where the load or the contact
 /// modulus in MPa is not known.
@@ -46,7 +47,8 @@ pub(crate) fn task(
     Ok(Some((NormalTask::Wheel(Arc::new(contact)), remarks)))
 }
 
-/// The motion of the wheelset, if the case gives it instead of creepages; its angular velocity is NaN where it has to be found.
+/// The motion of the wheelset, if the case gives it instead of creepages; its angular and its lateral velocity are NaN where they have to be
+/// found.
 pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
     let Motions::Wheelset { wheelset } = motions else {
         return None;
@@ -58,6 +60,7 @@ pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
         drive_torque_n_mm: _,
         force_x_n: _,
         lateral_velocity_mm_per_s,
+        force_y_n: _,
         yaw_rate_rad_per_s,
         roll_rate_rad_per_s,
     } = *wheelset;
@@ -65,7 +68,7 @@ pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
     Some(WheelsetMotion {
         speed,
         angular_velocity: angular_velocity_rad_per_s.or(free).unwrap_or(f64::NAN),
-        lateral_velocity: lateral_velocity_mm_per_s,
+        lateral_velocity: lateral_velocity_mm_per_s.unwrap_or(f64::NAN),
         yaw_rate: yaw_rate_rad_per_s,
         roll_rate: roll_rate_rad_per_s,
     })
@@ -79,11 +82,11 @@ pub(crate) fn drive_torque(motions: &Motions) -> Option<f64> {
     }
 }
 
-/// The longitudinal force in N that the rail is to carry.
-pub(crate) fn longitudinal_force(motions: &Motions) -> Option<f64> {
+/// The forces in N, along and across, that the rail is to carry under a wheelset's wheel.
+pub(crate) fn wheelset_forces(motions: &Motions) -> PrescribedForces {
     match motions {
-        Motions::Wheelset { wheelset } => wheelset.force_x_n,
-        _ => None,
+        Motions::Wheelset { wheelset } => [wheelset.force_x_n, wheelset.force_y_n],
+        _ => [None; 2],
     }
 }
 

@@ -33,8 +33,8 @@ pub struct Problem {
     pub wheelset: Option<WheelsetMotion>,
     /// Torque about the axle in N mm that the rails are to balance; the angular velocity of the wheelset is then found.
     pub drive_torque: Option<f64>,
-    /// Longitudinal force in N that the rail is to carry under the wheel; the angular velocity of the wheelset is then found.
-    pub longitudinal_force: Option<f64>,
+    /// Forces in N that the rail is to carry under the wheel of a wheelset; its angular velocity and its lateral velocity are then found.
+    pub wheelset_forces: PrescribedForces,
     /// Forces prescribed instead of creepages, motion by motion.
     pub forces: Vec<PrescribedForces>,
     /// Rolling speeds in mm/s, motion by motion, where they are given.
@@ -94,8 +94,8 @@ impl Problem {
         let NormalTask::Wheel(_) = self.task else {
             return None;
         };
-        let [along, across] = *self.forces.first()?;
-        let forces = [self.longitudinal_force.or(along), across];
+        let given = *self.forces.first()?;
+        let forces = [0, 1].map(|k| self.wheelset_forces[k].or(given[k]));
         (forces != [None; 2]).then_some(forces)
     }
 
@@ -106,7 +106,7 @@ impl Problem {
             motions: vec![motion],
             forces: vec![[None; 2]],
             wheelset,
-            longitudinal_force: None,
+            wheelset_forces: [None; 2],
             ..self.clone()
         }
     }

@@ -170,6 +170,7 @@ impl<'a> Assembly<'a> {
             normal: self.solved.report,
             wheel_lowering_mm: None,
             angular_velocity_rad_per_s: None,
+            lateral_velocity_mm_per_s: None,
             wheelset: None,
             origin: Origin {
                 x_mm: 0.0,

@@ -31,6 +31,10 @@ const COMPONENTS: [&str; 5] = [
 ];
 /// The member beside them.
 const SPEED_NAME: &str = "speed_mm_per_s";
+/// The lateral velocity of a wheelset, and the force that may stand in its place.
+const LATERAL_NAME: &str = "lateral_velocity_mm_per_s";
+/// See [`LATERAL_NAME`].
+const ACROSS_NAME: &str = "force_y_n";
 /// Place of the spin in [`COMPONENTS`].
 const SPIN_AT: usize = 2;
 /// Place of the first force.
@@ -126,12 +130,12 @@ fn speed(block: &mut Object) -> Option<Option<f64>> {
     }
 }
 
-/// The motion of a wheelset; on both rails a torque can be balanced, on one a longitudinal force.
+/// The motion of a wheelset; on both rails a torque can be balanced, on one a longitudinal and a lateral force.
 fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
     const TORQUE_NAME: (&str, AllowedRange) = ("drive_torque_n_mm", TORQUE);
     const FORCE_NAME: (&str, AllowedRange) = ("force_x_n", FORCE);
     const RATES: [(&str, AllowedRange); 3] = [
-        ("lateral_velocity_mm_per_s", VELOCITY),
+        (LATERAL_NAME, VELOCITY),
         ("yaw_rate_rad_per_s", RATE),
         ("roll_rate_rad_per_s", RATE),
     ];
@@ -145,9 +149,14 @@ fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
         },
     ];
     let names = spins.iter().chain(&RATES).map(|(name, _)| *name);
-    let names: Vec<&str> = ["speed_mm_per_s"].into_iter().chain(names).collect();
+    let across = (!on_both_rails).then_some(ACROSS_NAME);
+    let names: Vec<&str> = [SPEED_NAME]
+        .into_iter()
+        .chain(names)
+        .chain(across)
+        .collect();
     block.only(&names, &[]);
-    let speed_mm_per_s = block.required_number("speed_mm_per_s", SPEED);
+    let speed_mm_per_s = block.required_number(SPEED_NAME, SPEED);
     let mut spin = [None; 3];
     for (k, (name, allowed)) in spins.iter().enumerate() {
         spin[k] = block.number(name, *allowed);
@@ -159,40 +168,62 @@ fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
             Some(0.0)
         }
     });
-    let given: Vec<&str> = spins.iter().map(|(name, _)| *name).collect();
-    let given: Vec<&str> = given.into_iter().filter(|name| block.has(name)).collect();
-    match given.as_slice() {
-        [_] => {}
-        [] => {
-            let others: Vec<&str> = spins[1..].iter().map(|(name, _)| *name).collect();
-            let others = others.join(" or ");
-            block.fault(
-                spins[0].0,
-                format!("missing; {RATE} is needed, or {others} instead"),
-            );
-            return None;
-        }
-        [first, second, ..] => {
-            block.fault(
-                second,
-                format!("given together with {first}; exactly one of the two is allowed"),
-            );
-            return None;
-        }
-    }
+    let force_y_n = across_of_wheelset(block, on_both_rails);
+    turning_is_said_once(block, spins.map(|(name, _)| name))?;
     let [angular_velocity_rad_per_s, free_rolling_radius_mm, balanced] = spin;
     spin.into_iter().flatten().next()?;
     let [lateral, yaw, roll] = rates;
+    let (lateral, force_y_n) = (lateral?, force_y_n?);
     Some(Wheelset {
         speed_mm_per_s: speed_mm_per_s?,
         angular_velocity_rad_per_s,
         free_rolling_radius_mm,
         drive_torque_n_mm: balanced.filter(|_| on_both_rails),
         force_x_n: balanced.filter(|_| !on_both_rails),
-        lateral_velocity_mm_per_s: lateral?,
+        lateral_velocity_mm_per_s: force_y_n.is_none().then_some(lateral),
+        force_y_n,
         yaw_rate_rad_per_s: yaw?,
         roll_rate_rad_per_s: roll?,
     })
+}
+
+/// Faults unless exactly one of the members that say how fast a wheelset turns is given.
+fn turning_is_said_once(block: &mut Object, names: [&str; 3]) -> Option<()> {
+    let given: Vec<&str> = names.into_iter().filter(|name| block.has(name)).collect();
+    match given.as_slice() {
+        [_] => Some(()),
+        [] => {
+            let others = names[1..].join(" or ");
+            block.fault(
+                names[0],
+                format!("missing; {RATE} is needed, or {others} instead"),
+            );
+            None
+        }
+        [first, second, ..] => {
+            block.fault(
+                second,
+                format!("given together with {first}; exactly one of the two is allowed"),
+            );
+            None
+        }
+    }
+}
+
+/// The lateral force in place of the lateral velocity, which may be left out; the outer `None` says that it is faulty.
+fn across_of_wheelset(block: &mut Object, on_both_rails: bool) -> Option<Option<f64>> {
+    if on_both_rails || !block.has(ACROSS_NAME) {
+        return Some(None);
+    }
+    let force = block.number(ACROSS_NAME, FORCE);
+    if block.has(LATERAL_NAME) {
+        block.fault(
+            ACROSS_NAME,
+            format!("given together with {LATERAL_NAME}; exactly one of the two is allowed"),
+        );
+        return None;
+    }
+    force.map(Some)
 }
 
 fn sweep(block: &mut Object) -> Option<Sweep> {

@@ -78,7 +78,8 @@ pub enum Motions {
     },
 }
 
-/// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s`, `free_rolling_radius_mm`, `drive_torque_n_mm` and `force_x_n` is given.
+/// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s`, `free_rolling_radius_mm`, `drive_torque_n_mm` and `force_x_n` is given;
+/// `force_y_n` excludes `lateral_velocity_mm_per_s`.
 ///
 /// With the speed V, the axle e, the angular velocity ω = Ω e + (roll rate, 0, yaw rate) and r from the wheelset's centre to the
 /// patch, the wheel's material moves with v = (V, lateral velocity, 0) + ω × r; the creepages of a patch with the tangent t and the
@@ -107,8 +108,14 @@ pub struct Wheelset {
     #[schema(nullable = false)]
     pub force_x_n: Option<f64>,
     /// Velocity of the centre to the left in mm/s; 0 when left out.
-    #[schema(required = false)]
-    pub lateral_velocity_mm_per_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub lateral_velocity_mm_per_s: Option<f64>,
+    /// Lateral force on the rail in N, over all patches of the wheel, in track axes and with the normal forces; for the contact `profiles` only.
+    /// The lateral velocity is found at which the rail carries it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub force_y_n: Option<f64>,
     /// Rate of the yaw in rad/s; 0 when left out.
     #[schema(required = false)]
     pub yaw_rate_rad_per_s: f64,

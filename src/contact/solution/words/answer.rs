@@ -35,6 +35,10 @@ pub struct Solution {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub angular_velocity_rad_per_s: Option<f64>,
+    /// Velocity of the wheelset's centre to the left in mm/s, found for the lateral force that was prescribed; only for `profiles` with `wheelset.force_y_n`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub lateral_velocity_mm_per_s: Option<f64>,
     /// The positions of the wheelset and its kinematics; only for `wheelset`. `total` then has one entry per position, and every patch
     /// belongs to one side of one position.
     #[serde(skip_serializing_if = "Option::is_none", default)]
