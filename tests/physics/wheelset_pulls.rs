@@ -51,7 +51,6 @@ fn the_lateral_force_of_a_lateral_velocity_gives_the_velocity_back() {
             "{place:?}: {own} {force}"
         );
         let lateral = found.lateral_velocity_mm_per_s.expect("was found");
-        // 1e-4 of the speed is a creepage that changes the force by about 2 % of μN.
         let off = (lateral - velocity).abs() / SPEED;
         assert!(off < 5e-5, "{place:?}: {lateral} {velocity}");
         assert!(found.angular_velocity_rad_per_s.is_none());
