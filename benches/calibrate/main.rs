@@ -9,6 +9,7 @@ extern crate railhead_contact as railhead;
 
 mod continuity;
 mod finer;
+mod judge;
 mod patches;
 mod population;
 #[path = "../../tests/physics/profile_shapes.rs"]
@@ -24,8 +25,9 @@ use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::answer::Solution;
 use serde_json::json;
 
+use judge::judged;
 use population::{Class, case};
-use truth::{Judged, Truths, judged};
+use truth::{Judged, Truths};
 
 const CLASSES: [Class; 5] = [
     Class::Ellipse,

@@ -3,7 +3,7 @@
 use railhead::contact::rolling::resultants::Resultants;
 use railhead::contact::solution::words::answer::{PatchSolution, Solution};
 
-use crate::truth::{Frame, Judged, TrueResultants, Truth, distance};
+use crate::truth::{Judged, TrueResultants, Truth};
 
 /// The tangential answer of a patch, or the sums over several.
 #[derive(Debug, Clone, Copy, Default)]
@@ -53,16 +53,7 @@ impl PatchAnswer {
     }
 
     fn against(&self, known: &TrueResultants) -> Judged {
-        let frame = Frame {
-            centre: known.centre,
-            length: known.length,
-            limit: known.limit,
-        };
-        Judged {
-            error: distance(frame.relative(self.resultants), known.value),
-            estimate: self.estimate / known.limit,
-            uncertainty: known.uncertainty,
-        }
+        known.judged(self.resultants, self.estimate)
     }
 }
 

@@ -1,15 +1,11 @@
-//! What the resultants of a case truly are, kept in a file, and how far an answer is from it.
+//! What the resultants of a case truly are, kept in a file, and how far resultants are from it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use railhead::contact::rolling::resultants::Resultants;
-use railhead::contact::solution::words::answer::Solution;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-
-use crate::patches::{self, PatchAnswer};
-use crate::population::Class;
 
 /// What is known of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -37,6 +33,22 @@ pub struct TrueResultants {
     pub length: f64,
     /// μN in N.
     pub limit: f64,
+}
+
+impl TrueResultants {
+    /// How far an answer is from them: its resultants, and its estimate in N.
+    pub fn judged(&self, found: Resultants, estimate: f64) -> Judged {
+        let frame = Frame {
+            centre: self.centre,
+            length: self.length,
+            limit: self.limit,
+        };
+        Judged {
+            error: distance(frame.relative(found), self.value),
+            estimate: estimate / self.limit,
+            uncertainty: self.uncertainty,
+        }
+    }
 }
 
 /// All truths that are known: by class, then by number.
@@ -100,28 +112,4 @@ pub struct Judged {
     pub estimate: f64,
     /// What the truth may be off by.
     pub uncertainty: f64,
-}
-
-/// The estimates of an answer beside its errors: that of the sum, or of each patch of a wheel on a rail. None without an estimate.
-pub fn judged(class: Class, truth: &Truth, solution: &Solution) -> Option<Vec<Judged>> {
-    if class == Class::Profiles {
-        return PatchAnswer::of_solution(solution).map(|found| patches::judged(truth, &found));
-    }
-    let total = &solution.total[0];
-    let sum = Resultants {
-        force_x: total.force_x_n,
-        force_y: total.force_y_n,
-        moment_z: total.moment_z_n_mm,
-    };
-    let whole = &truth.whole;
-    let frame = Frame {
-        centre: whole.centre,
-        length: whole.length,
-        limit: whole.limit,
-    };
-    Some(vec![Judged {
-        error: distance(frame.relative(sum), whole.value),
-        estimate: total.error_estimate?.force_x_n / whole.limit,
-        uncertainty: whole.uncertainty,
-    }])
 }

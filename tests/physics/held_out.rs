@@ -6,9 +6,10 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
 use serde_json::json;
 
+use crate::judge::judged;
 use crate::population::{Class, case};
 use crate::reference::median;
-use crate::truth::{self, Judged, judged};
+use crate::truth::{self, Judged};
 
 /// Fewer errors that are clear of the uncertainty of the truth have no median to speak of.
 const CLEAR_MIN: usize = 8;

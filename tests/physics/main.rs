@@ -35,6 +35,8 @@ mod hertz;
 mod histories;
 mod history_falling;
 mod history_faults;
+#[path = "../../benches/calibrate/judge.rs"]
+mod judge;
 mod kalker;
 mod kalker_table;
 mod laws;

@@ -1,0 +1,23 @@
+//! How far an answer is from the truth.
+
+use railhead::contact::rolling::resultants::Resultants;
+use railhead::contact::solution::words::answer::Solution;
+
+use crate::patches::{self, PatchAnswer};
+use crate::population::Class;
+use crate::truth::{Judged, Truth};
+
+/// The estimates of an answer beside its errors: that of the sum, or of each patch of a wheel on a rail. None without an estimate.
+pub fn judged(class: Class, truth: &Truth, solution: &Solution) -> Option<Vec<Judged>> {
+    if class == Class::Profiles {
+        return PatchAnswer::of_solution(solution).map(|found| patches::judged(truth, &found));
+    }
+    let total = &solution.total[0];
+    let sum = Resultants {
+        force_x: total.force_x_n,
+        force_y: total.force_y_n,
+        moment_z: total.moment_z_n_mm,
+    };
+    let estimate = total.error_estimate?.force_x_n;
+    Some(vec![truth.whole.judged(sum, estimate)])
+}
