@@ -51,7 +51,8 @@ fn solve_motions(
         if let Some(reason) = history::solve::too_long(history, &extents, case.run.steps_max) {
             return Err(SolveError::NotCovered { reason });
         }
-        for mut point in history::solve::solve(&task, history, &mut state, watch)? {
+        let part = watch.of_next(case.problem.motions.len());
+        for mut point in history::solve::solve(&task, history, &mut state, &part)? {
             add_coupling_error(&mut point, solved.coupling_error);
             if assembly.is_empty() {
                 point.seconds += solved.report.map_or(0.0, |report| report.seconds);

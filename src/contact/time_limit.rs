@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use crate::contact::error::SolveError;
-use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::monitor::{Monitor, MonitorPart, Stop};
 use crate::contact::problem::checked_case::CheckedCase;
 
 /// The monitor of a whole case: adds the case's own time limit and turns motions done into progress, which never falls.
@@ -43,6 +43,16 @@ impl<'a> TimeLimit<'a> {
         SolveError::OutOfTime {
             limit_s: self.time_limit.map(|limit| limit.as_secs_f64()),
             motions: Some([case.problem.part.before + done, case.problem.part.all]),
+        }
+    }
+
+    /// A monitor of the next so many motions, which are solved together.
+    pub(crate) fn of_next(&self, motions: usize) -> MonitorPart<'_> {
+        let left = self.motions.saturating_sub(self.done.get()).max(1);
+        MonitorPart {
+            inner: self,
+            before: 0.0,
+            own: (motions as f64 / left as f64).min(1.0),
         }
     }
 

@@ -55,7 +55,7 @@ const TOLERANCE_FIRST: f64 = 0.1;
 ///
 /// A vertical force is balanced by the normal and the tangential forces together if the case has one motion: friction's share
 /// is found on a coarse mesh, the wheel brought to rest again, and so on until the share is what it was taken for. Several
-/// motions share their patches, so that only normal forces balance then; a remark says so.
+/// motions share their patches, as the points of a history do, so that only normal forces balance then; a remark says so.
 ///
 /// # Errors
 /// A named reason why there is no answer, with what `judge` says of it.
@@ -76,7 +76,7 @@ pub(crate) fn solve(
         case,
         contact,
         search,
-        balanced: vertical && case.problem.part.all == 1,
+        balanced: vertical && case.problem.part.all == 1 && case.problem.history.is_none(),
         judge,
         monitor,
     };

@@ -68,11 +68,8 @@ fn pressed_fault(given: &BesideHistory) -> Option<Fault> {
 /// Faults of a case with a history.
 pub(crate) fn faults(history: &HistoryTask, given: &BesideHistory, limits: &Limits) -> Vec<Fault> {
     let mut faults = Vec::new();
-    if matches!(
-        given.contact,
-        Some(Contact::Profiles { .. } | Contact::Wheelset { .. })
-    ) {
-        let detail = "given with profiles, whose patches move as the wheel does; give one patch as radii, an ellipse, a gap or a pressure";
+    if matches!(given.contact, Some(Contact::Wheelset { .. })) {
+        let detail = "given with a wheelset, whose pose and forces are found for steady rolling; give one of its wheels as \"type\": \"profiles\"";
         faults.push(Fault::new("/motion/history", detail));
     }
     let method = given.solver.map(|solver| solver.method);

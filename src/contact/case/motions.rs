@@ -73,7 +73,10 @@ impl ExpandedMotions {
             let pointer = pointer(given, index, ["force_x_n", "force_y_n"][k]);
             let [x, y] = forces.map(|force| force.unwrap_or(0.0));
             let length = x.hypot(y);
-            let detail = if of_profiles && self.forces.len() > 1 {
+            let detail = if of_profiles && self.history.is_some() {
+                "given with profiles in a history; creepages that all patches share are found for steady rolling only: give creepage_x and creepage_y"
+                    .to_owned()
+            } else if of_profiles && self.forces.len() > 1 {
                 "given with profiles in several motions, which share their patches; give one motion"
                     .to_owned()
             } else if let Some(limit) =

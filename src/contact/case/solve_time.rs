@@ -209,7 +209,7 @@ impl CheckedCase {
     pub fn solve_time(&self) -> SolveTime {
         let (patches, normal) = guesses(&self.problem.task, self.run.resolution.target());
         let tangential = match (self.run.method, self.run.resolution) {
-            _ if self.problem.history.is_some() => self.history_seconds(),
+            _ if self.problem.history.is_some() => self.history_seconds(&patches),
             (Method::BoundaryElement, Resolution::Target(target)) => {
                 self.to_target(&patches, target)
             }
@@ -281,18 +281,15 @@ impl CheckedCase {
     }
 
     /// Time of a history: its steps on the level that a target usually leads to, or on the mesh given, with the coarser one before it.
-    fn history_seconds(&self) -> f64 {
+    fn history_seconds(&self, patches: &[PatchGuess]) -> f64 {
         let Some(history) = &self.problem.history else {
             return 0.0;
         };
-        let extents: Vec<[f64; 4]> = self
-            .problem
-            .task
-            .known_patches()
-            .iter()
-            .flatten()
-            .map(|p| p.extent)
-            .collect();
+        let extent = |patch: &PatchGuess| {
+            let [a, b] = patch.half;
+            [-a, a, -b, b]
+        };
+        let extents: Vec<[f64; 4]> = patches.iter().map(extent).collect();
         let (steps, usual) = usual_work(history, &extents);
         let cells = match self.run.resolution {
             Resolution::Target(_) => usual,

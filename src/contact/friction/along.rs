@@ -17,6 +17,18 @@ impl AlongLaw {
         }
     }
 
+    /// The same table in axes whose origin lies at x in mm of these.
+    #[must_use]
+    pub fn about(&self, x: f64) -> AlongLaw {
+        let (at, coefficient): (Vec<f64>, Vec<f64>) = self
+            .table
+            .points()
+            .iter()
+            .map(|(at, mu)| (at - x, *mu))
+            .unzip();
+        AlongLaw::new(&at, &coefficient)
+    }
+
     /// The largest coefficient.
     #[must_use]
     pub fn largest(&self) -> f64 {

@@ -9,13 +9,17 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 const SAMPLES: usize = 129;
 
 /// Friction in the axes of a frame whose patches have these extents `[x_min, x_max, y_min, y_max]` in mm: a coefficient by the y of the
-/// rail's profile, or by the inclination of its surface, becomes one by the y of the frame.
+/// rail's profile, or by the inclination of its surface, becomes one by the y of the frame; one by the place along the track, one by the x of the
+/// frame, which under a yawed wheel does not begin where that of the track does.
 pub(crate) fn in_frame(
     friction: &FrictionLaw,
     frame: &Frame,
     geometry: &WheelRail,
     extents: impl Iterator<Item = [f64; 4]>,
 ) -> FrictionLaw {
+    if let Some(law) = friction.along() {
+        return FrictionLaw::Along(law.about(frame.origin[0]));
+    }
     let Some(law) = friction.across() else {
         return friction.clone();
     };

@@ -88,7 +88,8 @@ pub(crate) fn add(
     monitor: &dyn Monitor,
 ) -> Result<Vec<bool>, SolveError> {
     let motions = case.problem.motions.len();
-    let chosen: Vec<usize> = if motions <= MOTIONS_MAX {
+    // The points of a history follow from each other.
+    let chosen: Vec<usize> = if motions <= MOTIONS_MAX || case.problem.history.is_some() {
         (0..motions).collect()
     } else {
         (0..MOTIONS_MAX)

@@ -82,6 +82,22 @@ test('rolling that changes is written in the form, and its forces stand over the
   assert.deepEqual((await data())[1].map((value) => Number(value.toFixed(6))), [0, 0.2, 0.2, 0.2, 0]);
 }));
 
+test('a wheel on a rail moves across and rolls through a history in the form', () => onPage('', async (page) => {
+  await page.locator('.code textarea').fill(JSON.stringify({ ...example('wheel-rail-flange'), load: { normal_force_n: 75_000 } }));
+  await page.getByLabel('Lateral velocity').fill('-40');
+  assert.equal((await json(page)).motion.wheelset.lateral_velocity_mm_per_s, -40);
+  await sound(page);
+  await page.locator('.seg').filter({ hasText: 'While it rolls' }).click();
+  await sound(page);
+  assert.equal(await page.getByLabel('or force along').count(), 0, 'patches share their creepages');
+  await page.getByRole('button', { name: /^Solve/ }).click();
+  const curve = page.locator('creep-curve');
+  await curve.locator('canvas').waitFor();
+  const distances = await curve.evaluate((element) => /** @type {HTMLElement & { plot: { data: number[][] } }} */ (element).plot.data[0]);
+  assert.deepEqual(distances, [0.5, 1, 2, 3, 5, 8, 12, 20]);
+  await page.screenshot({ path: join(OUTPUT, 'result-wheel-history.png'), fullPage: true });
+}));
+
 test('form and JSON are faces of one document, and broken JSON loses nothing', () => onPage('', async (page) => {
   await sound(page);
   await page.getByLabel('Normal force').fill('123.5');

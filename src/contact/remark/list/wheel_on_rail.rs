@@ -120,12 +120,12 @@ macro_rules! wheel_remarks {
                 100.0 * share
             ),
 
-            /// Several motions share their patches, so that the vertical load is balanced by normal forces alone.
+            /// Several motions, or the points of a history, share their patches, so that the vertical load is balanced by normal forces alone.
             NormalForcesAloneBalance {}
             code: "normal-forces-alone-balance",
             severity: Warning,
             advice: "Ask for the motions in cases of their own if friction forces should be included in the vertical balance.",
-            detail: "normal forces alone balance the vertical force, because several motions share their patches; the totals of a motion \
+            detail: "normal forces alone balance the vertical force, because several motions, or the points of a history, share their patches; the totals of a motion \
                      include its friction, so that they differ from the load".to_owned(),
         }
     };

@@ -68,16 +68,17 @@ function loadField(app, type) {
 function motionFields(app, type) {
   const { motion } = app.store.get().compose.document ?? {};
   const kind = Array.isArray(motion) ? 'list' : isObject(motion) && 'sweep' in motion ? 'sweep' : isObject(motion) && 'wheelset' in motion ? 'wheelset' : isObject(motion) && 'history' in motion ? 'history' : 'one';
-  const kinds = [...(hasSections(type) ? [['wheelset', 'Wheelset']] : []), ['one', 'Creepages'], ['sweep', 'Creep curve'], ...(hasSections(type) ? [] : [['history', 'While it rolls']])];
+  const kinds = [...(hasSections(type) ? [['wheelset', 'Wheelset']] : []), ['one', 'Creepages'], ['sweep', 'Creep curve'], ...(type === 'wheelset' ? [] : [['history', 'While it rolls']])];
   return html`
     <div class="segs" role="group" aria-label="Kind of motion">${kinds.map(([key, label]) => html`<label class="seg">
       <input type="radio" name="motion" .checked=${key === kind} @change=${() => change(app, '/motion', startMotion(key, motion))}><span>${label}</span></label>`)}</div>
     ${kind === 'list' ? html`<p class="hint">${/** @type {JsonValue[]} */ (motion).length} motions on the same patch; change them in the JSON.</p>` : nothing}
-    ${kind === 'history' ? historyFields(app) : nothing}
+    ${kind === 'history' ? historyFields(app, type) : nothing}
     ${kind === 'one' ? html`<div class="triple">${COMPONENTS.map(({ key, label, unit, factor }) => field(app, `/motion/${key}`, label, unit, { factor }))}</div>` : nothing}
     ${kind === 'wheelset' ? html`<div class="pair">
       ${field(app, '/motion/wheelset/speed_mm_per_s', 'Speed', 'km/h', { factor: 1e6 / 3600 })}
-      ${turningField(app)}</div>` : nothing}
+      ${turningField(app)}
+      ${acrossField(app)}</div>` : nothing}
     ${kind === 'sweep' && isObject(motion) && isObject(motion.sweep) ? sweepFields(app, motion.sweep) : nothing}`;
 }
 
@@ -87,6 +88,14 @@ function turningField(app) {
   if (given('drive_torque_n_mm')) return field(app, '/motion/wheelset/drive_torque_n_mm', 'Torque of the drive', 'N·m', { factor: 1000 });
   if (given('angular_velocity_rad_per_s')) return field(app, '/motion/wheelset/angular_velocity_rad_per_s', 'Angular velocity', 'rad/s');
   return field(app, '/motion/wheelset/free_rolling_radius_mm', 'Free rolling radius', 'mm');
+}
+
+/** How it moves across the track, in the form that the case has. @param {App} app */
+function acrossField(app) {
+  const forced = at(app.store.get().compose.document ?? {}, '/motion/wheelset/force_y_n') !== undefined;
+  return forced
+    ? field(app, '/motion/wheelset/force_y_n', 'Force across', 'kN', { factor: 1000 })
+    : field(app, '/motion/wheelset/lateral_velocity_mm_per_s', 'Lateral velocity', 'mm/s');
 }
 
 /** @param {App} app @param {JsonObject} sweep */

@@ -21,16 +21,19 @@ const COURSES = /** @type {const} */ ([
 /** A history to begin with: a creepage that begins at once. */
 export const FIRST_HISTORY = /** @type {JsonObject} */ ({ history: { distance_mm: [0.5, 1, 2, 3, 5, 8, 12, 20], creepage_x: 0.001 }, start: 'rest' });
 
-/** @param {App} app */
-export function historyFields(app) {
+/** @param {App} app @param {string} type That of the contact; patches of a wheel on a rail share creepages, and do not grow similar to themselves. */
+export function historyFields(app, type) {
+  const wheel = type === 'profiles';
+  const courses = COURSES.filter(({ key }) => !wheel || !key.startsWith('force'));
+  const starts = STARTS.filter(([key]) => !wheel || key !== 'pressed');
   const start = String(at(app.store.get().compose.document ?? {}, '/motion/start') ?? 'rest');
   const fault = faultAt(app, '/motion/start');
   return html`
     ${field(app, '/motion/history/distance_mm', 'Distances rolled', 'mm', { list: true, hint: 'One answer for each. Below, a number for all of them or one each.' })}
-    <div class="pair">${COURSES.map(({ key, label, unit, factor }) => field(app, `/motion/history/${key}`, label, unit, { factor, list: true }))}
+    <div class="pair">${courses.map(({ key, label, unit, factor }) => field(app, `/motion/history/${key}`, label, unit, { factor, list: true }))}
       ${field(app, '/motion/history/spin_per_mm', 'Spin', '1/m', { factor: 0.001, list: true })}
       ${field(app, '/motion/history/speed_mm_per_s', 'Speed', 'km/h', { factor: 1e6 / 3600 })}</div>
-    <div class="segs" role="group" aria-label="Start of the history">${STARTS.map(([key, label]) => html`<label class="seg">
+    <div class="segs" role="group" aria-label="Start of the history">${starts.map(([key, label]) => html`<label class="seg">
       <input type="radio" name="start" .checked=${key === start} @change=${() => change(app, '/motion/start', key)}><span>${label}</span></label>`)}</div>
     ${fault ? html`<p class="fault">${fault.detail}</p>` : ''}`;
 }

@@ -1,0 +1,202 @@
+//! Rolling that changes of a wheel on a rail that stays where it is: every patch has its own history of the same creepages.
+
+use railhead::contact;
+use railhead::contact::case::limits::Limits;
+use railhead::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
+use serde_json::{Value, json};
+
+use crate::cases::assert_fault;
+use crate::profile_cases::{generated, put};
+use crate::reference::{assert_none, solve};
+
+const MU: f64 = 0.3;
+const CREEPAGES: [f64; 3] = [0.0015, -0.001, 2e-4];
+
+/// Load on the gauge corner and on the flange, which touches ahead because the wheelset is yawed.
+fn two_patches() -> Value {
+    let place = json!({ "lateral_shift_mm": -6.45, "yaw_rad": -0.02 });
+    let mut case = put(&generated(), "contact", place);
+    case["load"] = json!({ "normal_force_n": 75_000 });
+    case
+}
+
+fn rolled(distances: &[f64], creepages: [f64; 3]) -> Value {
+    let [x, y, spin] = creepages;
+    json!({ "history": { "distance_mm": distances, "creepage_x": x, "creepage_y": y, "spin_per_mm": spin } })
+}
+
+fn moving(case: &Value, motion: Value) -> Solution {
+    let mut case = case.clone();
+    case["motion"] = motion;
+    solve(&case).0
+}
+
+/// Where a patch begins and ends along the track in mm.
+fn ends(patch: &PatchSolution) -> [f64; 2] {
+    let origin = patch
+        .position
+        .as_ref()
+        .expect("of profiles")
+        .origin_track_mm[0];
+    [0, 1].map(|k| origin + patch.extent_mm[k])
+}
+
+#[test]
+fn every_patch_ends_in_steady_rolling() {
+    let mut failures = Vec::new();
+    for mut case in [generated(), two_patches()] {
+        case["load"] = json!({ "normal_force_n": 75_000 });
+        let [x, y, spin] = CREEPAGES;
+        let steady = moving(
+            &case,
+            json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": spin }),
+        );
+        let longest = steady
+            .patches
+            .iter()
+            .map(|p| p.extent_mm[1] - p.extent_mm[0]);
+        let length = longest.fold(0.0, f64::max);
+        let rolled = moving(&case, rolled(&[0.2 * length, 5.0 * length], CREEPAGES));
+        assert_eq!(rolled.patches.len(), steady.patches.len());
+        for (k, (patch, known)) in rolled.patches.iter().zip(&steady.patches).enumerate() {
+            let ([early, late], [known]) = (&patch.points[..], &known.points[..]) else {
+                panic!("two points and one")
+            };
+            let limit = MU * patch.normal_force_n;
+            let error = |point: &PointSolution| {
+                let error = point.error_estimate.expect("an estimate");
+                [error.force_x_n, error.force_y_n]
+            };
+            let (own, other) = (error(late), error(known));
+            let off = [
+                late.force_x_n - known.force_x_n,
+                late.force_y_n - known.force_y_n,
+            ];
+            if (0..2).any(|i| off[i].abs() > own[i] + other[i]) {
+                failures.push(format!(
+                    "patch {k}: {off:?} of {limit}, {own:?} and {other:?}"
+                ));
+            }
+            // It has not always been so.
+            assert!(early.force_x_n.abs() < 0.7 * late.force_x_n.abs(), "{k}");
+            let taken = |k: usize| patch.points[k].history.expect("a history").dissipated_n_mm;
+            assert!(0.0 <= taken(0) && taken(0) < taken(1));
+        }
+    }
+    assert_none("not steady", &failures);
+}
+
+#[test]
+fn totals_are_sums_in_track_axes_at_every_distance() {
+    let solution = moving(&two_patches(), rolled(&[1.0, 4.0, 9.0], CREEPAGES));
+    assert!(solution.patches.len() > 1, "gauge corner and flange");
+    assert_eq!(solution.total.len(), 3);
+    for (k, total) in solution.total.iter().enumerate() {
+        let parts = solution.patches.iter().map(|patch| {
+            let angle = patch
+                .position
+                .as_ref()
+                .expect("of profiles")
+                .contact_angle_rad;
+            let point = &patch.points[k];
+            [
+                point.force_x_n,
+                point.force_y_n * angle.cos() + patch.normal_force_n * angle.sin(),
+            ]
+        });
+        let sum = parts.fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+        assert!((sum[0] - total.force_x_n).abs() < 1e-6 * 75e3);
+        assert!((sum[1] - total.force_y_n).abs() < 1e-6 * 75e3);
+    }
+}
+
+/// A vertical force is balanced by normal forces alone, since those do not change as the friction does.
+#[test]
+fn a_vertical_force_is_balanced_by_normal_forces_and_a_remark_says_so() {
+    let mut case = two_patches();
+    case["load"] = json!({ "vertical_force_n": 75_000 });
+    for distances in [&[6.0][..], &[1.0, 6.0]] {
+        let solution = moving(&case, rolled(distances, CREEPAGES));
+        let code = "normal-forces-alone-balance";
+        assert!(solution.remarks.iter().any(|remark| remark.code == code));
+        let of = |patch: &PatchSolution| {
+            let position = patch.position.as_ref().expect("of profiles");
+            patch.normal_force_n * position.contact_angle_rad.cos()
+        };
+        let vertical: f64 = solution.patches.iter().map(of).sum();
+        assert!((vertical / 75e3 - 1.0).abs() < 1e-3, "{vertical}");
+    }
+}
+
+/// In full slip each patch carries what its place on the track allows, and patches of a yawed wheel come to a wet place one after the other.
+#[test]
+fn patches_reach_a_jump_of_friction_where_they_are() {
+    let mut case = two_patches();
+    let mut still = moving(&case, json!({ "creepage_x": 0.2 }));
+    still
+        .patches
+        .sort_by(|a, b| ends(a)[0].total_cmp(&ends(b)[0]));
+    let (behind, ahead) = (&still.patches[0], &still.patches[still.patches.len() - 1]);
+    let apart = ends(ahead)[0] - ends(behind)[0];
+    assert!(apart > 3.0, "{apart}");
+    let jump = 60.0;
+    // Every patch just before the jump, and just beyond it.
+    let places = still.patches.iter().flat_map(|patch| {
+        let [rear, front] = ends(patch);
+        [jump - front - 0.05, jump - rear + 0.05]
+    });
+    let mut distances: Vec<f64> = places.collect();
+    distances.sort_by(f64::total_cmp);
+    case["friction"] = json!({ "along": { "x_mm": [jump, jump], "coefficient": [MU, 0.1] } });
+    let found = moving(&case, rolled(&distances, [0.2, 0.0, 0.0]));
+    let mut seen = [0; 2];
+    for patch in &found.patches {
+        let [rear, front] = ends(patch);
+        for (point, q) in patch.points.iter().zip(&distances) {
+            let expected = match (q + front < jump, q + rear > jump) {
+                (true, _) => MU,
+                (_, true) => 0.1,
+                _ => continue,
+            };
+            let found = point.force_x_n.abs() / patch.normal_force_n;
+            assert!(
+                (found - expected).abs() < 0.003,
+                "{found} for {expected} at {q}"
+            );
+            seen[usize::from(expected < MU)] += 1;
+        }
+    }
+    assert!(seen[0] > 2 && seen[1] > 2, "{seen:?}");
+}
+
+#[test]
+fn what_does_not_go_with_a_wheel_that_stays_is_refused_by_name() {
+    let forced = json!({ "history": { "distance_mm": [0, 5], "force_x_n": 1000 } });
+    let mut case = generated();
+    case["motion"] = forced;
+    assert_fault(
+        &case,
+        "/motion/history/force_x_n",
+        &["profiles", "creepage_x"],
+    );
+    case["motion"] = json!({ "history": { "distance_mm": [5], "force_y_n": 1000 } });
+    assert_fault(
+        &case,
+        "/motion/history/force_y_n",
+        &["profiles", "creepage_x"],
+    );
+    let mut pressed = rolled(&[0.0, 5.0], CREEPAGES);
+    pressed["start"] = json!("pressed");
+    case["motion"] = pressed;
+    assert_fault(&case, "/motion/start", &["similar"]);
+}
+
+/// A history longer than the solver allows is found out when the patches are known.
+#[test]
+fn a_history_with_too_many_steps_is_refused() {
+    let mut case = generated();
+    case["motion"] = rolled(&[0.0, 1e7], CREEPAGES);
+    let case = contact::check(&case, &Limits::default()).expect("a good case");
+    let error = contact::solve(&case, &contact::monitor::Unmonitored).unwrap_err();
+    assert!(error.to_string().contains("steps"), "{error}");
+}
