@@ -3,7 +3,7 @@
 //! `cargo bench --bench calibrate` prints the tables for the halves of every class (the first for fitting, the second for
 //! checking; of wheels on rails every patch counts); with names of classes (`ellipse smooth jump gap profiles`) those alone. Truths come from
 //! `tests/data/finer_meshes.json`; `-- truths [classes]` finds the missing ones, some seconds each; `-- continuity`
-//! prints how the estimate changes along a sweep, `-- case gap 42` one case as JSON.
+//! prints how the estimate changes along a sweep, `-- sweeps` how right it is along many, `-- case gap 42` one case as JSON.
 
 extern crate railhead_contact as railhead;
 
@@ -16,6 +16,7 @@ mod population;
 mod profile_shapes;
 #[path = "../stress/random.rs"]
 mod random;
+mod sweeps;
 mod truth;
 
 use cpu_time::ThreadTime;
@@ -56,6 +57,10 @@ fn main() {
     }
     if has("continuity") {
         continuity::table();
+        return;
+    }
+    if has("sweeps") {
+        sweeps::tables(has("each"));
         return;
     }
     let named = CLASSES.iter().any(|class| has(class.name()));

@@ -9,7 +9,10 @@ use crate::contact::rolling::force_control;
 use crate::contact::rolling::history;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::refinement::lender::may_borrow;
+use crate::contact::rolling::refinement::level_solve::MotionTask;
 use crate::contact::rolling::refinement::state::RefinementState;
+use crate::contact::rolling::refinement::stretch::Stretch;
 use crate::contact::solution::assemble::Assembly;
 use crate::contact::solution::finish::share_seconds;
 use crate::contact::solution::words::answer::Solution;
@@ -63,17 +66,40 @@ fn solve_motions(
         return Ok(assembly.finish());
     }
     let mut before: Option<MotionAnswer> = None;
-    for index in 0..case.problem.motions.len() {
-        let mut point = force_control::solve(&task, &mut state, index, before.as_ref(), watch)?;
-        add_coupling_error(&mut point, solved.coupling_error);
-        if index == 0 {
-            // What all motions share is charged to the first.
-            point.seconds += solved.report.map_or(0.0, |report| report.seconds);
+    let mut stretch = Stretch::default();
+    let motions = case.problem.motions.len();
+    for index in 0..motions {
+        let mut found = match task.target() {
+            Some(target) if may_borrow(&task, index) => {
+                let motion = task.motions[index];
+                let asked = MotionTask { index, motion };
+                let mut found = stretch.solve(&task, &mut state, asked, target, watch)?;
+                if index + 1 == motions {
+                    found.extend(stretch.end(&task, &mut state, target, watch)?);
+                }
+                found
+            }
+            target => {
+                let target = target.unwrap_or_default();
+                let mut found = stretch.end(&task, &mut state, target, watch)?;
+                let last = found.last().or(before.as_ref());
+                found.push(force_control::solve(&task, &mut state, index, last, watch)?);
+                found
+            }
+        };
+        for point in &mut found {
+            add_coupling_error(point, solved.coupling_error);
+            if assembly.is_empty() {
+                // What all motions share is charged to the first.
+                point.seconds += solved.report.map_or(0.0, |report| report.seconds);
+            }
+            assembly.add(&state.levels, point, watch)?;
+            watch.advance();
         }
-        assembly.add(&state.levels, &point, watch)?;
-        state.trim();
-        before = Some(point);
-        watch.advance();
+        if stretch.is_settled() {
+            state.trim();
+        }
+        before = found.pop().or(before);
     }
     Ok(assembly.finish())
 }

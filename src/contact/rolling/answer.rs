@@ -59,6 +59,24 @@ impl Work {
         self.entries += later.entries;
         self.residual = later.residual;
     }
+
+    /// Adds the counts of work that did not change the answer.
+    pub fn add_lost(&mut self, lost: Work) {
+        let residual = self.residual;
+        self.add(lost);
+        self.residual = residual;
+    }
+
+    /// The counts since an earlier state.
+    #[must_use]
+    pub fn since(&self, earlier: Work) -> Work {
+        Work {
+            iterations: self.iterations - earlier.iterations,
+            products: self.products - earlier.products,
+            entries: self.entries - earlier.entries,
+            residual: self.residual,
+        }
+    }
 }
 
 /// Why there is no tangential answer.

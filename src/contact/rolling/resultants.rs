@@ -49,6 +49,16 @@ impl Resultants {
         }
     }
 
+    /// These resultants times a factor.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Resultants {
+        Resultants {
+            force_x: factor * self.force_x,
+            force_y: factor * self.force_y,
+            moment_z: factor * self.moment_z,
+        }
+    }
+
     /// Richardson's extrapolation of errors that fall as 1/N: these resultants plus `share` of their change from a coarser
     /// mesh, with a force no larger than `bound`.
     #[must_use]

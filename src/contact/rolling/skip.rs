@@ -15,6 +15,8 @@ pub enum Skip {
     HalfTheCells,
     /// The patch alone is mirror-symmetric, so that half the operator is enough.
     HalfTheOperator,
+    /// Neighbours of a sweep were solved on the companions of the mesh, and lent what they told.
+    Companions,
 }
 
 impl Skip {
@@ -31,6 +33,9 @@ impl Skip {
             Skip::HalfTheCells => "mirror symmetry of patch and motion: half the cells",
             Skip::HalfTheOperator => {
                 "mirror symmetry of the patch: half of the influence matrix was computed"
+            }
+            Skip::Companions => {
+                "the error and the extrapolation of the resultants follow from neighbours in the sweep: no coarser mesh was solved"
             }
         }
     }

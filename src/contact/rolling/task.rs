@@ -53,6 +53,8 @@ pub struct RollingTask<'a> {
     pub traction_bound: TractionBound,
     /// Target or mesh.
     pub resolution: Resolution,
+    /// Are slips asked for, or what follows from them? Forces do not depend on it.
+    pub wants_slips: bool,
 }
 
 impl RollingTask<'_> {

@@ -124,6 +124,7 @@ impl EllipseMesh {
             method: Method::Fastsim,
             traction_bound: bound,
             resolution: Resolution::Mesh(size),
+            wants_slips: false,
         };
         let level = StripMesh::new(&task, size)?;
         let mut bounds = level.bound.clone();

@@ -7,9 +7,8 @@ use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work};
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
-use crate::contact::rolling::methods::boundary_element::task::LevelTask;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
-use crate::contact::rolling::refinement::level_solve::MotionTask;
+use crate::contact::rolling::refinement::level_solve::{MotionTask, level_task};
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::refinement::warm_start::nested_tractions;
 use crate::contact::rolling::resultants::Resultants;
@@ -80,15 +79,7 @@ impl Companion {
         let nested = nested_tractions(&fine, &answer.traction, &level);
         let sweep = &mut state.sweep;
         let start = sweep.companion_start(levels, &motion, nested.clone(), &level.bound);
-        let of_level = LevelTask {
-            level: &level,
-            motion: &motion,
-            fall: task.bound_fall(asked.index, level.scale.slip()),
-            passage: task
-                .passage(asked.index)
-                .map(|laws| level.scale.passage(&laws)),
-            tolerance: task.tolerance(),
-        };
+        let of_level = level_task(task, &level, &motion, asked.index);
         match boundary_element::trapezoid(of_level, &start, &mut state.workspace, monitor) {
             Ok((traction, work)) => {
                 sweep.remember_companion(levels, motion, &nested, &traction);

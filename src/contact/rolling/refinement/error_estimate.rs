@@ -15,6 +15,7 @@ use crate::contact::rolling::refinement::constants::{
     LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH, RULES_ON_MESH_SAMPLED,
     SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
 };
+use crate::contact::rolling::refinement::distances::distances;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
 use crate::contact::rolling::refinement::regime::pole_error;
 use crate::contact::rolling::resolution::Resolution;
@@ -64,13 +65,13 @@ pub enum Indicators {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
     /// Between the two rules; nothing if one of them did not converge.
-    rules: Option<Vec<f64>>,
+    pub(super) rules: Option<Vec<f64>>,
     /// To the level before, weighted.
     before: Option<Vec<f64>>,
     /// To half the strips and to half the cells.
-    companions: [Option<Vec<f64>>; 2],
+    pub(super) companions: [Option<Vec<f64>>; 2],
     /// A companion was tried and has no answer.
-    missing: bool,
+    pub(super) missing: bool,
     /// How far the resultants were extrapolated.
     extrapolated: Vec<f64>,
     /// From sampling the vortex of the tractions, weighted.
@@ -82,7 +83,9 @@ pub struct Measured {
     /// Of the iteration.
     tolerance: f64,
     /// The factor.
-    scale: f64,
+    pub(super) scale: f64,
+    /// By how much what neighbours lent may be off.
+    pub(super) lent: Vec<f64>,
 }
 
 impl Indicators {
@@ -144,7 +147,8 @@ impl Indicators {
                 .map(|before| change(task, patches, level, found, before)),
             companions: [None, None],
             missing: false,
-            extrapolated: none,
+            extrapolated: none.clone(),
+            lent: none,
             pole: if sticking { 0.0 } else { POLE_WEIGHT * pole },
             sums,
             normal: match finer.filter(|_| jumps(task)) {
@@ -227,7 +231,8 @@ impl Measured {
             self.tolerance,
         ];
         let squares: f64 = parts.iter().map(|part| part * part).sum();
-        Some((self.scale * squares.sqrt()).max(self.extrapolated[k]))
+        let whole = (self.scale * squares.sqrt()).hypot(self.lent[k]);
+        Some(whole.max(self.extrapolated[k]))
     }
 }
 
@@ -412,37 +417,4 @@ fn few_strips(level: &StripMesh) -> f64 {
         .map(counted)
         .fold(STRIPS_FEW, f64::min);
     (STRIPS_FEW / fewest).powi(2)
-}
-
-/// Distances of two sets of resultants: every patch relative to its own μN with moments about its middle, then the sums.
-fn distances(
-    task: &RollingTask,
-    patches: &[Patch],
-    found: &[Resultants],
-    other: &[Resultants],
-) -> Vec<f64> {
-    let mut distances = Vec::with_capacity(patches.len() + 1);
-    let (mut sum, mut sum_other) = (Resultants::default(), Resultants::default());
-    let (mut force, mut area, mut centre) = (0.0, 0.0, [0.0, 0.0]);
-    for (k, ((patch, found), other)) in patches.iter().zip(found).zip(other).enumerate() {
-        let bound = task.friction.limit(task.footprint, k);
-        let at = [
-            0.5 * (patch.extent[0] + patch.extent[1]),
-            0.5 * (patch.extent[2] + patch.extent[3]),
-        ];
-        let length = (patch.area / std::f64::consts::PI).sqrt();
-        distances.push(found.about(at).distance(&other.about(at), bound, length));
-        sum = sum.plus(*found);
-        sum_other = sum_other.plus(*other);
-        force += bound;
-        area += patch.area;
-        centre = [centre[0] + bound * at[0], centre[1] + bound * at[1]];
-    }
-    let centre = centre.map(|c| c / force);
-    let length = (area / std::f64::consts::PI).sqrt();
-    distances.push(
-        sum.about(centre)
-            .distance(&sum_other.about(centre), force, length),
-    );
-    distances
 }

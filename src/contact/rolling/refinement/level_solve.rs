@@ -132,42 +132,83 @@ pub fn solve_level(
     let tangential = run_method(task, &level, asked, start, workspace, monitor)
         // A part of a sweep counts from its own first motion, the client from that of the case.
         .map_err(|f| named(f, task, task.first_motion + asked.index))?;
-    let patches = task.footprint.patches().len();
-    let summed: Vec<Resultants> = (0..patches)
-        .map(|p| Resultants::of_patch(&level, &tangential.traction, p))
-        .collect();
-    let before = coarser
-        .as_ref()
-        .and_then(|point| before(state, &level, point));
-    let finer = finer_for_sums(task, &level, asked, &tangential);
-    let context = EstimateContext {
-        motion: &asked.motion,
-        before,
-        finer: finer.as_ref(),
-        slenderness: state.policy.slenderness(),
-        tolerance: task.tolerance(),
-    };
-    let indicators = Indicators::of_level(task, &level, &tangential, &summed, context);
     state.sweep.remember(number, motion, &tangential);
     // A search for creepages solves its later trials on the same levels.
     state.sweep.path.push(number);
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
     work.add(tangential.work);
-    let seconds =
+    let mut solved = answer_on(task, state, number, asked, tangential, coarser.as_ref());
+    solved.point.work = work;
+    solved.point.seconds =
         (monitor.elapsed() - began).as_secs_f64() + coarser.map_or(0.0, |point| point.seconds);
-    let point = SolvedLevel {
+    Ok(solved)
+}
+
+/// What is known of a motion from an answer on a level, and from that on a coarser one if there is one.
+pub(crate) fn answer_on(
+    task: &RollingTask,
+    state: &RefinementState,
+    number: usize,
+    asked: MotionTask,
+    tangential: LevelAnswer,
+    coarser: Option<&SolvedLevel>,
+) -> JudgedAnswer {
+    let level = state.levels.get(number);
+    let patches = task.footprint.patches().len();
+    let summed: Vec<Resultants> = (0..patches)
+        .map(|p| Resultants::of_patch(&level, &tangential.traction, p))
+        .collect();
+    let mut point = SolvedLevel {
         motion: asked.motion,
+        work: tangential.work,
         tangential,
         level: number,
         // Extrapolated later, if both companions are solved.
         resultants: summed.clone(),
         summed,
-        errors: indicators.errors(),
-        work,
+        errors: Vec::new(),
         method: method_used(task),
-        seconds,
+        seconds: 0.0,
     };
-    Ok(JudgedAnswer { point, indicators })
+    let before = coarser.and_then(|coarser| before(state, &level, coarser));
+    let indicators = indicators_on(task, state, &level, &point, before);
+    point.errors = indicators.errors();
+    JudgedAnswer { point, indicators }
+}
+
+/// Indicators of an answer on a level.
+pub(crate) fn indicators_on(
+    task: &RollingTask,
+    state: &RefinementState,
+    level: &StripMesh,
+    point: &SolvedLevel,
+    before: Option<CoarserLevel>,
+) -> Indicators {
+    let finer = finer_for_sums(task, level, &point.motion, &point.tangential);
+    let context = EstimateContext {
+        motion: &point.motion,
+        before,
+        finer: finer.as_ref(),
+        slenderness: state.policy.slenderness(),
+        tolerance: task.tolerance(),
+    };
+    Indicators::of_level(task, level, &point.tangential, &point.summed, context)
+}
+
+/// The task of a motion on a level.
+pub(crate) fn level_task<'a>(
+    task: &'a RollingTask,
+    level: &'a StripMesh,
+    motion: &'a Motion,
+    index: usize,
+) -> LevelTask<'a> {
+    LevelTask {
+        level,
+        motion,
+        fall: task.bound_fall(index, level.scale.slip()),
+        passage: task.passage(index).map(|laws| level.scale.passage(&laws)),
+        tolerance: task.tolerance(),
+    }
 }
 
 /// The level before, if it is coarse enough to compare with.
@@ -190,10 +231,10 @@ pub(crate) fn before<'a>(
 fn finer_for_sums(
     task: &RollingTask,
     level: &StripMesh,
-    asked: MotionTask,
+    motion: &Motion,
     answer: &LevelAnswer,
 ) -> Option<StripMesh> {
-    let turns = asked.motion.spin_per_mm != 0.0 && !task.friction.is_frictionless();
+    let turns = motion.spin_per_mm != 0.0 && !task.friction.is_frictionless();
     let slides = turns && answer.slips.iter().all(|slips| *slips);
     if !slides && !error_estimate::jumps(task) {
         return None;
@@ -250,14 +291,6 @@ fn run_method(
     if task.method == Method::Fastsim {
         return Ok(fastsim::solve(task, level, &motion));
     }
-    let of_level = LevelTask {
-        level,
-        motion: &motion,
-        fall: task.bound_fall(asked.index, level.scale.slip()),
-        passage: task
-            .passage(asked.index)
-            .map(|laws| level.scale.passage(&laws)),
-        tolerance: task.tolerance(),
-    };
+    let of_level = level_task(task, level, &motion, asked.index);
     boundary_element::solve(of_level, start.as_ref(), workspace, monitor)
 }

@@ -62,6 +62,15 @@ impl<'a> Levels<'a> {
         Arc::clone(level)
     }
 
+    /// The same, counted as a use.
+    #[must_use]
+    pub fn used(&mut self, level: usize) -> Arc<StripMesh> {
+        if let Some(place) = self.kept.iter().position(|(number, _)| *number == level) {
+            self.kept[place..].rotate_left(1);
+        }
+        self.get(level)
+    }
+
     /// Drops the least recently used levels beyond [`LEVELS_KEPT`] and gives their numbers. Called between motions: no answer may refer to
     /// a level by its number after that.
     pub fn trim(&mut self) -> Vec<usize> {

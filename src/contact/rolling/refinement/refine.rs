@@ -57,7 +57,8 @@ pub fn solve(
             on_mesh(task, state, asked, size, monitor).map(MotionAnswer::from)
         }
         (None, Resolution::Target(target)) => {
-            to_target(task, state, asked, target, monitor).map(MotionAnswer::from)
+            let solved = to_target(task, state, asked, target, monitor)?;
+            Ok(solved.answer.point.into())
         }
     }
 }
@@ -171,52 +172,114 @@ pub(crate) fn to_target(
     asked: MotionTask,
     target: f64,
     monitor: &dyn Monitor,
-) -> Result<SolvedLevel, SolveError> {
-    let begun = match state.sweep.begin.take() {
+) -> Result<ComparedAnswer, SolveError> {
+    let follows = match state.sweep.begin {
+        Some(plan) => {
+            let number = state.levels.level(plan)?;
+            let level = state.levels.get(number);
+            let motion = level.scale.motion(&asked.motion);
+            state.sweep.follows(number, &level, &motion)
+        }
+        None => false,
+    };
+    let begin = state.sweep.begin.take().filter(|_| follows);
+    let begun = match begin.or(state.sweep.begin_head) {
         Some(plan) => begin_on(task, state, asked, plan, monitor)?,
         None => None,
     };
-    let mut solved = match begun {
+    let solved = match begun {
         Some(solved) => solved,
         None => {
             let first = state.policy.first();
             solve_level(task, state, asked, first, None, monitor)?
         }
     };
+    let cells = state.levels.get(solved.point.level).mesh.cells();
+    let larger = state.policy.is_refinable(cells, HalfDoublings::NONE);
+    let mut found = ComparedAnswer::untried(solved);
+    if !(is_small(cells, target) && larger) {
+        let target = larger.then_some(target);
+        found.companions = judge(task, state, asked, &mut found.answer, target, monitor)?;
+    }
+    let found = refined(task, state, asked, target, found, monitor)?;
+    if let Some(begin) = state.sweep.begin.filter(|_| !follows) {
+        state.sweep.remember_head(found.answer.point.level, begin);
+    }
+    Ok(found)
+}
+
+/// Is a mesh of so many cells not to be trusted with a target?
+fn is_small(cells: usize, target: f64) -> bool {
+    target < FINE_TARGET && cells < CELLS_FINE
+}
+
+/// Solves on from an answer that was compared with its companions, or is on too small a mesh for that, up to the first mesh that meets the
+/// target.
+///
+/// # Errors
+/// Why there is no answer.
+pub(crate) fn refined(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    asked: MotionTask,
+    target: f64,
+    mut found: ComparedAnswer,
+    monitor: &dyn Monitor,
+) -> Result<ComparedAnswer, SolveError> {
     let mut planned = HalfDoublings::NONE;
     loop {
+        let solved = found.answer;
         let cells = state.levels.get(solved.point.level).mesh.cells();
-        let small = target < FINE_TARGET && cells < CELLS_FINE;
         let larger = state.policy.is_refinable(cells, planned);
-        if !(small && larger) {
-            judge(
-                task,
-                state,
-                asked,
-                &mut solved,
-                larger.then_some(target),
-                monitor,
-            )?;
-            if solved.point.error().is_some_and(|error| error <= target) {
-                break;
-            }
-        }
-        if !larger {
+        let met = solved.point.error().is_some_and(|error| error <= target);
+        if !larger || met && !is_small(cells, target) {
+            found.answer = solved;
             break;
         }
         let excess = solved.point.error().map_or(1.0, |error| error / target);
-        let found = regime_of(state, asked, &solved.point);
+        let regime = regime_of(state, asked, &solved.point);
         let plan;
         (plan, planned) = state
             .policy
-            .next(cells, planned, excess, found, task.single_motion);
-        solved = solve_level(task, state, asked, plan, Some(solved.point), monitor)?;
+            .next(cells, planned, excess, regime, task.single_motion);
+        let below = Some(solved.point);
+        found = ComparedAnswer::untried(solve_level(task, state, asked, plan, below, monitor)?);
+        let cells = state.levels.get(found.answer.point.level).mesh.cells();
+        let larger = state.policy.is_refinable(cells, planned);
+        if !(is_small(cells, target) && larger) {
+            let target = larger.then_some(target);
+            found.companions = judge(task, state, asked, &mut found.answer, target, monitor)?;
+        }
     }
-    let level = state.levels.get(solved.point.level);
-    let (plan, cells) = (level.plan, level.mesh.cells());
-    let excess = solved.point.error().map(|error| error / target);
-    state.sweep.begin = Some(state.policy.next_begin(plan, cells, excess));
-    Ok(solved.point)
+    state.sweep.begin = Some(next_begin(state, &found.answer.point, target));
+    Ok(found)
+}
+
+/// Where the motion after this one should begin.
+pub(crate) fn next_begin(state: &RefinementState, point: &SolvedLevel, target: f64) -> MeshPlan {
+    let level = state.levels.get(point.level);
+    let excess = point.error().map(|error| error / target);
+    state
+        .policy
+        .next_begin(level.plan, level.mesh.cells(), excess)
+}
+
+/// An answer, and those on the companions of its mesh.
+#[derive(Debug, Clone)]
+pub(crate) struct ComparedAnswer {
+    /// The answer.
+    pub(crate) answer: JudgedAnswer,
+    /// Half the strips, half the cells.
+    pub(crate) companions: [CompanionAnswer; 2],
+}
+
+impl ComparedAnswer {
+    fn untried(answer: JudgedAnswer) -> ComparedAnswer {
+        ComparedAnswer {
+            answer,
+            companions: [CompanionAnswer::Untried, CompanionAnswer::Untried],
+        }
+    }
 }
 
 /// Solves the companions of a level and adds what they tell of value and error. With a target it stops as soon as the estimate exceeds
@@ -231,12 +294,12 @@ pub(crate) fn judge(
     solved: &mut JudgedAnswer,
     target: Option<f64>,
     monitor: &dyn Monitor,
-) -> Result<(), SolveError> {
+) -> Result<[CompanionAnswer; 2], SolveError> {
+    let mut seen = [CompanionAnswer::Untried, CompanionAnswer::Untried];
     if !matches!(solved.indicators, Indicators::Measured(_)) {
-        return Ok(());
+        return Ok(seen);
     }
     let began = monitor.elapsed();
-    let mut seen = [CompanionAnswer::Untried, CompanionAnswer::Untried];
     let point = &mut solved.point;
     for (k, which) in [Companion::Across, Companion::Along]
         .into_iter()
@@ -255,10 +318,23 @@ pub(crate) fn judge(
         });
         point.errors = solved.indicators.errors();
     }
+    extrapolate(task, state, solved, &seen);
+    solved.point.seconds += (monitor.elapsed() - began).as_secs_f64();
+    Ok(seen)
+}
+
+/// Extrapolates the resultants by what both companions tell, except where cells gather about a pole.
+pub(crate) fn extrapolate(
+    task: &RollingTask,
+    state: &RefinementState,
+    solved: &mut JudgedAnswer,
+    seen: &[CompanionAnswer; 2],
+) {
+    let point = &mut solved.point;
     if let [
         CompanionAnswer::Found(across, strips),
-        CompanionAnswer::Found(on_levels, cells),
-    ] = &seen
+        CompanionAnswer::Found(along, cells),
+    ] = seen
         && state.levels.get(point.level).plan.pole().is_none()
     {
         for p in 0..task.footprint.patches().len() {
@@ -271,7 +347,7 @@ pub(crate) fn judge(
                 }
                 None => limit,
             };
-            let companions = [(across[p], strips), (on_levels[p], cells)];
+            let companions = [(across[p], strips), (along[p], cells)];
             let companions = companions.map(|(other, reach)| (other, EXTRAPOLATED * reach));
             point.resultants[p] = point.summed[p].beyond_all(companions, bound);
         }
@@ -281,8 +357,6 @@ pub(crate) fn judge(
             .apart(task, &point.resultants, &point.summed);
         point.errors = solved.indicators.errors();
     }
-    point.seconds += (monitor.elapsed() - began).as_secs_f64();
-    Ok(())
 }
 
 /// Begins a motion of a sweep on the mesh where the last motion ended, if that serves this one too.
@@ -315,7 +389,7 @@ fn begin_on(
 }
 
 /// What the tractions of a solved level look like.
-fn regime_of(state: &RefinementState, asked: MotionTask, point: &SolvedLevel) -> Regime {
+pub(crate) fn regime_of(state: &RefinementState, asked: MotionTask, point: &SolvedLevel) -> Regime {
     let spinning = asked.motion.spin_per_mm != 0.0;
     regime(&state.levels.get(point.level), &point.tangential, spinning)
 }

@@ -255,7 +255,7 @@ impl<'a> RuleSequence<'a> {
             self.follow_passage(&newton, &rigid, passage, t)?;
         }
         let found = ThreePointAnswer {
-            slip: self.expand(self.control.workspace.slip()),
+            slip: self.own_slip(),
             slips: self.zones(&newton, t),
             by_fixed_point,
             other: None,
@@ -429,6 +429,11 @@ impl<'a> RuleSequence<'a> {
         }
         t.copy_from_slice(&found);
         Ok(Some(self.zones(&newton, t)))
+    }
+
+    /// The slips of the rule that was solved last, over the whole mesh.
+    pub(super) fn own_slip(&self) -> [Vec<f64>; 2] {
+        self.expand(self.control.workspace.slip())
     }
 
     /// Values of the unknowns (x then y) as two vectors over the whole mesh.

@@ -5,6 +5,7 @@
 //! three-point rule, whose slips are smooth; its direction is that of the traction, as Coulomb's law demands. The difference of the
 //! two rules is one of the indicators of the error.
 
+use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::Monitor;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::{
@@ -15,6 +16,7 @@ use crate::contact::rolling::methods::boundary_element::task::LevelTask;
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::start::Start;
+use crate::contact::rolling::strip_mesh::StripMesh;
 
 /// Solves one motion on one level, from a start or from zero tractions.
 ///
@@ -38,12 +40,7 @@ pub fn solve(
     let parity = level.parity(task.motion);
     let control = Control { workspace, monitor };
     let mut solve = RuleSequence::new(task, &operator, parity, control);
-    let mut skips = Vec::new();
-    if parity.is_some() {
-        skips.push(Skip::HalfTheCells);
-    } else if level.is_mirrored() {
-        skips.push(Skip::HalfTheOperator);
-    }
+    let mut skips = symmetry(level, parity);
     let mut t = solve.start(start.map(|start| &start.three_point));
     let three_point = solve.three_point(&mut t, start.is_some())?;
     if three_point.by_fixed_point {
@@ -86,6 +83,17 @@ pub fn solve(
     })
 }
 
+/// What the symmetry of a level and a motion saves.
+fn symmetry(level: &StripMesh, parity: Option<Parity>) -> Vec<Skip> {
+    if parity.is_some() {
+        vec![Skip::HalfTheCells]
+    } else if level.is_mirrored() {
+        vec![Skip::HalfTheOperator]
+    } else {
+        Vec::new()
+    }
+}
+
 /// Tractions of the trapezoid rule alone, from a start that is near; for the companions of a mesh. Where that takes many steps, and where
 /// bounds fall with the slip, the three-point rule is solved first.
 ///
@@ -126,4 +134,75 @@ pub fn trapezoid(
     let none = [0, 1].map(|_| vec![0.0; slips.len()]);
     project_on_bound(&solve.bounds(), &slips, &mut traction, &none);
     Ok((traction, solve.work))
+}
+
+/// The trapezoid rule alone, from a start of its own, if that takes few steps, and the work. Slips are those of this rule, which alternate
+/// from cell to cell ([`three_point_beside`] finds better ones).
+///
+/// # Errors
+/// The monitor may stop the work.
+pub fn trapezoid_of_motion(
+    task: LevelTask,
+    start: &[Vec<f64>; 2],
+    workspace: &mut NewtonWorkspace,
+    monitor: &dyn Monitor,
+) -> Result<(Option<LevelAnswer>, Work), LevelFailure> {
+    if task.without_iteration().is_some() {
+        return Ok((None, Work::default()));
+    }
+    let level = task.level;
+    let operator = level.operator(monitor)?;
+    let parity = level.parity(task.motion);
+    let control = Control { workspace, monitor };
+    let mut solve = RuleSequence::new(task, &operator, parity, control);
+    let mut t = solve.start(Some(start));
+    let Some(slips) = solve.few_steps(&mut t)? else {
+        return Ok((None, solve.work));
+    };
+    let mut traction = solve.expand(&t);
+    let own = solve.own_slip();
+    let slip = project_on_bound(&solve.bounds(), &slips, &mut traction, &own);
+    let answer = LevelAnswer {
+        traction,
+        second: None,
+        slip,
+        slips,
+        exit: LevelExit::Solved,
+        work: solve.work,
+        skips: symmetry(level, parity),
+        remarks: Vec::new(),
+    };
+    Ok((Some(answer), solve.work))
+}
+
+/// Adds the three-point rule to an answer of [`trapezoid_of_motion`], from tractions that differ from those of the answer by `apart`:
+/// its tractions, and slips of its size.
+///
+/// # Errors
+/// See [`solve`].
+pub fn three_point_beside(
+    task: LevelTask,
+    answer: &mut LevelAnswer,
+    apart: &[Vec<f64>; 2],
+    workspace: &mut NewtonWorkspace,
+    monitor: &dyn Monitor,
+) -> Result<(), LevelFailure> {
+    let level = task.level;
+    let operator = level.operator(monitor)?;
+    let parity = level.parity(task.motion);
+    let control = Control { workspace, monitor };
+    let mut solve = RuleSequence::new(task, &operator, parity, control);
+    let start = [0, 1].map(|k| {
+        let pairs = answer.traction[k].iter().zip(&apart[k]);
+        pairs.map(|(t, apart)| t + apart).collect()
+    });
+    let mut t = solve.start(Some(&start));
+    let three_point = solve.three_point(&mut t, true)?;
+    answer.second = Some(solve.expand(&t));
+    // The tractions are within their bounds already, and are to stay as they are to the last bit.
+    let mut same = answer.traction.clone();
+    let bound = solve.bounds();
+    answer.slip = project_on_bound(&bound, &answer.slips, &mut same, &three_point.slip);
+    answer.work.add_lost(solve.work);
+    Ok(())
 }
