@@ -107,11 +107,10 @@ impl Sum<'_> {
         let [xx, yy, zz, xy, xz, yz] = terms;
         for lane in 0..LANES {
             let (x, y, z) = (xs[lane] - x_load, ys[lane] - y_load, zs[lane]);
-            let (along, across) = (along * share[lane], across * share[lane]);
-            let down = down * share[lane];
             let distance = x.mul_add(x, y.mul_add(y, z * z)).sqrt();
             let deep = distance + z;
-            let inverse = 1.0 / (distance * deep);
+            // Every term has this factor, so that a load that is not felt adds exactly 0.
+            let inverse = share[lane] / (distance * deep);
             // 1/ρ, 1/(ρ + z), 1/(ρ (ρ + z)).
             let (near, below) = (inverse * deep, inverse * distance);
             let square = near * near;

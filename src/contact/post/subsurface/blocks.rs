@@ -2,6 +2,10 @@
 
 use crate::contact::half_space::point_loads::LANES;
 
+/// Depth counts this much more than length along the surface: rules follow from distances to loads, which differ more over depths. Places on a plane
+/// of 40 × 25 feel 5 % fewer loads in vain than with 1, and as many with 3; lengths over depths and logarithms of depths do worse.
+const DEPTH: f64 = 2.0;
+
 /// Orders the numbers of places so that each run of [`LANES`] of them lies close together: halved along their largest extent until one
 /// run is left.
 pub fn gather(places: &[[f64; 3]], order: &mut [usize]) {
@@ -13,7 +17,11 @@ pub fn gather(places: &[[f64; 3]], order: &mut [usize]) {
         let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
             (low.min(at), high.max(at))
         });
-        high - low
+        if axis == 2 {
+            DEPTH * (high - low)
+        } else {
+            high - low
+        }
     };
     let extents = [0, 1, 2].map(extent);
     let axis = (0..3).max_by(|a, b| extents[*a].total_cmp(&extents[*b]));
