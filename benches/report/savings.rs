@@ -83,6 +83,7 @@ pub fn section(lu: f64) -> String {
         );
     }
     text.push_str(&one_by_one(lu));
+    text.push_str(&creep_map(lu));
     text.push_str(&one_shape(lu));
     text
 }
@@ -99,6 +100,24 @@ fn one_by_one(lu: f64) -> String {
         costs.iter().map(|c| c.seconds).sum::<f64>() / lu,
         costs.iter().map(|c| c.products).sum::<u32>(),
         costs.iter().map(|c| c.allocations).sum::<u64>()
+    )
+}
+
+/// Both creepages over a grid, at one spin, in one job.
+fn creep_map(lu: f64) -> String {
+    let [along, across] = [40_u32, 25];
+    let motion = json!({ "sweep": {
+        "creepage_x": { "from": -0.004, "to": 0.004, "points": along },
+        "creepage_y": { "from": 0, "to": 0.004, "points": across },
+        "spin_per_mm": { "from": 0.0004, "to": 0.0004, "points": 1 },
+        "combine": "grid",
+    } });
+    let cost = cost(&motion, &json!(["resultants"]), 0.3);
+    let motions = f64::from(along * across);
+    format!(
+        "A creep map of {along} × {across} creepages at a spin of 0.0004/mm takes {:.3} LU and {:.1} products a motion.\n\n",
+        cost.seconds / lu / motions,
+        f64::from(cost.products) / motions
     )
 }
 
