@@ -71,7 +71,7 @@ pub struct Stretch {
 }
 
 impl Stretch {
-    /// Solves the next motion of a sweep, which [`may_borrow`]. Gives the motions whose answers are known now, in order; others wait.
+    /// Solves the next motion of a sweep, which [`may_borrow`](crate::contact::rolling::refinement::lender::may_borrow). Gives the motions whose answers are known now, in order; others wait.
     ///
     /// # Errors
     /// Why there is no answer.
