@@ -9,8 +9,8 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 const SAMPLES: usize = 129;
 
 /// Friction in the axes of a frame whose patches have these extents `[x_min, x_max, y_min, y_max]` in mm: a coefficient by the y of the
-/// rail's profile, or by the inclination of its surface, becomes one by the y of the frame; one by the place along the track, one by the x of the
-/// frame, which under a yawed wheel does not begin where that of the track does.
+/// rail's profile, or by the inclination of its surface, becomes one by the y of the frame; one by the place along the track becomes one by
+/// the x of the frame, whose origin lies ahead of or behind that of the track if the wheel is yawed.
 pub(crate) fn in_frame(
     friction: &FrictionLaw,
     frame: &Frame,

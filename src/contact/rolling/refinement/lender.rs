@@ -1,5 +1,6 @@
-//! What a motion of a sweep lends to its neighbours: by how much the resultants change to the second rule and to both companions. Between
-//! near motions on one mesh these changes are nearly linear, and how far from it three motions that were solved for them tell.
+//! What a motion of a sweep lends to its neighbours: how much its resultants change with the second rule and on both companion meshes.
+//! Between nearby motions on the same mesh these changes are almost linear; three motions for which they were computed show how far they
+//! are from it.
 
 use crate::contact::method::Method;
 use crate::contact::rolling::answer::LevelAnswer;
@@ -15,17 +16,19 @@ use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
-/// What neighbours lend may be off by this share of the larger of their estimates; it is added to the estimate. With 0.5 and a tenth of the target
-/// below, as many motions borrow and as many estimates hold (`cargo bench --bench calibrate -- sweeps`).
+/// A motion borrows if interpolation between its neighbours is off by no more than this share of the larger of their estimates, or by the share of the
+/// target below; this error is added to its own estimate. With 0.5 and 0.1, as many motions borrow and as many estimates hold
+/// (`cargo bench --bench calibrate -- sweeps`). With 1 and 0.5 a creep curve of 51 points takes 14 % more products, because larger estimates miss
+/// the target.
 const SHARE_BENT: f64 = 0.3;
-/// The same, of the target.
+/// See [`SHARE_BENT`].
 const SHARE_BENT_TARGET: f64 = 0.2;
 
 /// Changes of the resultants of every patch: to the three-point rule, to half the strips, to half the cells.
 type Changes = [Vec<Resultants>; 3];
 
-/// May motion `index` borrow? Not where bounds follow from the slips of the three-point rule, and not where forces are prescribed, which
-/// the judged answer is searched for.
+/// May motion `index` borrow? Not if the bounds depend on the slips of the three-point rule, and not if forces are prescribed, because the search
+/// for their creepages needs a judged answer at every trial.
 #[must_use]
 pub fn may_borrow(task: &RollingTask, index: usize) -> bool {
     let constant = !task.friction.depends_on_slip()
@@ -107,8 +110,8 @@ fn combined<const N: usize>(parts: [(&Changes, f64); N]) -> Changes {
     })
 }
 
-/// By how much estimates between two places may be off that are `reach` apart, where the changes bend as over these three motions, in
-/// order: for every patch, then for the sum.
+/// The largest error of linear interpolation between two places `reach` apart, if the changes curve as they do over these three motions, in
+/// order. It is weighted as in an estimate, for every patch and then for the sum.
 #[must_use]
 pub fn bent(task: &RollingTask, three: [&Lender; 3], reach: f64) -> Vec<f64> {
     let [a, b, c] = three;
@@ -134,7 +137,7 @@ pub fn bent(task: &RollingTask, three: [&Lender; 3], reach: f64) -> Vec<f64> {
     (0..=patches.len()).map(of).collect()
 }
 
-/// Is what was found by [`bent`] no more than a share of the larger estimate of both motions, or of the target?
+/// Is an error found by [`bent`] small enough beside the estimates of both motions, or beside the target?
 #[must_use]
 pub fn is_straight(off: &[f64], ends: [&Lender; 2], target: f64) -> bool {
     let [a, b] = ends;
@@ -143,8 +146,8 @@ pub fn is_straight(off: &[f64], ends: [&Lender; 2], target: f64) -> bool {
     pairs.all(|(off, (a, b))| *off <= (SHARE_BENT * a.max(*b)).max(SHARE_BENT_TARGET * target))
 }
 
-/// Puts into the indicators of a motion at `place` between two others what these tell, each change as large as at that of both where it is
-/// larger, and what it may be off by; gives answers on the companions, as if they had been solved.
+/// Sets the indicators of a motion at `place` from the two compared motions around it: the interpolated changes, each at least as large as at
+/// either end, and the interpolation error `off`. Returns the answers on the companions as if they had been solved.
 fn lend(
     task: &RollingTask,
     solved: &mut JudgedAnswer,
@@ -189,7 +192,8 @@ fn lend(
     found
 }
 
-/// Lets a motion borrow from the lenders about its place, of which the first has the number `begin`. Is what it borrows right enough?
+/// Lets a motion borrow from the two lenders around its place, of which the first has the number `begin`. Returns `false` if interpolation
+/// between them is not exact enough.
 pub fn borrow(
     task: &RollingTask,
     state: &RefinementState,
@@ -201,7 +205,7 @@ pub fn borrow(
 ) -> bool {
     let ends = [&lenders[begin], &lenders[begin + 1]];
     let reach = ends[1].place - ends[0].place;
-    // Of the lenders before and behind, those that make the more of it.
+    // The third lender may be the one before or the one behind; the larger curvature counts.
     let first = [begin.checked_sub(1), Some(begin)];
     let three = first
         .into_iter()

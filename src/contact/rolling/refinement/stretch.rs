@@ -1,5 +1,5 @@
-//! Stretches of a sweep: near motions on a line that one mesh serves. Some of them are compared with the companions of the mesh; those
-//! between are solved with one rule alone and borrow what their neighbours were told.
+//! Stretches of a sweep: nearby motions on a line that the same mesh serves. Some of them are compared with the companion meshes; those in
+//! between are solved with one rule only and borrow the result of the comparison from their neighbours.
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
@@ -20,9 +20,9 @@ use crate::contact::rolling::refinement::sweep_line::SweepLine;
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::task::RollingTask;
 
-/// Most motions from one that is compared to the next. Chosen by judgement; how much it matters was not measured.
+/// Largest number of motions from one comparison to the next. Chosen by judgement; how much it matters was not measured.
 const STRIDE_MAX: usize = 16;
-/// Most motions that are solved in the usual way after one whose start was no good, before another is tried. Of 120 sweeps at 0.02 and
+/// Largest number of motions that are solved in the usual way after a failed start, before another start is tried. Of 120 sweeps at 0.02 and
 /// 0.005 the worst takes 6 % more products than without borrowing, 14 % without a pause.
 const PAUSE_MAX: usize = 16;
 
@@ -60,11 +60,11 @@ pub struct Stretch {
     apart: [Vec<f64>; 2],
     /// Motions since the last of them.
     waiting: Vec<Waiting>,
-    /// How many motions from one that is compared to the next.
+    /// Number of motions from one comparison to the next.
     stride: usize,
     /// Work that led to no answer.
     lost: Work,
-    /// Motions in a row whose start was no good.
+    /// Number of motions in a row whose start failed.
     vain: u32,
     /// Motions to solve in the usual way before a start is tried again.
     pause: usize,
