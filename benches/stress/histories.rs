@@ -27,9 +27,9 @@ const CLASSES: [Class; 7] = [
 /// Contact lengths of rolling with nothing that changes, after which rolling is steady. On a patch two and a half times as wide as long the force
 /// was 0.003 of the limit from steady after 4, on meshes from 12 × 16 to 40 × 54 alike, and a twentieth of that after 6.
 const LENGTHS_STEADY: f64 = 6.0;
-/// The same where friction falls with slip.
+/// The same where friction falls with slip: bounds lag by up to two contact lengths. Chosen by judgement, long.
 const LENGTHS_FALLING: f64 = 38.0;
-/// Length in mm that no patch of a wheel is longer than.
+/// A length in mm that no patch of the wheels below reaches; the distances are scaled to it. Chosen by judgement.
 const WHEEL_PATCH: f64 = 25.0;
 /// S1002 on 60E1.
 const WHEEL: &str = include_str!("../../api/examples/wheel-rail-flange.case.json");

@@ -62,7 +62,7 @@ pub(super) struct RuleSequence<'a> {
     /// Newton steps of a rule at most.
     steps_max: u32,
     operator: &'a LevelOperator,
-    parity: Option<Parity>,
+    pub(super) parity: Option<Parity>,
     /// Bounds of the cells, at rest where they fall with the slip.
     bound: Vec<f64>,
     /// The same at the slips of the three-point rule, once it is solved; nothing where they do not fall.
@@ -76,7 +76,6 @@ impl<'a> RuleSequence<'a> {
     pub(super) fn new(
         task: LevelTask<'a>,
         operator: &'a LevelOperator,
-        parity: Option<Parity>,
         control: Control<'a>,
     ) -> RuleSequence<'a> {
         let LevelTask {
@@ -86,6 +85,7 @@ impl<'a> RuleSequence<'a> {
             passage,
             tolerance,
         } = task;
+        let parity = level.parity(motion);
         let padded = operator.influence.padded(parity);
         let padded_with_zeros = |values: &[f64]| {
             let length = padded.max(values.len());

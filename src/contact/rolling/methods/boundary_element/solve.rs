@@ -35,12 +35,9 @@ pub fn solve(
     if let Some(answer) = task.without_iteration() {
         return Ok(answer);
     }
-    let level = task.level;
-    let operator = level.operator(monitor)?;
-    let parity = level.parity(task.motion);
-    let control = Control { workspace, monitor };
-    let mut solve = RuleSequence::new(task, &operator, parity, control);
-    let mut skips = symmetry(level, parity);
+    let operator = task.level.operator(monitor)?;
+    let mut solve = RuleSequence::new(task, &operator, Control { workspace, monitor });
+    let mut skips = symmetry(task.level, solve.parity);
     let mut t = solve.start(start.map(|start| &start.three_point));
     let three_point = solve.three_point(&mut t, start.is_some())?;
     if three_point.by_fixed_point {
@@ -109,11 +106,8 @@ pub fn trapezoid(
     if let Some(answer) = task.without_iteration() {
         return Ok((answer.traction, answer.work));
     }
-    let level = task.level;
-    let operator = level.operator(monitor)?;
-    let parity = level.parity(task.motion);
-    let control = Control { workspace, monitor };
-    let mut solve = RuleSequence::new(task, &operator, parity, control);
+    let operator = task.level.operator(monitor)?;
+    let mut solve = RuleSequence::new(task, &operator, Control { workspace, monitor });
     let mut t = solve.start(Some(start));
     let mut slips = None;
     if task.fall.is_none() && task.passage.is_none() {
@@ -150,11 +144,8 @@ pub fn trapezoid_of_motion(
     if task.without_iteration().is_some() {
         return Ok((None, Work::default()));
     }
-    let level = task.level;
-    let operator = level.operator(monitor)?;
-    let parity = level.parity(task.motion);
-    let control = Control { workspace, monitor };
-    let mut solve = RuleSequence::new(task, &operator, parity, control);
+    let operator = task.level.operator(monitor)?;
+    let mut solve = RuleSequence::new(task, &operator, Control { workspace, monitor });
     let mut t = solve.start(Some(start));
     let Some(slips) = solve.few_steps(&mut t)? else {
         return Ok((None, solve.work));
@@ -169,7 +160,7 @@ pub fn trapezoid_of_motion(
         slips,
         exit: LevelExit::Solved,
         work: solve.work,
-        skips: symmetry(level, parity),
+        skips: symmetry(task.level, solve.parity),
         remarks: Vec::new(),
     };
     Ok((Some(answer), solve.work))
@@ -187,11 +178,8 @@ pub fn three_point_beside(
     workspace: &mut NewtonWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<(), LevelFailure> {
-    let level = task.level;
-    let operator = level.operator(monitor)?;
-    let parity = level.parity(task.motion);
-    let control = Control { workspace, monitor };
-    let mut solve = RuleSequence::new(task, &operator, parity, control);
+    let operator = task.level.operator(monitor)?;
+    let mut solve = RuleSequence::new(task, &operator, Control { workspace, monitor });
     let start = [0, 1].map(|k| {
         let pairs = answer.traction[k].iter().zip(&apart[k]);
         pairs.map(|(t, apart)| t + apart).collect()
