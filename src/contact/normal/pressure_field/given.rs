@@ -10,6 +10,7 @@ use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::level_set::State;
 use crate::contact::normal::pressure_field::line::GridLine;
+use crate::contact::normal::pressure_field::patch_shape::EdgeCare;
 use crate::contact::normal::pressure_field::sample_grid::{
     PADDING, PATCHES_MAX, SampleGrid, padded,
 };
@@ -63,7 +64,7 @@ impl GridPressure {
             };
             remarks.push(remark.into());
         }
-        field.find_edges();
+        field.find_edges(EdgeCare::Exact);
         Ok((field, remarks))
     }
 
@@ -95,14 +96,14 @@ impl GridPressure {
     }
 
     /// Continues the squared pressures beyond the contact and measures the region of every patch.
-    pub(crate) fn find_edges(&mut self) {
+    pub(crate) fn find_edges(&mut self, care: EdgeCare) {
         let states = level_set::extend(&self.grid, &mut self.q);
         self.smooth = states
             .into_iter()
             .map(|state| state == State::Smooth)
             .collect();
         for label in 0..self.shapes.len() {
-            let (extent, area) = self.measure(label, &self.shapes[label]);
+            let (extent, area) = self.measure(label, &self.shapes[label], care);
             let patch = &mut self.shapes[label].patch;
             (patch.extent, patch.area) = (extent, area);
         }

@@ -17,6 +17,7 @@ use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::Tile;
 use crate::contact::normal::hertz::NormalLoad;
 use crate::contact::normal::neighbours::{Neighbour, neglected};
+use crate::contact::normal::pressure_field::computed::Edges;
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
 use crate::contact::normal::wheel_height::gap_remarks::{cut_patches, missed_beside};
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
@@ -78,6 +79,8 @@ struct Fineness {
     detail: GapSampling,
     /// Target of the resultants' error relative to μN.
     target: f64,
+    /// Whether edges are placed: not where a height is only looked at on the way.
+    edges: Edges,
 }
 
 impl Fineness {
@@ -86,8 +89,19 @@ impl Fineness {
         let mut fineness = Fineness::fine(wanted);
         if !near {
             fineness.detail = GapSampling::Coarse;
+            if matches!(wanted.accuracy, Accuracy::For(_)) {
+                fineness.edges = Edges::Left;
+            }
         }
         fineness
+    }
+
+    fn finer(self) -> Fineness {
+        Fineness {
+            detail: GapSampling::Fine,
+            edges: Edges::Found,
+            ..self
+        }
     }
 
     fn fine(wanted: NormalPass) -> Fineness {
@@ -98,6 +112,7 @@ impl Fineness {
         Fineness {
             detail: GapSampling::Fine,
             target,
+            edges: Edges::Found,
         }
     }
 }
@@ -239,7 +254,7 @@ impl WheelTask {
             lowering = if closed { found.lowering } else { next };
             if closed || !fine && found.is_near(force) {
                 // Forces of coarse gaps are too inexact as ends of the bracket; their slope is exact enough.
-                fineness.detail = GapSampling::Fine;
+                fineness = fineness.finer();
                 bracket = bracket.opened(found.found[1]);
             }
             last = Some(found);
@@ -261,10 +276,7 @@ impl WheelTask {
     ) -> Result<WheelContact, NormalError> {
         match self.lowered(search, lowering, fineness, near, workspace, monitor) {
             Err(NormalError::NoAnswer(_)) if fineness.detail == GapSampling::Coarse => {
-                let fine = Fineness {
-                    detail: GapSampling::Fine,
-                    ..fineness
-                };
+                let fine = fineness.finer();
                 self.lowered(search, lowering, fine, near, workspace, monitor)
             }
             found => found,
@@ -355,6 +367,7 @@ impl WheelTask {
             GapSampling::Fine => GridFineness::for_answer(fineness.target),
         };
         let found = contact.solve_near(start, resolution, workspace, monitor)?;
+        let found = contact.found(found, fineness.edges)?;
         let mut remarks = found.remarks;
         remarks.extend(missed_beside(gap, &found.field));
         if fineness.detail == GapSampling::Fine {
