@@ -139,7 +139,7 @@ impl<T: FftFloat> GridOperator<T> {
         self.clear_rows_from(self.ny, workspace);
         transform_columns(&*self.plans.columns_forward, workspace);
         for (value, factor) in workspace.columns.iter_mut().zip(&self.spectrum) {
-            *value = *value * *factor;
+            (value.re, value.im) = (value.re * *factor, value.im * *factor);
         }
         transform_columns(&*self.plans.columns_backward, workspace);
         for (block, rows) in displacement.chunks_mut(nx * BLOCK).enumerate() {
@@ -206,9 +206,20 @@ impl<T: FftFloat> GridOperator<T> {
     fn store_rows(&self, first: usize, count: usize, workspace: &mut GridWorkspace<T>) {
         let half = self.half();
         let columns = workspace.columns.chunks_exact_mut(self.height);
+        if count < BLOCK {
+            for (i, column) in columns.enumerate() {
+                for k in 0..count {
+                    column[first + k] = workspace.spectra[k * half + i];
+                }
+            }
+            return;
+        }
+        let rows: [&[Complex<T>]; BLOCK] =
+            std::array::from_fn(|k| &workspace.spectra[k * half..(k + 1) * half]);
         for (i, column) in columns.enumerate() {
-            for k in 0..count {
-                column[first + k] = workspace.spectra[k * half + i];
+            let column = &mut column[first..first + BLOCK];
+            for k in 0..BLOCK {
+                column[k] = rows[k][i];
             }
         }
     }
@@ -217,9 +228,11 @@ impl<T: FftFloat> GridOperator<T> {
     fn fetch_rows(&self, first: usize, count: usize, workspace: &mut GridWorkspace<T>) {
         let half = self.half();
         let columns = workspace.columns.chunks_exact(self.height);
+        let spectra = &mut workspace.spectra[..count * half];
         for (i, column) in columns.enumerate() {
-            for k in 0..count {
-                workspace.spectra[k * half + i] = column[first + k];
+            let column = &column[first..first + count];
+            for (spectrum, value) in spectra.chunks_exact_mut(half).zip(column) {
+                spectrum[i] = *value;
             }
         }
     }
