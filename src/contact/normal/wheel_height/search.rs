@@ -6,20 +6,13 @@
 //! and solved coarsely.
 
 use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
+use crate::contact::geometry::local_gap::GapSampling;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
-use crate::contact::normal::gap::grid::GridFineness;
-use crate::contact::normal::gap::seen::GapSeen;
-use crate::contact::normal::gap::surface::GapSurface;
-use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::gap::tile::Tile;
-use crate::contact::normal::hertz::NormalLoad;
 use crate::contact::normal::neighbours::{Neighbour, neglected};
-use crate::contact::normal::pressure_field::computed::Edges;
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
-use crate::contact::normal::wheel_height::gap_remarks::{cut_patches, missed_beside};
+use crate::contact::normal::wheel_height::lowered::Fineness;
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::remark::list::Remark;
@@ -30,8 +23,11 @@ const HEIGHTS_MAX: u32 = 40;
 /// contacts scale; the error left is of second order for these, and at worst about a third of the tolerance in pressures and lengths.
 /// Below the lower bound the forces of neighbouring heights differ by no more than those of different grids.
 const FORCE_TOLERANCE: [f64; 2] = [5e-4, 5e-3];
-/// A gap whose overlap is less than this fraction of the deepest one is left out: its force is about the power 3/2 of this, 1e-4.
-const DEPTH_SHARE_MIN: f64 = 2e-3;
+/// Times that a wheel with one gap is looked at before its height is sought by its overlaps. Keeps the numbers safe; not tuned.
+const ALONE_MAX: u32 = 5;
+/// A wheel with one gap is pressed by its force: how far, relatively, the height that this tells may lie from the one that its gap was made for,
+/// where gaps are coarse and where they are fine. XXX
+const ALONE_OFF: [f64; 2] = [0.3, 0.02];
 
 /// How a wheel should come to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,61 +67,6 @@ impl Accuracy {
             Accuracy::For(target) => target.clamp(low, high),
         }
     }
-}
-
-/// How finely the wheel is solved at one height.
-#[derive(Debug, Clone, Copy)]
-struct Fineness {
-    detail: GapSampling,
-    /// Target of the resultants' error relative to μN.
-    target: f64,
-    /// Whether edges are placed: not where a height is only looked at on the way.
-    edges: Edges,
-}
-
-impl Fineness {
-    /// At the first height: coarse where it is not near the one sought.
-    fn first(wanted: NormalPass, near: bool) -> Fineness {
-        let mut fineness = Fineness::fine(wanted);
-        if !near {
-            fineness.detail = GapSampling::Coarse;
-            if matches!(wanted.accuracy, Accuracy::For(_)) {
-                fineness.edges = Edges::Left;
-            }
-        }
-        fineness
-    }
-
-    fn finer(self) -> Fineness {
-        Fineness {
-            detail: GapSampling::Fine,
-            edges: Edges::Found,
-            ..self
-        }
-    }
-
-    fn fine(wanted: NormalPass) -> Fineness {
-        let target = match wanted.accuracy {
-            Accuracy::About(_) => f64::INFINITY,
-            Accuracy::For(target) => target,
-        };
-        Fineness {
-            detail: GapSampling::Fine,
-            target,
-            edges: Edges::Found,
-        }
-    }
-}
-
-/// One gap at one height of the wheel's centre.
-struct LoweredGap<'a> {
-    gap: &'a LocalGap,
-    /// Deepest overlap in mm.
-    depth: f64,
-    /// Height of the wheel's centre in mm.
-    centre: f64,
-    /// What it is solved from, if anything is known.
-    start: Option<Tile>,
 }
 
 impl WheelTask {
@@ -188,8 +129,62 @@ impl WheelTask {
                 friction_share: wanted.friction_share,
                 ..wheel
             }),
-            _ => self.height_sought(search, wanted, start, workspace, monitor),
+            _ => match self.alone(search, wanted, start, workspace, monitor)? {
+                Some(wheel) => Ok(wheel),
+                None => self.height_sought(search, wanted, start, workspace, monitor),
+            },
         }
+    }
+
+    /// The wheel that touches in one gap alone: pressed by its force there, coarsely to see where it comes to rest and what friction carries, and
+    /// finely at that height. Nothing where it touches in more than one gap.
+    fn alone(
+        &self,
+        search: &ContactLocus,
+        wanted: NormalPass,
+        HeightStart { before, forecast }: HeightStart,
+        workspace: &mut GridWorkspace<f32>,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<WheelContact>, NormalError> {
+        let target = |friction_share: f64| self.target(friction_share).unwrap_or_default();
+        let mut friction_share = wanted.friction_share;
+        let mut force = target(friction_share);
+        let exact = matches!(wanted.accuracy, Accuracy::For(_));
+        let starts_near = exact && before.is_some_and(|before| before.is_near(force));
+        let mut fineness = Fineness::first(wanted, starts_near);
+        let mut lowering = match before {
+            Some(known) => known.lowering_for(force),
+            None => search.estimated_lowering(force / self.contact_modulus),
+        };
+        let mut last = None::<WheelContact>;
+        for heights in 1..=ALONE_MAX {
+            let near = last.as_ref().or(before);
+            let place = (lowering, force);
+            let pressed = self.pressed_alone(search, place, fineness, near, workspace, monitor)?;
+            let Some(mut found) = pressed else {
+                return Ok(None);
+            };
+            found.heights = heights;
+            found.friction_share = friction_share;
+            let off = (found.lowering / lowering - 1.0).abs();
+            let fine = fineness.detail == GapSampling::Fine;
+            if fine && off <= ALONE_OFF[1] {
+                return Ok(Some(found.at_rest(HeightExit::Met { missed: 0.0 }, force)));
+            }
+            if !fine && off <= ALONE_OFF[0] {
+                if !exact {
+                    return Ok(Some(found));
+                }
+                if let Some(share) = forecast.and_then(|told| told(&found)) {
+                    friction_share = share;
+                    force = target(share);
+                }
+                fineness = fineness.finer();
+            }
+            lowering = found.lowering_for(force);
+            last = Some(found);
+        }
+        Ok(None)
     }
 
     /// The wheel at the height that carries the force, height by height.
@@ -283,117 +278,6 @@ impl WheelTask {
         }
     }
 
-    /// The wheel at one height.
-    fn lowered(
-        &self,
-        search: &ContactLocus,
-        lowering: f64,
-        fineness: Fineness,
-        near: Option<&WheelContact>,
-        workspace: &mut GridWorkspace<f32>,
-        monitor: &dyn Monitor,
-    ) -> Result<WheelContact, NormalError> {
-        let centre = search.touch - lowering;
-        let gaps = search
-            .gaps(lowering, fineness.detail)
-            .map_err(NormalError::NoAnswer)?;
-        let depths: Vec<f64> = gaps.iter().map(depth).collect();
-        let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
-        let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
-        let patches = touching
-            .map(|(gap, depth)| {
-                let start = near.and_then(|near| near.start_for(gap, *depth));
-                let place = LoweredGap {
-                    gap,
-                    depth: *depth,
-                    centre,
-                    start,
-                };
-                self.solve_gap(place, fineness, workspace, monitor)
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        if patches.is_empty() {
-            return Err(NormalError::NoAnswer(
-                "wheel and rail do not overlap at this height of the wheel".to_owned(),
-            ));
-        }
-        let mut wheel = WheelContact {
-            lowering,
-            found: [0.0; 2],
-            load_error: 0.0,
-            force_residual: 0.0,
-            centre,
-            heights: 1,
-            friction_share: 0.0,
-            met: false,
-            patches,
-            remarks: Vec::new(),
-        };
-        let carried = self.carried(&wheel);
-        wheel.found = [carried, self.slope(&wheel, carried)];
-        Ok(wheel)
-    }
-
-    /// One gap under the overlap it has; approaches count from the first touch of its patch along the normal.
-    fn solve_gap(
-        &self,
-        place: LoweredGap,
-        fineness: Fineness,
-        workspace: &mut GridWorkspace<f32>,
-        monitor: &dyn Monitor,
-    ) -> Result<GapContact, NormalError> {
-        let LoweredGap {
-            gap,
-            depth,
-            centre,
-            start,
-        } = place;
-        if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
-            return Err(NormalError::Stopped(stop));
-        }
-        let above: Vec<Vec<f64>> = gap
-            .gap
-            .iter()
-            .map(|row| row.iter().map(|height| height + depth).collect())
-            .collect();
-        let contact = GapTask {
-            gap: GapSurface::grid(&gap.x, &gap.y, &above),
-            loading: NormalLoad::Approach(depth),
-            contact_modulus: self.contact_modulus,
-            seen: GapSeen::default(),
-        };
-        let resolution = match fineness.detail {
-            GapSampling::Coarse => GridFineness::coarse(),
-            GapSampling::Fine => GridFineness::for_answer(fineness.target),
-        };
-        let found = contact.solve_near(start, resolution, workspace, monitor)?;
-        let found = contact.found(found, fineness.edges)?;
-        let mut remarks = found.remarks;
-        remarks.extend(missed_beside(gap, &found.field));
-        if fineness.detail == GapSampling::Fine {
-            let cut = cut_patches(&self.geometry, gap, &found.field);
-            remarks.extend(cut.map_err(|miss| NormalError::NoAnswer(miss.to_string()))?);
-        }
-        let moved = |to: [f64; 2]| {
-            let place = self.geometry.moved(&gap.frame, to, centre);
-            place.map_err(|miss| NormalError::NoAnswer(miss.to_string()))
-        };
-        if fineness.detail == GapSampling::Fine {
-            for patch in 0..found.field.patches().len() {
-                moved(found.field.load_centre(Some(patch)))?;
-            }
-        }
-        let middle = found.field.load_centre(None);
-        Ok(GapContact {
-            frame: moved(middle)?,
-            approach: depth,
-            field: found.field.from_origin(middle),
-            report: found.report,
-            remarks,
-            start: found.start,
-        })
-    }
-
     /// A remark if the patches in gaps of their own would change each other's forces by more than a part of the load.
     #[must_use]
     pub fn uncoupled(&self, wheel: &WheelContact, part: f64) -> Option<Remark> {
@@ -407,38 +291,4 @@ impl WheelTask {
         let [share, distance_mm] = neglected(&gaps, self.contact_modulus, keeps_load)?;
         (share > part).then_some(Remark::PatchesUncoupled { share, distance_mm })
     }
-
-    /// The force that is prescribed, as it came out.
-    fn carried(&self, found: &WheelContact) -> f64 {
-        match self.loading {
-            WheelLoad::Vertical(_) => found.vertical_force(),
-            WheelLoad::Normal(_) | WheelLoad::Lowering(_) => {
-                found.patches.iter().map(GapContact::normal_force).sum()
-            }
-        }
-    }
-
-    /// Estimated derivative of that force by the lowering.
-    fn slope(&self, found: &WheelContact, carried: f64) -> f64 {
-        let part = |gap: &GapContact| {
-            let cos = gap.frame.angle.cos();
-            let own = 2.0 * self.contact_modulus * gap.stiffness() * cos;
-            match self.loading {
-                WheelLoad::Vertical(_) => own * cos,
-                WheelLoad::Normal(_) | WheelLoad::Lowering(_) => own,
-            }
-        };
-        let slope: f64 = found.patches.iter().map(part).sum();
-        // The power 3/2 of Hertz's contacts is a bound for anything that grows as it is pressed.
-        slope.max(carried / found.lowering)
-    }
-}
-
-/// Deepest overlap of a gap in mm.
-fn depth(gap: &LocalGap) -> f64 {
-    -gap.gap
-        .iter()
-        .flatten()
-        .copied()
-        .fold(f64::INFINITY, f64::min)
 }

@@ -140,6 +140,14 @@ impl WheelContact {
             .start_for(gap, depth)
     }
 
+    /// The lowering at which another force is likely to be carried, from the derivative of the power 2/3 of the force, which for Hertz's contacts
+    /// is constant.
+    pub(crate) fn lowering_for(&self, force: f64) -> f64 {
+        let [carried, slope] = self.found;
+        let step = 1.5 * carried / slope * ((force / carried).powf(2.0 / 3.0) - 1.0);
+        (self.lowering + step).clamp(0.25 * self.lowering, 4.0 * self.lowering)
+    }
+
     /// Is the force near enough to go on with fine gaps?
     pub(crate) fn is_near(&self, target: f64) -> bool {
         let single = matches!(&self.patches[..], [gap] if gap.field.patches().len() == 1);
