@@ -1,5 +1,6 @@
 //! Normal influence between equal rectangles on a regular grid, applied as a padded convolution.
 
+use pulp::{Arch, NullaryFnOnce};
 use rustfft::Fft;
 use rustfft::num_complex::Complex;
 
@@ -154,16 +155,14 @@ impl<T: FftFloat> GridOperator<T> {
         }
     }
 
-    /// Adds the displacement in mm at every centre caused by an additional pressure in MPa on cell `cell`.
-    pub fn add(&self, cell: usize, pressure: f64, displacement: &mut [f64]) {
-        let (nx, stride) = (self.nx, 2 * self.nx - 1);
-        let (i, j) = (cell % nx, cell / nx);
-        for (row, values) in displacement.chunks_exact_mut(nx).enumerate() {
-            let first = row.abs_diff(j) * stride + nx - 1 - i;
-            for (u, coefficient) in values.iter_mut().zip(&self.lines[first..first + nx]) {
-                *u += pressure * coefficient;
-            }
-        }
+    /// Adds the displacement in mm at every centre caused by additional pressures in MPa on some cells.
+    pub fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
+        Arch::new().dispatch(Addition {
+            nx: self.nx,
+            lines: &self.lines,
+            changes,
+            displacement,
+        });
     }
 
     /// Transforms the row of the workspace into spectrum `k` of the block.
@@ -272,6 +271,32 @@ impl<T: FftFloat> GridOperator<T> {
     }
 }
 
+/// See [`GridOperator::add`]; compiled for the instruction set of this machine.
+struct Addition<'a> {
+    nx: usize,
+    lines: &'a [f64],
+    changes: &'a [(usize, f64)],
+    displacement: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Addition<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let (nx, stride) = (self.nx, 2 * self.nx - 1);
+        for (cell, pressure) in self.changes {
+            let (i, j) = (cell % nx, cell / nx);
+            for (row, values) in self.displacement.chunks_exact_mut(nx).enumerate() {
+                let first = row.abs_diff(j) * stride + nx - 1 - i;
+                for (u, coefficient) in values.iter_mut().zip(&self.lines[first..first + nx]) {
+                    *u += pressure * coefficient;
+                }
+            }
+        }
+    }
+}
+
 fn transform_columns<T: FftFloat>(plan: &dyn Fft<T>, workspace: &mut GridWorkspace<T>) {
     plan.process_with_scratch(&mut workspace.columns, &mut workspace.scratch);
 }
@@ -369,9 +394,8 @@ mod tests {
             }
         }
         let mut summed = vec![0.0; pressure.len()];
-        for (cell, p) in pressure.iter().enumerate() {
-            operator.add(cell, *p, &mut summed);
-        }
+        let changes: Vec<(usize, f64)> = pressure.iter().copied().enumerate().collect();
+        operator.add(&changes, &mut summed);
         for (a, b) in summed.iter().zip(expected) {
             assert!((a - b).abs() < 1e-12 * largest, "{a} {b}");
         }

@@ -31,7 +31,7 @@ pub(crate) trait PressureInfluence {
 }
 
 impl<T: FftFloat> PressureInfluence for GridOperator<T> {
-    const CHANGES_MAX: usize = 12;
+    const CHANGES_MAX: usize = 48;
     type Workspace = GridWorkspace<T>;
 
     fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut GridWorkspace<T>) {
@@ -39,9 +39,7 @@ impl<T: FftFloat> PressureInfluence for GridOperator<T> {
     }
 
     fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
-        for (cell, pressure) in changes {
-            GridOperator::add(self, *cell, *pressure, displacement);
-        }
+        GridOperator::add(self, changes, displacement);
     }
 
     fn own(&self) -> f64 {

@@ -14,6 +14,7 @@ pub(crate) const RESOLUTION: GridFineness = GridFineness {
     contact: 44.0,
     patch: 24.0,
     share_min: 0.02,
+    settles: true,
 };
 
 /// The same for the search of a height, where forces within some tenths of a per cent are enough.
@@ -21,11 +22,19 @@ pub(crate) const RESOLUTION_COARSE: GridFineness = GridFineness {
     contact: 22.0,
     patch: 12.0,
     share_min: 0.05,
+    settles: false,
 };
 
 /// Below this target of the resultants' error (relative to μN) grids are finer: the error of a normal problem falls with the
 /// power 3/2 of its cells' size.
 pub(crate) const TARGET_USUAL: f64 = 0.002;
+
+/// Beyond this target they are coarser, down to [`COARSEST`] times the usual cells: 26 across the contact, where the error of the normal problem is
+/// about 0.0013.
+pub(crate) const TARGET_LOOSE: f64 = 0.005;
+
+/// See [`TARGET_LOOSE`].
+pub(crate) const COARSEST: f64 = 0.6;
 
 /// Power of the target over [`TARGET_USUAL`] by which the cells grow: the inverse of that 3/2.
 pub(crate) const TARGET_POWER: f64 = -2.0 / 3.0;

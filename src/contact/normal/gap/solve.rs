@@ -11,8 +11,8 @@ use crate::contact::normal::gap::conjugate_gradients::{
     PressureAnswer, PressureTask, solve_pressure,
 };
 use crate::contact::normal::gap::constants::{
-    APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, NEAR, PRESSURE_CHANGE,
-    REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL, TOLERANCE,
+    APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, COARSEST, GRIDS_MAX, LEVEL_BEYOND, NEAR, PRESSURE_CHANGE,
+    REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_LOOSE, TARGET_POWER, TARGET_USUAL, TOLERANCE,
     TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
@@ -205,8 +205,12 @@ impl GapTask {
             return Err(edge_reached(*side, limits));
         }
         let capped = wanted.capped;
-        let Some((coarse, before)) = before.filter(|_| resolution.settles()) else {
+        if !resolution.settles {
             return Ok(NextStep::End(GridsExit::Settled, capped));
+        }
+        let Some((coarse, before)) = before else {
+            // The first grid is solved roughly, and there is nothing to compare it with.
+            return Ok(NextStep::PressureGrid(finer));
         };
         let ratio = (coarse.step[0] / grid.step[0]).max(coarse.step[1] / grid.step[1]);
         if (pressed.approach - before.approach).abs() <= APPROACH_CHANGE * ratio * depth
@@ -249,18 +253,15 @@ impl GridFineness {
         RESOLUTION.for_target(target)
     }
 
-    /// The resolution for a target of the resultants' error relative to μN; unchanged for targets from [`TARGET_USUAL`] on.
+    /// The resolution for a target of the resultants' error relative to μN; unchanged for targets from [`TARGET_USUAL`] to [`TARGET_LOOSE`].
     fn for_target(self, target: f64) -> GridFineness {
         let finer = (target.min(TARGET_USUAL) / TARGET_USUAL).powf(TARGET_POWER);
+        let coarser = (target.max(TARGET_LOOSE) / TARGET_LOOSE).powf(TARGET_POWER);
+        let finer = finer * coarser.max(COARSEST);
         GridFineness {
             contact: finer * self.contact,
             patch: finer * self.patch,
             ..self
         }
-    }
-
-    /// Is the result compared with that of the grid before?
-    fn settles(self) -> bool {
-        self.contact >= RESOLUTION.contact
     }
 }
