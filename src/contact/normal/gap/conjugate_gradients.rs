@@ -84,7 +84,7 @@ impl PressureAnswer {
 /// Why there is no pressure.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum PressureFailure {
-    /// The iteration ended with this residual.
+    /// The iteration ended, with this least residual.
     NotConverged(f64),
     /// The caller stopped the work.
     Stopped(Stop),
@@ -123,14 +123,15 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
     work.scale_to(loading, cell);
     influence.apply(&work.p[..n], &mut work.u[..n], workspace);
     let (mut follow, mut last) = (false, 1.0);
-    let mut residual = f64::INFINITY;
+    let mut least_residual = f64::INFINITY;
     for iterations in 0..ITERATIONS_MAX {
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(PressureFailure::Stopped(stop));
         }
         let approach = work.distances(loading);
         let [violation, square] = work.part_from(approach);
-        residual = violation / (approach - least);
+        let residual = violation / (approach - least);
+        least_residual = least_residual.min(residual);
         if residual <= tolerance && approach > least {
             work.p.truncate(n);
             work.g.truncate(n);
@@ -162,7 +163,7 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
             influence.apply(&work.p[..n], &mut work.u[..n], workspace);
         }
     }
-    Err(PressureFailure::NotConverged(residual))
+    Err(PressureFailure::NotConverged(least_residual))
 }
 
 /// What changes from iteration to iteration; all cells, and a few more without pressure up to a multiple of [`LANES`].

@@ -14,7 +14,7 @@ use crate::contact::normal::neighbours::{Neighbour, neglected};
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
 use crate::contact::normal::wheel_height::lowered::Fineness;
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
-use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
+use crate::contact::normal::wheel_height::wheel_contact::WheelContact;
 use crate::contact::remark::list::Remark;
 
 /// Heights after which the search is given up. Keeps the numbers safe; not tuned.
