@@ -12,9 +12,8 @@ use crate::contact::geometry::envelope::envelope;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::grouping::{Grouping, Overlap};
 use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
-use crate::contact::geometry::locus_lines::{LocusLines, LocusPoint};
+use crate::contact::geometry::locus_lines::{Inclination, LocusLines, LocusPoint};
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::numerics::bisection::bisect;
 
 /// Spacing of the search across the track, in mm. It decides where frames and windows lie, not what the gap is in them: 0.01 mm changes forces by
 /// XXX of μN at most on the wheels of `cargo bench --bench calibrate profiles`.
@@ -36,6 +35,8 @@ const SLOPE_BEYOND_CUT: f64 = 0.5;
 const LOWERING_MAX: f64 = 16.0;
 /// Lowering in mm under a light load; the estimate for heavier ones doubles it until it carries them. It changes times, no answer.
 const LOWERING_FIRST: f64 = 0.032;
+/// Steps by which a lowering is estimated within its bracket, which the first steps narrow to about a hundredth. It changes times, no answer.
+const SECANTS: usize = 6;
 /// Clearance in mm below which the inclination of a line is kept: more than usual loads lower a wheel. It changes times, no answer.
 const NEAR: f64 = 0.3;
 
@@ -108,10 +109,13 @@ fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
     })
 }
 
-/// Turn about x that lays the track's y along the rail's surface at a parameter of its curve.
-fn inclination(geometry: &WheelRail, rail: f64) -> f64 {
+/// The inclination of the rail's surface at a parameter of its curve.
+fn inclination(geometry: &WheelRail, rail: f64) -> Inclination {
     let [y, z] = geometry.rail_at(rail).slope;
-    (z / y).atan()
+    Inclination {
+        angle: (z / y).atan(),
+        cos: y.abs() / (y * y + z * z).sqrt(),
+    }
 }
 
 impl<'g> ContactLocus<'g> {
@@ -180,10 +184,23 @@ impl<'g> ContactLocus<'g> {
             (low, high) = (high, 2.0 * high);
             near = below(self.lines, high);
         }
-        // The estimate jumps where one more line overlaps: only its being more or less than the force can be relied on.
-        let [low, high] = bisect([low, high], 17, |lowering| {
-            estimated_force(&near, self.rolling_radius(), lowering) < force
-        });
+        // The estimate jumps where one more line overlaps: the bracket is kept. It grows about as the power 3/2.
+        let power =
+            |lowering: f64| estimated_force(&near, self.rolling_radius(), lowering).powf(2.0 / 3.0);
+        let wanted = force.powf(2.0 / 3.0);
+        let mut known = [(low, power(low)), (high, power(high))];
+        for _ in 0..SECANTS {
+            let [(low, under), (high, over)] = known;
+            let secant = low + (high - low) * (wanted - under) / (over - under);
+            let margin = 0.02 * (high - low);
+            let next = secant.clamp(low + margin, high - margin);
+            if !next.is_finite() {
+                break;
+            }
+            let found = (next, power(next));
+            known[usize::from(found.1 >= wanted)] = found;
+        }
+        let [(low, _), (high, _)] = known;
         0.5 * (low + high)
     }
 
@@ -198,7 +215,9 @@ impl<'g> ContactLocus<'g> {
             let own = depth * depth * depth.sqrt();
             weight += own;
             y += own * line.y;
-            angle += own * self.inclination(line);
+            if own > 0.0 {
+                angle += own * self.inclination(line).angle;
+            }
         }
         let y = y / weight;
         let k = lines
@@ -220,11 +239,11 @@ impl<'g> ContactLocus<'g> {
 
     /// Clearance on a line along the rail's normal, with the wheel lowered below first touch; in mm.
     pub(crate) fn clearance(&self, line: &LocusPoint, lowering: f64) -> f64 {
-        (line.clearance - lowering) * self.inclination(line).cos()
+        (line.clearance - lowering) * self.inclination(line).cos
     }
 
-    /// Turn about x that lays the track's y along the rail's surface.
-    pub(crate) fn inclination(&self, line: &LocusPoint) -> f64 {
+    /// The inclination of the rail's surface on a line.
+    pub(crate) fn inclination(&self, line: &LocusPoint) -> Inclination {
         line.inclination
             .unwrap_or_else(|| inclination(self.geometry, line.rail))
     }

@@ -23,7 +23,10 @@ pub(crate) fn envelope(curve: &[Option<[f64; 3]>], step: f64) -> Envelope {
             continue;
         };
         let (low, high) = (from[0].min(to[0]) / step, from[0].max(to[0]) / step);
-        let (lowest, highest) = (low.ceil() as i64, high.floor() as i64);
+        // Casts cut toward zero, which costs less than a call that rounds.
+        let (lowest, highest) = (low as i64, high as i64);
+        let lowest = lowest + i64::from((lowest as f64) < low);
+        let highest = highest - i64::from(highest as f64 > high);
         if lowest > highest {
             continue;
         }

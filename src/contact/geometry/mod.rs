@@ -3,8 +3,8 @@
 pub mod conicity;
 pub mod contact_locus;
 pub mod crossing;
-pub mod formats;
 pub mod envelope;
+pub mod formats;
 pub mod frame;
 pub mod grouping;
 pub mod holes;

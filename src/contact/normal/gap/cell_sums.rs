@@ -106,9 +106,8 @@ impl WithSimd for Parting<'_> {
         let approach = simd.splat_f64s(self.approach);
         let (mut violation, mut square) = (zero, zero);
         let (g, _) = S::as_mut_simd_f64s(self.distance);
-        let [p, area, yielding] =
-            [self.pressure, &self.weights.area, &self.weights.yielding]
-                .map(|values| &S::as_simd_f64s(values).0[..g.len()]);
+        let [p, area, yielding] = [self.pressure, &self.weights.area, &self.weights.yielding]
+            .map(|values| &S::as_simd_f64s(values).0[..g.len()]);
         for k in 0..g.len() {
             let here = simd.sub_f64s(g[k], approach);
             g[k] = here;
@@ -213,7 +212,11 @@ impl WithSimd for Product<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f64 {
         let mut sum = simd.splat_f64s(0.0);
-        for (a, b) in S::as_simd_f64s(self.0).0.iter().zip(S::as_simd_f64s(self.1).0) {
+        for (a, b) in S::as_simd_f64s(self.0)
+            .0
+            .iter()
+            .zip(S::as_simd_f64s(self.1).0)
+        {
             sum = simd.mul_add_e_f64s(*a, *b, sum);
         }
         simd.reduce_sum_f64s(sum)

@@ -11,9 +11,9 @@ use crate::contact::normal::gap::conjugate_gradients::{
     PressureAnswer, PressureTask, solve_pressure,
 };
 use crate::contact::normal::gap::constants::{
-    APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, COARSEST, GRIDS_MAX, LEVEL_BEYOND, NEAR, PRESSURE_CHANGE,
-    REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_LOOSE, TARGET_POWER, TARGET_USUAL, TOLERANCE,
-    TOLERANCE_FIRST,
+    APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, COARSEST, GRIDS_MAX, LEVEL_BEYOND, NEAR,
+    PRESSURE_CHANGE, REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_LOOSE, TARGET_POWER,
+    TARGET_USUAL, TOLERANCE, TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
 use crate::contact::normal::gap::search_box::{SearchBox, reach_of_level};

@@ -179,7 +179,9 @@ mod tests {
         let (task, start) = (bumps(lift, 0.06), start.at([0.0, -6.0], 0.06));
         let fineness = GridFineness::for_answer(TARGET);
         let near = task.solve_from(start, fineness, &mut workspace, &Unmonitored);
-        let near = near.unwrap().map(|found| task.found(found, Edges::Found).unwrap());
+        let near = near
+            .unwrap()
+            .map(|found| task.found(found, Edges::Found).unwrap());
         let searched = task.solve_for(TARGET, &mut workspace, &Unmonitored);
         (near, searched.unwrap())
     }

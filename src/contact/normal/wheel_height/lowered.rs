@@ -198,7 +198,11 @@ impl WheelTask {
         if !is_alone(reached) {
             return Ok(None);
         }
-        Ok(Some(self.wheel(reached, search.touch - reached, vec![patch])))
+        Ok(Some(self.wheel(
+            reached,
+            search.touch - reached,
+            vec![patch],
+        )))
     }
 
     /// One gap pressed together; approaches count from the first touch of its patch along the normal. Where a force is given, the wheel lies by what
@@ -245,7 +249,11 @@ impl WheelTask {
         };
         let found = contact.solve_near(start, resolution, workspace, monitor)?;
         let found = contact.found(found, fineness.edges)?;
-        let reached = found.field.patches().iter().find_map(|patch| patch.approach);
+        let reached = found
+            .field
+            .patches()
+            .iter()
+            .find_map(|patch| patch.approach);
         let approach = reached.unwrap_or(depth);
         let centre = centre - (approach - depth) / gap.frame.angle.cos();
         let mut remarks = found.remarks;
