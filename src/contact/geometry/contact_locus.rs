@@ -15,8 +15,8 @@ use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
 use crate::contact::geometry::locus_lines::{Inclination, LocusLines, LocusPoint};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
-/// Spacing of the search across the track, in mm. It decides where frames and windows lie, not what the gap is in them: 0.01 mm changes forces by
-/// XXX of μN at most on the wheels of `cargo bench --bench calibrate profiles`.
+/// Spacing of the search across the track, in mm. It decides where frames and windows lie, not what the gap is in them: with 0.01 mm forces differ by
+/// 0.0002 of μN in the median and 0.002 at most on the wheels of `cargo bench --bench calibrate profiles`, as with any other shift of the grids.
 pub(crate) const STEP: f64 = 0.04;
 /// Spacing of the points along the curves, in mm.
 const CURVE_STEP: f64 = 0.08;

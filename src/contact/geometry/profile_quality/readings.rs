@@ -11,8 +11,8 @@ use crate::contact::numerics::spline::Spline;
 
 /// Bounds of the spacing of the comparison in mm. Where points are dense it is the lower one.
 const STEP: [f64; 2] = [0.05, 0.2];
-/// Samples of the comparison on the shortest chord, where the spacing is between its bounds: between two points the curves are cubics.
-/// XXX
+/// Samples of the comparison on the shortest chord, where the spacing is between its bounds: between two points the curves are cubics. Chosen by
+/// judgement; points up to 0.3 mm apart, as measurements have them, are compared at the lower bound.
 const ON_CHORD: f64 = 6.0;
 /// Distance in mm by which the comparison extends beyond twice the half width of the contact.
 const BEYOND: f64 = 10.0;

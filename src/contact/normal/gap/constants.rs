@@ -29,13 +29,6 @@ pub(crate) const RESOLUTION_COARSE: GridFineness = GridFineness {
 /// power 3/2 of its cells' size.
 pub(crate) const TARGET_USUAL: f64 = 0.002;
 
-/// Beyond this target they are coarser, down to [`COARSEST`] times the usual cells: 31 across the contact, where the error of the normal problem is
-/// about 0.001.
-pub(crate) const TARGET_LOOSE: f64 = 0.005;
-
-/// See [`TARGET_LOOSE`].
-pub(crate) const COARSEST: f64 = 0.7;
-
 /// Power of the target over [`TARGET_USUAL`] by which the cells grow: the inverse of that 3/2.
 pub(crate) const TARGET_POWER: f64 = -2.0 / 3.0;
 

@@ -11,9 +11,9 @@ use crate::contact::normal::gap::conjugate_gradients::{
     PressureAnswer, PressureTask, solve_pressure,
 };
 use crate::contact::normal::gap::constants::{
-    APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, COARSEST, GRIDS_MAX, LEVEL_BEYOND, NEAR,
-    PRESSURE_CHANGE, REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_LOOSE, TARGET_POWER,
-    TARGET_USUAL, TOLERANCE, TOLERANCE_FIRST,
+    APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, NEAR, PRESSURE_CHANGE,
+    REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL, TOLERANCE,
+    TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
 use crate::contact::normal::gap::search_box::{SearchBox, reach_of_level};
@@ -253,11 +253,9 @@ impl GridFineness {
         RESOLUTION.for_target(target)
     }
 
-    /// The resolution for a target of the resultants' error relative to μN; unchanged for targets from [`TARGET_USUAL`] to [`TARGET_LOOSE`].
+    /// The resolution for a target of the resultants' error relative to μN; unchanged for targets from [`TARGET_USUAL`] on.
     fn for_target(self, target: f64) -> GridFineness {
         let finer = (target.min(TARGET_USUAL) / TARGET_USUAL).powf(TARGET_POWER);
-        let coarser = (target.max(TARGET_LOOSE) / TARGET_LOOSE).powf(TARGET_POWER);
-        let finer = finer * coarser.max(COARSEST);
         GridFineness {
             contact: finer * self.contact,
             patch: finer * self.patch,

@@ -25,9 +25,6 @@ const DEPTH_SHARE_MIN: f64 = 2e-3;
 /// small by more. The box grows if it is not enough.
 const REACH: f64 = 1.15;
 
-/// Beyond this target gaps are sampled coarsely for the answer as well: grids are not fine enough to see the difference. XXX
-const TARGET_LOOSE: f64 = 0.01;
-
 /// How finely the wheel is solved at one height.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fineness {
@@ -49,15 +46,6 @@ impl Fineness {
             }
         }
         fineness
-    }
-
-    /// How closely gaps are sampled.
-    fn sampling(self) -> GapSampling {
-        if self.target > TARGET_LOOSE {
-            GapSampling::Coarse
-        } else {
-            self.detail
-        }
     }
 
     /// The same with fine gaps and edges.
@@ -108,7 +96,7 @@ impl WheelTask {
     ) -> Result<WheelContact, NormalError> {
         let centre = search.touch - lowering;
         let gaps = search
-            .gaps(lowering, fineness.sampling())
+            .gaps(lowering, fineness.detail)
             .map_err(NormalError::NoAnswer)?;
         let depths: Vec<f64> = gaps.iter().map(depth).collect();
         let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
@@ -172,7 +160,7 @@ impl WheelTask {
         if !is_alone(lowering) {
             return Ok(None);
         }
-        let Ok(gaps) = search.gaps(lowering, fineness.sampling()) else {
+        let Ok(gaps) = search.gaps(lowering, fineness.detail) else {
             return Ok(None);
         };
         let gap = &gaps[0];

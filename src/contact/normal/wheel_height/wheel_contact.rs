@@ -114,6 +114,14 @@ impl WheelContact {
         self
     }
 
+    /// The same where the load is as uncertain as after a correction by this part.
+    pub(crate) fn uncertain_by(self, missed: f64) -> WheelContact {
+        WheelContact {
+            load_error: CORRECTED * missed,
+            ..self
+        }
+    }
+
     /// The same wheel under another force, where both together miss what was solved by no more than the tolerance.
     pub(crate) fn carrying(&self, wanted: f64, tolerance: f64) -> Option<WheelContact> {
         let [carried, slope] = self.found;
