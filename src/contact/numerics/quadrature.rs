@@ -40,8 +40,6 @@ pub(crate) const RULES: [&[(f64, f64)]; 5] = [
 /// How many points are used for an integral over one interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum GaussPoints {
-    /// Exact for polynomials of degree 3.
-    Two,
     /// Exact for polynomials of degree 5.
     Three,
     /// Exact for polynomials of degree 9.
@@ -49,21 +47,18 @@ pub(crate) enum GaussPoints {
 }
 
 impl GaussPoints {
-    /// The weight of the middle point, and the points of the right half with their weights.
-    fn right_half(self) -> (f64, &'static [(f64, f64)]) {
+    /// The middle point, then the points of the right half, with their weights.
+    fn right_half(self) -> &'static [(f64, f64)] {
         match self {
-            GaussPoints::Two => (0.0, &[(0.577_350_269_189_625_8, 1.0)]),
-            GaussPoints::Three => (
-                0.888_888_888_888_889,
-                &[(0.774_596_669_241_483_4, 0.555_555_555_555_555_6)],
-            ),
-            GaussPoints::Five => (
-                0.568_888_888_888_888_9,
-                &[
-                    (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
-                    (0.906_179_845_938_664, 0.236_926_885_056_189_08),
-                ],
-            ),
+            GaussPoints::Three => &[
+                (0.0, 0.888_888_888_888_889),
+                (0.774_596_669_241_483_4, 0.555_555_555_555_555_6),
+            ],
+            GaussPoints::Five => &[
+                (0.0, 0.568_888_888_888_888_9),
+                (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+                (0.906_179_845_938_664, 0.236_926_885_056_189_08),
+            ],
         }
     }
 }
@@ -71,13 +66,10 @@ impl GaussPoints {
 /// Integral of f from the first to the second bound; exchanged bounds change its sign.
 pub(crate) fn integral([from, to]: [f64; 2], points: GaussPoints, f: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-    let (middle_weight, points) = points.right_half();
+    let points = points.right_half();
     let pair = |(at, weight): &(f64, f64)| weight * (f(middle - half * at) + f(middle + half * at));
-    let outer: f64 = points.iter().map(pair).sum();
-    if middle_weight == 0.0 {
-        return half * outer;
-    }
-    half * (middle_weight * f(middle) + outer)
+    let outer: f64 = points[1..].iter().map(pair).sum();
+    half * (points[0].1 * f(middle) + outer)
 }
 
 #[cfg(test)]

@@ -28,16 +28,6 @@ impl<T> Once<T> {
     }
 }
 
-impl GapSeen {
-    /// The contact is expected in a box.
-    pub(crate) fn in_box(reach: SearchBox) -> GapSeen {
-        GapSeen {
-            reach: Once(OnceLock::from(reach)),
-            ..GapSeen::default()
-        }
-    }
-}
-
 /// What is known of a contact before it is solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GapOutlook {

@@ -41,9 +41,8 @@ impl GapTask {
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<Option<GapOutcome>, NormalError> {
-        let approach = match self.loading {
-            NormalLoad::Approach(approach) => approach,
-            NormalLoad::Force(_) => start.pressed.approach,
+        let NormalLoad::Approach(approach) = self.loading else {
+            return Ok(None);
         };
         let (limits, [least, _]) = (self.gap.window(), self.gap.extremes());
         let depth = approach - least;
@@ -56,7 +55,7 @@ impl GapTask {
             level: approach,
             least,
         };
-        let mut start = (start.grid, start.pressed);
+        let start = (start.grid, start.pressed);
         let mut last: Option<(PressureGrid, PressureAnswer)> = None;
         let mut iterations = 0;
         for _ in 0..GRIDS_MAX {
@@ -73,9 +72,6 @@ impl GapTask {
                 last = Some((std::mem::replace(&mut grid, larger), pressed));
                 continue;
             }
-            // Under a force the start has an approach that was guessed: only its pressure tells whether the grids agree.
-            start.1.approach = pressed.approach;
-            let depth = pressed.approach - least;
             let next = self.next_grid(&grid, &pressed, Some(&start), depth, resolution);
             if !next.is_ok_and(|next| next.is_settled()) || self.touches_beside(&grid, &pressed) {
                 return Ok(None);

@@ -2,7 +2,6 @@
 
 use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal::pressure_field::patch_shape::EdgeCare;
 use crate::contact::normal::pressure_field::sample_grid::{PADDING, SampleGrid, padded};
 
 /// Whether edges are placed between the cells of a computed pressure.
@@ -64,7 +63,7 @@ impl GridPressure {
             shape.patch.approach = Some(approach);
         }
         match edges {
-            Edges::Found => field.find_edges(EdgeCare::Usual),
+            Edges::Found => field.find_edges(),
             Edges::Left => {
                 for label in 0..field.shapes.len() {
                     let (extent, area) = field.measure_samples(&samples, label);

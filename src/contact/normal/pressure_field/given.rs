@@ -10,7 +10,6 @@ use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::level_set::State;
 use crate::contact::normal::pressure_field::line::GridLine;
-use crate::contact::normal::pressure_field::patch_shape::EdgeCare;
 use crate::contact::normal::pressure_field::sample_grid::{
     PADDING, PATCHES_MAX, SampleGrid, padded,
 };
@@ -64,7 +63,7 @@ impl GridPressure {
             };
             remarks.push(remark.into());
         }
-        field.find_edges(EdgeCare::Exact);
+        field.find_edges();
         Ok((field, remarks))
     }
 
@@ -84,7 +83,6 @@ impl GridPressure {
             q,
             smooth: Vec::new(),
             runs: Vec::new(),
-            care: EdgeCare::Exact,
             cells,
             pressure_max,
             shapes: Vec::new(),
@@ -98,8 +96,7 @@ impl GridPressure {
     }
 
     /// Continues the squared pressures beyond the contact and measures the region of every patch.
-    pub(crate) fn find_edges(&mut self, care: EdgeCare) {
-        self.care = care;
+    pub(crate) fn find_edges(&mut self) {
         let states = level_set::extend(&self.grid, &mut self.q);
         self.smooth = states
             .into_iter()
@@ -113,7 +110,7 @@ impl GridPressure {
         };
         self.runs = self.q.chunks_exact(self.grid.x.len()).map(run).collect();
         for label in 0..self.shapes.len() {
-            let (extent, area) = self.measure(label, &self.shapes[label], care);
+            let (extent, area) = self.measure(label, &self.shapes[label]);
             let patch = &mut self.shapes[label].patch;
             (patch.extent, patch.area) = (extent, area);
         }
@@ -166,7 +163,7 @@ impl GridPressure {
     ///
     /// Gauss–Legendre quadrature of order 10 per grid interval (6 where there are many intervals), with the square root of the
     /// distance from the nearer end of the chord as variable, in which the pressure is smooth; accurate to about 1e-9 for Hertz's
-    /// pressure. Of computed pressures orders 6 and 4 are enough.
+    /// pressure.
     #[must_use]
     pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
         let (low, high) = (x0.max(chord.left), x1.min(chord.right));
@@ -190,12 +187,10 @@ impl GridPressure {
         }
         let centre = 0.5 * (chord.right + chord.left);
         let points = |from: f64, to: f64| {
-            let many = (to - from) * INTERVALS_MANY < chord.right - chord.left;
-            match (self.care, many) {
-                (EdgeCare::Exact, true) => GaussPoints::Three,
-                (EdgeCare::Exact, false) => GaussPoints::Five,
-                (EdgeCare::Usual, true) => GaussPoints::Two,
-                (EdgeCare::Usual, false) => GaussPoints::Three,
+            if (to - from) * INTERVALS_MANY < chord.right - chord.left {
+                GaussPoints::Three
+            } else {
+                GaussPoints::Five
             }
         };
         let mut sum = 0.0;

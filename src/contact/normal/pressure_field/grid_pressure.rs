@@ -2,7 +2,6 @@
 
 use crate::contact::normal::pressure_field::jump::Jump;
 use crate::contact::normal::pressure_field::patch_cells::PatchShape;
-use crate::contact::normal::pressure_field::patch_shape::EdgeCare;
 use crate::contact::normal::pressure_field::sample_grid::SampleGrid;
 
 /// Pressure samples on one rectangular grid and the patches they form.
@@ -16,8 +15,6 @@ pub struct GridPressure {
     pub(crate) smooth: Vec<bool>,
     /// The first and the last positive sample of every row that has one run of them; empty before edges are found.
     pub(crate) runs: Vec<Option<[usize; 2]>>,
-    /// How carefully edges and mean pressures are computed.
-    pub(crate) care: EdgeCare,
     /// The patch of every cell that has one of its samples as a corner.
     pub(crate) cells: Vec<u8>,
     /// Largest pressure in MPa.

@@ -16,28 +16,6 @@ use crate::contact::remark::list::Remark;
 /// Hertz's pressure, the sum of the samples is wrong by up to 2 % with 9 samples, 0.5 % with 18.
 const SAMPLES_ACROSS_MIN: usize = 8;
 
-/// How carefully the region of a patch is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum EdgeCare {
-    /// To rounding error, for pressures that are given.
-    Exact,
-    /// To 1e-4 of its size, less than computed pressures leave uncertain.
-    Usual,
-}
-
-/// Value of a hump at its summit in an interval, by the parabola through the ends and a place between them.
-fn summit([low, high]: [f64; 2], at: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let [before, here, after] = [low, at, high].map(&f);
-    let (left, right) = ((before - here) / (low - at), (after - here) / (high - at));
-    let bend = (right - left) / (high - low);
-    let place = at - 0.5 * (left + bend * (at - low)) / bend;
-    if bend < 0.0 && place > low && place < high {
-        f(place).max(here)
-    } else {
-        here
-    }
-}
-
 impl GridPressure {
     /// Patches before their regions are found: force, rows and columns, from the samples.
     pub(crate) fn shapes_from_samples(&self, samples: &[u8], count: usize) -> Vec<PatchShape> {
@@ -82,22 +60,10 @@ impl GridPressure {
     }
 
     /// Extent `[x_min, x_max, y_min, y_max]` in mm and area in mm² of a patch, from its chords on lines along x.
-    pub(crate) fn measure(
-        &self,
-        label: usize,
-        shape: &PatchShape,
-        care: EdgeCare,
-    ) -> ([f64; 4], f64) {
-        // A patch that no line meets twice has a plain outline.
-        let plain = care == EdgeCare::Usual && shape.segments_per_strip <= 1.0;
-        let [y_min, y_max] = self.extent_across(shape, label, care);
+    pub(crate) fn measure(&self, label: usize, shape: &PatchShape) -> ([f64; 4], f64) {
+        let [y_min, y_max] = self.extent_across(shape, label);
         // The length of chords varies as a square root at both ends of the patch, so lines are closer there.
-        let rows = shape.rows.clone().count();
-        let lines = if plain {
-            (16 + rows / 2).max(40)
-        } else {
-            (32 + rows).max(72)
-        };
+        let lines = (32 + shape.rows.clone().count()).max(72);
         let (middle, half) = (0.5 * (y_min + y_max), 0.5 * (y_max - y_min));
         let step = PI / lines as f64;
         let at = |n: f64| middle - half * (n * step).cos();
@@ -121,36 +87,19 @@ impl GridPressure {
             widen(n, left, right);
         }
         // The longest chord of a rough patch may lie on a row of samples.
-        let inside = |j: &usize| (y_min..=y_max).contains(&self.grid.y[*j]);
-        let rows = (0..self.grid.y.len()).filter(inside);
-        for j in rows.filter(|j| !plain || self.is_outermost(shape, *j)) {
-            let y = self.grid.y[j];
-            let (left, right, _) = ends(y);
+        for y in self.grid.y.iter().filter(|y| y_min < **y && **y < y_max) {
+            let (left, right, _) = ends(*y);
             widen(((middle - y) / half).acos() / step, left, right);
         }
         let (first, last) = (|n: f64| -ends(at(n)).0, |n: f64| ends(at(n)).1);
         let bracket = |n: f64| [(n - 1.0).max(0.0), (n + 1.0).min(lines as f64)];
-        let farthest = |n: f64, f: &dyn Fn(f64) -> f64| match care {
-            EdgeCare::Exact => maximum(bracket(n), f),
-            EdgeCare::Usual => summit(bracket(n), n, f),
-        };
         let extent = [
-            -farthest(x_min.1, &first).max(-x_min.0),
-            farthest(x_max.1, &last).max(x_max.0),
+            -maximum(bracket(x_min.1), first).max(-x_min.0),
+            maximum(bracket(x_max.1), last).max(x_max.0),
             y_min,
             y_max,
         ];
         (extent, area)
-    }
-
-    /// Does a row of samples reach the first or the last column of its patch, or the one next to it?
-    fn is_outermost(&self, shape: &PatchShape, j: usize) -> bool {
-        // The outermost samples are two lines inside the range of cells (see `shapes_from_samples`).
-        let (first, last) = (*shape.columns.start() + 2, *shape.columns.end() - 1);
-        let row = j * self.grid.x.len();
-        [first, first + 1, last - 1, last]
-            .iter()
-            .any(|i| self.q[row + i] > 0.0)
     }
 
     /// Region of a patch from its samples alone: the box around them, and the area that they stand for.
@@ -174,18 +123,15 @@ impl GridPressure {
     }
 
     /// First and last y of lines that meet the patch.
-    fn extent_across(&self, shape: &PatchShape, label: usize, care: EdgeCare) -> [f64; 2] {
-        let halvings = match care {
-            // Two spacings halved this often are below rounding error.
-            EdgeCare::Exact => 36,
-            EdgeCare::Usual => 18,
-        };
+    fn extent_across(&self, shape: &PatchShape, label: usize) -> [f64; 2] {
+        // Two spacings halved this often are below rounding error.
+        const HALVINGS: u32 = 36;
         let y = &self.grid.y;
         // The outermost samples are two lines inside the range of cells (see `shapes_from_samples`).
         let [first, last] = [*shape.rows.start(), *shape.rows.end() + 1];
         [(first, first + 2), (last, last - 2)].map(|(outside, inside)| {
             let empty = |y: f64| self.segments(label, y).is_empty();
-            let [_, inside] = bisect([y[outside], y[inside]], halvings, empty);
+            let [_, inside] = bisect([y[outside], y[inside]], HALVINGS, empty);
             inside
         })
     }

@@ -1,4 +1,4 @@
-//! A wheel at one height over its rail: every gap pressed by its overlap, or the only one by a force.
+//! A wheel at one height over its rail: every gap pressed by its overlap.
 
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
@@ -6,7 +6,6 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::gap::grid::GridFineness;
-use crate::contact::normal::gap::search_box::reach_of_level;
 use crate::contact::normal::gap::seen::GapSeen;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
@@ -20,10 +19,6 @@ use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelConta
 
 /// A gap whose overlap is less than this fraction of the deepest one is left out: its force is about the power 3/2 of this, 1e-4.
 const DEPTH_SHARE_MIN: f64 = 2e-3;
-
-/// Of a wheel that is pressed by a force, the approach in the box that is looked at first, over the overlap: estimated lowerings are hardly ever too
-/// small by more. The box grows if it is not enough.
-const REACH: f64 = 1.15;
 
 /// How finely the wheel is solved at one height.
 #[derive(Debug, Clone, Copy)]
@@ -79,8 +74,6 @@ pub(crate) struct LoweredGap<'a> {
     centre: f64,
     /// What it is solved from, if anything is known.
     start: Option<Tile>,
-    /// Its overlap, or a force.
-    loading: NormalLoad,
 }
 
 impl WheelTask {
@@ -109,7 +102,6 @@ impl WheelTask {
                     depth: *depth,
                     centre,
                     start,
-                    loading: NormalLoad::Approach(*depth),
                 };
                 self.solve_gap(place, fineness, workspace, monitor)
             })
@@ -141,60 +133,7 @@ impl WheelTask {
         wheel
     }
 
-    /// The wheel near a height, with the force it is to carry, if it touches in one gap alone there; and how far below that height it then lies, in
-    /// mm. Lowered a little, the wheel is moved along the normal of its gap, and along the plane, which is of second order: so the approach that
-    /// carries the force tells the height. Nothing where there is more than one gap, or the gap cannot be pressed so.
-    ///
-    /// # Errors
-    /// The monitor stopped the work.
-    pub(crate) fn pressed_alone(
-        &self,
-        search: &ContactLocus,
-        (lowering, force): (f64, f64),
-        fineness: Fineness,
-        near: Option<&WheelContact>,
-        workspace: &mut GridWorkspace<f32>,
-        monitor: &dyn Monitor,
-    ) -> Result<Option<WheelContact>, NormalError> {
-        let is_alone = |at: f64| search.overlaps(at).is_ok_and(|found| found.len() == 1);
-        if !is_alone(lowering) {
-            return Ok(None);
-        }
-        let Ok(gaps) = search.gaps(lowering, fineness.detail) else {
-            return Ok(None);
-        };
-        let gap = &gaps[0];
-        let depth = depth(gap);
-        let cos = gap.frame.angle.cos();
-        let own = match self.loading {
-            WheelLoad::Vertical(_) => force / cos,
-            WheelLoad::Normal(_) | WheelLoad::Lowering(_) => force,
-        };
-        let place = LoweredGap {
-            gap,
-            depth,
-            centre: search.touch - lowering,
-            start: near.and_then(|near| near.start_for(gap, depth)),
-            loading: NormalLoad::Force(own),
-        };
-        let patch = match self.solve_gap(place, fineness, workspace, monitor) {
-            Ok(patch) => patch,
-            Err(NormalError::NoAnswer(_)) => return Ok(None),
-            Err(stopped) => return Err(stopped),
-        };
-        let reached = lowering + (patch.approach - depth) / cos;
-        if !is_alone(reached) {
-            return Ok(None);
-        }
-        Ok(Some(self.wheel(
-            reached,
-            search.touch - reached,
-            vec![patch],
-        )))
-    }
-
-    /// One gap pressed together; approaches count from the first touch of its patch along the normal. Where a force is given, the wheel lies by what
-    /// is wanting to the approach lower than its centre says.
+    /// One gap under the overlap it has; approaches count from the first touch of its patch along the normal.
     fn solve_gap(
         &self,
         place: LoweredGap,
@@ -207,7 +146,6 @@ impl WheelTask {
             depth,
             centre,
             start,
-            loading,
         } = place;
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(NormalError::Stopped(stop));
@@ -218,18 +156,11 @@ impl WheelTask {
             .map(|row| row.iter().map(|height| height + depth).collect())
             .collect();
         let surface = GapSurface::grid(&gap.x, &gap.y, &above);
-        let seen = match loading {
-            // The overlap tells the box better than the force.
-            NormalLoad::Force(_) if start.is_none() => {
-                GapSeen::in_box(reach_of_level(&surface, REACH * depth))
-            }
-            _ => GapSeen::default(),
-        };
         let contact = GapTask {
             gap: surface,
-            loading,
+            loading: NormalLoad::Approach(depth),
             contact_modulus: self.contact_modulus,
-            seen,
+            seen: GapSeen::default(),
         };
         let resolution = match fineness.detail {
             GapSampling::Coarse => GridFineness::coarse(),
@@ -262,7 +193,7 @@ impl WheelTask {
         let middle = found.field.load_centre(None);
         Ok(GapContact {
             frame: moved(middle)?,
-            approach,
+            approach: depth,
             field: found.field.from_origin(middle),
             report: found.report,
             remarks,

@@ -23,11 +23,6 @@ const HEIGHTS_MAX: u32 = 40;
 /// contacts scale; the error left is of second order for these, and at worst about a third of the tolerance in pressures and lengths.
 /// Below the lower bound the forces of neighbouring heights differ by no more than those of different grids.
 const FORCE_TOLERANCE: [f64; 2] = [5e-4, 5e-3];
-/// Times that a wheel with one gap is looked at before its height is sought by its overlaps. Keeps the numbers safe; not tuned.
-const ALONE_MAX: u32 = 5;
-/// A wheel with one gap is pressed by its force: how far, relatively, the height that this tells may lie from the one that its gap was made for,
-/// where gaps are coarse and where they are fine. Coarse gaps are hardly ever off by a tenth, fine ones by some 0.003. Chosen by judgement.
-const ALONE_OFF: [f64; 2] = [0.3, 0.02];
 
 /// How a wheel should come to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,65 +124,8 @@ impl WheelTask {
                 friction_share: wanted.friction_share,
                 ..wheel
             }),
-            _ => match self.alone(search, wanted, start, workspace, monitor)? {
-                Some(wheel) => Ok(wheel),
-                None => self.height_sought(search, wanted, start, workspace, monitor),
-            },
+            _ => self.height_sought(search, wanted, start, workspace, monitor),
         }
-    }
-
-    /// The wheel that touches in one gap alone: pressed by its force there, coarsely to see where it comes to rest and what friction carries, and
-    /// finely at that height. Nothing where it touches in more than one gap.
-    fn alone(
-        &self,
-        search: &ContactLocus,
-        wanted: NormalPass,
-        HeightStart { before, forecast }: HeightStart,
-        workspace: &mut GridWorkspace<f32>,
-        monitor: &dyn Monitor,
-    ) -> Result<Option<WheelContact>, NormalError> {
-        let target = |friction_share: f64| self.target(friction_share).unwrap_or_default();
-        let mut friction_share = wanted.friction_share;
-        let mut force = target(friction_share);
-        let exact = matches!(wanted.accuracy, Accuracy::For(_));
-        let starts_near = exact && before.is_some_and(|before| before.is_near(force));
-        let mut fineness = Fineness::first(wanted, starts_near);
-        let mut lowering = match before {
-            Some(known) => known.lowering_for(force),
-            None => search.estimated_lowering(force / self.contact_modulus),
-        };
-        let mut last = None::<WheelContact>;
-        for heights in 1..=ALONE_MAX {
-            let near = last.as_ref().or(before);
-            let place = (lowering, force);
-            let pressed = self.pressed_alone(search, place, fineness, near, workspace, monitor)?;
-            let Some(mut found) = pressed else {
-                return Ok(None);
-            };
-            found.heights = heights;
-            found.friction_share = friction_share;
-            let off = (found.lowering / lowering - 1.0).abs();
-            let fine = fineness.detail == GapSampling::Fine;
-            if fine && off <= ALONE_OFF[1] {
-                // As if the force had been missed by what this height is off, and corrected: it grows with the power 3/2.
-                let missed = 1.5 * off;
-                let resting = found.at_rest(HeightExit::Met { missed: 0.0 }, force);
-                return Ok(Some(resting.uncertain_by(missed)));
-            }
-            if !fine && off <= ALONE_OFF[0] {
-                if !exact {
-                    return Ok(Some(found));
-                }
-                if let Some(share) = forecast.and_then(|told| told(&found)) {
-                    friction_share = share;
-                    force = target(share);
-                }
-                fineness = fineness.finer();
-            }
-            lowering = found.lowering_for(force);
-            last = Some(found);
-        }
-        Ok(None)
     }
 
     /// The wheel at the height that carries the force, height by height.

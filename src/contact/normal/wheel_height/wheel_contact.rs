@@ -114,14 +114,6 @@ impl WheelContact {
         self
     }
 
-    /// The same where the load is as uncertain as after a correction by this part.
-    pub(crate) fn uncertain_by(self, missed: f64) -> WheelContact {
-        WheelContact {
-            load_error: CORRECTED * missed,
-            ..self
-        }
-    }
-
     /// The same wheel under another force, where both together miss what was solved by no more than the tolerance.
     pub(crate) fn carrying(&self, wanted: f64, tolerance: f64) -> Option<WheelContact> {
         let [carried, slope] = self.found;
@@ -146,14 +138,6 @@ impl WheelContact {
             .iter()
             .min_by(|a, b| apart(a).total_cmp(&apart(b)))?
             .start_for(gap, depth)
-    }
-
-    /// The lowering at which another force is likely to be carried, from the derivative of the power 2/3 of the force, which for Hertz's contacts
-    /// is constant.
-    pub(crate) fn lowering_for(&self, force: f64) -> f64 {
-        let [carried, slope] = self.found;
-        let step = 1.5 * carried / slope * ((force / carried).powf(2.0 / 3.0) - 1.0);
-        (self.lowering + step).clamp(0.25 * self.lowering, 4.0 * self.lowering)
     }
 
     /// Is the force near enough to go on with fine gaps?
