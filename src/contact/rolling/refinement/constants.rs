@@ -24,6 +24,15 @@ pub const WITHOUT_COMPANION: f64 = 1.5;
 pub const LEVELS_LIKE: f64 = 0.3;
 /// The same between levels of different kinds; 0.1 and 0.25 change the work by less than 1 %.
 pub const LEVELS_UNLIKE: f64 = 0.15;
+/// The same weights where the change stands in place of the difference of the rules, because one rule was solved alone. On the first 200
+/// ellipses at four targets, with .3 and .6 the share that is covered differs by less than 1 %, and so does it with the difference of the rules in
+/// their place (.97 to .99; the other 200: .97 to .98).
+pub const ALONE_LIKE: f64 = 0.5;
+/// Between levels of different kinds; see [`ALONE_LIKE`].
+pub const ALONE_UNLIKE: f64 = 0.25;
+/// One rule is solved alone on levels of at least this many times the cells of the level below: the change from it is divided by the
+/// ratio less 1. Chosen by judgement; how much it matters was not measured.
+pub const ONE_RULE_RATIO: f64 = 1.2;
 /// A level is compared with a coarser one if it has at least this many times its cells; with 1.5 the work changes by 1 %.
 pub const LEVEL_RATIO_MIN: f64 = 1.8;
 /// Error of sampling the vortex of the tractions by the cell that holds its centre, over p h² / N (1500 solves on random
@@ -36,6 +45,10 @@ pub const POLE_WEIGHT: f64 = 0.3;
 /// the count), on an explicit mesh by its square; four strips of an ellipse count as 3.5. 3 and 4.5 are alike on ellipses; needed
 /// for irregular patches of gaps.
 pub const STRIPS_FEW: f64 = 3.5;
+/// Factor for a motion by itself where region and pressure are closed forms: the errors are those of the mesh alone. With 1 the estimates of the
+/// first 200 ellipses are 3.0 to 4.0 times the error in the median and cover .975 to .99, with .9 they are 2.7 to 3.5 times the error and cover .97
+/// to .985; the other 200: .97 to .975, and .96 to .98.
+pub const HERTZ: f64 = 0.9;
 /// Factor where a smooth pressure is given in samples, and the power of the cells that it falls with in place of [`DECAY`]. Chosen on 160
 /// grids at targets of 0.02, 0.005 and 0.001: .95, .96 and .98 covered, estimates 3.7, 3.3 and 3.3 times the error in the median; 160
 /// others: .95, .96 and .99, and 3.8, 3.2 and 3.5 (`cargo bench --bench calibrate`). .76 gives 4.2, 3.3 and 3.5 there and covers .97, .96
@@ -67,6 +80,12 @@ pub const EXTRAPOLATED: f64 = 1.0 / 3.0;
 /// Error that the next mesh is expected to have for its cells, over the present error. 0.65 takes 3 % more work at
 /// the target 0.001 and 1 takes 4 % less; at 0.005 both take 40 to 60 % more, because of a few cases that step over a mesh size.
 pub const MARGIN: f64 = 0.8;
+/// The same for a motion by itself whose mesh was compared with no companion: its whole estimate would be twice as large in the median. Less
+/// than 1.5 takes up to 5 % more work at targets below .002, 2 takes more at the others (400 ellipses, work counted on all their
+/// meshes).
+pub const MARGIN_OF_NONE: f64 = 1.5;
+/// The same with one companion.
+pub const MARGIN_OF_ONE: f64 = 1.0;
 /// Smallest mesh for a target below `FINE_TARGET`: on fewer cells three small differences may coincide by accident. At 0.001, 64 takes the
 /// same work and 200 takes 3 % more.
 pub const CELLS_FINE: usize = 128;

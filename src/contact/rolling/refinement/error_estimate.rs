@@ -11,12 +11,13 @@ use crate::contact::rolling::motion_answer::RelativeErrors;
 use crate::contact::rolling::refinement::caution::caution;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::constants::{
-    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, JUMPING, LEVELS_LIKE,
-    LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH, RULES_ON_MESH_SAMPLED,
-    SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
+    ALONE_LIKE, ALONE_UNLIKE, CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES,
+    HERTZ, JUMPING, LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS,
+    RULES_ON_MESH, RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW,
+    SURPRISES, WITHOUT_COMPANION,
 };
 use crate::contact::rolling::refinement::distances::distances;
-use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
+use crate::contact::rolling::refinement::mesh_policy::{CELLS_FIRST, Compared};
 use crate::contact::rolling::refinement::regime::pole_error;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
@@ -64,10 +65,12 @@ pub enum Indicators {
 /// Differences that stand for the error of a level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Between the two rules; nothing if one of them did not converge.
+    /// Between the two rules; nothing if one of them did not converge or was not solved.
     pub(super) rules: Option<Vec<f64>>,
     /// To the level before, weighted.
     before: Option<Vec<f64>>,
+    /// That change stands in place of the difference of the rules.
+    one_rule: bool,
     /// To half the strips and to half the cells.
     pub(super) companions: [Option<Vec<f64>>; 2],
     /// A companion was tried and has no answer.
@@ -140,11 +143,19 @@ impl Indicators {
             return Indicators::Known(errors);
         }
         let sticking = matches!(level.plan.regime, Regime::Sticking { .. });
+        let one_rule = answer.is_of_one_rule();
         Indicators::Measured(Box::new(Measured {
             rules,
-            before: context
-                .before
-                .map(|before| change(task, patches, level, found, before)),
+            before: context.before.map(|before| {
+                let weight = if one_rule {
+                    weight_alone
+                } else {
+                    weight_beside
+                };
+                let weight = weight(before.regime, level.plan.regime);
+                change(task, patches, found, before, weight)
+            }),
+            one_rule,
             companions: [None, None],
             missing: false,
             extrapolated: none.clone(),
@@ -183,6 +194,19 @@ impl Indicators {
         }
     }
 
+    /// How many of the companions were compared, or tried without an answer.
+    #[must_use]
+    pub fn compared(&self) -> Compared {
+        match self {
+            Indicators::Measured(measured) => match &measured.companions {
+                [None, None] if !measured.missing => Compared::None,
+                [Some(_), Some(_)] => Compared::Both,
+                _ => Compared::One,
+            },
+            Indicators::Known(_) => Compared::Both,
+        }
+    }
+
     /// Whether a companion was tried and has no answer.
     #[must_use]
     pub fn companion_missing(&self) -> bool {
@@ -212,17 +236,17 @@ impl Measured {
     /// The estimate for patch `k`, or for the sum: the root of the sum of the squares of all indicators, with one factor for
     /// all regimes, shapes and motions. Without companions it is a lower bound, by which a mesh can be refused.
     fn error(&self, k: usize) -> Option<f64> {
-        let rules = DIFFERENCES * self.rules.as_ref()?[k];
-        let rules = if self.missing {
-            WITHOUT_COMPANION * rules
-        } else {
-            rules
-        };
         let of = |values: &Option<Vec<f64>>| values.as_ref().map_or(0.0, |values| values[k]);
+        let caution = if self.missing { WITHOUT_COMPANION } else { 1.0 };
+        let (rules, before) = match (&self.rules, &self.before) {
+            (Some(rules), _) => (caution * DIFFERENCES * rules[k], of(&self.before)),
+            (None, Some(before)) if self.one_rule => (0.0, caution * before[k]),
+            _ => return None,
+        };
         let [across, along] = [0, 1].map(|c| DIFFERENCES * of(&self.companions[c]));
         let parts = [
             rules,
-            of(&self.before),
+            before,
             across,
             along,
             self.pole,
@@ -247,6 +271,7 @@ fn scale(task: &RollingTask, level: &StripMesh, patches: usize) -> f64 {
             let mixed = |smooth: f64, jumping: f64| smooth + between * (jumping - smooth);
             (mixed(SAMPLED, JUMPING), mixed(SAMPLED_DECAY, DECAY))
         }
+        None if task.single_motion && task.footprint.is_closed_form() => (HERTZ, DECAY),
         None => (1.0, DECAY),
     };
     caution(task) * samples * finer.powf(decay) * few_strips(level).sqrt()
@@ -305,20 +330,41 @@ fn weighted(patches: &[Patch], mut errors: Vec<f64>) -> Vec<f64> {
     errors
 }
 
+/// Are the meshes of two regimes of one kind?
+fn are_like(before: Regime, here: Regime) -> bool {
+    matches!(
+        (before, here),
+        (Regime::Sticking { .. }, Regime::Sticking { .. })
+            | (Regime::Spinning(_), Regime::Spinning(_))
+    )
+}
+
+/// The weight of the change from the level before, beside the difference of the rules.
+fn weight_beside(before: Regime, here: Regime) -> f64 {
+    match here {
+        _ if are_like(before, here) => LEVELS_LIKE,
+        Regime::Sticking { .. } => LEVELS_UNLIKE,
+        Regime::Spinning(_) | Regime::Unknown => 0.0,
+    }
+}
+
+/// The same in place of that difference.
+fn weight_alone(before: Regime, here: Regime) -> f64 {
+    if are_like(before, here) {
+        ALONE_LIKE
+    } else {
+        ALONE_UNLIKE
+    }
+}
+
 /// The weighted change from the level before.
 fn change(
     task: &RollingTask,
     patches: &[Patch],
-    level: &StripMesh,
     found: &[Resultants],
     before: CoarserLevel,
+    factor: f64,
 ) -> Vec<f64> {
-    let factor = match (before.regime, level.plan.regime) {
-        (Regime::Sticking { .. }, Regime::Sticking { .. })
-        | (Regime::Spinning(_), Regime::Spinning(_)) => LEVELS_LIKE,
-        (_, Regime::Sticking { .. }) => LEVELS_UNLIKE,
-        _ => 0.0,
-    };
     let mut change = distances(task, patches, found, before.summed);
     change.iter_mut().for_each(|d| *d *= factor * before.share);
     change

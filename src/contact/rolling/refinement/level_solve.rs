@@ -13,11 +13,12 @@ use crate::contact::rolling::methods::liu_hsu::on_level;
 use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{MotionAnswer, RelativeErrors, SolvedFields};
-use crate::contact::rolling::refinement::constants::LEVEL_RATIO_MIN;
+use crate::contact::rolling::refinement::constants::{LEVEL_RATIO_MIN, ONE_RULE_RATIO};
 use crate::contact::rolling::refinement::error_estimate;
 use crate::contact::rolling::refinement::error_estimate::{
     CoarserLevel, EstimateContext, Indicators,
 };
+use crate::contact::rolling::refinement::one_rule;
 use crate::contact::rolling::refinement::slender::slender;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::refinement::warm_start::from_coarser;
@@ -126,12 +127,31 @@ pub fn solve_level(
     let motion = level.scale.motion(&asked.motion);
     // The motion before on this mesh is preferred: its tractions need not be interpolated from other cells.
     let warm = state.sweep.start(number, &level, &motion);
-    let start =
-        warm.or_else(|| below.map(|(coarse, answer)| from_coarser(&coarse, answer, &level)));
+    // A part of a sweep counts from its own first motion, the client from that of the case.
+    let named = |failure| named(failure, task, task.first_motion + asked.index);
     let workspace = &mut state.workspace;
-    let tangential = run_method(task, &level, asked, start, workspace, monitor)
-        // A part of a sweep counts from its own first motion, the client from that of the case.
-        .map_err(|f| named(f, task, task.first_motion + asked.index))?;
+    let (alone, lost) = match &below {
+        Some((coarse, answer)) if warm.is_none() => {
+            let of_level = level_task(task, &level, &motion, asked.index);
+            let below = (coarse.as_ref(), *answer);
+            one_rule::attempt(task, of_level, below, workspace, monitor).map_err(named)?
+        }
+        _ => (None, Work::default()),
+    };
+    let tangential = match alone {
+        Some(found) => found,
+        None => {
+            let nested = |(coarse, answer)| from_coarser(coarse, answer, &level);
+            let below = below
+                .as_ref()
+                .map(|(coarse, answer)| (coarse.as_ref(), *answer));
+            let start = warm.or_else(|| below.map(nested));
+            let found = run_method(task, &level, asked, start, workspace, monitor);
+            let mut found = found.map_err(named)?;
+            found.work.add_lost(lost);
+            found
+        }
+    };
     state.sweep.remember(number, motion, &tangential);
     // A search for creepages solves its later trials on the same levels.
     state.sweep.path.push(number);
@@ -170,7 +190,12 @@ pub(crate) fn answer_on(
         method: method_used(task),
         seconds: 0.0,
     };
-    let before = coarser.and_then(|coarser| before(state, &level, coarser));
+    let ratio = if point.tangential.is_of_one_rule() {
+        ONE_RULE_RATIO
+    } else {
+        LEVEL_RATIO_MIN
+    };
+    let before = coarser.and_then(|coarser| before(state, &level, coarser, ratio));
     let indicators = indicators_on(task, state, &level, &point, before);
     point.errors = indicators.errors();
     JudgedAnswer { point, indicators }
@@ -211,15 +236,16 @@ pub(crate) fn level_task<'a>(
     }
 }
 
-/// The level before, if it is coarse enough to compare with.
+/// The level before, if the level has at least `ratio_min` times its cells.
 pub(crate) fn before<'a>(
     state: &RefinementState,
     level: &StripMesh,
     point: &'a SolvedLevel,
+    ratio_min: f64,
 ) -> Option<CoarserLevel<'a>> {
     let below = state.levels.get(point.level);
     let ratio = level.mesh.cells() as f64 / below.mesh.cells() as f64;
-    (ratio >= LEVEL_RATIO_MIN).then(|| CoarserLevel {
+    (ratio >= ratio_min).then(|| CoarserLevel {
         summed: &point.summed,
         regime: below.plan.regime,
         share: 1.0 / (ratio - 1.0),
@@ -247,6 +273,33 @@ fn finer_for_sums(
 /// The method that solved; the reader of cases has resolved `auto`.
 fn method_used(task: &RollingTask) -> Method {
     task.method
+}
+
+/// Adds the three-point rule, whose slips are smooth, to an answer of one rule, from tractions that differ from its own by `apart`. Where it
+/// has no answer, slips stay those of the one rule.
+///
+/// # Errors
+/// The monitor may stop the work.
+pub(crate) fn add_three_point(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    solved: &mut SolvedLevel,
+    asked: MotionTask,
+    apart: &[Vec<f64>; 2],
+    monitor: &dyn Monitor,
+) -> Result<(), SolveError> {
+    let level = state.levels.used(solved.level);
+    let motion = level.scale.motion(&asked.motion);
+    let of_level = level_task(task, &level, &motion, asked.index);
+    let (workspace, answer) = (&mut state.workspace, &mut solved.tangential);
+    let before = answer.work;
+    let added = boundary_element::three_point_beside(of_level, answer, apart, workspace, monitor);
+    match added {
+        Ok(()) | Err(LevelFailure::NotConverged { .. }) => {}
+        Err(LevelFailure::Stopped(stop)) => return Err(stop.into()),
+    }
+    solved.work.add_lost(answer.work.since(before));
+    Ok(())
 }
 
 pub(crate) fn named(failure: LevelFailure, task: &RollingTask, point: usize) -> SolveError {

@@ -1,0 +1,51 @@
+//! Levels on which the trapezoid rule is solved alone: those of a motion by itself that begin near their answer, on a coarser level.
+//!
+//! Elsewhere the three-point rule is solved first, because it converges from anywhere, and its difference tells of the error. Here the change
+//! from the coarser level tells as much: on the ellipses of `benches/calibrate`, estimates with the one or with the other cover the same share
+//! on the same meshes.
+
+use crate::contact::method::Method;
+use crate::contact::monitor::Monitor;
+use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work};
+use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
+use crate::contact::rolling::methods::boundary_element::task::LevelTask;
+use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use crate::contact::rolling::refinement::constants::ONE_RULE_RATIO;
+use crate::contact::rolling::refinement::warm_start::nested_tractions;
+use crate::contact::rolling::resolution::Resolution;
+use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::task::RollingTask;
+
+/// Is one rule enough on levels with a coarser one below? Bounds that follow the slips need the smooth slips of the other rule, motions of a
+/// sweep start from both, and estimates where layers or different bodies make the slips coarse were fitted with both.
+#[must_use]
+pub(crate) fn is_enough(task: &RollingTask, asked: &LevelTask) -> bool {
+    task.single_motion
+        && task.method == Method::BoundaryElement
+        && matches!(task.resolution, Resolution::Target(_))
+        && !task.has_prescribed_forces()
+        && !task.is_coupled()
+        && task.interface.layer == 0.0
+        && asked.fall.is_none()
+        && asked.passage.is_none()
+}
+
+/// Solves a level with one rule from the answer on a coarser one, if that is enough and takes few steps; the work in any case.
+///
+/// # Errors
+/// The monitor may stop the work.
+pub(crate) fn attempt(
+    task: &RollingTask,
+    asked: LevelTask,
+    (coarse, answer): (&StripMesh, &LevelAnswer),
+    workspace: &mut NewtonWorkspace,
+    monitor: &dyn Monitor,
+) -> Result<(Option<LevelAnswer>, Work), LevelFailure> {
+    let level = asked.level;
+    let refined = level.mesh.cells() as f64 >= ONE_RULE_RATIO * coarse.mesh.cells() as f64;
+    if !refined || !is_enough(task, &asked) {
+        return Ok((None, Work::default()));
+    }
+    let start = nested_tractions(coarse, &answer.traction, level);
+    boundary_element::trapezoid_of_motion(asked, &start, workspace, monitor)
+}
