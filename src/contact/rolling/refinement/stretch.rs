@@ -5,6 +5,7 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::{LevelFailure, Work};
 use crate::contact::rolling::mesh_plan::Regime;
+use crate::contact::rolling::methods::boundary_element::rule_sequence::FEW_STEPS;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::MotionAnswer;
@@ -183,7 +184,8 @@ impl Stretch {
         };
         let of_level = level_task(task, &level, &motion, asked.index);
         let workspace = &mut state.workspace;
-        let found = boundary_element::trapezoid_of_motion(of_level, &start, workspace, monitor);
+        let found =
+            boundary_element::trapezoid_of_motion(of_level, &start, FEW_STEPS, workspace, monitor);
         let tangential = match found {
             Ok((Some(tangential), _)) => tangential,
             Ok((None, work)) | Err(LevelFailure::NotConverged { work, .. }) => {

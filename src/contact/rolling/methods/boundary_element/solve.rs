@@ -11,7 +11,9 @@ use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::{
     LevelAnswer, LevelExit, LevelFailure, Work, project_on_bound,
 };
-use crate::contact::rolling::methods::boundary_element::rule_sequence::{Control, RuleSequence};
+use crate::contact::rolling::methods::boundary_element::rule_sequence::{
+    Control, FEW_STEPS, RuleSequence,
+};
 use crate::contact::rolling::methods::boundary_element::task::LevelTask;
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::skip::Skip;
@@ -111,7 +113,7 @@ pub fn trapezoid(
     let mut t = solve.start(Some(start));
     let mut slips = None;
     if task.fall.is_none() && task.passage.is_none() {
-        slips = solve.few_steps(&mut t)?;
+        slips = solve.few_steps(&mut t, FEW_STEPS)?;
     }
     if slips.is_none() {
         solve.three_point(&mut t, true)?;
@@ -130,7 +132,7 @@ pub fn trapezoid(
     Ok((traction, solve.work))
 }
 
-/// The trapezoid rule alone, from a start of its own, if that takes few steps, and the work. Slips are those of this rule, which alternate
+/// The trapezoid rule alone, from a start of its own, if that takes no more than `steps_max` steps, and the work. Slips are those of this rule, which alternate
 /// from cell to cell ([`three_point_beside`] finds better ones).
 ///
 /// # Errors
@@ -138,6 +140,7 @@ pub fn trapezoid(
 pub fn trapezoid_of_motion(
     task: LevelTask,
     start: &[Vec<f64>; 2],
+    steps_max: u32,
     workspace: &mut NewtonWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<(Option<LevelAnswer>, Work), LevelFailure> {
@@ -147,7 +150,7 @@ pub fn trapezoid_of_motion(
     let operator = task.level.operator(monitor)?;
     let mut solve = RuleSequence::new(task, &operator, Control { workspace, monitor });
     let mut t = solve.start(Some(start));
-    let Some(slips) = solve.few_steps(&mut t)? else {
+    let Some(slips) = solve.few_steps(&mut t, steps_max)? else {
         return Ok((None, solve.work));
     };
     let mut traction = solve.expand(&t);
