@@ -80,12 +80,6 @@ pub const EXTRAPOLATED: f64 = 1.0 / 3.0;
 /// Error that the next mesh is expected to have for its cells, over the present error. 0.65 takes 3 % more work at
 /// the target 0.001 and 1 takes 4 % less; at 0.005 both take 40 to 60 % more, because of a few cases that step over a mesh size.
 pub const MARGIN: f64 = 0.8;
-/// The same for a motion by itself whose mesh was compared with no companion: its whole estimate would be twice as large in the median. Less
-/// than 1.5 takes up to 5 % more work at targets below .002, 2 takes more at the others (400 ellipses, work counted on all their
-/// meshes).
-pub const MARGIN_OF_NONE: f64 = 1.5;
-/// The same with one companion.
-pub const MARGIN_OF_ONE: f64 = 1.0;
 /// Smallest mesh for a target below `FINE_TARGET`: on fewer cells three small differences may coincide by accident. At 0.001, 64 takes the
 /// same work and 200 takes 3 % more.
 pub const CELLS_FINE: usize = 128;

@@ -17,7 +17,7 @@ use crate::contact::rolling::refinement::constants::{
     SURPRISES, WITHOUT_COMPANION,
 };
 use crate::contact::rolling::refinement::distances::distances;
-use crate::contact::rolling::refinement::mesh_policy::{CELLS_FIRST, Compared};
+use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
 use crate::contact::rolling::refinement::regime::pole_error;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
@@ -191,19 +191,6 @@ impl Indicators {
                 apart.iter_mut().for_each(|d| *d *= reach);
                 measured.companions[k] = Some(apart);
             }
-        }
-    }
-
-    /// How many of the companions were compared, or tried without an answer.
-    #[must_use]
-    pub fn compared(&self) -> Compared {
-        match self {
-            Indicators::Measured(measured) => match &measured.companions {
-                [None, None] if !measured.missing => Compared::None,
-                [Some(_), Some(_)] => Compared::Both,
-                _ => Compared::One,
-            },
-            Indicators::Known(_) => Compared::Both,
         }
     }
 

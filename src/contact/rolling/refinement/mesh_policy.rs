@@ -6,9 +6,7 @@ use crate::contact::method::Method;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
 use crate::contact::rolling::methods::fastsim;
-use crate::contact::rolling::refinement::constants::{
-    MARGIN, MARGIN_OF_NONE, MARGIN_OF_ONE, SLACK, SLACK_POLE,
-};
+use crate::contact::rolling::refinement::constants::{MARGIN, SLACK, SLACK_POLE};
 use crate::contact::rolling::resolution::Resolution;
 
 /// Cells of the first mesh of a patch that is not slender. On the first 160 ellipses of `cargo bench --bench calibrate ellipse` at the
@@ -25,12 +23,9 @@ const SIDE_MIN: f64 = 4.0;
 const SLENDER: f64 = 5.0;
 /// Coordinates of a vortex centre are rounded to multiples of this. 0.02 and 0.1 take 1 to 6 % more work on the same ellipses.
 const POLE_GRID: f64 = 0.05;
-/// Longest step from one mesh of a sweep to the next, in half-doublings of the number of cells.
+/// Longest step from one mesh to the next, in half-doublings of the number of cells. With 6, motions by themselves on 400 ellipses take 1 to 8 %
+/// more time at the targets .005, .002 and .001, because some starts are then too far for one rule alone.
 const STEP_MAX: i32 = 4;
-/// The same for a motion by itself.
-const STEP_MAX_ALONE: i32 = 6;
-/// The estimate of a motion by itself falls as this power of the number of cells: 1, and what `DECAY` adds.
-const ORDER_ALONE: f64 = 1.12;
 
 /// By how many half-doublings of its cells a mesh was to be finer than the first one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,29 +34,6 @@ pub struct HalfDoublings(i32);
 impl HalfDoublings {
     /// Of a mesh that was not planned as finer than another.
     pub const NONE: HalfDoublings = HalfDoublings(i32::MIN);
-}
-
-/// With how many of its companions a mesh was compared when it was refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Compared {
-    /// With none: its own indicators exceeded the target.
-    None,
-    /// With one.
-    One,
-    /// With both.
-    Both,
-}
-
-impl Compared {
-    /// The error that the next mesh is expected to have for its cells, over the present estimate, where a motion by itself leaves a mesh
-    /// that was made for it.
-    fn margin(self) -> f64 {
-        match self {
-            Compared::None => MARGIN_OF_NONE,
-            Compared::One => MARGIN_OF_ONE,
-            Compared::Both => MARGIN,
-        }
-    }
 }
 
 /// The meshes that suit the patches of a footprint.
@@ -176,8 +148,8 @@ impl MeshPolicy {
         self.plan(cells.round() as u32, regime)
     }
 
-    /// The mesh after one of so many cells whose error is `excess` times the target, after `compared`: errors fall about as 1/N. Motions of
-    /// a sweep take coarse steps, so that they share their meshes; a motion alone may take small ones, and one large one in place of two.
+    /// The mesh after one of so many cells whose error is `excess` times the target: errors fall about as 1/N. Motions of a sweep take
+    /// coarse steps, so that they share their meshes; a motion alone may take small ones.
     ///
     /// A mesh has not quite the cells that were `planned`, because strips are even in number and may miss a patch. The next plan is finer
     /// than the last one all the same, so that refinement ends.
@@ -187,18 +159,12 @@ impl MeshPolicy {
         cells: usize,
         planned: HalfDoublings,
         excess: f64,
-        compared: Compared,
         regime: Regime,
         alone: bool,
     ) -> (MeshPlan, HalfDoublings) {
         let here = self.half_doublings(cells);
-        let steps =
-            |margin: f64, order: f64| (2.0 * (margin * excess).log2() / order).ceil() as i32;
-        let step = match alone {
-            true if here > 0 => steps(compared.margin(), ORDER_ALONE).clamp(1, STEP_MAX_ALONE),
-            true => steps(MARGIN, ORDER_ALONE).clamp(1, STEP_MAX_ALONE),
-            false => steps(MARGIN, 1.0).clamp(2, STEP_MAX),
-        };
+        let least = if alone { 1 } else { 2 };
+        let step = ((2.0 * (MARGIN * excess).log2()).ceil() as i32).clamp(least, STEP_MAX);
         let finer = (here + step).max(planned.0.saturating_add(1));
         let finer = finer.min(self.largest());
         (self.at(finer, regime), HalfDoublings(finer))
@@ -247,8 +213,7 @@ mod tests {
                     if !policy.is_refinable(cells as usize, planned) {
                         break;
                     }
-                    (plan, planned) =
-                        policy.next(cells as usize, planned, 1.01, Compared::Both, regime, true);
+                    (plan, planned) = policy.next(cells as usize, planned, 1.01, regime, true);
                     steps += 1;
                     assert!(steps < 20, "a/b {a_over_b}, {missed} missed: {plan:?}");
                 }

@@ -241,13 +241,11 @@ pub(crate) fn refined(
             break;
         }
         let excess = solved.point.error().map_or(1.0, |error| error / target);
-        let compared = solved.indicators.compared();
         let regime = regime_of(state, asked, &solved.point);
         let plan;
-        (plan, planned) =
-            state
-                .policy
-                .next(cells, planned, excess, compared, regime, task.single_motion);
+        (plan, planned) = state
+            .policy
+            .next(cells, planned, excess, regime, task.single_motion);
         let below = Some(solved.point);
         found = ComparedAnswer::untried(solve_level(task, state, asked, plan, below, monitor)?);
         let cells = state.levels.get(found.answer.point.level).mesh.cells();
