@@ -100,6 +100,15 @@ impl Footprint {
         matches!(self.shape, FootprintShape::Hertz(_))
     }
 
+    /// Hertz's ellipse, if it is one.
+    #[must_use]
+    pub fn ellipse(&self) -> Option<&Ellipse> {
+        match &self.shape {
+            FootprintShape::Hertz(ellipse) => Some(ellipse),
+            FootprintShape::Sampled(_) => None,
+        }
+    }
+
     /// Does the pressure jump from one sample to the next?
     #[must_use]
     pub fn jumps(&self) -> bool {
