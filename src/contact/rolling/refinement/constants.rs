@@ -24,15 +24,6 @@ pub const WITHOUT_COMPANION: f64 = 1.5;
 pub const LEVELS_LIKE: f64 = 0.3;
 /// The same between levels of different kinds; 0.1 and 0.25 change the work by less than 1 %.
 pub const LEVELS_UNLIKE: f64 = 0.15;
-/// The same weights where the change stands in place of the difference of the rules, because one rule was solved alone. On the first 200
-/// ellipses at four targets, with .3 and .6 the share that is covered differs by less than 1 %, and so does it with the difference of the rules in
-/// their place (.97 to .99; the other 200: .97 to .98).
-pub const ALONE_LIKE: f64 = 0.5;
-/// Between levels of different kinds; see [`ALONE_LIKE`].
-pub const ALONE_UNLIKE: f64 = 0.25;
-/// One rule is solved alone on levels of at least this many times the cells of the level below: the change from it is divided by the
-/// ratio less 1. Chosen by judgement; how much it matters was not measured.
-pub const ONE_RULE_RATIO: f64 = 1.2;
 /// A level is compared with a coarser one if it has at least this many times its cells; with 1.5 the work changes by 1 %.
 pub const LEVEL_RATIO_MIN: f64 = 1.8;
 /// Error of sampling the vortex of the tractions by the cell that holds its centre, over p h² / N (1500 solves on random

@@ -11,10 +11,10 @@ use crate::contact::rolling::motion_answer::RelativeErrors;
 use crate::contact::rolling::refinement::caution::caution;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::constants::{
-    ALONE_LIKE, ALONE_UNLIKE, CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES,
-    HERTZ, JUMPING, LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS,
-    RULES_ON_MESH, RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW,
-    SURPRISES, WITHOUT_COMPANION,
+    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, HERTZ, JUMPING,
+    LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH,
+    RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES,
+    WITHOUT_COMPANION,
 };
 use crate::contact::rolling::refinement::distances::distances;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
@@ -44,6 +44,8 @@ pub struct EstimateContext<'a> {
     pub motion: &'a Motion,
     /// The level before.
     pub before: Option<CoarserLevel<'a>>,
+    /// What is left of the difference of the two rules on a coarser level, for a level that was solved with one of them.
+    pub carried: Option<&'a [f64]>,
     /// A finer level, where everything slips or the pressure jumps.
     pub finer: Option<&'a StripMesh>,
     /// Slenderness of the patch over that of the population of the factors for explicit meshes; at least 1.
@@ -65,12 +67,10 @@ pub enum Indicators {
 /// Differences that stand for the error of a level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Between the two rules; nothing if one of them did not converge or was not solved.
+    /// Between the two rules, or what is left of it from a coarser level; nothing if one of them did not converge.
     pub(super) rules: Option<Vec<f64>>,
     /// To the level before, weighted.
     before: Option<Vec<f64>>,
-    /// That change stands in place of the difference of the rules.
-    one_rule: bool,
     /// To half the strips and to half the cells.
     pub(super) companions: [Option<Vec<f64>>; 2],
     /// A companion was tried and has no answer.
@@ -101,7 +101,12 @@ impl Indicators {
         found: &[Resultants],
         context: EstimateContext,
     ) -> Indicators {
-        let EstimateContext { motion, finer, .. } = context;
+        let EstimateContext {
+            motion,
+            finer,
+            carried,
+            ..
+        } = context;
         let patches = task.footprint.patches();
         let none = vec![0.0; patches.len() + 1];
         let all = |value| Indicators::Known(vec![value; patches.len() + 1]);
@@ -133,6 +138,8 @@ impl Indicators {
                 .collect();
             distances(task, patches, found, &second)
         });
+        let carried = carried.filter(|_| answer.is_of_one_rule());
+        let rules = rules.or(carried.map(<[f64]>::to_vec));
         let pole = if motion.spin_per_mm == 0.0 {
             0.0
         } else {
@@ -143,19 +150,11 @@ impl Indicators {
             return Indicators::Known(errors);
         }
         let sticking = matches!(level.plan.regime, Regime::Sticking { .. });
-        let one_rule = answer.is_of_one_rule();
         Indicators::Measured(Box::new(Measured {
             rules,
-            before: context.before.map(|before| {
-                let weight = if one_rule {
-                    weight_alone
-                } else {
-                    weight_beside
-                };
-                let weight = weight(before.regime, level.plan.regime);
-                change(task, patches, found, before, weight)
-            }),
-            one_rule,
+            before: context
+                .before
+                .map(|before| change(task, patches, level, found, before)),
             companions: [None, None],
             missing: false,
             extrapolated: none.clone(),
@@ -194,6 +193,15 @@ impl Indicators {
         }
     }
 
+    /// The difference of the two rules, measured or carried on from a coarser level.
+    #[must_use]
+    pub fn rules(&self) -> Option<&Vec<f64>> {
+        match self {
+            Indicators::Measured(measured) => measured.rules.as_ref(),
+            Indicators::Known(_) => None,
+        }
+    }
+
     /// Whether a companion was tried and has no answer.
     #[must_use]
     pub fn companion_missing(&self) -> bool {
@@ -223,17 +231,17 @@ impl Measured {
     /// The estimate for patch `k`, or for the sum: the root of the sum of the squares of all indicators, with one factor for
     /// all regimes, shapes and motions. Without companions it is a lower bound, by which a mesh can be refused.
     fn error(&self, k: usize) -> Option<f64> {
-        let of = |values: &Option<Vec<f64>>| values.as_ref().map_or(0.0, |values| values[k]);
-        let caution = if self.missing { WITHOUT_COMPANION } else { 1.0 };
-        let (rules, before) = match (&self.rules, &self.before) {
-            (Some(rules), _) => (caution * DIFFERENCES * rules[k], of(&self.before)),
-            (None, Some(before)) if self.one_rule => (0.0, caution * before[k]),
-            _ => return None,
+        let rules = DIFFERENCES * self.rules.as_ref()?[k];
+        let rules = if self.missing {
+            WITHOUT_COMPANION * rules
+        } else {
+            rules
         };
+        let of = |values: &Option<Vec<f64>>| values.as_ref().map_or(0.0, |values| values[k]);
         let [across, along] = [0, 1].map(|c| DIFFERENCES * of(&self.companions[c]));
         let parts = [
             rules,
-            before,
+            of(&self.before),
             across,
             along,
             self.pole,
@@ -317,41 +325,20 @@ fn weighted(patches: &[Patch], mut errors: Vec<f64>) -> Vec<f64> {
     errors
 }
 
-/// Are the meshes of two regimes of one kind?
-fn are_like(before: Regime, here: Regime) -> bool {
-    matches!(
-        (before, here),
-        (Regime::Sticking { .. }, Regime::Sticking { .. })
-            | (Regime::Spinning(_), Regime::Spinning(_))
-    )
-}
-
-/// The weight of the change from the level before, beside the difference of the rules.
-fn weight_beside(before: Regime, here: Regime) -> f64 {
-    match here {
-        _ if are_like(before, here) => LEVELS_LIKE,
-        Regime::Sticking { .. } => LEVELS_UNLIKE,
-        Regime::Spinning(_) | Regime::Unknown => 0.0,
-    }
-}
-
-/// The same in place of that difference.
-fn weight_alone(before: Regime, here: Regime) -> f64 {
-    if are_like(before, here) {
-        ALONE_LIKE
-    } else {
-        ALONE_UNLIKE
-    }
-}
-
 /// The weighted change from the level before.
 fn change(
     task: &RollingTask,
     patches: &[Patch],
+    level: &StripMesh,
     found: &[Resultants],
     before: CoarserLevel,
-    factor: f64,
 ) -> Vec<f64> {
+    let factor = match (before.regime, level.plan.regime) {
+        (Regime::Sticking { .. }, Regime::Sticking { .. })
+        | (Regime::Spinning(_), Regime::Spinning(_)) => LEVELS_LIKE,
+        (_, Regime::Sticking { .. }) => LEVELS_UNLIKE,
+        _ => 0.0,
+    };
     let mut change = distances(task, patches, found, before.summed);
     change.iter_mut().for_each(|d| *d *= factor * before.share);
     change

@@ -13,7 +13,7 @@ use crate::contact::rolling::methods::liu_hsu::on_level;
 use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{MotionAnswer, RelativeErrors, SolvedFields};
-use crate::contact::rolling::refinement::constants::{LEVEL_RATIO_MIN, ONE_RULE_RATIO};
+use crate::contact::rolling::refinement::constants::LEVEL_RATIO_MIN;
 use crate::contact::rolling::refinement::error_estimate;
 use crate::contact::rolling::refinement::error_estimate::{
     CoarserLevel, EstimateContext, Indicators,
@@ -55,6 +55,8 @@ pub struct SolvedLevel {
     pub resultants: Vec<Resultants>,
     /// The same as the tractions give them, without extrapolation.
     pub summed: Vec<Resultants>,
+    /// Difference of the two rules as an indicator, or what is left of it from a coarser level: it falls as 1/N.
+    pub rules: Option<Vec<f64>>,
     /// Estimated errors, see [`Indicators::errors`].
     pub errors: RelativeErrors,
     /// Work over all levels.
@@ -130,8 +132,9 @@ pub fn solve_level(
     // A part of a sweep counts from its own first motion, the client from that of the case.
     let named = |failure| named(failure, task, task.first_motion + asked.index);
     let workspace = &mut state.workspace;
+    let told = coarser.as_ref().is_some_and(|point| point.rules.is_some());
     let (alone, lost) = match &below {
-        Some((coarse, answer)) if warm.is_none() => {
+        Some((coarse, answer)) if warm.is_none() && told => {
             let of_level = level_task(task, &level, &motion, asked.index);
             let below = (coarse.as_ref(), *answer);
             one_rule::attempt(task, of_level, below, workspace, monitor).map_err(named)?
@@ -186,17 +189,14 @@ pub(crate) fn answer_on(
         // Extrapolated later, if both companions are solved.
         resultants: summed.clone(),
         summed,
+        rules: coarser.and_then(|coarser| carried(state, &level, coarser)),
         errors: Vec::new(),
         method: method_used(task),
         seconds: 0.0,
     };
-    let ratio = if point.tangential.is_of_one_rule() {
-        ONE_RULE_RATIO
-    } else {
-        LEVEL_RATIO_MIN
-    };
-    let before = coarser.and_then(|coarser| before(state, &level, coarser, ratio));
+    let before = coarser.and_then(|coarser| before(state, &level, coarser));
     let indicators = indicators_on(task, state, &level, &point, before);
+    point.rules = indicators.rules().cloned();
     point.errors = indicators.errors();
     JudgedAnswer { point, indicators }
 }
@@ -213,6 +213,7 @@ pub(crate) fn indicators_on(
     let context = EstimateContext {
         motion: &point.motion,
         before,
+        carried: point.rules.as_deref(),
         finer: finer.as_ref(),
         slenderness: state.policy.slenderness(),
         tolerance: task.tolerance(),
@@ -236,16 +237,23 @@ pub(crate) fn level_task<'a>(
     }
 }
 
-/// The level before, if the level has at least `ratio_min` times its cells.
+/// What is left of the difference of the rules on a coarser level.
+fn carried(state: &RefinementState, level: &StripMesh, coarser: &SolvedLevel) -> Option<Vec<f64>> {
+    let cells = state.levels.get(coarser.level).mesh.cells();
+    let left = (cells as f64 / level.mesh.cells() as f64).min(1.0);
+    let rules = coarser.rules.as_ref()?.iter();
+    Some(rules.map(|rules| left * rules).collect())
+}
+
+/// The level before, if it is coarse enough to compare with.
 pub(crate) fn before<'a>(
     state: &RefinementState,
     level: &StripMesh,
     point: &'a SolvedLevel,
-    ratio_min: f64,
 ) -> Option<CoarserLevel<'a>> {
     let below = state.levels.get(point.level);
     let ratio = level.mesh.cells() as f64 / below.mesh.cells() as f64;
-    (ratio >= ratio_min).then(|| CoarserLevel {
+    (ratio >= LEVEL_RATIO_MIN).then(|| CoarserLevel {
         summed: &point.summed,
         regime: below.plan.regime,
         share: 1.0 / (ratio - 1.0),
