@@ -134,18 +134,23 @@ impl Ellipse {
 
     /// The same behind those in a buffer.
     pub fn add_chords(&self, strips: &[(f64, f64)], chords: &mut Vec<Chord>) {
-        let chord = |(strip, &(y, dy)): (usize, &(f64, f64))| {
-            let half = self.half_chord(y);
-            (half > 0.0).then_some(Chord {
-                patch: 0,
-                strip,
-                y,
-                dy,
-                left: -half,
-                right: half,
-            })
-        };
+        let chord = |(strip, &line): (usize, &(f64, f64))| self.chord(strip, line);
         chords.extend(strips.iter().enumerate().filter_map(chord));
+    }
+
+    /// The chord on one strip `(y, dy)`; nothing if it misses the patch.
+    #[must_use]
+    #[inline]
+    pub fn chord(&self, strip: usize, (y, dy): (f64, f64)) -> Option<Chord> {
+        let half = self.half_chord(y);
+        (half > 0.0).then_some(Chord {
+            patch: 0,
+            strip,
+            y,
+            dy,
+            left: -half,
+            right: half,
+        })
     }
 
     /// Mean pressure in MPa over `x0 < x < x1` on the line of a chord, in closed form; 0 outside the ellipse.
@@ -175,18 +180,6 @@ impl Ellipse {
         self.pressure_max * 0.5 * (chord.right - chord.left) / self.a * sine
     }
 
-    /// The sum over chords of their loads in N/mm between two of these angles: the integral of sin² u, without cancellation near the ends.
-    #[must_use]
-    pub fn load(&self, chords: &[Chord], [u0, u1]: [f64; 2]) -> f64 {
-        let (width, middle) = (u1 - u0, 0.5 * (u0 + u1));
-        let integral = 0.5 * ((width - width.sin()) + 2.0 * width.sin() * middle.sin().powi(2));
-        let squares = chords.iter().map(|chord| {
-            let half = 0.5 * (chord.right - chord.left);
-            half * half
-        });
-        self.pressure_max / self.a * squares.sum::<f64>() * integral
-    }
-
     /// Mean pressures over the largest one of a line, between neighbouring places on it that run from −1 to 1: they are the same on
     /// every line.
     #[must_use]
@@ -198,6 +191,7 @@ impl Ellipse {
     }
 
     /// Half-length of the chord at y; 0 where the line misses the ellipse.
+    #[inline]
     fn half_chord(&self, y: f64) -> f64 {
         let t = y / self.b;
         self.a * ((1.0 - t) * (1.0 + t)).max(0.0).sqrt()
