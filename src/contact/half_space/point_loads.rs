@@ -34,7 +34,7 @@ pub fn stresses(
     points: &[Lanes; 3],
     nu: f64,
 ) -> [Stress; LANES] {
-    Arch::new().dispatch(Sums {
+    Arch::new().dispatch(FeltStresses {
         packs,
         felt,
         points,
@@ -42,7 +42,7 @@ pub fn stresses(
     })
 }
 
-struct Sums<'a> {
+struct FeltStresses<'a> {
     packs: &'a [LoadPack],
     felt: &'a [Vec<Range<usize>>; LANES],
     points: &'a [Lanes; 3],
@@ -50,7 +50,7 @@ struct Sums<'a> {
     rest: f32,
 }
 
-impl NullaryFnOnce for Sums<'_> {
+impl NullaryFnOnce for FeltStresses<'_> {
     type Output = [Stress; LANES];
 
     #[inline(always)]

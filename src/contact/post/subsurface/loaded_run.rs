@@ -87,16 +87,20 @@ struct Turns {
 }
 
 /// Tractions over pressure along and across at the points of a rule along a strip.
-type Row = [[f32; POINTS_MAX]; 2];
+type StripRatios = [[f32; POINTS_MAX]; 2];
 
 /// The rows of two neighbouring strips with their numbers.
-struct TwoRows([(usize, Row); 2]);
+struct TwoRows([(usize, StripRatios); 2]);
 
 impl TwoRows {
     const NONE: TwoRows = TwoRows([(usize::MAX, [[0.0; POINTS_MAX]; 2]); 2]);
 
     /// Moves on to these strips, with what makes their rows.
-    fn move_to(&mut self, pair: [usize; 2], make: impl Fn(usize) -> Row) -> [&Row; 2] {
+    fn move_to(
+        &mut self,
+        pair: [usize; 2],
+        make: impl Fn(usize) -> StripRatios,
+    ) -> [&StripRatios; 2] {
         let TwoRows(rows) = self;
         if rows[1].0 == pair[0] {
             rows[0] = rows[1];
@@ -300,7 +304,7 @@ impl<'a> LoadedRun<'a> {
     }
 
     /// Tractions over pressure on the mid-line of a strip.
-    fn row(&self, strip: usize, turns: &Turns) -> Row {
+    fn row(&self, strip: usize, turns: &Turns) -> StripRatios {
         let nodes = self.nodes.len();
         let own = &self.ratios[strip * nodes..][..nodes];
         let mut row = [[0.0; POINTS_MAX]; 2];
