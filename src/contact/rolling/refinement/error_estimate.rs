@@ -101,12 +101,7 @@ impl Indicators {
         found: &[Resultants],
         context: EstimateContext,
     ) -> Indicators {
-        let EstimateContext {
-            motion,
-            finer,
-            carried,
-            ..
-        } = context;
+        let EstimateContext { motion, finer, .. } = context;
         let patches = task.footprint.patches();
         let none = vec![0.0; patches.len() + 1];
         let all = |value| Indicators::Known(vec![value; patches.len() + 1]);
@@ -132,14 +127,7 @@ impl Indicators {
         if task.method == Method::LiuHsu {
             return Indicators::Known(dense_errors(task, patches, found, context));
         }
-        let rules = answer.second.as_ref().map(|second| {
-            let second: Vec<Resultants> = (0..patches.len())
-                .map(|p| Resultants::of_patch(level, second, p))
-                .collect();
-            distances(task, patches, found, &second)
-        });
-        let carried = carried.filter(|_| answer.is_of_one_rule());
-        let rules = rules.or(carried.map(<[f64]>::to_vec));
+        let rules = between_rules(task, level, answer, found, context.carried);
         let pole = if motion.spin_per_mm == 0.0 {
             0.0
         } else {
@@ -323,6 +311,25 @@ fn weighted(patches: &[Patch], mut errors: Vec<f64>) -> Vec<f64> {
         .sum();
     errors.push(sum);
     errors
+}
+
+/// The difference of the two rules, or what was `carried` on to a level of one rule.
+fn between_rules(
+    task: &RollingTask,
+    level: &StripMesh,
+    answer: &LevelAnswer,
+    found: &[Resultants],
+    carried: Option<&[f64]>,
+) -> Option<Vec<f64>> {
+    let Some(second) = &answer.second else {
+        let carried = carried.filter(|_| answer.is_of_one_rule());
+        return carried.map(<[f64]>::to_vec);
+    };
+    let patches = task.footprint.patches();
+    let second: Vec<Resultants> = (0..patches.len())
+        .map(|p| Resultants::of_patch(level, second, p))
+        .collect();
+    Some(distances(task, patches, found, &second))
 }
 
 /// The weighted change from the level before.

@@ -6,7 +6,7 @@ pub mod linearisation;
 pub mod newton;
 mod newton_system;
 pub mod preconditioner;
-pub(crate) mod rule_sequence;
+mod rule_sequence;
 pub mod solve;
 pub mod task;
 pub mod workspace;

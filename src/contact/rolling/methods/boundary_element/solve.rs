@@ -14,7 +14,7 @@ use crate::contact::rolling::answer::{
 use crate::contact::rolling::methods::boundary_element::rule_sequence::{
     Control, FEW_STEPS, RuleSequence,
 };
-use crate::contact::rolling::methods::boundary_element::task::LevelTask;
+use crate::contact::rolling::methods::boundary_element::task::{FEW_STEPS, LevelTask};
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::start::Start;
