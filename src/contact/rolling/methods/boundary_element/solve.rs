@@ -11,9 +11,7 @@ use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::{
     LevelAnswer, LevelExit, LevelFailure, Work, project_on_bound,
 };
-use crate::contact::rolling::methods::boundary_element::rule_sequence::{
-    Control, FEW_STEPS, RuleSequence,
-};
+use crate::contact::rolling::methods::boundary_element::rule_sequence::{Control, RuleSequence};
 use crate::contact::rolling::methods::boundary_element::task::{FEW_STEPS, LevelTask};
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::skip::Skip;
