@@ -11,7 +11,7 @@ const LAYER: f64 = 2.5;
 /// Factor on estimates where bodies differ, less 1, over |K|: the slips from the pressure are as coarse as the cells in both rules (12
 /// contacts with |K| up to 0.25, errors up to 1.4 times the estimate without it, 2.3 times where rolling is free, which the error of the
 /// pressure adds to: `cargo test --test physics -- unlike_bodies`).
-const UNLIKE: f64 = 3.5;
+const UNLIKE: f64 = 3.0;
 
 /// The factor of a problem; 1 for a coefficient and like bodies.
 pub(crate) fn caution(task: &RollingTask) -> f64 {
