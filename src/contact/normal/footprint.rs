@@ -176,7 +176,7 @@ impl Footprint {
         }
     }
 
-    /// Pressures in MPa at points of a chord (not yet scaled to the patch's force), given by the cosines and sines of the angles u: they lie
+    /// Pressures in MPa at points of a chord (not yet scaled to the patch's force), given by the cosines and sines of rising angles u: they lie
     /// `−half · cos u` from the middle of the chord.
     #[must_use]
     #[inline]
@@ -190,10 +190,9 @@ impl Footprint {
                 let steepness = ellipse.pressure(chord, 1.0);
                 sines.map(|sine| steepness * sine)
             }
-            FootprintShape::Sampled(field) => cosines.map(|cosine| {
-                let x = chord.along(cosine);
-                field.mean_pressure(chord, x, x)
-            }),
+            FootprintShape::Sampled(field) => {
+                field.pressures(chord, cosines.map(|cosine| chord.along(cosine)))
+            }
         }
     }
 }

@@ -16,15 +16,18 @@ use crate::contact::rolling::strip_mesh::StripMesh;
 /// Points of the rule with most of them.
 const POINTS_MAX: usize = RULES[ORDERS - 1].len();
 
-/// See [`halvings`]: of Hertz's ellipses with one coefficient of friction; of other patches; of those whose pressure jumps and of those that have
+/// See [`halvings`]: of Hertz's ellipses with one coefficient of friction; of other patches; of those whose pressure is rough or that have
 /// hollows. With none at all, errors on ellipses with a pole of spin grow from 0.0015 of the largest pressure to 0.0055, where friction jumps from 0.4
-/// to 0.1 across from 0.0009 to 0.0055, on a gap of two radii from 0.002 to 0.004, and where the pressure jumps from 0.006 to 0.02. Two halvings across
+/// to 0.1 across from 0.0009 to 0.0055, on a gap of two radii from 0.001 to 0.004, and where the pressure jumps from 0.007 to 0.02. Two halvings across
 /// take an eighth more time than none.
 const SMOOTH: [u32; 2] = [0, 2];
 /// See [`SMOOTH`].
-const UNEVEN: [u32; 2] = [0, 3];
+const UNEVEN: [u32; 2] = [0, 4];
 /// See [`SMOOTH`].
 const ROUGH: [u32; 2] = [4, 4];
+/// See [`steepest`]: it is 0.30 at most on ellipses and gaps, where the last cells differ by their width alone, and 0.54 and more where the pressure jumps,
+/// at hollows, and where a gap opens so steeply that the pressure rises towards the edge.
+const STEEP: f64 = 0.4;
 /// By how much, relatively, coefficients may differ that are taken for one. Chosen by judgement.
 const EVEN: f64 = 0.1;
 
@@ -336,7 +339,7 @@ fn halvings(level: &StripMesh, footprint: &Footprint, segments: &[Segment]) -> [
     let patch = segments[0].chord.patch;
     let all = level.mesh.segments.iter();
     let hollow = all.filter(|segment| segment.chord.patch == patch).count() > segments.len();
-    if footprint.jumps() || hollow {
+    if footprint.jumps() || hollow || steepest(level, segments) > STEEP {
         return ROUGH;
     }
     // Bounds over pressures, cell by cell, multiplied by both pressures.
@@ -352,6 +355,30 @@ fn halvings(level: &StripMesh, footprint: &Footprint, segments: &[Segment]) -> [
     } else {
         UNEVEN
     }
+}
+
+/// The largest relative change from cell to cell along a strip of the pressure over that of an ellipse, which is proportional to sin u; strips with less
+/// than a tenth of the largest pressure do not count.
+fn steepest(level: &StripMesh, segments: &[Segment]) -> f64 {
+    let cells = segments[0].cells.start..segments[segments.len() - 1].cells.end;
+    let pressures = &level.pressure;
+    let largest = pressures[cells].iter().copied().fold(0.0, f64::max);
+    let mut steepest = 0.0_f64;
+    for Segment { chord, cells } in segments {
+        let top = pressures[cells.clone()].iter().copied().fold(0.0, f64::max);
+        if top < 0.1 * largest {
+            continue;
+        }
+        let form = |i: usize| {
+            let x = level.mesh.node[i];
+            pressures[i] / ((x - chord.left) * (chord.right - x)).max(0.0).sqrt()
+        };
+        for i in cells.start + 1..cells.end {
+            let [before, here] = [i - 1, i].map(form);
+            steepest = steepest.max((here - before).abs() / before.min(here));
+        }
+    }
+    steepest
 }
 
 /// Sine and cosine. Most angles are small, for which a few terms of the series are exact to 1e-13.
