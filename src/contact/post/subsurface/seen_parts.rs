@@ -20,8 +20,7 @@ pub struct LoadResolution {
 impl LoadResolution {
     /// For stresses that are answered: within 0.0016 of the largest pressure of those with sizes of 0.05 to 0.67 and a quadrature cell by cell, and within
     /// 0.0001 in the median, on the 18 ellipses of `cargo bench --bench stress -- --only after`, three in full slip and four at other targets; within
-    /// 0.0019 on two gaps; at 3500 random points each in depths from 0.012 to 4 half-widths. With 0.5, 1.1 and 3 it is 0.0028, for a tenth less time, with 0.3, 0.8 and 1.6 half of
-    /// it for twice the time. Of a constant load on a square, 0.62, 1.4 and 3 leave 0.001.
+    /// 0.0009 on two gaps; at 3500 random points each in depths from 0.012 to 4 half-widths. Of a constant load on a square, 0.62, 1.4 and 3 leave 0.001.
     pub const FINE: LoadResolution = LoadResolution {
         sizes: [0.5, 1.0, 2.6],
     };
