@@ -157,6 +157,10 @@ fn the_field_is_in_equilibrium() {
     }
 }
 
+/// On the gap of two radii CONTACT's window, 139 columns of 12/135 mm, ends inside the patch, which would reach to 7.21 mm: its contact ends there, and
+/// so does ours, where the bodies are 2 mm apart beyond it.
+const WINDOW: f64 = 139.0 * 6.0 / 135.0;
+
 /// A contact whose stresses were computed elsewhere.
 #[derive(Debug, Deserialize)]
 struct StressReference {
@@ -189,7 +193,7 @@ impl StressReference {
         let [[_, meet, first], [_, _, second]] = gap.segments[..] else {
             panic!("two arcs")
         };
-        let height = |y: f64| {
+        let across = |y: f64| {
             if y <= meet {
                 0.5 * y * y / first
             } else {
@@ -197,9 +201,21 @@ impl StressReference {
                 0.5 * meet * meet / first + d * meet / first + 0.5 * d * d / second
             }
         };
-        let y: Vec<f64> = (0..=180).map(|k| -8.0 + 0.125 * f64::from(k)).collect();
-        let gap_mm: Vec<f64> = y.iter().map(|y| height(*y)).collect();
-        json!({ "type": "gap_profile", "rolling_mm": gap.rolling_mm, "y_mm": y, "gap_mm": gap_mm })
+        let x: Vec<f64> = (-60..=60).map(|k| f64::from(k) * WINDOW / 46.0).collect();
+        let y: Vec<f64> = (0..=90).map(|k| -3.5 + 0.08 * f64::from(k)).collect();
+        let height = |x: f64, y: f64| {
+            let beyond = if x.abs() > 1.001 * WINDOW { 2.0 } else { 0.0 };
+            across(y) + 0.5 * x * x / gap.rolling_mm + beyond
+        };
+        let row = |y: &f64| x.iter().map(|x| height(*x, *y)).collect::<Vec<f64>>();
+        let rows: Vec<Vec<f64>> = y.iter().map(row).collect();
+        json!({ "type": "gap_grid", "x_mm": x, "y_mm": y, "gap_mm": rows })
+    }
+
+    /// The largest pressure inside the patch. That of the reference's gap is the peak at the end of the window: its middle grid, whose window is a
+    /// little wider, has 1730.6 MPa.
+    fn largest(&self) -> f64 {
+        self.gap.as_ref().map_or(self.pressure_max_mpa, |_| 1730.6)
     }
 
     fn case(&self) -> Value {
@@ -218,7 +234,7 @@ impl StressReference {
 }
 
 /// At default settings, every component and von Mises' stress: within 0.3 % of the largest pressure at a depth of 0.1 semi-axes and below
-/// on ellipses, within 1.2 % on gaps, whose pressure is computed too, and within 0.8 % above; beyond the reference's uncertainty.
+/// and within 0.8 % above; beyond the reference's uncertainty.
 #[test]
 fn stresses_are_those_of_contact() {
     let mut failures = Vec::new();
@@ -235,7 +251,7 @@ fn stresses_are_those_of_contact() {
             errors.push((point.von_mises_mpa - known[9]).abs());
             let error = errors.iter().copied().fold(0.0, f64::max) - known[10];
             let deep = usize::from(known[2] > 0.99 * shallow);
-            worst[deep] = worst[deep].max(error / case.pressure_max_mpa);
+            worst[deep] = worst[deep].max(error / case.largest());
         }
         println!(
             "{}: {:.4} above, {:.4} below, {} points",
@@ -244,8 +260,7 @@ fn stresses_are_those_of_contact() {
             worst[1],
             found.len()
         );
-        let allowed = if case.gap.is_some() { 0.012 } else { 0.003 };
-        if worst[0] > 0.008 || worst[1] > allowed {
+        if worst[0] > 0.008 || worst[1] > 0.003 {
             failures.push(format!("{}: {worst:.4?}", case.id));
         }
     }

@@ -6,9 +6,9 @@ use crate::contact::problem::checked_case::CheckedCase;
 /// Time in s before the first stress below the surface, and for each; for the worst point of a patch; for the power of all cells of a usual
 /// mesh; for the rest. Of `cargo bench --bench stress -- --only after`, medians over 18 ellipses, the first two with one to twenty times as many
 /// points along x; a fine mesh takes several times as long.
-const LOADS_SECONDS: f64 = 9e-4;
+const LOADS_SECONDS: f64 = 3e-4;
 const STRESS_SECONDS: f64 = 4e-7;
-const WORST_SECONDS: f64 = 0.005;
+const WORST_SECONDS: f64 = 0.0025;
 const POWER_SECONDS: f64 = 8e-5;
 const DAMAGE_SECONDS: f64 = 3e-6;
 /// For the passages below a patch, for each thing that is judged of them: the same bench.

@@ -16,71 +16,57 @@ pub const LANES: usize = 16;
 /// One number for each of the points.
 pub type Lanes = [f32; LANES];
 
-/// A force on the surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PointLoad {
-    /// Where it acts, in mm.
-    pub at: [f32; 2],
-    /// Its components along x, along y and into the body, in N.
-    pub force: [f32; 3],
+/// Forces on the surface, [`LANES`] side by side. Those that are not needed are 0.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LoadPack {
+    /// Where they act: x and y in mm.
+    pub at: [Lanes; 2],
+    /// Their components along x, along y and into the body, in N.
+    pub force: [Lanes; 3],
 }
 
-/// Loads that some of the points feel.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FeltLoads {
-    /// Of the list of all loads.
-    pub loads: Range<usize>,
-    /// A bit for each point that feels them.
-    pub lanes: u16,
-}
-
-/// The stresses in MPa at the points `x, y, z` in mm, z more than 0, for Poisson's ratio `nu`. Lanes to which no load is felt get 0.
-///
-/// A point's stress does not depend on the points beside it: what it does not feel adds exactly 0.
+/// The stresses in MPa at the points `[x, y, z]` in mm, z more than 0, for Poisson's ratio `nu`; each point feels its own packs of the list
+/// of all.
 #[must_use]
 pub fn stresses(
-    loads: &[PointLoad],
-    felt: &[FeltLoads],
+    packs: &[LoadPack],
+    felt: &[Vec<Range<usize>>; LANES],
     points: &[Lanes; 3],
     nu: f64,
 ) -> [Stress; LANES] {
-    let sums = Arch::new().dispatch(Sum {
-        loads,
+    Arch::new().dispatch(FeltStresses {
+        packs,
         felt,
         points,
         rest: (1.0 - 2.0 * nu) as f32,
-    });
-    std::array::from_fn(|lane| sums.map(|sum| f64::from(sum[lane]) * (0.5 * FRAC_1_PI)))
+    })
 }
 
-struct Sum<'a> {
-    loads: &'a [PointLoad],
-    felt: &'a [FeltLoads],
+struct FeltStresses<'a> {
+    packs: &'a [LoadPack],
+    felt: &'a [Vec<Range<usize>>; LANES],
     points: &'a [Lanes; 3],
     /// 1 − 2ν.
     rest: f32,
 }
 
-impl NullaryFnOnce for Sum<'_> {
-    type Output = [Lanes; 6];
+impl NullaryFnOnce for FeltStresses<'_> {
+    type Output = [Stress; LANES];
 
     #[inline(always)]
-    fn call(self) -> [Lanes; 6] {
-        let mut sums = StressSums::default();
-        for FeltLoads { loads, lanes } in self.felt {
-            let share: Lanes =
-                std::array::from_fn(|lane| if lanes >> lane & 1 == 1 { 1.0 } else { 0.0 });
-            for load in &self.loads[loads.clone()] {
-                self.add(load, &share, &mut sums);
+    fn call(self) -> [Stress; LANES] {
+        let mut stresses = [[0.0; 6]; LANES];
+        let points = (0..LANES).map(|k| self.points.map(|axis| axis[k]));
+        for ((stress, felt), point) in stresses.iter_mut().zip(self.felt).zip(points) {
+            let mut sums = StressSums::default();
+            for packs in felt {
+                for pack in &self.packs[packs.clone()] {
+                    add(pack, point, self.rest, &mut sums);
+                }
             }
+            *stress = sums.total();
         }
-        let StressSums { terms, even } = sums;
-        let [mut xx, mut yy, zz, xy, xz, yz] = terms;
-        for ((xx, yy), even) in xx.iter_mut().zip(&mut yy).zip(even) {
-            *xx += even;
-            *yy += even;
-        }
-        [xx, yy, zz, xy, xz, yz]
+        stresses
     }
 }
 
@@ -93,47 +79,70 @@ struct StressSums {
     even: Lanes,
 }
 
-impl Sum<'_> {
-    /// Adds 2π times the stresses of one load.
-    ///
-    /// With r from the load to the point, ρ its length and F the force: −3 (F·r) r_i r_j/ρ⁵, and 1 − 2ν times what has only the components
-    /// in the surface. Written for few operations that depend on each other: one division, products added where they arise.
+impl StressSums {
+    /// The sum over the lanes.
     #[inline(always)]
-    fn add(&self, load: &PointLoad, share: &Lanes, sums: &mut StressSums) {
-        let [xs, ys, zs] = self.points;
-        let [x_load, y_load] = load.at;
-        let [along, across, down] = load.force;
-        let StressSums { terms, even } = sums;
-        let [xx, yy, zz, xy, xz, yz] = terms;
-        for lane in 0..LANES {
-            let (x, y, z) = (xs[lane] - x_load, ys[lane] - y_load, zs[lane]);
-            let distance = x.mul_add(x, y.mul_add(y, z * z)).sqrt();
-            let deep = distance + z;
-            // Every term has this factor, so that a load that is not felt adds exactly 0.
-            let inverse = share[lane] / (distance * deep);
-            // 1/ρ, 1/(ρ + z), 1/(ρ (ρ + z)).
-            let (near, below) = (inverse * deep, inverse * distance);
-            let square = near * near;
-            let cube = square * near;
-            let sheared = along.mul_add(x, across * y);
-            let all = -3.0 * down.mul_add(z, sheared) * (cube * square);
-            // 1/(ρ (ρ + z)²), and what multiplies the squares of the coordinates.
-            let turned = inverse * below;
-            let rest = self.rest * turned;
-            let twice = distance + deep;
-            let squares = (sheared * below).mul_add(distance + twice, down * twice);
-            let both = (rest * square).mul_add(squares, all);
-            let flat = cube.mul_add(z, -inverse);
-            even[lane] += self.rest * sheared.mul_add(cube - turned, down * flat);
-            let (along, across) = (rest * along, rest * across);
-            xx[lane] = x.mul_add(both.mul_add(x, -2.0 * along), xx[lane]);
-            yy[lane] = y.mul_add(both.mul_add(y, -2.0 * across), yy[lane]);
-            xy[lane] = x.mul_add(both.mul_add(y, -across), y.mul_add(-along, xy[lane]));
-            let all = all * z;
-            zz[lane] = all.mul_add(z, zz[lane]);
-            xz[lane] = all.mul_add(x, xz[lane]);
-            yz[lane] = all.mul_add(y, yz[lane]);
-        }
+    fn total(&self) -> Stress {
+        let sum = |lanes: &Lanes| {
+            let mut halves = *lanes;
+            for width in [8, 4, 2, 1] {
+                for lane in 0..width {
+                    halves[lane] += halves[lane + width];
+                }
+            }
+            f64::from(halves[0]) * (0.5 * FRAC_1_PI)
+        };
+        let even = sum(&self.even);
+        let [xx, yy, zz, xy, xz, yz] = &self.terms;
+        [
+            sum(xx) + even,
+            sum(yy) + even,
+            sum(zz),
+            sum(xy),
+            sum(xz),
+            sum(yz),
+        ]
+    }
+}
+
+/// Adds 2π times the stresses of a pack.
+///
+/// With r from the load to the point, ρ its length and F the force: −3 (F·r) r_i r_j/ρ⁵, and 1 − 2ν times what has only the components
+/// in the surface. Written for few operations that depend on each other: one division, products added where they arise.
+#[inline(always)]
+fn add(pack: &LoadPack, [x_point, y_point, z]: [f32; 3], share: f32, sums: &mut StressSums) {
+    let [xs, ys] = &pack.at;
+    let [alongs, acrosses, downs] = &pack.force;
+    let StressSums { terms, even } = sums;
+    let [xx, yy, zz, xy, xz, yz] = terms;
+    for lane in 0..LANES {
+        let (x, y) = (x_point - xs[lane], y_point - ys[lane]);
+        let (along, across, down) = (alongs[lane], acrosses[lane], downs[lane]);
+        let distance = x.mul_add(x, y.mul_add(y, z * z)).sqrt();
+        let deep = distance + z;
+        let inverse = 1.0 / (distance * deep);
+        // 1/ρ, 1/(ρ + z), 1/(ρ (ρ + z)).
+        let (near, below) = (inverse * deep, inverse * distance);
+        let square = near * near;
+        let cube = square * near;
+        let sheared = along.mul_add(x, across * y);
+        let all = -3.0 * down.mul_add(z, sheared) * (cube * square);
+        // 1/(ρ (ρ + z)²), and what multiplies the squares of the coordinates.
+        let turned = inverse * below;
+        let rest = share * turned;
+        let twice = distance + deep;
+        let squares = (sheared * below).mul_add(distance + twice, down * twice);
+        let both = (rest * square).mul_add(squares, all);
+        let flat = cube.mul_add(z, -inverse);
+        even[lane] += share * sheared.mul_add(cube - turned, down * flat);
+        let (along, across) = (rest * along, rest * across);
+        xx[lane] = x.mul_add(both.mul_add(x, -2.0 * along), xx[lane]);
+        yy[lane] = y.mul_add(both.mul_add(y, -2.0 * across), yy[lane]);
+        xy[lane] = x.mul_add(both.mul_add(y, -across), y.mul_add(-along, xy[lane]));
+        let all = all * z;
+        zz[lane] = all.mul_add(z, zz[lane]);
+        xz[lane] = all.mul_add(x, xz[lane]);
+        yz[lane] = all.mul_add(y, yz[lane]);
     }
 }
 
@@ -143,20 +152,27 @@ mod tests {
 
     #[test]
     fn a_point_feels_its_own_loads_alone() {
-        let load = |x: f32| PointLoad {
-            at: [x, 0.2],
-            force: [0.1, 0.2, 1.0],
+        let pack = |x: f32| LoadPack {
+            at: [[x; LANES], [0.2; LANES]],
+            force: [[0.1; LANES], [0.2; LANES], [1.0; LANES]],
         };
-        let loads = [load(0.0), load(0.7), load(-0.4)];
+        let packs = [pack(0.0), pack(0.7), pack(-0.4)];
         let points = [
             std::array::from_fn(|lane| lane as f32),
             [0.3; LANES],
             [0.5; LANES],
         ];
-        let felt = |loads: Range<usize>, lanes: u16| FeltLoads { loads, lanes };
-        let all = stresses(&loads, &[felt(0..1, 0b11), felt(1..3, 0b01)], &points, 0.3);
-        let first = stresses(&loads, &[felt(0..1, 0b01), felt(1..3, 0b01)], &points, 0.3);
-        let second = stresses(&loads, &[felt(0..1, 0b10)], &points, 0.3);
+        // Ends of what a point feels.
+        let felt = |first: &[usize], second: &[usize]| {
+            let mut felt = [const { Vec::new() }; LANES];
+            for (felt, ends) in felt.iter_mut().zip([first, second]) {
+                felt.extend(ends.windows(2).map(|ends| ends[0]..ends[1]));
+            }
+            felt
+        };
+        let all = stresses(&packs, &felt(&[0, 1, 3], &[0, 1]), &points, 0.3);
+        let first = stresses(&packs, &felt(&[0, 3], &[]), &points, 0.3);
+        let second = stresses(&packs, &felt(&[], &[0, 1]), &points, 0.3);
         assert_eq!((all[0], all[1]), (first[0], second[1]));
         assert_eq!(all[2], [0.0; 6]);
     }

@@ -102,7 +102,7 @@ pub fn add_rectangle(at: [f64; 3], sides: [f64; 4], loads: [f64; 3], nu: f64, su
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::half_space::point_loads::{FeltLoads, LANES, PointLoad, stresses};
+    use crate::contact::half_space::point_loads::{LANES, LoadPack, stresses};
 
     fn rectangle(at: [f64; 3], sides: [f64; 4], loads: [f64; 3], nu: f64) -> Stress {
         let mut sum = [0.0; 6];
@@ -237,15 +237,12 @@ mod tests {
             [0.3, -0.2, 0.9],
         ] {
             let side = 0.004;
-            let load = PointLoad {
-                at: [0.0; 2],
-                force: force.map(|f: f64| f as f32),
-            };
-            let felt = FeltLoads {
-                loads: 0..1,
-                lanes: u16::MAX,
-            };
-            let found = stresses(&[load], &[felt], &points, 0.28);
+            let mut pack = LoadPack::default();
+            for (forces, force) in pack.force.iter_mut().zip(force) {
+                forces[0] = force as f32;
+            }
+            let felt = std::array::from_fn(|_| std::iter::once(0..1).collect());
+            let found = stresses(&[pack], &felt, &points, 0.28);
             for (place, found) in places.iter().zip(found) {
                 let mut known = [0.0; 6];
                 let [x, y, z] = force.map(|f| f / (side * side));

@@ -270,6 +270,20 @@ impl Mesh {
         }
     }
 
+    /// Is every segment its own image under x → −x, to the last bit? The influence of cells on points is then that of their images on the images
+    /// of the points.
+    #[must_use]
+    pub fn is_reversible(&self) -> bool {
+        let own_image = |segment: &Segment| {
+            let cells = segment.cells.clone();
+            let images = cells.clone().rev();
+            cells.zip(images).all(|(i, image)| {
+                self.left[i] == -self.right[image] && self.node[i] == -self.node[image]
+            })
+        };
+        self.segments.iter().all(own_image)
+    }
+
     /// The y about which segment `j` is the mirror image of segment `m − 1 − j` for every `j`, if there is one and
     /// no segment is its own image. Lengths are compared to 1e-10 of the mesh's extent.
     #[must_use]

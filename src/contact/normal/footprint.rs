@@ -100,6 +100,15 @@ impl Footprint {
         matches!(self.shape, FootprintShape::Hertz(_))
     }
 
+    /// Hertz's ellipse, if it is one.
+    #[must_use]
+    pub fn ellipse(&self) -> Option<&Ellipse> {
+        match &self.shape {
+            FootprintShape::Hertz(ellipse) => Some(ellipse),
+            FootprintShape::Sampled(_) => None,
+        }
+    }
+
     /// Does the pressure jump from one sample to the next?
     #[must_use]
     pub fn jumps(&self) -> bool {
@@ -145,6 +154,19 @@ impl Footprint {
         }
     }
 
+    /// The chord of one patch along a line `y` that stands for a strip of width `dy`, if there is exactly one.
+    #[must_use]
+    #[inline]
+    pub fn single_chord(&self, patch: usize, line: (f64, f64)) -> Option<Chord> {
+        match &self.shape {
+            FootprintShape::Hertz(ellipse) => ellipse.chord(0, line),
+            FootprintShape::Sampled(field) => match field.chords(patch, &[line])[..] {
+                [chord] => Some(chord),
+                _ => None,
+            },
+        }
+    }
+
     /// Mean pressure in MPa over `x0 < x < x1` on the line of a chord (not yet scaled to the patch's force).
     #[must_use]
     pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
@@ -154,31 +176,23 @@ impl Footprint {
         }
     }
 
-    /// Pressure in MPa at one point of a chord (not yet scaled to the patch's force): at `x` in mm, which lies `−half · cos u` from the middle
-    /// of the chord; `sine` is sin u.
+    /// Pressures in MPa at points of a chord (not yet scaled to the patch's force), given by the cosines and sines of rising angles u: they lie
+    /// `−half · cos u` from the middle of the chord.
     #[must_use]
-    pub fn pressure(&self, chord: &Chord, x: f64, sine: f64) -> f64 {
+    #[inline]
+    pub fn pressures<const N: usize>(
+        &self,
+        chord: &Chord,
+        (cosines, sines): (&[f64; N], &[f64; N]),
+    ) -> [f64; N] {
         match &self.shape {
-            FootprintShape::Hertz(ellipse) => ellipse.pressure(chord, sine),
-            FootprintShape::Sampled(field) => field.mean_pressure(chord, x, x),
-        }
-    }
-
-    /// The mean over chords of their loads in N/mm between two places, given by the angles u as in [`Footprint::pressure`] (not yet scaled to
-    /// the patch's force).
-    #[must_use]
-    pub fn mean_load(&self, chords: &[Chord], u: [f64; 2]) -> f64 {
-        let sum: f64 = match &self.shape {
-            FootprintShape::Hertz(ellipse) => ellipse.load(chords, u),
-            FootprintShape::Sampled(field) => {
-                let cosines = u.map(f64::cos);
-                let load = |chord: &Chord| {
-                    let [x0, x1] = cosines.map(|cosine| chord.along(cosine));
-                    (x1 - x0) * field.mean_pressure(chord, x0, x1)
-                };
-                chords.iter().map(load).sum()
+            FootprintShape::Hertz(ellipse) => {
+                let steepness = ellipse.pressure(chord, 1.0);
+                sines.map(|sine| steepness * sine)
             }
-        };
-        sum / chords.len() as f64
+            FootprintShape::Sampled(field) => {
+                field.pressures(chord, cosines.map(|cosine| chord.along(cosine)))
+            }
+        }
     }
 }

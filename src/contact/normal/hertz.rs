@@ -134,18 +134,23 @@ impl Ellipse {
 
     /// The same behind those in a buffer.
     pub fn add_chords(&self, strips: &[(f64, f64)], chords: &mut Vec<Chord>) {
-        let chord = |(strip, &(y, dy)): (usize, &(f64, f64))| {
-            let half = self.half_chord(y);
-            (half > 0.0).then_some(Chord {
-                patch: 0,
-                strip,
-                y,
-                dy,
-                left: -half,
-                right: half,
-            })
-        };
+        let chord = |(strip, &line): (usize, &(f64, f64))| self.chord(strip, line);
         chords.extend(strips.iter().enumerate().filter_map(chord));
+    }
+
+    /// The chord on one strip `(y, dy)`; nothing if it misses the patch.
+    #[must_use]
+    #[inline]
+    pub fn chord(&self, strip: usize, (y, dy): (f64, f64)) -> Option<Chord> {
+        let half = self.half_chord(y);
+        (half > 0.0).then_some(Chord {
+            patch: 0,
+            strip,
+            y,
+            dy,
+            left: -half,
+            right: half,
+        })
     }
 
     /// Mean pressure in MPa over `x0 < x < x1` on the line of a chord, in closed form; 0 outside the ellipse.
@@ -160,17 +165,13 @@ impl Ellipse {
             let root = ((half - x0) * (half + x0)).max(0.0).sqrt();
             return self.pressure_max * root / self.a;
         }
-        // On the chord x = half cos θ, so that the pressure is p0 (half/a) sin θ and its integral over x that of
-        // sin² θ; written with the width and middle of the interval of θ it has no cancellation near the ends.
-        let angle = |x: f64| {
-            let x = x.clamp(-half, half);
-            ((half - x) * (half + x)).sqrt().atan2(x)
-        };
-        let scale = self.pressure_max * half / self.a;
-        let (theta0, theta1) = (angle(x0), angle(x1));
-        let (width, middle) = (theta0 - theta1, 0.5 * (theta0 + theta1));
-        let integral = 0.5 * ((width - width.sin()) + 2.0 * width.sin() * middle.sin().powi(2));
-        scale * half * integral / (x1 - x0)
+        self.largest_on(chord) * mean_height(half, x0, x1)
+    }
+
+    /// Largest pressure in MPa on the line of a chord.
+    #[must_use]
+    pub fn largest_on(&self, chord: &Chord) -> f64 {
+        self.pressure_max * self.half_chord(chord.y) / self.a
     }
 
     /// Pressure in MPa at the angle u on a chord, where x = −half cos u; `sine` is sin u.
@@ -179,23 +180,37 @@ impl Ellipse {
         self.pressure_max * 0.5 * (chord.right - chord.left) / self.a * sine
     }
 
-    /// The sum over chords of their loads in N/mm between two of these angles: the integral of sin² u, without cancellation near the ends.
+    /// Mean pressures over the largest one of a line, between neighbouring places on it that run from −1 to 1: they are the same on
+    /// every line.
     #[must_use]
-    pub fn load(&self, chords: &[Chord], [u0, u1]: [f64; 2]) -> f64 {
-        let (width, middle) = (u1 - u0, 0.5 * (u0 + u1));
-        let integral = 0.5 * ((width - width.sin()) + 2.0 * width.sin() * middle.sin().powi(2));
-        let squares = chords.iter().map(|chord| {
-            let half = 0.5 * (chord.right - chord.left);
-            half * half
-        });
-        self.pressure_max / self.a * squares.sum::<f64>() * integral
+    pub fn profile(places: &[f64]) -> Vec<f64> {
+        places
+            .windows(2)
+            .map(|x| mean_height(1.0, x[0], x[1]))
+            .collect()
     }
 
     /// Half-length of the chord at y; 0 where the line misses the ellipse.
+    #[inline]
     fn half_chord(&self, y: f64) -> f64 {
         let t = y / self.b;
         self.a * ((1.0 - t) * (1.0 + t)).max(0.0).sqrt()
     }
+}
+
+/// Mean of `√(1 − x²/half²)` over `x0 < x < x1`.
+///
+/// With x = half cos θ the integrand is sin θ and its integral over x that of sin² θ; written with the width and middle of the interval of θ it
+/// has no cancellation near the ends.
+fn mean_height(half: f64, x0: f64, x1: f64) -> f64 {
+    let angle = |x: f64| {
+        let x = x.clamp(-half, half);
+        ((half - x) * (half + x)).sqrt().atan2(x)
+    };
+    let (theta0, theta1) = (angle(x0), angle(x1));
+    let (width, middle) = (theta0 - theta1, 0.5 * (theta0 + theta1));
+    let integral = 0.5 * ((width - width.sin()) + 2.0 * width.sin() * middle.sin().powi(2));
+    half * integral / (x1 - x0)
 }
 
 /// The shape of the ellipse of two radii, for many loads: of [`Ellipse::of_radii`] what does not depend on the load.

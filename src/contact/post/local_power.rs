@@ -209,6 +209,7 @@ impl Differences {
             rows.resize(3 * cells * segment.cells.len(), T::ZERO);
             edges.observe_from(mesh, segment.chord.y);
             arch.dispatch(SegmentRows {
+                reversible: false,
                 edges: &mut edges,
                 points: &edges_of(mesh, segment),
                 mesh,

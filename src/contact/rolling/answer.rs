@@ -25,6 +25,15 @@ pub struct LevelAnswer {
     pub remarks: Vec<Remark>,
 }
 
+impl LevelAnswer {
+    /// Was one rule solved alone, because that was enough? Its slips alternate from cell to cell.
+    #[must_use]
+    pub fn is_of_one_rule(&self) -> bool {
+        let failed = || self.remarks.contains(&Remark::SecondRuleFailed {});
+        self.exit == LevelExit::Solved && self.second.is_none() && !failed()
+    }
+}
+
 /// How the tractions of a level came about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LevelExit {

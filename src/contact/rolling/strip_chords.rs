@@ -22,10 +22,16 @@ impl StripChord {
     /// length so that its profile keeps its form (exact for Hertz's semi-ellipse).
     #[must_use]
     pub fn mean_pressure(&self, footprint: &Footprint, x0: f64, x1: f64) -> f64 {
-        let ratio = (self.chord.right - self.chord.left) / (self.line.right - self.line.left);
+        let ratio = self.stretch();
         let middle = 0.5 * (self.line.left + self.line.right);
         let stretched = |x: f64| middle + (x - middle) / ratio;
         ratio * footprint.mean_pressure(&self.line, stretched(x0), stretched(x1))
+    }
+
+    /// Length of the chord over that of the line.
+    #[must_use]
+    pub fn stretch(&self) -> f64 {
+        (self.chord.right - self.chord.left) / (self.line.right - self.line.left)
     }
 
     /// Loads over width at equally spaced places y of the strip.

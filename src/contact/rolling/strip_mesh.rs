@@ -12,6 +12,7 @@ use crate::contact::mesh::chord::Chord;
 use crate::contact::mesh::strips::{Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::hertz::Ellipse;
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::{
@@ -161,7 +162,7 @@ impl StripMesh {
             mesh.load_y = fitted.iter().map(|f| f.load_y).collect();
         }
         let area = mesh.areas();
-        let pressure = cell_pressures(footprint, &fitted, &mesh, &area);
+        let pressure = cell_pressures(footprint, &fitted, &mesh, &grading, &area);
         let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
         let bound = bounds(task, &fitted, &mesh, &pressure, largest);
         // Pressures enter the equations through their bounds only, so that bounds decide the symmetry.
@@ -329,15 +330,24 @@ fn cell_pressures(
     footprint: &Footprint,
     fitted: &[StripChord],
     mesh: &Mesh,
+    grading: &Grading,
     area: &[f64],
 ) -> Vec<f64> {
+    // Cells divide every line in the same way, so that their shares of a semi-ellipse are found once.
+    let known = footprint.ellipse();
+    let known = known.map(|ellipse| (ellipse, Ellipse::profile(&grading.edges)));
     let patches = footprint.patches();
     let mut load = vec![0.0; patches.len()];
     let mut pressure = vec![0.0; mesh.cells()];
     for (segment, fitted) in mesh.segments.iter().zip(fitted) {
         let mut carried = 0.0;
-        for i in segment.cells.clone() {
-            pressure[i] = fitted.mean_pressure(footprint, mesh.left[i], mesh.right[i]);
+        for (k, i) in segment.cells.clone().enumerate() {
+            pressure[i] = match &known {
+                Some((ellipse, profile)) => {
+                    fitted.stretch() * ellipse.largest_on(&fitted.line) * profile[k]
+                }
+                None => fitted.mean_pressure(footprint, mesh.left[i], mesh.right[i]),
+            };
             carried += pressure[i] * area[i];
         }
         if let Some(strip) = fitted.load

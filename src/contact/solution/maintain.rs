@@ -31,7 +31,7 @@ use crate::contact::solution::words::fields::PointFields;
 use crate::contact::solution::words::maintenance::{SubsurfaceSummary, TemperatureSummary};
 
 /// Stresses are answered from this part of the half-width of the smaller patch on: nearer to the surface the steps of the traction from cell
-/// to cell would show, whose stresses grow without bound. There the largest error in the reference contacts is 0.6 % of the largest pressure
+/// to cell would show, whose stresses grow without bound. There the largest error in the reference contacts is 0.3 % of the largest pressure
 /// (`cargo test --test physics -- stresses_are --nocapture`).
 const LEAST_DEPTH: f64 = 0.01;
 /// Points between two looks at the monitor.

@@ -156,6 +156,7 @@ impl OperatorAssembly<'_> {
         let mut matrix = vec![T::ZERO; rows * self.row_length];
         let mut edges = CellEdges::new(self.mesh);
         let (arch, mut points) = (Arch::new(), Vec::new());
+        let reversible = self.mesh.is_reversible();
         let places = self.first_row.windows(2);
         for (place, segment) in places.zip(&self.mesh.segments) {
             if let ControlFlow::Break(stop) = monitor.tick(0.0) {
@@ -169,6 +170,7 @@ impl OperatorAssembly<'_> {
                 mesh: self.mesh,
                 nu: self.nu,
                 folded: self.folded,
+                reversible,
                 stride: self.stride,
                 target: &mut matrix[place[0] * self.row_length..place[1] * self.row_length],
             });
@@ -184,6 +186,8 @@ pub(crate) struct SegmentRows<'a, T> {
     pub(crate) mesh: &'a Mesh,
     pub(crate) nu: f64,
     pub(crate) folded: bool,
+    /// See [`Mesh::is_reversible`].
+    pub(crate) reversible: bool,
     pub(crate) stride: usize,
     pub(crate) target: &'a mut [T],
 }
@@ -199,12 +203,20 @@ impl<T: Float> NullaryFnOnce for SegmentRows<'_, T> {
             mesh,
             nu,
             folded,
+            reversible,
             stride,
             target,
         } = self;
-        edges.corner_sums(points[0]);
         let row_length = if folded { 6 * stride } else { 3 * stride };
-        for (point, out) in points[1..].iter().zip(target.chunks_exact_mut(row_length)) {
+        // The rows between nodes of the trailing half are images of those of the leading half.
+        let first = if reversible {
+            (points.len() - 4) / 2
+        } else {
+            0
+        };
+        edges.corner_sums(points[first]);
+        let rows = target.chunks_exact_mut(row_length).skip(first);
+        for (point, out) in points[first + 1..].iter().zip(rows) {
             // Neighbouring rows share a point, whose sums are computed once.
             std::mem::swap(&mut edges.now, &mut edges.before);
             edges.corner_sums(*point);
@@ -219,6 +231,45 @@ impl<T: Float> NullaryFnOnce for SegmentRows<'_, T> {
                 }
             }
         }
+        for k in 0..first {
+            let (head, tail) = target.split_at_mut((k + 1) * row_length);
+            let image = &tail[(points.len() - 6 - 2 * k) * row_length..][..row_length];
+            reverse(mesh, folded, stride, image, &mut head[k * row_length..]);
+        }
+    }
+}
+
+/// Writes the row whose points are the images of those of another row on a reversible mesh. From one point to the next `u_x` of `T_x` and `u_y`
+/// of `T_y` change the other way about, the cross terms alike.
+#[inline(always)]
+fn reverse<T: Float>(mesh: &Mesh, folded: bool, stride: usize, image: &[T], row: &mut [T]) {
+    let (each, stored) = if folded {
+        (2, mesh.segments.len() / 2)
+    } else {
+        (1, mesh.segments.len())
+    };
+    let blocks = image.chunks_exact(stride).zip(row.chunks_exact_mut(stride));
+    for (block, (image, row)) in blocks.enumerate() {
+        let crosses = block / each == 1;
+        for segment in &mesh.segments[..stored] {
+            let cells = segment.cells.clone();
+            reverse_cells(&image[cells.clone()], &mut row[cells], !crosses);
+        }
+    }
+}
+
+/// Values in reverse order, with their signs changed where asked for; in runs of eight, which the compiler turns round at once.
+#[inline(always)]
+fn reverse_cells<T: Float>(from: &[T], to: &mut [T], negate: bool) {
+    let (remaining, runs) = from.as_rchunks::<8>();
+    let (targets, rest) = to.as_chunks_mut::<8>();
+    for (target, run) in targets.iter_mut().zip(runs.iter().rev()) {
+        let mut run = *run;
+        run.reverse();
+        *target = if negate { run.map(|value| -value) } else { run };
+    }
+    for (target, value) in rest.iter_mut().zip(remaining.iter().rev()) {
+        *target = if negate { -*value } else { *value };
     }
 }
 

@@ -117,6 +117,13 @@ impl PressureField {
         self.grids[grid].mean_pressure(chord, x0, x1)
     }
 
+    /// The pressures in MPa at points of the line of a chord, given by x in rising order; 0 outside the chord.
+    #[must_use]
+    pub fn pressures<const N: usize>(&self, chord: &Chord, places: [f64; N]) -> [f64; N] {
+        let [grid, _] = self.places[chord.patch];
+        self.grids[grid].pressures(chord, places)
+    }
+
     /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean position weighted with the pressure.
     #[must_use]
     pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {

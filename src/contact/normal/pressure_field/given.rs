@@ -217,6 +217,35 @@ impl GridPressure {
         self.pressure_max * sum / (x1 - x0)
     }
 
+    /// Pressures at points of the line of a chord, given by x in rising order; 0 outside the chord.
+    #[must_use]
+    pub fn pressures<const N: usize>(&self, chord: &Chord, places: [f64; N]) -> [f64; N] {
+        let x = &self.grid.x;
+        let y = if self.images.is_empty() {
+            chord.y
+        } else {
+            chord.y.abs()
+        };
+        let j = self.row_interval(y);
+        let weights = weights(&self.grid.y, j, y);
+        let mut known = None;
+        places.map(|place| {
+            if place < chord.left || place > chord.right {
+                return 0.0;
+            }
+            let i = self.column_interval(place);
+            let cubic = match known {
+                Some((column, cubic)) if column == i => cubic,
+                _ => {
+                    let value = |k| self.value_on_column(i - 1 + k, j, weights);
+                    line::cubic(x, i, std::array::from_fn(value))
+                }
+            };
+            known = Some((i, cubic));
+            self.pressure_max * cubic.at(place).sqrt()
+        })
+    }
+
     /// The segments of the line at y that lie in a patch, from smaller to larger x.
     pub(crate) fn segments(&self, label: usize, y: f64) -> Vec<(f64, f64)> {
         let (label, y) = match self.images.get(label) {

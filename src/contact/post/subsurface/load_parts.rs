@@ -1,91 +1,115 @@
-//! The parts of cells that were looked at, and their points of quadrature, kept from point to point.
+//! The parts of regions that were looked at, and their point loads, kept from point to point.
 //!
-//! A part is halved along its larger side, whatever the point: only how far the halving goes depends on the distance. So the parts of a cell
+//! A part is halved along its larger side, whatever the point: only how far the halving goes depends on the distance. So the parts of a region
 //! are a tree that is the same for all points, and each part is worked out once.
 
 use std::ops::Range;
 
-use crate::contact::half_space::point_loads::PointLoad;
-use crate::contact::post::subsurface::lines::{HALVINGS_MAX, StripPart};
+use crate::contact::half_space::point_loads::LoadPack;
+use crate::contact::post::subsurface::piece::Piece;
 use crate::contact::post::subsurface::seen_parts::{ORDERS, PartBox};
 
-/// Parts, and points of quadrature, that are kept, in 60 MB together; only memory depends on them.
+/// Parts, and packs of point loads, that are kept, in 45 MB together; only memory depends on them.
 const PARTS_MAX: usize = 100_000;
 /// See [`PARTS_MAX`].
-const POINTS_MAX: usize = 1_000_000;
+const PACKS_MAX: usize = 100_000;
+/// Room for packs from the beginning.
+const PACKS_FIRST: usize = 1024;
 
-/// A part of a cell: a piece of the strip between two places along it.
+/// A region is halved across at most so often: of a patch a hundred times as wide as long a part is then a third of the least depth that is
+/// answered wide.
+const HALVINGS_MAX: u32 = 16;
+
+/// A part of a loaded region.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadPart {
-    /// The cell, and the strip it belongs to.
-    pub cell: usize,
-    /// See `cell`.
-    pub strip: usize,
-    /// The places: angles of the outline, or x in mm where the strip is not refined.
-    pub u: [f64; 2],
-    /// The piece across the strip.
-    pub piece: StripPart,
+    /// The region.
+    pub region: usize,
+    /// The piece of it along: of the angles of the outline, or of the length of a rectangle.
+    pub along: Piece,
+    /// The piece across.
+    pub across: Piece,
 }
 
 impl LoadPart {
-    /// Its halves, along the strip or across it.
+    /// The parts of a region after so many halvings along and across.
+    pub fn pieces(region: usize, along: u32, across: u32) -> impl Iterator<Item = LoadPart> {
+        Piece::all(along).flat_map(move |along| {
+            Piece::all(across).map(move |across| LoadPart {
+                region,
+                along,
+                across,
+            })
+        })
+    }
+
+    /// Its halves, along the strips or across them.
     #[must_use]
     pub fn halves(self, along: bool) -> [LoadPart; 2] {
         if along {
-            let [from, to] = self.u;
-            let middle = 0.5 * (from + to);
-            return [[from, middle], [middle, to]].map(|u| LoadPart { u, ..self });
+            return self.along.halves().map(|along| LoadPart { along, ..self });
         }
-        self.piece.halves().map(|piece| LoadPart { piece, ..self })
+        self.across
+            .halves()
+            .map(|across| LoadPart { across, ..self })
     }
 }
+
+/// Packs that were not asked for.
+const NONE: [u32; 2] = [u32::MAX; 2];
 
 /// A part with what was worked out for it.
 #[derive(Debug)]
 struct Node {
     part: LoadPart,
     seen: PartBox,
-    /// Points of quadrature, by the rules along and across.
-    points: [[Option<[u32; 2]>; ORDERS]; ORDERS],
+    /// The first and the end of its packs, by the rules along and across; [`NONE`] where they were not asked for.
+    packs: [[[u32; 2]; ORDERS]; ORDERS],
     /// The first of its halves, of which the second is the next node.
     halves: Option<u32>,
 }
 
-/// The parts of all cells of a mesh; the first ones are the cells.
+/// The parts of all regions; the first ones are those to begin with.
 #[derive(Debug)]
 pub struct LoadParts {
     nodes: Vec<Node>,
-    cells: usize,
-    points: Vec<PointLoad>,
+    first: usize,
+    packs: Vec<LoadPack>,
 }
 
 impl LoadParts {
-    /// The whole cells.
+    /// The parts to begin with.
     #[must_use]
-    pub fn new(cells: impl Iterator<Item = (LoadPart, PartBox)>) -> LoadParts {
-        let nodes: Vec<Node> = cells.map(|(part, seen)| Node::new(part, seen)).collect();
+    pub fn new(first: impl Iterator<Item = (LoadPart, PartBox)>) -> LoadParts {
+        let nodes: Vec<Node> = first.map(|(part, seen)| Node::new(part, seen)).collect();
         LoadParts {
-            cells: nodes.len(),
+            first: nodes.len(),
             nodes,
-            points: Vec::new(),
+            packs: Vec::with_capacity(PACKS_FIRST),
         }
     }
 
-    /// Forgets all parts of cells and all points if there are too many. Called between points.
+    /// Forgets all later parts and all packs if there are too many. Called between points.
     pub fn trim(&mut self) {
-        if self.nodes.len() > PARTS_MAX.max(2 * self.cells) || self.points.len() > POINTS_MAX {
-            self.nodes.truncate(self.cells);
+        if self.nodes.len() > PARTS_MAX.max(2 * self.first) || self.packs.len() > PACKS_MAX {
+            self.nodes.truncate(self.first);
             for node in &mut self.nodes {
                 *node = Node::new(node.part, node.seen);
             }
-            self.points.clear();
+            self.packs.clear();
         }
     }
 
-    /// Number of cells.
+    /// Number of parts to begin with.
     #[must_use]
-    pub fn cells(&self) -> usize {
-        self.cells
+    pub fn first(&self) -> usize {
+        self.first
+    }
+
+    /// A part.
+    #[must_use]
+    pub fn part(&self, number: usize) -> LoadPart {
+        self.nodes[number].part
     }
 
     /// How large a part is.
@@ -94,16 +118,16 @@ impl LoadParts {
         self.nodes[number].seen
     }
 
-    /// Can only halving along the strip make a part smaller?
+    /// Can only halving along the strips make a part smaller?
     #[must_use]
     pub fn narrow(&self, number: usize) -> bool {
-        self.nodes[number].part.piece.level >= HALVINGS_MAX
+        self.nodes[number].part.across.level >= HALVINGS_MAX
     }
 
-    /// All points of quadrature.
+    /// All packs.
     #[must_use]
-    pub fn points(&self) -> &[PointLoad] {
-        &self.points
+    pub fn packs(&self) -> &[LoadPack] {
+        &self.packs
     }
 
     /// The halves of a part.
@@ -127,19 +151,21 @@ impl LoadParts {
         [first, first + 1]
     }
 
-    /// The points of a part for these rules along and across.
+    /// The packs of a part for these rules along and across.
     pub fn quadrature(
         &mut self,
         number: usize,
         [along, across]: [usize; 2],
-        make: impl FnOnce(&LoadPart, &mut Vec<PointLoad>),
+        make: impl FnOnce(&LoadPart, &mut Vec<LoadPack>),
     ) -> Range<usize> {
         let node = &mut self.nodes[number];
-        let [first, end] = *node.points[along][across].get_or_insert_with(|| {
-            let first = self.points.len();
-            make(&node.part, &mut self.points);
-            [first as u32, self.points.len() as u32]
-        });
+        let known = &mut node.packs[along][across];
+        if *known == NONE {
+            let first = self.packs.len();
+            make(&node.part, &mut self.packs);
+            *known = [first as u32, self.packs.len() as u32];
+        }
+        let [first, end] = *known;
         first as usize..end as usize
     }
 }
@@ -149,7 +175,7 @@ impl Node {
         Node {
             part,
             seen,
-            points: [[None; ORDERS]; ORDERS],
+            packs: [[NONE; ORDERS]; ORDERS],
             halves: None,
         }
     }

@@ -1,11 +1,12 @@
 //! Stresses below the surface: tensors at chosen points, the worst point of a patch, and what a passage of the contact does.
 
-pub mod blocks;
 pub mod enclosing_ball;
-pub mod lines;
 pub mod load_parts;
-pub(crate) mod loaded_strip;
+pub(crate) mod loaded_cell;
+pub(crate) mod loaded_run;
+pub mod outline;
 pub mod passage;
+pub mod piece;
 pub mod principal;
 pub mod seen_parts;
 pub mod states;

@@ -11,9 +11,10 @@ use crate::contact::rolling::motion_answer::RelativeErrors;
 use crate::contact::rolling::refinement::caution::caution;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::constants::{
-    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, JUMPING, LEVELS_LIKE,
-    LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH, RULES_ON_MESH_SAMPLED,
-    SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
+    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, HERTZ, JUMPING,
+    LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH,
+    RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES,
+    WITHOUT_COMPANION,
 };
 use crate::contact::rolling::refinement::distances::distances;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
@@ -43,6 +44,8 @@ pub struct EstimateContext<'a> {
     pub motion: &'a Motion,
     /// The level before.
     pub before: Option<CoarserLevel<'a>>,
+    /// What is left of the difference of the two rules on a coarser level, for a level that was solved with one of them.
+    pub carried: Option<&'a [f64]>,
     /// A finer level, where everything slips or the pressure jumps.
     pub finer: Option<&'a StripMesh>,
     /// Slenderness of the patch over that of the population of the factors for explicit meshes; at least 1.
@@ -64,7 +67,7 @@ pub enum Indicators {
 /// Differences that stand for the error of a level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Between the two rules; nothing if one of them did not converge.
+    /// Between the two rules, or what is left of it from a coarser level; nothing if one of them did not converge.
     pub(super) rules: Option<Vec<f64>>,
     /// To the level before, weighted.
     before: Option<Vec<f64>>,
@@ -124,12 +127,7 @@ impl Indicators {
         if task.method == Method::LiuHsu {
             return Indicators::Known(dense_errors(task, patches, found, context));
         }
-        let rules = answer.second.as_ref().map(|second| {
-            let second: Vec<Resultants> = (0..patches.len())
-                .map(|p| Resultants::of_patch(level, second, p))
-                .collect();
-            distances(task, patches, found, &second)
-        });
+        let rules = between_rules(task, level, answer, found, context.carried);
         let pole = if motion.spin_per_mm == 0.0 {
             0.0
         } else {
@@ -180,6 +178,15 @@ impl Indicators {
                 apart.iter_mut().for_each(|d| *d *= reach);
                 measured.companions[k] = Some(apart);
             }
+        }
+    }
+
+    /// The difference of the two rules, measured or carried on from a coarser level.
+    #[must_use]
+    pub fn rules(&self) -> Option<&Vec<f64>> {
+        match self {
+            Indicators::Measured(measured) => measured.rules.as_ref(),
+            Indicators::Known(_) => None,
         }
     }
 
@@ -247,6 +254,7 @@ fn scale(task: &RollingTask, level: &StripMesh, patches: usize) -> f64 {
             let mixed = |smooth: f64, jumping: f64| smooth + between * (jumping - smooth);
             (mixed(SAMPLED, JUMPING), mixed(SAMPLED_DECAY, DECAY))
         }
+        None if task.single_motion && task.footprint.is_closed_form() => (HERTZ, DECAY),
         None => (1.0, DECAY),
     };
     caution(task) * samples * finer.powf(decay) * few_strips(level).sqrt()
@@ -303,6 +311,25 @@ fn weighted(patches: &[Patch], mut errors: Vec<f64>) -> Vec<f64> {
         .sum();
     errors.push(sum);
     errors
+}
+
+/// The difference of the two rules, or what was `carried` on to a level of one rule.
+fn between_rules(
+    task: &RollingTask,
+    level: &StripMesh,
+    answer: &LevelAnswer,
+    found: &[Resultants],
+    carried: Option<&[f64]>,
+) -> Option<Vec<f64>> {
+    let Some(second) = &answer.second else {
+        let carried = carried.filter(|_| answer.is_of_one_rule());
+        return carried.map(<[f64]>::to_vec);
+    };
+    let patches = task.footprint.patches();
+    let second: Vec<Resultants> = (0..patches.len())
+        .map(|p| Resultants::of_patch(level, second, p))
+        .collect();
+    Some(distances(task, patches, found, &second))
 }
 
 /// The weighted change from the level before.

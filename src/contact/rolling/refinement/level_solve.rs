@@ -18,6 +18,7 @@ use crate::contact::rolling::refinement::error_estimate;
 use crate::contact::rolling::refinement::error_estimate::{
     CoarserLevel, EstimateContext, Indicators,
 };
+use crate::contact::rolling::refinement::one_rule;
 use crate::contact::rolling::refinement::slender::slender;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::refinement::warm_start::from_coarser;
@@ -54,6 +55,8 @@ pub struct SolvedLevel {
     pub resultants: Vec<Resultants>,
     /// The same as the tractions give them, without extrapolation.
     pub summed: Vec<Resultants>,
+    /// Difference of the two rules as an indicator, or what is left of it from a coarser level: it falls as 1/N.
+    pub rules: Option<Vec<f64>>,
     /// Estimated errors, see [`Indicators::errors`].
     pub errors: RelativeErrors,
     /// Work over all levels.
@@ -126,12 +129,32 @@ pub fn solve_level(
     let motion = level.scale.motion(&asked.motion);
     // The motion before on this mesh is preferred: its tractions need not be interpolated from other cells.
     let warm = state.sweep.start(number, &level, &motion);
-    let start =
-        warm.or_else(|| below.map(|(coarse, answer)| from_coarser(&coarse, answer, &level)));
+    // A part of a sweep counts from its own first motion, the client from that of the case.
+    let named = |failure| named(failure, task, task.first_motion + asked.index);
     let workspace = &mut state.workspace;
-    let tangential = run_method(task, &level, asked, start, workspace, monitor)
-        // A part of a sweep counts from its own first motion, the client from that of the case.
-        .map_err(|f| named(f, task, task.first_motion + asked.index))?;
+    let told = coarser.as_ref().is_some_and(|point| point.rules.is_some());
+    let (alone, lost) = match &below {
+        Some((coarse, answer)) if warm.is_none() && told => {
+            let of_level = level_task(task, &level, &motion, asked.index);
+            let below = (coarse.as_ref(), *answer);
+            one_rule::attempt(task, of_level, below, workspace, monitor).map_err(named)?
+        }
+        _ => (None, Work::default()),
+    };
+    let tangential = match alone {
+        Some(found) => found,
+        None => {
+            let nested = |(coarse, answer)| from_coarser(coarse, answer, &level);
+            let below = below
+                .as_ref()
+                .map(|(coarse, answer)| (coarse.as_ref(), *answer));
+            let start = warm.or_else(|| below.map(nested));
+            let found = run_method(task, &level, asked, start, workspace, monitor);
+            let mut found = found.map_err(named)?;
+            found.work.add_lost(lost);
+            found
+        }
+    };
     state.sweep.remember(number, motion, &tangential);
     // A search for creepages solves its later trials on the same levels.
     state.sweep.path.push(number);
@@ -166,12 +189,14 @@ pub(crate) fn answer_on(
         // Extrapolated later, if both companions are solved.
         resultants: summed.clone(),
         summed,
+        rules: coarser.and_then(|coarser| carried(state, &level, coarser)),
         errors: Vec::new(),
         method: method_used(task),
         seconds: 0.0,
     };
     let before = coarser.and_then(|coarser| before(state, &level, coarser));
     let indicators = indicators_on(task, state, &level, &point, before);
+    point.rules = indicators.rules().cloned();
     point.errors = indicators.errors();
     JudgedAnswer { point, indicators }
 }
@@ -188,6 +213,7 @@ pub(crate) fn indicators_on(
     let context = EstimateContext {
         motion: &point.motion,
         before,
+        carried: point.rules.as_deref(),
         finer: finer.as_ref(),
         slenderness: state.policy.slenderness(),
         tolerance: task.tolerance(),
@@ -209,6 +235,14 @@ pub(crate) fn level_task<'a>(
         passage: task.passage(index).map(|laws| level.scale.passage(&laws)),
         tolerance: task.tolerance(),
     }
+}
+
+/// What is left of the difference of the rules on a coarser level.
+fn carried(state: &RefinementState, level: &StripMesh, coarser: &SolvedLevel) -> Option<Vec<f64>> {
+    let cells = state.levels.get(coarser.level).mesh.cells();
+    let left = (cells as f64 / level.mesh.cells() as f64).min(1.0);
+    let rules = coarser.rules.as_ref()?.iter();
+    Some(rules.map(|rules| left * rules).collect())
 }
 
 /// The level before, if it is coarse enough to compare with.
@@ -247,6 +281,33 @@ fn finer_for_sums(
 /// The method that solved; the reader of cases has resolved `auto`.
 fn method_used(task: &RollingTask) -> Method {
     task.method
+}
+
+/// Adds the three-point rule, whose slips are smooth, to an answer of one rule, from tractions that differ from its own by `apart`. Where it
+/// has no answer, slips stay those of the one rule.
+///
+/// # Errors
+/// The monitor may stop the work.
+pub(crate) fn add_three_point(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    solved: &mut SolvedLevel,
+    asked: MotionTask,
+    apart: &[Vec<f64>; 2],
+    monitor: &dyn Monitor,
+) -> Result<(), SolveError> {
+    let level = state.levels.used(solved.level);
+    let motion = level.scale.motion(&asked.motion);
+    let of_level = level_task(task, &level, &motion, asked.index);
+    let (workspace, answer) = (&mut state.workspace, &mut solved.tangential);
+    let before = answer.work;
+    let added = boundary_element::three_point_beside(of_level, answer, apart, workspace, monitor);
+    match added {
+        Ok(()) | Err(LevelFailure::NotConverged { .. }) => {}
+        Err(LevelFailure::Stopped(stop)) => return Err(stop.into()),
+    }
+    solved.work.add_lost(answer.work.since(before));
+    Ok(())
 }
 
 pub(crate) fn named(failure: LevelFailure, task: &RollingTask, point: usize) -> SolveError {

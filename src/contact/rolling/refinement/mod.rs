@@ -11,6 +11,7 @@ pub mod lender;
 pub mod level_solve;
 pub mod levels;
 pub mod mesh_policy;
+mod one_rule;
 pub mod refine;
 pub mod regime;
 pub mod slender;

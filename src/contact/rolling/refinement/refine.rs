@@ -13,7 +13,7 @@ use crate::contact::rolling::refinement::companions::Companion;
 use crate::contact::rolling::refinement::constants::{CELLS_FINE, EXTRAPOLATED, FINE_TARGET};
 use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::level_solve::{
-    JudgedAnswer, MotionTask, SolvedLevel, solve_level,
+    JudgedAnswer, MotionTask, SolvedLevel, add_three_point, solve_level,
 };
 use crate::contact::rolling::refinement::mesh_policy::{HalfDoublings, MeshPolicy};
 use crate::contact::rolling::refinement::regime::regime;
@@ -57,8 +57,12 @@ pub fn solve(
             on_mesh(task, state, asked, size, monitor).map(MotionAnswer::from)
         }
         (None, Resolution::Target(target)) => {
-            let solved = to_target(task, state, asked, target, monitor)?;
-            Ok(solved.answer.point.into())
+            let mut solved = to_target(task, state, asked, target, monitor)?.answer.point;
+            if task.wants_slips && solved.tangential.is_of_one_rule() {
+                let same = [0, 1].map(|k| vec![0.0; solved.tangential.traction[k].len()]);
+                add_three_point(task, state, &mut solved, asked, &same, monitor)?;
+            }
+            Ok(solved.into())
         }
     }
 }

@@ -6,12 +6,13 @@ use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::{LevelFailure, Work};
 use crate::contact::rolling::mesh_plan::Regime;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
+use crate::contact::rolling::methods::boundary_element::task::FEW_STEPS;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::lender::{Lender, apart, bent, borrow, is_straight};
 use crate::contact::rolling::refinement::level_solve::{
-    JudgedAnswer, MotionTask, answer_on, indicators_on, level_task,
+    JudgedAnswer, MotionTask, add_three_point, answer_on, indicators_on, level_task,
 };
 use crate::contact::rolling::refinement::refine;
 use crate::contact::rolling::refinement::refine::ComparedAnswer;
@@ -183,7 +184,8 @@ impl Stretch {
         };
         let of_level = level_task(task, &level, &motion, asked.index);
         let workspace = &mut state.workspace;
-        let found = boundary_element::trapezoid_of_motion(of_level, &start, workspace, monitor);
+        let found =
+            boundary_element::trapezoid_of_motion(of_level, &start, FEW_STEPS, workspace, monitor);
         let tangential = match found {
             Ok((Some(tangential), _)) => tangential,
             Ok((None, work)) | Err(LevelFailure::NotConverged { work, .. }) => {
@@ -323,7 +325,14 @@ impl Stretch {
         monitor: &dyn Monitor,
     ) -> Result<(), SolveError> {
         let mut solved = one.solved.clone();
-        self.add_three_point(task, state, &mut solved, one.asked, monitor)?;
+        add_three_point(
+            task,
+            state,
+            &mut solved.point,
+            one.asked,
+            &self.apart,
+            monitor,
+        )?;
         let level = state.levels.used(self.level);
         solved.indicators = indicators_on(task, state, &level, &solved.point, None);
         solved.point.errors = solved.indicators.errors();
@@ -398,38 +407,17 @@ impl Stretch {
     ) -> Result<MotionAnswer, SolveError> {
         let mut solved = one.solved;
         if task.wants_slips {
-            self.add_three_point(task, state, &mut solved, one.asked, monitor)?;
+            add_three_point(
+                task,
+                state,
+                &mut solved.point,
+                one.asked,
+                &self.apart,
+                monitor,
+            )?;
         }
         let mut answer = MotionAnswer::from(solved.point);
         answer.skips.push(Skip::Companions);
         Ok(answer)
-    }
-
-    /// Adds the three-point rule to a motion that waits. Where it has no answer, slips stay those of the trapezoid rule.
-    fn add_three_point(
-        &self,
-        task: &RollingTask,
-        state: &mut RefinementState,
-        solved: &mut JudgedAnswer,
-        asked: MotionTask,
-        monitor: &dyn Monitor,
-    ) -> Result<(), SolveError> {
-        let level = state.levels.used(self.level);
-        let motion = level.scale.motion(&asked.motion);
-        let of_level = level_task(task, &level, &motion, asked.index);
-        let (workspace, answer) = (&mut state.workspace, &mut solved.point.tangential);
-        let before = answer.work;
-        match boundary_element::three_point_beside(
-            of_level,
-            answer,
-            &self.apart,
-            workspace,
-            monitor,
-        ) {
-            Ok(()) | Err(LevelFailure::NotConverged { .. }) => {}
-            Err(LevelFailure::Stopped(stop)) => return Err(stop.into()),
-        }
-        solved.point.work.add_lost(answer.work.since(before));
-        Ok(())
     }
 }

@@ -231,3 +231,30 @@ fn a_stop_is_seen_between_segments() {
     );
     assert_eq!(stopped.map(|_| ()), Err(Stop::Cancelled));
 }
+
+/// A mesh that is its own image has its trailing rows from the leading ones; moved along x it is none any more.
+#[test]
+fn rows_of_a_reversible_mesh_are_those_of_the_same_mesh_elsewhere() {
+    for cells in [1, 2, 3, 4, 9, 19] {
+        let mesh = ellipse(1.3, 0.8, 6, cells);
+        let moved = mesh.normalised([0.25, 0.0], 1.0);
+        assert!(mesh.is_reversible() && !moved.is_reversible());
+        for folded in [false, true] {
+            let [here, there] = [&mesh, &moved].map(|mesh| {
+                StripOperator::new(mesh, 0.3, folded, Precision::Double, &Unmonitored).unwrap()
+            });
+            let parity = folded.then_some(Parity::Lateral);
+            for row in 0..here.row_count() {
+                for cell in 0..here.cells(here.segments() - 1).end {
+                    let pairs = [&here, &there].map(|all| all.entry(parity, row, cell));
+                    for (a, b) in pairs[0].into_iter().zip(pairs[1]) {
+                        assert!(
+                            (a - b).abs() < 1e-12,
+                            "{cells} {folded} {row} {cell}: {a} {b}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

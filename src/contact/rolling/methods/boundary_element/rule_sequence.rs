@@ -25,11 +25,6 @@ use crate::contact::rolling::strip_mesh::StripMesh;
 /// From this stability number on (see [`Newton::stability`]) a second solution is looked for. None was seen below 1.5 in 360 random
 /// motions of the prototype.
 const SECOND_START_FROM: f64 = 0.5;
-/// Newton steps of a companion from its start before the three-point rule is solved for a better one. On the 62 reference ellipses at the
-/// targets 0.02, 0.005 and 0.001 the work of companions, products times entries, is the same within 1 % with 8, 12 and 60, and 2 %
-/// more with 5 at 0.02. On two parabolas (radii 300 and 2 mm, 16 mm apart, 60 kN, target 0.001) 60 takes 2.8 times as much.
-const FEW_STEPS: u32 = 8;
-
 /// Rounds of bounds that follow from slips, and slips from bounds. On 200 random motions with friction that
 /// falls with temperature none took as many. Keeps the numbers safe; not tuned.
 const PASSAGE_ROUNDS: u32 = 60;
@@ -368,12 +363,16 @@ impl<'a> RuleSequence<'a> {
     }
 
     /// The trapezoid rule from `t` if few steps are enough; nothing otherwise, and `t` is as it was.
-    pub(super) fn few_steps(&mut self, t: &mut [f64]) -> Result<Option<Vec<bool>>, Stop> {
+    pub(super) fn few_steps(
+        &mut self,
+        t: &mut [f64],
+        steps_max: u32,
+    ) -> Result<Option<Vec<bool>>, Stop> {
         let equations = self.equations(Rule::Trapezoid);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
         let mut found = t.to_vec();
-        self.steps_max = FEW_STEPS;
+        self.steps_max = steps_max;
         let report = self.rule(&newton, &rigid, &mut found, true)?.0;
         self.steps_max = STEPS_MAX;
         if !report.exit.converged() {

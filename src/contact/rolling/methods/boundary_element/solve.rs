@@ -12,7 +12,7 @@ use crate::contact::rolling::answer::{
     LevelAnswer, LevelExit, LevelFailure, Work, project_on_bound,
 };
 use crate::contact::rolling::methods::boundary_element::rule_sequence::{Control, RuleSequence};
-use crate::contact::rolling::methods::boundary_element::task::LevelTask;
+use crate::contact::rolling::methods::boundary_element::task::{FEW_STEPS, LevelTask};
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::start::Start;
@@ -111,7 +111,7 @@ pub fn trapezoid(
     let mut t = solve.start(Some(start));
     let mut slips = None;
     if task.fall.is_none() && task.passage.is_none() {
-        slips = solve.few_steps(&mut t)?;
+        slips = solve.few_steps(&mut t, FEW_STEPS)?;
     }
     if slips.is_none() {
         solve.three_point(&mut t, true)?;
@@ -130,7 +130,7 @@ pub fn trapezoid(
     Ok((traction, solve.work))
 }
 
-/// The trapezoid rule alone, from a start of its own, if that takes few steps, and the work. Slips are those of this rule, which alternate
+/// The trapezoid rule alone, from a start of its own, if that takes no more than `steps_max` steps, and the work. Slips are those of this rule, which alternate
 /// from cell to cell ([`three_point_beside`] finds better ones).
 ///
 /// # Errors
@@ -138,6 +138,7 @@ pub fn trapezoid(
 pub fn trapezoid_of_motion(
     task: LevelTask,
     start: &[Vec<f64>; 2],
+    steps_max: u32,
     workspace: &mut NewtonWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<(Option<LevelAnswer>, Work), LevelFailure> {
@@ -147,7 +148,7 @@ pub fn trapezoid_of_motion(
     let operator = task.level.operator(monitor)?;
     let mut solve = RuleSequence::new(task, &operator, Control { workspace, monitor });
     let mut t = solve.start(Some(start));
-    let Some(slips) = solve.few_steps(&mut t)? else {
+    let Some(slips) = solve.few_steps(&mut t, steps_max)? else {
         return Ok((None, solve.work));
     };
     let mut traction = solve.expand(&t);

@@ -1,0 +1,394 @@
+//! What neighbouring strips carry that cross the patch once each: pressure on the true outline, tractions over pressure between the nodes.
+
+use std::f64::consts::PI;
+
+use crate::contact::half_space::point_loads::{LANES, Lanes, LoadPack};
+use crate::contact::mesh::chord::Chord;
+use crate::contact::mesh::strips::Segment;
+use crate::contact::normal::footprint::Footprint;
+use crate::contact::numerics::quadrature::RULES;
+use crate::contact::post::subsurface::load_parts::LoadPart;
+use crate::contact::post::subsurface::outline::{KnownLines, RunOutline};
+use crate::contact::post::subsurface::seen_parts::{ORDERS, PartBox};
+use crate::contact::rolling::answer::LevelAnswer;
+use crate::contact::rolling::strip_mesh::StripMesh;
+
+/// Points of the rule with most of them.
+const POINTS_MAX: usize = RULES[ORDERS - 1].len();
+
+/// See [`halvings`]: of Hertz's ellipses with one coefficient of friction; of other patches; of those whose pressure is rough or that have
+/// hollows. With none at all, errors on ellipses with a pole of spin grow from 0.0015 of the largest pressure to 0.0055, where friction jumps from 0.4
+/// to 0.1 across from 0.0009 to 0.0055, on a gap of two radii from 0.001 to 0.004, and where the pressure jumps from 0.007 to 0.02. Two halvings across
+/// take an eighth more time than none.
+const SMOOTH: [u32; 2] = [0, 2];
+/// See [`SMOOTH`].
+const UNEVEN: [u32; 2] = [0, 4];
+/// See [`SMOOTH`].
+const ROUGH: [u32; 2] = [4, 4];
+/// See [`steepest`]: it is 0.30 at most on ellipses and gaps, where the last cells differ by their width alone, and 0.54 and more where the pressure jumps,
+/// at hollows, and where a gap opens so steeply that the pressure rises towards the edge.
+const STEEP: f64 = 0.4;
+/// By how much, relatively, coefficients may differ that are taken for one. Chosen by judgement.
+const EVEN: f64 = 0.1;
+
+/// The loads on a run of strips.
+#[derive(Debug)]
+pub(crate) struct LoadedRun<'a> {
+    outline: RunOutline<'a>,
+    /// Smallest and largest x of its chords.
+    extent: [f64; 2],
+    /// y of the mid-lines of the strips.
+    lines: Vec<f64>,
+    /// Angles of the nodes, the same in all strips: they are divided alike.
+    nodes: Vec<f64>,
+    /// See [`LoadedRun::halvings`].
+    halvings: [u32; 2],
+    /// Tractions over pressure, node by node, strip by strip.
+    ratios: Vec<[f32; 2]>,
+}
+
+/// A place between two of a list: their numbers, and the share of the second. Beyond the outermost it is the outermost.
+#[derive(Debug, Clone, Copy, Default)]
+struct Between {
+    pair: [usize; 2],
+    share: f64,
+}
+
+impl Between {
+    /// Where `at` lies in a rising list, of which `passed` are known to lie below; moves this number on.
+    fn new(list: &[f64], at: f64, passed: &mut usize) -> Between {
+        while *passed < list.len() && list[*passed] < at {
+            *passed += 1;
+        }
+        if *passed == 0 || *passed == list.len() {
+            let outermost = passed.saturating_sub(1);
+            return Between {
+                pair: [outermost; 2],
+                share: 0.0,
+            };
+        }
+        let (low, high) = (list[*passed - 1], list[*passed]);
+        Between {
+            pair: [*passed - 1, *passed],
+            share: (at - low) / (high - low),
+        }
+    }
+}
+
+/// How many of a rising list lie below a place.
+fn below(list: &[f64], at: f64) -> usize {
+    list.partition_point(|place| *place < at)
+}
+
+/// The points of a rule along the strips; those that it does not have are 0.
+struct Turns {
+    count: usize,
+    sines: [f64; POINTS_MAX],
+    cosines: [f64; POINTS_MAX],
+    weights: [f64; POINTS_MAX],
+    nodes: [Between; POINTS_MAX],
+}
+
+/// Tractions over pressure along and across at the points of a rule along a strip.
+type StripRatios = [[f32; POINTS_MAX]; 2];
+
+/// The rows of two neighbouring strips with their numbers.
+struct TwoRows([(usize, StripRatios); 2]);
+
+impl TwoRows {
+    const NONE: TwoRows = TwoRows([(usize::MAX, [[0.0; POINTS_MAX]; 2]); 2]);
+
+    /// Moves on to these strips, with what makes their rows.
+    fn move_to(
+        &mut self,
+        pair: [usize; 2],
+        make: impl Fn(usize) -> StripRatios,
+    ) -> [&StripRatios; 2] {
+        let TwoRows(rows) = self;
+        if rows[1].0 == pair[0] {
+            rows[0] = rows[1];
+        }
+        for (row, strip) in rows.iter_mut().zip(pair) {
+            if row.0 != strip {
+                *row = (strip, make(strip));
+            }
+        }
+        let [(_, below), (_, above)] = &*rows;
+        [below, above]
+    }
+}
+
+impl<'a> LoadedRun<'a> {
+    /// The run of these segments, the `number`-th of the mesh, with the tractions of an answer, which are in `unit` MPa.
+    pub(crate) fn new(
+        level: &StripMesh,
+        footprint: &'a Footprint,
+        answer: &LevelAnswer,
+        unit: f64,
+        (segments, number): (&[Segment], usize),
+    ) -> LoadedRun<'a> {
+        let [first, last] = [0, segments.len() - 1].map(|k| &segments[k].chord);
+        let low = first.y - 0.5 * first.dy;
+        let ratio = |i: usize| match level.pressure[i] {
+            p if p > 0.0 => [0, 1].map(|k| (unit * answer.traction[k][i] / p) as f32),
+            _ => [0.0; 2],
+        };
+        let (centre, half) = (
+            0.5 * (first.left + first.right),
+            0.5 * (first.right - first.left),
+        );
+        let angle = |x: &f64| ((centre - x) / half).clamp(-1.0, 1.0).acos();
+        let nodes = &level.mesh.node[segments[0].cells.clone()];
+        let chords = segments.iter().map(|segment| &segment.chord);
+        LoadedRun {
+            outline: RunOutline {
+                footprint,
+                patch: first.patch,
+                number,
+                low,
+                width: last.y + 0.5 * last.dy - low,
+            },
+            extent: [
+                chords
+                    .clone()
+                    .map(|chord| chord.left)
+                    .fold(f64::INFINITY, f64::min),
+                chords
+                    .clone()
+                    .map(|chord| chord.right)
+                    .fold(f64::NEG_INFINITY, f64::max),
+            ],
+            halvings: halvings(level, footprint, segments),
+            lines: chords.map(|chord| chord.y).collect(),
+            nodes: nodes.iter().map(angle).collect(),
+            ratios: segments
+                .iter()
+                .flat_map(|segment| segment.cells.clone())
+                .map(ratio)
+                .collect(),
+        }
+    }
+
+    /// How often it is halved along and across in any case.
+    pub(crate) fn halvings(&self) -> [u32; 2] {
+        self.halvings
+    }
+
+    /// The rule with fewest points along a part: the load along a chord is nearly that of sin² u, of whose integral over all angles four points
+    /// leave 0.1 %.
+    pub(crate) fn least_rule(part: LoadPart) -> usize {
+        match part.along.level {
+            0 => ORDERS - 1,
+            1 => ORDERS - 2,
+            _ => 0,
+        }
+    }
+
+    /// How large a part is, in mm from `origin`.
+    pub(crate) fn seen(
+        &self,
+        part: &LoadPart,
+        origin: [f64; 2],
+        known: &mut KnownLines,
+    ) -> PartBox {
+        let cosines = [0.0, 1.0].map(|side| (PI * part.along.share(side)).cos());
+        let [y0, y1] = [0.0, 1.0].map(|side| self.outline.y(part.across.share(side)));
+        let [low, middle, high] =
+            [0.0, 0.5, 1.0].map(|side| self.outline.chord(part.across.share(side), known));
+        // By how much x changes over the part as it does in its middle: points of quadrature are equally far apart in the angle.
+        let slope = 0.5 * PI * part.along.width() * (PI * part.along.share(0.5)).sin();
+        let (x, length, skew) = match middle {
+            Some(chord) => {
+                // Where the region ends inside the part, its end stands for the missing chord.
+                let end = [0.5 * (chord.left + chord.right); 2];
+                let ends = |chord: Chord| cosines.map(|cosine| chord.along(cosine));
+                let own = ends(chord);
+                let [low, high] = [low, high].map(|chord| chord.map_or(end, ends));
+                let least = [0, 1].map(|k| own[k].min(low[k]).min(high[k]));
+                let most = [0, 1].map(|k| own[k].max(low[k]).max(high[k]));
+                let skew = (most[0] - least[0]).max(most[1] - least[1]);
+                (
+                    [least[0], most[1]],
+                    slope * (chord.right - chord.left),
+                    skew,
+                )
+            }
+            None => {
+                let [left, right] = self.extent;
+                (self.extent, slope * (right - left), 0.0)
+            }
+        };
+        let across = (y1 - y0).max(skew);
+        PartBox {
+            sides: [
+                x[0] - origin[0],
+                x[1] - origin[0],
+                y0 - origin[1],
+                y1 - origin[1],
+            ]
+            .map(|side| side as f32),
+            squares: [length * length, across * across].map(|square| square as f32),
+        }
+    }
+
+    /// Appends what a part carries as point loads, for rules along and across; x and y count from `origin`.
+    pub(crate) fn quadrature(
+        &self,
+        part: &LoadPart,
+        [along_rule, across_rule]: [usize; 2],
+        origin: [f64; 2],
+        known: &mut KnownLines,
+        to: &mut Vec<LoadPack>,
+    ) {
+        let turns = self.turns(part, along_rule);
+        let count = turns.count;
+        let rule = RULES[across_rule];
+        let first = to.len();
+        to.resize(
+            first + (count * rule.len()).div_ceil(LANES),
+            LoadPack::default(),
+        );
+        let mut passed = below(&self.lines, self.outline.y(part.across.share(0.0)));
+        let mut rows = TwoRows::NONE;
+        let width = 0.5 * self.outline.width * part.across.width();
+        let angles = (&turns.cosines, &turns.sines);
+        let cosines = turns.cosines.map(|cosine| cosine as f32);
+        for (k, (at, weight)) in rule.iter().enumerate() {
+            let share = part.across.share(0.5 * (1.0 + at));
+            let Some(chord) = self.outline.chord(share, known) else {
+                continue;
+            };
+            let between = Between::new(&self.lines, chord.y, &mut passed);
+            let [below, above] = rows.move_to(between.pair, |strip| self.row(strip, &turns));
+            let pressures = self.outline.footprint.pressures(&chord, angles);
+            let half = 0.5 * (chord.right - chord.left);
+            let reach = half * width * weight;
+            let middle = (0.5 * (chord.right + chord.left) - origin[0]) as f32;
+            let (half, share) = (half as f32, between.share as f32);
+            let mut values = [[0.0_f32; POINTS_MAX]; 5];
+            for k in 0..POINTS_MAX {
+                let load = (pressures[k] * (reach * turns.weights[k])) as f32;
+                let ratio = |c: usize| below[c][k] + share * (above[c][k] - below[c][k]);
+                values[0][k] = middle - half * cosines[k];
+                values[1][k] = (chord.y - origin[1]) as f32;
+                values[2][k] = load * ratio(0);
+                values[3][k] = load * ratio(1);
+                values[4][k] = load;
+            }
+            let pack = &mut to[first + k * count / LANES];
+            let lane = k * count % LANES;
+            for (place, values) in pack.at.iter_mut().chain(&mut pack.force).zip(&values) {
+                put(place, lane, &values[..count]);
+            }
+        }
+    }
+
+    /// The points of a rule along a part.
+    fn turns(&self, part: &LoadPart, rule: usize) -> Turns {
+        let mut turns = Turns {
+            count: RULES[rule].len(),
+            sines: [0.0; POINTS_MAX],
+            cosines: [0.0; POINTS_MAX],
+            weights: [0.0; POINTS_MAX],
+            nodes: [Between::default(); POINTS_MAX],
+        };
+        let (middle, half) = (PI * part.along.share(0.5), 0.5 * PI * part.along.width());
+        let (sine, cosine) = middle.sin_cos();
+        let mut passed = below(&self.nodes, middle - half);
+        for (k, (at, weight)) in RULES[rule].iter().enumerate() {
+            let turn = half * at;
+            let (sine_turn, cosine_turn) = small_sin_cos(turn);
+            turns.sines[k] = sine * cosine_turn + cosine * sine_turn;
+            turns.cosines[k] = cosine * cosine_turn - sine * sine_turn;
+            turns.weights[k] = half * weight * turns.sines[k];
+            turns.nodes[k] = Between::new(&self.nodes, middle + turn, &mut passed);
+        }
+        turns
+    }
+
+    /// Tractions over pressure on the mid-line of a strip.
+    fn row(&self, strip: usize, turns: &Turns) -> StripRatios {
+        let nodes = self.nodes.len();
+        let own = &self.ratios[strip * nodes..][..nodes];
+        let mut row = [[0.0; POINTS_MAX]; 2];
+        for (k, between) in turns.nodes[..turns.count].iter().enumerate() {
+            let [low, high] = between.pair.map(|node| own[node]);
+            let share = between.share as f32;
+            row[0][k] = low[0] + share * (high[0] - low[0]);
+            row[1][k] = low[1] + share * (high[1] - low[1]);
+        }
+        row
+    }
+}
+
+/// Puts values in their place; a whole rule at once, which is the usual case.
+#[inline]
+fn put(place: &mut Lanes, lane: usize, values: &[f32]) {
+    if let Ok(whole) = <&[f32; POINTS_MAX]>::try_from(values) {
+        place[lane..lane + POINTS_MAX].copy_from_slice(whole);
+    } else {
+        for (place, value) in place[lane..].iter_mut().zip(values) {
+            *place = *value;
+        }
+    }
+}
+
+/// How often a run is halved along and across in any case: points of quadrature have to see what loads do between strips and cells, also from far
+/// away.
+fn halvings(level: &StripMesh, footprint: &Footprint, segments: &[Segment]) -> [u32; 2] {
+    let patch = segments[0].chord.patch;
+    let all = level.mesh.segments.iter();
+    let hollow = all.filter(|segment| segment.chord.patch == patch).count() > segments.len();
+    if footprint.jumps() || hollow || steepest(level, segments) > STEEP {
+        return ROUGH;
+    }
+    // Bounds over pressures, cell by cell, multiplied by both pressures.
+    let first = segments[0].cells.start;
+    let evenly = |i: usize| {
+        let [own, known] =
+            [[i, first], [first, i]].map(|[i, j]| level.bound[i] * level.pressure[j]);
+        (own - known).abs() <= EVEN * known
+    };
+    let even = segments[0].cells.start..segments[segments.len() - 1].cells.end;
+    if footprint.is_closed_form() && even.into_iter().all(evenly) {
+        SMOOTH
+    } else {
+        UNEVEN
+    }
+}
+
+/// The largest relative change from cell to cell along a strip of the pressure over that of an ellipse, which is proportional to sin u; strips with less
+/// than a tenth of the largest pressure do not count.
+fn steepest(level: &StripMesh, segments: &[Segment]) -> f64 {
+    let cells = segments[0].cells.start..segments[segments.len() - 1].cells.end;
+    let pressures = &level.pressure;
+    let largest = pressures[cells].iter().copied().fold(0.0, f64::max);
+    let mut steepest = 0.0_f64;
+    for Segment { chord, cells } in segments {
+        let top = pressures[cells.clone()].iter().copied().fold(0.0, f64::max);
+        if top < 0.1 * largest {
+            continue;
+        }
+        let form = |i: usize| {
+            let x = level.mesh.node[i];
+            pressures[i] / ((x - chord.left) * (chord.right - x)).max(0.0).sqrt()
+        };
+        for i in cells.start + 1..cells.end {
+            let [before, here] = [i - 1, i].map(form);
+            steepest = steepest.max((here - before).abs() / before.min(here));
+        }
+    }
+    steepest
+}
+
+/// Sine and cosine. Most angles are small, for which a few terms of the series are exact to 1e-13.
+fn small_sin_cos(angle: f64) -> (f64, f64) {
+    if angle.abs() > 0.2 {
+        return angle.sin_cos();
+    }
+    let square = angle * angle;
+    let term = |number: f64, rest: f64| 1.0 - square / (number * (number + 1.0)) * rest;
+    let sine = angle * term(2.0, term(4.0, term(6.0, term(8.0, 1.0))));
+    let cosine = term(1.0, term(3.0, term(5.0, term(7.0, term(9.0, 1.0)))));
+    (sine, cosine)
+}
