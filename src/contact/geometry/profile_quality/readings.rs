@@ -9,11 +9,8 @@ use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::numerics::hermite::{akima_slopes, value};
 use crate::contact::numerics::spline::Spline;
 
-/// Bounds of the spacing of the comparison in mm. Where points are dense it is the lower one.
-const STEP: [f64; 2] = [0.05, 0.2];
-/// Samples of the comparison on the shortest chord, where the spacing is between its bounds: between two points the curves are cubics. Chosen by
-/// judgement; points up to 0.3 mm apart, as measurements have them, are compared at the lower bound.
-const ON_CHORD: f64 = 6.0;
+/// Spacing of the comparison in mm.
+const STEP: f64 = 0.05;
 /// Distance in mm by which the comparison extends beyond twice the half width of the contact.
 const BEYOND: f64 = 10.0;
 /// Distance, in cut wavelengths, beyond which points do not affect a smoothed curve.
@@ -56,11 +53,7 @@ pub fn roughness(
         window[0] - SUPPORT * reference,
         window[1] + SUPPORT * reference,
     ]);
-    let chords = part.along.windows(2).map(|pair| pair[1] - pair[0]);
-    let shortest = chords.fold(f64::INFINITY, f64::min);
-    let step = (shortest / ON_CHORD)
-        .clamp(STEP[0], STEP[1])
-        .max((window[1] - window[0]) / SAMPLES_MAX as f64);
+    let step = STEP.max((window[1] - window[0]) / SAMPLES_MAX as f64);
     let count = ((window[1] - window[0]) / step).floor() as usize + 1;
     let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
     let used = spline(part, smoothing);

@@ -31,7 +31,7 @@ pub(crate) trait PressureInfluence {
 }
 
 impl<T: FftFloat> PressureInfluence for GridOperator<T> {
-    const CHANGES_MAX: usize = 48;
+    const CHANGES_MAX: usize = 12;
     type Workspace = GridWorkspace<T>;
 
     fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut GridWorkspace<T>) {
