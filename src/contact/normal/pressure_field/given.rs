@@ -150,6 +150,17 @@ impl GridPressure {
         chords
     }
 
+    /// The interval of rows that holds the line of a chord, and the weights of the rows about it.
+    fn row_weights(&self, chord: &Chord) -> (usize, [f64; 4]) {
+        let y = if self.images.is_empty() {
+            chord.y
+        } else {
+            chord.y.abs()
+        };
+        let j = self.row_interval(y);
+        (j, weights(&self.grid.y, j, y))
+    }
+
     /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For
     /// `x0 = x1` the pressure there.
     ///
@@ -163,13 +174,7 @@ impl GridPressure {
             return 0.0;
         }
         let x = &self.grid.x;
-        let y = if self.images.is_empty() {
-            chord.y
-        } else {
-            chord.y.abs()
-        };
-        let j = self.row_interval(y);
-        let weights = weights(&self.grid.y, j, y);
+        let (j, weights) = self.row_weights(chord);
         let (first, last) = (self.column_interval(low), self.column_interval(high));
         let value = |i: usize| self.value_on_column(i, j, weights);
         let mut values: [f64; 4] = std::array::from_fn(|k| value(first - 1 + k));
@@ -213,13 +218,7 @@ impl GridPressure {
     #[must_use]
     pub fn pressures<const N: usize>(&self, chord: &Chord, places: [f64; N]) -> [f64; N] {
         let x = &self.grid.x;
-        let y = if self.images.is_empty() {
-            chord.y
-        } else {
-            chord.y.abs()
-        };
-        let j = self.row_interval(y);
-        let weights = weights(&self.grid.y, j, y);
+        let (j, weights) = self.row_weights(chord);
         let mut known = None;
         places.map(|place| {
             if place < chord.left || place > chord.right {

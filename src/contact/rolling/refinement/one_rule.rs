@@ -20,7 +20,7 @@ use crate::contact::rolling::task::RollingTask;
 const STEPS_MAX: u32 = 5;
 
 /// Bodies that differ by a |K| of more than this keep both rules: with one, free rolling at |K| = 0.25 is off by 1.2 estimates. Where they hardly
-/// differ, forces are to be those of like bodies.
+/// differ, forces are to be those of like bodies. Chosen by judgement below every |K| of the references, the least of which is 0.05.
 const UNLIKE_MAX: f64 = 0.02;
 
 /// Is one rule enough on levels with a coarser one below? Bounds that follow the slips need the smooth slips of the other rule, motions of a

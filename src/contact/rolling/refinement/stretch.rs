@@ -12,7 +12,7 @@ use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::lender::{Lender, apart, bent, borrow, is_straight};
 use crate::contact::rolling::refinement::level_solve::{
-    JudgedAnswer, MotionTask, add_three_point, answer_on, indicators_on, level_task,
+    JudgedAnswer, MotionTask, SolvedLevel, add_three_point, answer_on, indicators_on, level_task,
 };
 use crate::contact::rolling::refinement::refine;
 use crate::contact::rolling::refinement::refine::ComparedAnswer;
@@ -325,14 +325,7 @@ impl Stretch {
         monitor: &dyn Monitor,
     ) -> Result<(), SolveError> {
         let mut solved = one.solved.clone();
-        add_three_point(
-            task,
-            state,
-            &mut solved.point,
-            one.asked,
-            &self.apart,
-            monitor,
-        )?;
+        self.add_slips(task, state, &mut solved.point, one.asked, monitor)?;
         let level = state.levels.used(self.level);
         solved.indicators = indicators_on(task, state, &level, &solved.point, None);
         solved.point.errors = solved.indicators.errors();
@@ -407,17 +400,22 @@ impl Stretch {
     ) -> Result<MotionAnswer, SolveError> {
         let mut solved = one.solved;
         if task.wants_slips {
-            add_three_point(
-                task,
-                state,
-                &mut solved.point,
-                one.asked,
-                &self.apart,
-                monitor,
-            )?;
+            self.add_slips(task, state, &mut solved.point, one.asked, monitor)?;
         }
         let mut answer = MotionAnswer::from(solved.point);
         answer.skips.push(Skip::Companions);
         Ok(answer)
+    }
+
+    /// Adds the three-point rule, started as far from the other rule as in the last motion that has both.
+    fn add_slips(
+        &self,
+        task: &RollingTask,
+        state: &mut RefinementState,
+        solved: &mut SolvedLevel,
+        asked: MotionTask,
+        monitor: &dyn Monitor,
+    ) -> Result<(), SolveError> {
+        add_three_point(task, state, solved, asked, &self.apart, monitor)
     }
 }
