@@ -20,8 +20,8 @@ impl GapSampling {
     /// Samples along and across.
     fn samples(self) -> [usize; 2] {
         match self {
-            GapSampling::Coarse => [17, 81],
-            GapSampling::Fine => [17, 161],
+            GapSampling::Coarse => [9, 81],
+            GapSampling::Fine => [9, 161],
         }
     }
 }

@@ -9,8 +9,15 @@ pub(crate) struct LocusPoint {
     pub(crate) clearance: f64,
     pub(crate) rail: f64,
     pub(crate) wheel: f64,
-    /// Turn about x that lays the track's y along the rail's surface, where the clearance is small.
-    pub(crate) inclination: Option<f64>,
+    /// The inclination there, where the clearance is small.
+    pub(crate) inclination: Option<Inclination>,
+}
+
+/// Turn about x that lays the track's y along the rail's surface, in rad, and its cosine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Inclination {
+    pub(crate) angle: f64,
+    pub(crate) cos: f64,
 }
 
 /// The lines and the height of first touch in mm.

@@ -3,6 +3,7 @@
 pub mod conicity;
 pub mod contact_locus;
 pub mod crossing;
+pub mod envelope;
 pub mod formats;
 pub mod frame;
 pub mod grouping;

@@ -141,7 +141,7 @@ impl ContactLocus<'_> {
         let [first, last] = whole.ends;
         let (depths, main) = self.depths(whole, lowering);
         let angles: Vec<f64> = (first..=last)
-            .map(|k| self.inclination(&self.lines[k]))
+            .map(|k| self.inclination(&self.lines[k]).angle)
             .collect();
         let (after, before) = ((main..depths.len()).collect(), (0..=main).rev().collect());
         let mut valleys = Vec::new();
@@ -191,7 +191,7 @@ impl ContactLocus<'_> {
     /// How deep the bodies overlap along the normal, line by line, and where most.
     fn depths(&self, overlap: Overlap, lowering: f64) -> (Vec<f64>, usize) {
         let [first, last] = overlap.ends;
-        let depth = |line: &LocusPoint| (lowering - line.clearance) * self.inclination(line).cos();
+        let depth = |line: &LocusPoint| (lowering - line.clearance) * self.inclination(line).cos;
         let depths: Vec<f64> = self.lines[first..=last].iter().map(depth).collect();
         let deeper = |a: &usize, b: &usize| depths[*a].total_cmp(&depths[*b]);
         let main = (0..depths.len()).max_by(deeper).unwrap_or(0);

@@ -1,8 +1,12 @@
 //! Where a wheel touches its rail if both are rigid, for many places of the wheelset over the same rail.
 
-use crate::contact::geometry::contact_locus::{CURVE_STEP, Envelope, STEP, envelope, rail_points};
+use crate::contact::geometry::contact_locus::rail_points;
+use crate::contact::geometry::envelope::{Envelope, envelope};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
+/// Spacing of the lines on which the rail's upper edge is kept, and of its points, in mm.
+const LINE_STEP: f64 = 0.01;
+const CURVE_STEP: f64 = 0.02;
 /// Spacing of the points of the wheel among which the touching one is looked for, in mm. Two places of contact whose clearances
 /// differ by less than some 3e-5 mm may be taken for each other.
 const WHEEL_STEP: f64 = 0.05;
@@ -42,14 +46,14 @@ impl RailTop {
         let rail = rail_points(geometry, rail);
         let [_, wheel] = geometry.parameters(WHEEL_STEP);
         RailTop {
-            lines: envelope(&rail),
+            lines: envelope(&rail, LINE_STEP),
             wheel,
         }
     }
 
     /// Height and parameter of the rail's upper edge over y.
     fn over(&self, y: f64) -> Option<[f64; 2]> {
-        let place = y / STEP - self.lines.first as f64;
+        let place = y / self.lines.step - self.lines.first as f64;
         let k = place.floor();
         if k < 0.0 {
             return None;

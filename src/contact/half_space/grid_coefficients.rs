@@ -1,6 +1,10 @@
 //! Influence coefficients between equal rectangles on a regular grid, see
 //! [`GridOperator`](crate::contact::half_space::grid_operator::GridOperator).
 
+use pulp::{Arch, NullaryFnOnce};
+
+use crate::contact::numerics::simd_ln::Float;
+
 /// Displacement i cells along x and j cells along y away from a cell with unit pressure, stored at `j * nx + i`.
 pub(crate) fn coefficients(
     nx: usize,
@@ -12,40 +16,50 @@ pub(crate) fn coefficients(
     let factor = 1.0 / (std::f64::consts::PI * contact_modulus);
     // Corners lie half a cell before and after the centres. Neighbouring cells share them, so each is evaluated once; the
     // two corners of the first cell differ only in sign.
-    let places = |n: usize, d: f64| -> Vec<[f64; 2]> {
-        let at = |i: usize| (i as f64 + 0.5) * d;
-        (0..n).map(|i| [at(i), at(i).ln()]).collect()
-    };
+    let places = |n: usize, d: f64| -> Vec<f64> { (0..n).map(|i| (i as f64 + 0.5) * d).collect() };
     let (x, y) = (places(nx, dx), places(ny, dy));
-    // p asinh(q/p) + q asinh(p/q)
-    let corner = |[p, ln_p]: [f64; 2], [q, ln_q]: [f64; 2]| {
-        let r = (p * p + q * q).sqrt();
-        p * ((q + r).ln() - ln_p) + q * ((p + r).ln() - ln_q)
-    };
-    let line = |q: [f64; 2]| -> Vec<f64> {
-        let mut before = -corner(x[0], q);
-        x.iter()
-            .map(|p| {
-                let here = corner(*p, q);
-                let between = here - before;
-                before = here;
-                between
-            })
-            .collect()
+    let mut corners = vec![0.0; nx * ny];
+    Arch::new().dispatch(Corners {
+        x: &x,
+        y: &y,
+        out: &mut corners,
+    });
+    let between = |line: &[f64], i: usize| {
+        let before = if i == 0 { -line[0] } else { line[i - 1] };
+        line[i] - before
     };
     let mut out = Vec::with_capacity(nx * ny);
-    let mut below: Vec<f64> = line(y[0]).into_iter().map(|value| -value).collect();
-    for q in y {
-        let above = line(q);
-        out.extend(
-            above
-                .iter()
-                .zip(&below)
-                .map(|(above, below)| factor * (above - below)),
-        );
-        below = above;
+    for j in 0..ny {
+        let above = &corners[j * nx..(j + 1) * nx];
+        let (below, sign) = if j == 0 {
+            (above, -1.0)
+        } else {
+            (&corners[(j - 1) * nx..j * nx], 1.0)
+        };
+        out.extend((0..nx).map(|i| factor * (between(above, i) - sign * between(below, i))));
     }
     out
+}
+
+/// `p asinh(q/p) + q asinh(p/q)` at all pairs of two lists of positive lengths.
+struct Corners<'a> {
+    x: &'a [f64],
+    y: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Corners<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (q, line) in self.y.iter().zip(self.out.chunks_exact_mut(self.x.len())) {
+            for (p, corner) in self.x.iter().zip(line) {
+                let r = (p * p + q * q).sqrt();
+                *corner = p * Float::ln((q + r) / *p) + q * Float::ln((p + r) / *q);
+            }
+        }
+    }
 }
 
 /// The coefficients and their mirror images for negative i, row by row.

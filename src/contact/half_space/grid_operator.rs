@@ -1,12 +1,13 @@
 //! Normal influence between equal rectangles on a regular grid, applied as a padded convolution.
 
+use pulp::{Arch, NullaryFnOnce};
 use rustfft::Fft;
 use rustfft::num_complex::Complex;
 
 use crate::contact::half_space::grid_coefficients::{coefficients, lines};
 use crate::contact::half_space::transforms::{FftFloat, FftPlanners, FftPlans};
 
-/// Rows copied into the columns at a time, so that whole cache lines are written.
+/// Rows copied into the columns at a time, so that whole cache lines are written. Two rows are transformed as one: real and imaginary part.
 const BLOCK: usize = 8;
 
 /// Normal displacement at the centres of `nx` by `ny` equal rectangles caused by uniform pressures on them, both bodies
@@ -37,8 +38,10 @@ pub struct GridOperator<T> {
 pub struct GridWorkspace<T: FftFloat> {
     planners: FftPlanners<T>,
     row: Vec<T>,
-    /// Spectra of a block of rows.
-    spectra: Vec<Complex<T>>,
+    /// The spectrum of a row.
+    spectrum: Vec<Complex<T>>,
+    /// Rows of a block, two and two.
+    pairs: Vec<Complex<T>>,
     columns: Vec<Complex<T>>,
     scratch: Vec<Complex<T>>,
 }
@@ -48,7 +51,8 @@ impl<T: FftFloat> Default for GridWorkspace<T> {
         GridWorkspace {
             planners: FftPlanners::default(),
             row: Vec::new(),
-            spectra: Vec::new(),
+            spectrum: Vec::new(),
+            pairs: Vec::new(),
             columns: Vec::new(),
             scratch: Vec::new(),
         }
@@ -61,13 +65,15 @@ impl<T: FftFloat> GridWorkspace<T> {
         let (half, plans) = (operator.half(), &operator.plans);
         let scratch = [
             plans.forward.get_scratch_len(),
-            plans.backward.get_scratch_len(),
+            plans.rows_forward.get_inplace_scratch_len(),
+            plans.rows_backward.get_inplace_scratch_len(),
             plans.columns_forward.get_inplace_scratch_len(),
             plans.columns_backward.get_inplace_scratch_len(),
         ];
         let zero = Complex::new(T::zero(), T::zero());
         self.row.resize(operator.width, T::zero());
-        self.spectra.resize(half * BLOCK, zero);
+        self.spectrum.resize(half, zero);
+        self.pairs.resize(operator.width * BLOCK / 2, zero);
         self.columns.resize(half * operator.height, zero);
         self.scratch
             .resize(scratch.into_iter().max().unwrap_or(0), zero);
@@ -125,103 +131,101 @@ impl<T: FftFloat> GridOperator<T> {
             return;
         }
         workspace.fit(self);
-        let (down, up) = (1.0 / largest, largest * self.own);
+        // A pair of rows leaves twice its spectra.
+        let (down, up) = (0.5 / largest, largest * self.own);
+        let zero = Complex::new(T::zero(), T::zero());
         for (block, rows) in pressure.chunks(nx * BLOCK).enumerate() {
-            for (k, values) in rows.chunks_exact(nx).enumerate() {
-                for (to, from) in workspace.row.iter_mut().zip(values) {
-                    *to = T::of(from * down);
+            let pairs = rows.chunks(2 * nx);
+            for (pair, both) in workspace.pairs.chunks_exact_mut(self.width).zip(pairs) {
+                let (one, other) = both.split_at(nx);
+                for (to, from) in pair.iter_mut().zip(one) {
+                    *to = Complex::new(T::of(from * down), T::zero());
                 }
-                workspace.row[nx..].fill(T::zero());
-                self.transform_row(k, workspace);
+                for (to, from) in pair.iter_mut().zip(other) {
+                    to.im = T::of(from * down);
+                }
+                pair[nx..].fill(zero);
             }
-            self.store_rows(block * BLOCK, rows.len() / nx, workspace);
+            self.store_pairs(block * BLOCK, rows.len() / nx, workspace);
         }
         self.clear_rows_from(self.ny, workspace);
         transform_columns(&*self.plans.columns_forward, workspace);
         for (value, factor) in workspace.columns.iter_mut().zip(&self.spectrum) {
-            *value = *value * *factor;
+            (value.re, value.im) = (value.re * *factor, value.im * *factor);
         }
         transform_columns(&*self.plans.columns_backward, workspace);
         for (block, rows) in displacement.chunks_mut(nx * BLOCK).enumerate() {
-            self.fetch_rows(block * BLOCK, rows.len() / nx, workspace);
-            for (k, values) in rows.chunks_exact_mut(nx).enumerate() {
-                self.transform_row_back(k, workspace);
-                for (to, from) in values.iter_mut().zip(&workspace.row) {
-                    let from: f64 = (*from).into();
-                    *to = up * from;
+            self.fetch_pairs(block * BLOCK, rows.len() / nx, workspace);
+            let pairs = rows.chunks_mut(2 * nx);
+            for (both, pair) in pairs.zip(workspace.pairs.chunks_exact(self.width)) {
+                let (one, other) = both.split_at_mut(nx);
+                for (to, from) in one.iter_mut().zip(pair) {
+                    *to = up * from.re.into();
+                }
+                for (to, from) in other.iter_mut().zip(pair) {
+                    *to = up * from.im.into();
                 }
             }
         }
     }
 
-    /// Adds the displacement in mm at every centre caused by an additional pressure in MPa on cell `cell`.
-    pub fn add(&self, cell: usize, pressure: f64, displacement: &mut [f64]) {
-        let (nx, stride) = (self.nx, 2 * self.nx - 1);
-        let (i, j) = (cell % nx, cell / nx);
-        for (row, values) in displacement.chunks_exact_mut(nx).enumerate() {
-            let first = row.abs_diff(j) * stride + nx - 1 - i;
-            for (u, coefficient) in values.iter_mut().zip(&self.lines[first..first + nx]) {
-                *u += pressure * coefficient;
-            }
-        }
+    /// Adds the displacement in mm at every centre caused by additional pressures in MPa on some cells.
+    pub fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
+        Arch::new().dispatch(Addition {
+            nx: self.nx,
+            lines: &self.lines,
+            changes,
+            displacement,
+        });
     }
 
-    /// Transforms the row of the workspace into spectrum `k` of the block.
-    fn transform_row(&self, k: usize, workspace: &mut GridWorkspace<T>) {
-        let half = self.half();
+    /// Transforms the pairs of a block of `count` rows, and stores the spectra of the rows as lines of the columns from `first` on.
+    fn store_pairs(&self, first: usize, count: usize, workspace: &mut GridWorkspace<T>) {
         let GridWorkspace {
-            row,
-            spectra,
+            pairs,
+            columns,
             scratch,
             ..
         } = workspace;
-        let spectrum = &mut spectra[k * half..(k + 1) * half];
-        let done = self
-            .plans
-            .forward
-            .process_with_scratch(row, spectrum, scratch);
-        debug_assert!(done.is_ok());
+        let pairs = &mut pairs[..count.div_ceil(2) * self.width];
+        self.plans.rows_forward.process_with_scratch(pairs, scratch);
+        for (i, column) in columns.chunks_exact_mut(self.height).enumerate() {
+            let image = if i == 0 { 0 } else { self.width - i };
+            let column = &mut column[first..first + count];
+            for (pair, rows) in pairs.chunks_exact(self.width).zip(column.chunks_mut(2)) {
+                // The even part belongs to the real row, the odd one to the imaginary row.
+                let (here, there) = (pair[i], pair[image]);
+                rows[0] = Complex::new(here.re + there.re, here.im - there.im);
+                if let Some(other) = rows.get_mut(1) {
+                    *other = Complex::new(here.im + there.im, there.re - here.re);
+                }
+            }
+        }
     }
 
-    /// Transforms spectrum `k` of the block into the row of the workspace.
-    fn transform_row_back(&self, k: usize, workspace: &mut GridWorkspace<T>) {
-        let half = self.half();
+    /// The reverse of [`GridOperator::store_pairs`].
+    fn fetch_pairs(&self, first: usize, count: usize, workspace: &mut GridWorkspace<T>) {
         let GridWorkspace {
-            row,
-            spectra,
+            pairs,
+            columns,
             scratch,
             ..
         } = workspace;
-        let spectrum = &mut spectra[k * half..(k + 1) * half];
-        // The first and last values of a real row's transform are real; rounding left an imaginary part that the inverse rejects.
-        (spectrum[0].im, spectrum[half - 1].im) = (T::zero(), T::zero());
-        let done = self
-            .plans
-            .backward
-            .process_with_scratch(spectrum, row, scratch);
-        debug_assert!(done.is_ok());
-    }
-
-    /// Stores `count` spectra of the block as lines of the columns from `first` on.
-    fn store_rows(&self, first: usize, count: usize, workspace: &mut GridWorkspace<T>) {
-        let half = self.half();
-        let columns = workspace.columns.chunks_exact_mut(self.height);
-        for (i, column) in columns.enumerate() {
-            for k in 0..count {
-                column[first + k] = workspace.spectra[k * half + i];
+        let pairs = &mut pairs[..count.div_ceil(2) * self.width];
+        for (i, column) in columns.chunks_exact(self.height).enumerate() {
+            let column = &column[first..first + count];
+            for (pair, rows) in pairs.chunks_exact_mut(self.width).zip(column.chunks(2)) {
+                let zero = Complex::new(T::zero(), T::zero());
+                let (one, other) = (rows[0], rows.get(1).copied().unwrap_or(zero));
+                pair[i] = Complex::new(one.re - other.im, one.im + other.re);
+                if i > 0 {
+                    pair[self.width - i] = Complex::new(one.re + other.im, other.re - one.im);
+                }
             }
         }
-    }
-
-    /// The reverse of [`GridOperator::store_rows`].
-    fn fetch_rows(&self, first: usize, count: usize, workspace: &mut GridWorkspace<T>) {
-        let half = self.half();
-        let columns = workspace.columns.chunks_exact(self.height);
-        for (i, column) in columns.enumerate() {
-            for k in 0..count {
-                workspace.spectra[k * half + i] = column[first + k];
-            }
-        }
+        self.plans
+            .rows_backward
+            .process_with_scratch(pairs, scratch);
     }
 
     fn clear_rows_from(&self, first: usize, workspace: &mut GridWorkspace<T>) {
@@ -243,8 +247,19 @@ impl<T: FftFloat> GridOperator<T> {
                     workspace.row[self.width - i] = value;
                 }
             }
-            self.transform_row(0, workspace);
-            self.store_rows(j, 1, workspace);
+            let GridWorkspace {
+                row,
+                spectrum,
+                columns,
+                scratch,
+                ..
+            } = &mut *workspace;
+            let forward = &self.plans.forward;
+            let done = forward.process_with_scratch(row, spectrum, scratch);
+            debug_assert!(done.is_ok());
+            for (column, value) in columns.chunks_exact_mut(self.height).zip(spectrum) {
+                column[j] = *value;
+            }
         }
         for column in workspace.columns.chunks_exact_mut(height) {
             for j in 1..ny {
@@ -255,6 +270,32 @@ impl<T: FftFloat> GridOperator<T> {
         let scale = T::of(1.0 / (self.width * height) as f64);
         for (factor, value) in self.spectrum.iter_mut().zip(&workspace.columns) {
             *factor = scale * value.re;
+        }
+    }
+}
+
+/// See [`GridOperator::add`]; compiled for the instruction set of this machine.
+struct Addition<'a> {
+    nx: usize,
+    lines: &'a [f64],
+    changes: &'a [(usize, f64)],
+    displacement: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Addition<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let (nx, stride) = (self.nx, 2 * self.nx - 1);
+        for (cell, pressure) in self.changes {
+            let (i, j) = (cell % nx, cell / nx);
+            for (row, values) in self.displacement.chunks_exact_mut(nx).enumerate() {
+                let first = row.abs_diff(j) * stride + nx - 1 - i;
+                for (u, coefficient) in values.iter_mut().zip(&self.lines[first..first + nx]) {
+                    *u += pressure * coefficient;
+                }
+            }
         }
     }
 }
@@ -356,9 +397,8 @@ mod tests {
             }
         }
         let mut summed = vec![0.0; pressure.len()];
-        for (cell, p) in pressure.iter().enumerate() {
-            operator.add(cell, *p, &mut summed);
-        }
+        let changes: Vec<(usize, f64)> = pressure.iter().copied().enumerate().collect();
+        operator.add(&changes, &mut summed);
         for (a, b) in summed.iter().zip(expected) {
             assert!((a - b).abs() < 1e-12 * largest, "{a} {b}");
         }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use realfft::{ComplexToReal, FftNum, RealFftPlanner, RealToComplex};
+use realfft::{FftNum, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
 
 /// The floating-point precision of the transforms.
@@ -23,10 +23,11 @@ impl FftFloat for f64 {
     }
 }
 
-/// FftPlans for the transforms of rows and columns.
+/// FftPlans for the transforms of rows and columns: of a real row, of two rows at once as real and imaginary part, and of columns.
 pub struct FftPlans<T> {
     pub(crate) forward: Arc<dyn RealToComplex<T>>,
-    pub(crate) backward: Arc<dyn ComplexToReal<T>>,
+    pub(crate) rows_forward: Arc<dyn Fft<T>>,
+    pub(crate) rows_backward: Arc<dyn Fft<T>>,
     pub(crate) columns_forward: Arc<dyn Fft<T>>,
     pub(crate) columns_backward: Arc<dyn Fft<T>>,
 }
@@ -52,7 +53,8 @@ impl<T: FftNum> FftPlanners<T> {
     pub fn plans(&mut self, width: usize, height: usize) -> FftPlans<T> {
         FftPlans {
             forward: self.real.plan_fft_forward(width),
-            backward: self.real.plan_fft_inverse(width),
+            rows_forward: self.complex.plan_fft_forward(width),
+            rows_backward: self.complex.plan_fft_inverse(width),
             columns_forward: self.complex.plan_fft_forward(height),
             columns_backward: self.complex.plan_fft_inverse(height),
         }

@@ -159,7 +159,8 @@ pub(crate) fn interval(axis: &[f64], x: f64) -> usize {
 /// Slope at a node of the parabola through it and its neighbours at distances `before` and `after`, over which the
 /// value rises by `rise_before` and `rise_after`.
 pub(crate) fn tangent(before: f64, after: f64, rise_before: f64, rise_after: f64) -> f64 {
-    (rise_before / before * after + rise_after / after * before) / (before + after)
+    (rise_before * after * after + rise_after * before * before)
+        / (before * after * (before + after))
 }
 
 #[cfg(test)]

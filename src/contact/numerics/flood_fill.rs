@@ -1,37 +1,73 @@
 //! Connected groups of grid cells.
 
+/// Cells of one row, from the first to the one after the last, and a run of the same group before it (its own number where there is none).
+#[derive(Clone, Copy)]
+struct RowRun {
+    from: usize,
+    to: usize,
+    parent: usize,
+}
+
 /// Groups the cells of a `width` by `height` grid for which the predicate is true (cell (i, j) is `j * width + i`). Cells that share
-/// an edge or a corner are connected. Groups are ordered by their first cells, cells within a group by when they were
-/// reached.
+/// an edge or a corner are connected. Groups are ordered by their first cells, cells within a group by their numbers.
 pub(crate) fn groups(
     [width, height]: [usize; 2],
     inside: impl Fn(usize) -> bool,
 ) -> Vec<Vec<usize>> {
-    let mut seen = vec![false; width * height];
-    let mut groups = Vec::new();
-    for start in 0..width * height {
-        if seen[start] || !inside(start) {
-            continue;
-        }
-        seen[start] = true;
-        let mut group = vec![start];
-        let mut next = 0;
-        while let Some(&cell) = group.get(next) {
-            next += 1;
-            let (i, j) = (cell % width, cell / width);
-            for j in j.saturating_sub(1)..(j + 2).min(height) {
-                for i in i.saturating_sub(1)..(i + 2).min(width) {
-                    let neighbour = j * width + i;
-                    if !seen[neighbour] && inside(neighbour) {
-                        seen[neighbour] = true;
-                        group.push(neighbour);
-                    }
+    let mut runs: Vec<RowRun> = Vec::new();
+    // The runs of the row before.
+    let mut above = 0..0;
+    for j in 0..height {
+        let (first, row) = (runs.len(), j * width);
+        let mut i = 0;
+        while i < width {
+            if !inside(row + i) {
+                i += 1;
+                continue;
+            }
+            let from = i;
+            while i < width && inside(row + i) {
+                i += 1;
+            }
+            let parent = runs.len();
+            runs.push(RowRun {
+                from: row + from,
+                to: row + i,
+                parent,
+            });
+            // Those that it meets at an edge or a corner.
+            for k in above.clone() {
+                let (low, high) = (runs[k].from + width, runs[k].to + width);
+                if low <= row + i && high >= row + from {
+                    join(&mut runs, k, parent);
                 }
             }
         }
-        groups.push(group);
+        above = first..runs.len();
+    }
+    let mut places = vec![usize::MAX; runs.len()];
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for k in 0..runs.len() {
+        let root = root(&runs, k);
+        if places[root] == usize::MAX {
+            places[root] = groups.len();
+            groups.push(Vec::new());
+        }
+        groups[places[root]].extend(runs[k].from..runs[k].to);
     }
     groups
+}
+
+fn root(runs: &[RowRun], mut k: usize) -> usize {
+    while runs[k].parent != k {
+        k = runs[k].parent;
+    }
+    k
+}
+
+fn join(runs: &mut [RowRun], one: usize, other: usize) {
+    let (one, other) = (root(runs, one), root(runs, other));
+    runs[one.max(other)].parent = one.min(other);
 }
 
 #[cfg(test)]
@@ -43,10 +79,13 @@ mod tests {
         // Two diagonals that touch at a corner, and a cell at the far end of the next row.
         let map = ["x...", ".x.x", "..x.", "...."];
         let inside = |cell: usize| map[cell / 4].as_bytes()[cell % 4] == b'x';
-        assert_eq!(groups([4, 4], inside), [vec![0, 5, 10, 7]]);
+        assert_eq!(groups([4, 4], inside), [vec![0, 5, 7, 10]]);
         let ends = ["..xx", "x...", "...."];
         let inside = |cell: usize| ends[cell / 4].as_bytes()[cell % 4] == b'x';
         assert_eq!(groups([4, 3], inside), [vec![2, 3], vec![4]]);
+        let fork = ["x..x", "x..x", ".xx."];
+        let inside = |cell: usize| fork[cell / 4].as_bytes()[cell % 4] == b'x';
+        assert_eq!(groups([4, 3], inside), [vec![0, 3, 4, 7, 9, 10]]);
         assert!(groups([0, 0], |_| true).is_empty());
     }
 }

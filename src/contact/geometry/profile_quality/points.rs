@@ -1,5 +1,7 @@
 //! The quality of a profile under a contact, and the smoothing that its noise requires.
 
+use realfft::RealFftPlanner;
+
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
@@ -43,13 +45,14 @@ pub struct UnderContact {
 }
 
 /// Quality of the points of a body under the contact `[low, high]` (mm along the profile), smoothed by `smoothing` mm; the contact
-/// modulus is in MPa.
+/// modulus is in MPa. The planner is for transforms.
 #[must_use]
 pub fn under_contact(
     points: Points,
     smoothing: f64,
     contact: [f64; 2],
     modulus: f64,
+    planner: &mut RealFftPlanner<f64>,
 ) -> UnderContact {
     let [low, high] = contact;
     let half = 0.5 * (high - low);
@@ -75,7 +78,7 @@ pub fn under_contact(
         over_width: points.chord(widest) / (high - low),
         spacing,
         noise: noise::noise(points, around).or_else(|| noise::noise(points, whole)),
-        roughness: roughness(points, smoothing, contact, modulus),
+        roughness: roughness(points, smoothing, contact, modulus, planner),
         polygon: noise::polygon(points, around),
         outlier,
         step,

@@ -31,9 +31,16 @@ pub struct Roughness {
     pub ambiguity: f64,
 }
 
-/// Roughness of a profile at the contact `middle ± half` (mm along the profile); the contact modulus is in MPa.
+/// Roughness of a profile at the contact `middle ± half` (mm along the profile); the contact modulus is in MPa. The planner keeps what it has
+/// planned for the next contact.
 #[must_use]
-pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64) -> Roughness {
+pub fn roughness(
+    points: Points,
+    smoothing: f64,
+    contact: [f64; 2],
+    modulus: f64,
+    planner: &mut RealFftPlanner<f64>,
+) -> Roughness {
     let [low, high] = contact;
     let half = 0.5 * (high - low);
     let last = points.along.len() - 1;
@@ -51,7 +58,6 @@ pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64
     let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
     let used = spline(part, smoothing);
     let used: Vec<CurvePoint> = places.iter().map(|s| used.at(*s)).collect();
-    let planner = &mut RealFftPlanner::new();
     let mut pressures = |other: &dyn Fn(f64) -> [f64; 2]| {
         let heights: Vec<f64> = (used.iter().zip(&places))
             .map(|(used, s)| above(used, other(*s)))
@@ -125,7 +131,13 @@ mod tests {
             at: &at,
             along: &along,
         };
-        roughness(points, smoothing, CONTACT, MODULUS)
+        roughness(
+            points,
+            smoothing,
+            CONTACT,
+            MODULUS,
+            &mut RealFftPlanner::new(),
+        )
     }
 
     #[test]
@@ -179,7 +191,14 @@ mod tests {
                 at: &at,
                 along: &along,
             };
-            roughness(points, smoothing, CONTACT, MODULUS).ambiguity
+            roughness(
+                points,
+                smoothing,
+                CONTACT,
+                MODULUS,
+                &mut RealFftPlanner::new(),
+            )
+            .ambiguity
         };
         assert!(
             open(8, 0.0) > 3.0 * open(1, 0.0),

@@ -7,6 +7,10 @@
 use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::contact::half_space::transforms::FftFloat;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::normal::gap::cell_sums;
+use crate::contact::normal::gap::cell_sums::{
+    Advance, CellProduct, CellWeights, Direction, Distances, LANES, Parting, StepSums,
+};
 use crate::contact::normal::hertz::NormalLoad;
 
 /// Displacements that pressures on cells cause, cells of one size or of several.
@@ -21,11 +25,9 @@ pub(crate) trait PressureInfluence {
     fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]);
     /// Displacement in mm/MPa of the first cell by its own pressure.
     fn own(&self) -> f64;
-    /// Area of a cell relative to that of the first one.
-    fn area(&self, cell: usize) -> f64;
-    /// Displacement of the first cell by its own pressure relative to that of this one: distances times this are the direction
-    /// of steepest descent for cells of several sizes.
-    fn yielding(&self, cell: usize) -> f64;
+    /// Areas of the cells relative to that of the first one; and the displacement of the first cell by its own pressure relative to that of
+    /// each: distances times this are the direction of steepest descent for cells of several sizes.
+    fn weights(&self, cells: usize) -> CellWeights;
 }
 
 impl<T: FftFloat> PressureInfluence for GridOperator<T> {
@@ -37,23 +39,19 @@ impl<T: FftFloat> PressureInfluence for GridOperator<T> {
     }
 
     fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
-        for (cell, pressure) in changes {
-            GridOperator::add(self, *cell, *pressure, displacement);
-        }
+        GridOperator::add(self, changes, displacement);
     }
 
     fn own(&self) -> f64 {
         GridOperator::own(self)
     }
 
-    #[inline]
-    fn area(&self, _cell: usize) -> f64 {
-        1.0
-    }
-
-    #[inline]
-    fn yielding(&self, _cell: usize) -> f64 {
-        1.0
+    fn weights(&self, cells: usize) -> CellWeights {
+        let ones = vec![1.0; cells.next_multiple_of(LANES)];
+        CellWeights {
+            area: ones.clone(),
+            yielding: ones,
+        }
     }
 }
 
@@ -86,7 +84,7 @@ impl PressureAnswer {
 /// Why there is no pressure.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum PressureFailure {
-    /// The iteration ended with this residual.
+    /// The iteration ended, with this least residual.
     NotConverged(f64),
     /// The caller stopped the work.
     Stopped(Stop),
@@ -121,26 +119,25 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
     } = *task;
     let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
     let n = gap.len();
-    let mut work = PressureIterate {
-        p: start,
-        u: vec![0.0; n],
-        g: vec![0.0; n],
-        t: vec![0.0; n],
-        r: vec![0.0; n],
-        changes: Vec::new(),
-    };
-    work.scale_to(influence, loading, cell);
-    influence.apply(&work.p, &mut work.u, workspace);
+    let mut work = PressureIterate::new(gap, start, influence.weights(n));
+    work.scale_to(loading, cell);
+    influence.apply(&work.p[..n], &mut work.u[..n], workspace);
     let (mut follow, mut last) = (false, 1.0);
-    let mut residual = f64::INFINITY;
+    let mut least_residual = f64::INFINITY;
     for iterations in 0..ITERATIONS_MAX {
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(PressureFailure::Stopped(stop));
         }
-        let approach = work.distances(influence, gap, loading);
-        let (violation, square) = work.part_from(influence, approach);
-        residual = violation / (approach - least);
+        let approach = work.distances(loading);
+        let [violation, square] = work.part_from(approach);
+        if !square.is_finite() {
+            break;
+        }
+        let residual = violation / (approach - least);
+        least_residual = least_residual.min(residual);
         if residual <= tolerance && approach > least {
+            work.p.truncate(n);
+            work.g.truncate(n);
             return Ok(PressureAnswer {
                 pressure: work.p,
                 distance: work.g,
@@ -151,23 +148,30 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
         }
         let factor = if follow { square / last } else { 0.0 };
         last = square;
-        work.direction(influence, factor);
-        influence.apply(&work.t, &mut work.r, workspace);
-        let step = work.step(influence, loading);
-        follow = work.advance(influence, step);
+        let step = work.step_after(factor, n, influence, loading, workspace);
+        follow = work.advance(step);
         if work.changes.len() <= I::CHANGES_MAX {
-            influence.add(&work.changes, &mut work.u);
-            let scale = work.scale_to(influence, loading, cell);
-            work.u.iter_mut().for_each(|u| *u *= scale);
+            for (u, r) in work.u.iter_mut().zip(&work.r) {
+                *u -= step * r;
+            }
+            influence.add(&work.changes, &mut work.u[..n]);
+            let scale = work.scale_to(loading, cell);
+            if scale != 1.0 {
+                work.u.iter_mut().for_each(|u| *u *= scale);
+            }
         } else {
-            work.scale_to(influence, loading, cell);
-            influence.apply(&work.p, &mut work.u, workspace);
+            work.scale_to(loading, cell);
+            influence.apply(&work.p[..n], &mut work.u[..n], workspace);
         }
     }
-    Err(PressureFailure::NotConverged(residual))
+    Err(PressureFailure::NotConverged(least_residual))
 }
 
+/// What changes from iteration to iteration; all cells, and a few more without pressure up to a multiple of [`LANES`].
 struct PressureIterate {
+    /// Gap of the undeformed surfaces.
+    h: Vec<f64>,
+    weights: CellWeights,
     /// Pressure and displacement.
     p: Vec<f64>,
     u: Vec<f64>,
@@ -176,152 +180,142 @@ struct PressureIterate {
     /// Direction of the step, 0 outside the contact, and its displacement.
     t: Vec<f64>,
     r: Vec<f64>,
+    /// Difference of every pressure from that of the full step.
+    off: Vec<f64>,
     /// Cells whose pressure differs from that of the full step, with the difference.
     changes: Vec<(usize, f64)>,
 }
 
 impl PressureIterate {
+    fn new(gap: &[f64], mut start: Vec<f64>, weights: CellWeights) -> PressureIterate {
+        let padded = gap.len().next_multiple_of(LANES);
+        let mut h = gap.to_vec();
+        // The surfaces never meet there.
+        h.resize(padded, f64::INFINITY);
+        start.resize(padded, 0.0);
+        let zeros = || vec![0.0; padded];
+        PressureIterate {
+            h,
+            weights,
+            p: start,
+            u: zeros(),
+            g: zeros(),
+            t: zeros(),
+            r: zeros(),
+            off: zeros(),
+            changes: Vec::new(),
+        }
+    }
+
     /// Scales the pressures to the prescribed force; returns the factor.
-    fn scale_to(
-        &mut self,
-        influence: &impl PressureInfluence,
-        loading: NormalLoad,
-        cell: f64,
-    ) -> f64 {
+    fn scale_to(&mut self, loading: NormalLoad, cell: f64) -> f64 {
         let NormalLoad::Force(force) = loading else {
             return 1.0;
         };
-        let [sum] = sums(self.p.len(), |k| [influence.area(k) * self.p[k]]);
-        let scale = force / (cell * sum);
+        let scale = force / (cell * cell_sums::run(CellProduct(&self.weights.area, &self.p)));
         self.p.iter_mut().for_each(|p| *p *= scale);
         scale
     }
 
     /// Puts `u + h` into the distances and returns the approach δ; with a force it makes the mean over the contact 0.
-    fn distances(
-        &mut self,
-        influence: &impl PressureInfluence,
-        gap: &[f64],
-        loading: NormalLoad,
-    ) -> f64 {
-        for ((g, u), h) in self.g.iter_mut().zip(&self.u).zip(gap) {
-            *g = u + h;
-        }
+    fn distances(&mut self, loading: NormalLoad) -> f64 {
+        let [sum, count] = cell_sums::run(Distances {
+            distance: &mut self.g,
+            displacement: &self.u,
+            gap: &self.h,
+            pressure: &self.p,
+            weights: &self.weights,
+        });
         match loading {
-            NormalLoad::Force(_) => {
-                let [sum, count] = self.inside(|k| {
-                    let weight = influence.area(k) * influence.yielding(k);
-                    [weight * self.g[k], weight]
-                });
-                sum / count
-            }
+            NormalLoad::Force(_) => sum / count,
             NormalLoad::Approach(approach) => approach,
         }
     }
 
     /// Subtracts the approach from the distances; returns their largest violation and the sum of their squares in the contact.
-    fn part_from(&mut self, influence: &impl PressureInfluence, approach: f64) -> (f64, f64) {
-        let mut violation = 0.0_f64;
-        for (g, p) in self.g.iter_mut().zip(&self.p) {
-            *g -= approach;
-            violation = violation.max(if *p > 0.0 { g.abs() } else { -*g });
-        }
-        let [square] =
-            self.inside(|k| [influence.area(k) * influence.yielding(k) * (self.g[k] * self.g[k])]);
-        (violation, square)
+    fn part_from(&mut self, approach: f64) -> [f64; 2] {
+        cell_sums::run(Parting {
+            distance: &mut self.g,
+            pressure: &self.p,
+            weights: &self.weights,
+            approach,
+        })
     }
 
-    fn direction(&mut self, influence: &impl PressureInfluence, factor: f64) {
-        for (k, ((t, g), p)) in self.t.iter_mut().zip(&self.g).zip(&self.p).enumerate() {
-            *t = if *p > 0.0 {
-                influence.yielding(k) * g + factor * *t
-            } else {
-                0.0
-            };
-        }
+    fn direct(&mut self, factor: f64) {
+        cell_sums::run(Direction {
+            direction: &mut self.t,
+            distance: &self.g,
+            pressure: &self.p,
+            weights: &self.weights,
+            factor,
+        });
     }
 
-    /// Length of the step that leaves no distance along the direction.
-    fn step(&self, influence: &impl PressureInfluence, loading: NormalLoad) -> f64 {
-        let (g, t, r) = (&self.g, &self.t, &self.r);
-        let [above, product, along, sum, count] = self.inside(|k| {
-            let area = influence.area(k);
-            let weight = area * influence.yielding(k);
-            [
-                area * (g[k] * t[k]),
-                area * (r[k] * t[k]),
-                area * t[k],
-                weight * r[k],
-                weight,
-            ]
+    /// Chooses the direction and what it displaces; returns the length of the step along it.
+    ///
+    /// Cells that left the contact turn the conjugate direction. If it no longer lowers the energy, steepest descent takes its place.
+    fn step_after<I: PressureInfluence>(
+        &mut self,
+        factor: f64,
+        n: usize,
+        influence: &I,
+        loading: NormalLoad,
+        workspace: &mut I::Workspace,
+    ) -> f64 {
+        for factor in [factor, 0.0] {
+            self.direct(factor);
+            influence.apply(&self.t[..n], &mut self.r[..n], workspace);
+            if let Some(step) = self.step(loading) {
+                return step;
+            }
+            if factor == 0.0 {
+                break;
+            }
+        }
+        // A single cell under a force leaves nothing to minimise; a step by its own stiffness lets other cells in.
+        1.0 / influence.own()
+    }
+
+    /// Length of the step that leaves no distance along the direction, if the direction lowers the energy.
+    fn step(&self, loading: NormalLoad) -> Option<f64> {
+        let [above, product, along, sum, count] = cell_sums::run(StepSums {
+            distance: &self.g,
+            direction: &self.t,
+            displacement: &self.r,
+            pressure: &self.p,
+            weights: &self.weights,
         });
         let below = match loading {
             NormalLoad::Force(_) => product - sum / count * along,
             NormalLoad::Approach(_) => product,
         };
-        // A single cell under a force leaves nothing to minimise; a step by its own stiffness lets other cells in.
-        if below > 0.0 && above > 0.0 {
-            above / below
-        } else {
-            1.0 / influence.own()
-        }
+        (below > 0.0 && above > 0.0).then(|| above / below)
     }
 
     /// Takes the step, and records the cells whose pressure had to be changed otherwise. Returns whether the next direction may be
     /// conjugate to this one: no cell came into contact.
-    fn advance(&mut self, influence: &impl PressureInfluence, step: f64) -> bool {
-        let mut follow = true;
+    fn advance(&mut self, step: f64) -> bool {
+        let follow = cell_sums::run(Advance {
+            pressure: &mut self.p,
+            off: &mut self.off,
+            direction: &self.t,
+            distance: &self.g,
+            weights: &self.weights,
+            step,
+        });
         self.changes.clear();
-        for (k, p) in self.p.iter_mut().enumerate() {
-            let stepped = *p - step * self.t[k];
-            if *p > 0.0 && stepped > 0.0 {
-                *p = stepped;
+        for (block, off) in self.off.chunks(LANES).enumerate() {
+            // Nearly all blocks have none.
+            if off.iter().fold(0, |bits, off| bits | off.to_bits()) == 0 {
                 continue;
             }
-            // Outside, and what has just left the contact although the bodies overlap there.
-            *p = if self.g[k] < 0.0 {
-                follow = false;
-                -step * influence.yielding(k) * self.g[k]
-            } else {
-                0.0
-            };
-            if *p != stepped {
-                self.changes.push((k, *p - stepped));
-            }
-        }
-        for (u, r) in self.u.iter_mut().zip(&self.r) {
-            *u -= step * r;
+            let changed = off.iter().enumerate().filter(|(_, off)| **off != 0.0);
+            self.changes
+                .extend(changed.map(|(k, off)| (block * LANES + k, *off)));
         }
         follow
     }
-
-    /// Sums over the cells in contact.
-    fn inside<const N: usize>(&self, term: impl Fn(usize) -> [f64; N]) -> [f64; N] {
-        sums(self.p.len(), |k| {
-            let inside = f64::from(u8::from(self.p[k] > 0.0));
-            term(k).map(|value| inside * value)
-        })
-    }
-}
-
-/// Sums of several terms over `0..n`, in four chains: one would wait for each addition.
-fn sums<const N: usize>(n: usize, term: impl Fn(usize) -> [f64; N]) -> [f64; N] {
-    let mut chains = [[0.0; N]; 4];
-    let mut add = |chain: usize, k: usize| {
-        for (sum, value) in chains[chain].iter_mut().zip(term(k)) {
-            *sum += value;
-        }
-    };
-    let whole = n - n % 4;
-    for k in (0..whole).step_by(4) {
-        for chain in 0..4 {
-            add(chain, k + chain);
-        }
-    }
-    for k in whole..n {
-        add(0, k);
-    }
-    std::array::from_fn(|m| chains.iter().map(|chain| chain[m]).sum())
 }
 
 #[cfg(test)]

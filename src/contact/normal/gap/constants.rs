@@ -14,6 +14,7 @@ pub(crate) const RESOLUTION: GridFineness = GridFineness {
     contact: 44.0,
     patch: 24.0,
     share_min: 0.02,
+    settles: true,
 };
 
 /// The same for the search of a height, where forces within some tenths of a per cent are enough.
@@ -21,6 +22,7 @@ pub(crate) const RESOLUTION_COARSE: GridFineness = GridFineness {
     contact: 22.0,
     patch: 12.0,
     share_min: 0.05,
+    settles: false,
 };
 
 /// Below this target of the resultants' error (relative to μN) grids are finer: the error of a normal problem falls with the

@@ -32,32 +32,39 @@ const DISPLACEMENT: [(f64, f64); 18] = [
 ///
 /// `pressure` belongs to a grid with `nx` cells along x.
 pub(crate) fn squares(nx: usize, pressure: &[f64]) -> Vec<f64> {
-    let square = |k: usize| pressure[k].powi(2);
+    let square: Vec<f64> = pressure.iter().map(|p| p * p).collect();
+    let mut moved = square.clone();
     let ny = pressure.len() / nx;
-    let moved = |k: usize| {
-        if pressure[k] <= 0.0 {
-            return 0.0;
+    for j in 0..ny {
+        let row = j * nx;
+        for i in 0..nx {
+            let own = square[row + i];
+            if own <= 0.0 {
+                continue;
+            }
+            let along = slope(i, nx, |i| square[row + i]);
+            let across = slope(j, ny, |j| square[i + j * nx]);
+            let slope = (along * along + across * across).sqrt();
+            if slope > 0.0 {
+                moved[row + i] = own - slope * displacement(own / slope);
+            }
         }
-        let along = |i: usize| square(k - k % nx + i);
-        let across = |j: usize| square(k % nx + j * nx);
-        let slope = slope(k % nx, nx, along).hypot(slope(k / nx, ny, across));
-        if slope > 0.0 {
-            square(k) - slope * displacement(square(k) / slope)
-        } else {
-            square(k)
-        }
-    };
-    (0..pressure.len()).map(moved).collect()
+    }
+    moved
 }
 
 /// Change per cell at cell `i` of a line of `n`, from cells in contact only; a cell at the edge takes that between its
 /// two inner neighbours, as its own value is not sound.
+#[inline]
 fn slope(i: usize, n: usize, square: impl Fn(usize) -> f64) -> f64 {
-    let value = |k: Option<usize>| k.filter(|k| *k < n).map_or(0.0, &square);
-    let [before2, before, after, after2] =
-        [i.checked_sub(2), i.checked_sub(1), Some(i + 1), Some(i + 2)].map(value);
+    let before = if i > 0 { square(i - 1) } else { 0.0 };
+    let after = if i + 1 < n { square(i + 1) } else { 0.0 };
+    if before > 0.0 && after > 0.0 {
+        return 0.5 * (after - before);
+    }
+    let before2 = if i > 1 { square(i - 2) } else { 0.0 };
+    let after2 = if i + 2 < n { square(i + 2) } else { 0.0 };
     match (before > 0.0, after > 0.0) {
-        (true, true) => 0.5 * (after - before),
         (true, false) if before2 > 0.0 => before - before2,
         (false, true) if after2 > 0.0 => after2 - after,
         _ => 0.0,
@@ -65,10 +72,11 @@ fn slope(i: usize, n: usize, square: impl Fn(usize) -> f64) -> f64 {
 }
 
 fn displacement(distance: f64) -> f64 {
-    let next = DISPLACEMENT.partition_point(|(at, _)| *at <= distance);
-    if next == DISPLACEMENT.len() {
-        return DISPLACEMENT[next - 1].1;
+    let (last, far) = DISPLACEMENT[DISPLACEMENT.len() - 1];
+    if distance >= last {
+        return far;
     }
+    let next = DISPLACEMENT.partition_point(|(at, _)| *at <= distance);
     let ((x0, y0), (x1, y1)) = (DISPLACEMENT[next - 1], DISPLACEMENT[next]);
     y0 + (y1 - y0) * (distance - x0) / (x1 - x0)
 }
@@ -76,11 +84,11 @@ fn displacement(distance: f64) -> f64 {
 /// The squares, continued below 0 in the cells next to the contact: the mean over all eight directions of the extrapolation from two
 /// cells inside in a row, or of the negative of one cell where there is only one.
 pub(crate) fn continued(nx: usize, squares: Vec<f64>) -> Vec<f64> {
-    let (nx, ny) = (nx as isize, (squares.len() / nx) as isize);
+    let ny = squares.len() / nx;
     let value = |i: isize, j: isize| {
-        let inside = (0..nx).contains(&i) && (0..ny).contains(&j);
+        let inside = (0..nx as isize).contains(&i) && (0..ny as isize).contains(&j);
         let value = if inside {
-            squares[(j * nx + i) as usize]
+            squares[j as usize * nx + i as usize]
         } else {
             0.0
         };
@@ -97,13 +105,27 @@ pub(crate) fn continued(nx: usize, squares: Vec<f64>) -> Vec<f64> {
         }
         if count > 0.0 { sum / count } else { 0.0 }
     };
-    let each = squares.iter().enumerate();
-    each.map(|(k, square)| {
-        if *square == 0.0 {
-            beyond(k as isize % nx, k as isize / nx)
-        } else {
-            *square
+    let mut out = squares.clone();
+    let row_of = |j: usize| squares[j * nx..(j + 1) * nx].iter();
+    // Cells of a row of the contact, the first and the last one, and those of the rows around it.
+    let ends: Vec<Option<[usize; 2]>> = (0..ny)
+        .map(|j| {
+            let first = row_of(j).position(|square| *square > 0.0)?;
+            Some([first, row_of(j).rposition(|square| *square > 0.0)?])
+        })
+        .collect();
+    for j in 0..ny {
+        let near = &ends[j.saturating_sub(1)..(j + 2).min(ny)];
+        let first = near.iter().flatten().map(|ends| ends[0]).min();
+        let last = near.iter().flatten().map(|ends| ends[1]).max();
+        let (Some(first), Some(last)) = (first, last) else {
+            continue;
+        };
+        for i in first.saturating_sub(1)..(last + 2).min(nx) {
+            if squares[j * nx + i] == 0.0 {
+                out[j * nx + i] = beyond(i as isize, j as isize);
+            }
         }
-    })
-    .collect()
+    }
+    out
 }

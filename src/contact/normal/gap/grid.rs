@@ -56,6 +56,8 @@ pub(crate) struct GridFineness {
     pub(crate) patch: f64,
     /// Patches that carry a smaller fraction of the load do not count.
     pub(crate) share_min: f64,
+    /// The result is compared with that of the grid before.
+    pub(crate) settles: bool,
 }
 
 impl GridSide {

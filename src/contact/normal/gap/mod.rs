@@ -1,6 +1,7 @@
 //! Region and pressure of a given gap.
 
 pub mod answer;
+pub mod cell_sums;
 pub mod conjugate_gradients;
 pub mod constants;
 pub mod coupling;

@@ -1,10 +1,11 @@
 //! The answer of a gap: pressures of the last grids as a field, and remarks on them.
 
 use crate::contact::normal::gap::answer::{NormalAnswer, NormalError, NormalWork};
-use crate::contact::normal::gap::edges;
+use crate::contact::normal::gap::edges::squares;
 use crate::contact::normal::gap::start::GapStart;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, Tile};
+use crate::contact::normal::pressure_field::computed::Edges;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::remark::entry::RemarkEntry;
@@ -31,7 +32,11 @@ struct Coarse {
 
 impl GapTask {
     /// Field, report and remarks.
-    pub(crate) fn found(&self, outcome: GapOutcome) -> Result<NormalAnswer, NormalError> {
+    pub(crate) fn found(
+        &self,
+        outcome: GapOutcome,
+        edges: Edges,
+    ) -> Result<NormalAnswer, NormalError> {
         let loads = outcome.tiles.iter().map(Tile::load);
         let heaviest = loads
             .zip(&outcome.tiles)
@@ -47,7 +52,7 @@ impl GapTask {
             residual: pressed.residual,
             pressure_change: outcome.pressure_change,
         };
-        let field = field(&outcome.tiles).map_err(NormalError::NoAnswer)?;
+        let field = field(&outcome.tiles, edges).map_err(NormalError::NoAnswer)?;
         let coarse = coarse(&outcome.tiles);
         let mut remarks = Vec::new();
         for Coarse {
@@ -142,15 +147,16 @@ fn coarse(tiles: &[Tile]) -> Vec<Coarse> {
 }
 
 /// The pressures of the grids as a field with edges between their cells.
-fn field(tiles: &[Tile]) -> Result<PressureField, String> {
+fn field(tiles: &[Tile], edges: Edges) -> Result<PressureField, String> {
     let loaded = tiles.iter().filter(|tile| tile.largest() > 0.0);
     let grids = loaded.map(|Tile { grid, pressed }| {
         GridPressure::of_solution(
             &grid.centres(0),
             &grid.centres(1),
-            &edges::squares(grid.cells[0], &pressed.pressure),
+            &squares(grid.cells[0], &pressed.pressure),
             &pressed.pressure,
             pressed.approach,
+            edges,
         )
     });
     PressureField::of_grids(grids.collect::<Result<_, _>>()?)

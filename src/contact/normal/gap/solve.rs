@@ -20,6 +20,7 @@ use crate::contact::normal::gap::search_box::{SearchBox, reach_of_level};
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
 use crate::contact::normal::hertz::NormalLoad;
+use crate::contact::normal::pressure_field::computed::Edges;
 
 impl GapTask {
     /// What is wrong with the gap, as far as its samples tell without solving.
@@ -61,7 +62,9 @@ impl GapTask {
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
-        self.solve_near(None, RESOLUTION.for_target(target), workspace, monitor)
+        let resolution = RESOLUTION.for_target(target);
+        let found = self.solve_near(None, resolution, workspace, monitor)?;
+        self.found(found, Edges::Found)
     }
 
     /// The solution from a start, if it has one there.
@@ -71,11 +74,11 @@ impl GapTask {
         resolution: GridFineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<NormalAnswer, NormalError> {
+    ) -> Result<GapOutcome, NormalError> {
         if let Some(start) = start
             && let Some(found) = self.solve_from(start, resolution, workspace, monitor)?
         {
-            return self.found(found);
+            return Ok(found);
         }
         self.solve_on(resolution, workspace, monitor)
     }
@@ -85,7 +88,7 @@ impl GapTask {
         resolution: GridFineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<NormalAnswer, NormalError> {
+    ) -> Result<GapOutcome, NormalError> {
         let mut reach = self.reach();
         if let NormalLoad::Approach(approach) = self.loading
             && approach <= reach.least
@@ -131,13 +134,13 @@ impl GapTask {
             && let Some(found) =
                 self.solve_on_tiles(whole.clone(), reach.least, resolution, workspace, monitor)?
         {
-            return self.found(GapOutcome {
+            return Ok(GapOutcome {
                 iterations: iterations + found.iterations,
                 least: reach.least,
                 ..found
             });
         }
-        self.found(GapOutcome {
+        Ok(GapOutcome {
             tiles: vec![whole],
             iterations,
             exit,
@@ -202,8 +205,12 @@ impl GapTask {
             return Err(edge_reached(*side, limits));
         }
         let capped = wanted.capped;
-        let Some((coarse, before)) = before.filter(|_| resolution.settles()) else {
+        if !resolution.settles {
             return Ok(NextStep::End(GridsExit::Settled, capped));
+        }
+        let Some((coarse, before)) = before else {
+            // The first grid is solved roughly, and there is nothing to compare it with.
+            return Ok(NextStep::PressureGrid(finer));
         };
         let ratio = (coarse.step[0] / grid.step[0]).max(coarse.step[1] / grid.step[1]);
         if (pressed.approach - before.approach).abs() <= APPROACH_CHANGE * ratio * depth
@@ -254,10 +261,5 @@ impl GridFineness {
             patch: finer * self.patch,
             ..self
         }
-    }
-
-    /// Is the result compared with that of the grid before?
-    fn settles(self) -> bool {
-        self.contact >= RESOLUTION.contact
     }
 }

@@ -147,6 +147,7 @@ mod tests {
     use crate::contact::normal::gap::answer::NormalAnswer;
     use crate::contact::normal::gap::seen::GapSeen;
     use crate::contact::normal::gap::surface::GapSurface;
+    use crate::contact::normal::pressure_field::computed::Edges;
     use crate::contact::normal::pressure_field::field::PressureField;
 
     const TARGET: f64 = 0.005;
@@ -174,7 +175,9 @@ mod tests {
         let (task, start) = (bumps(lift, 0.06), start.at([0.0, -6.0], 0.06));
         let fineness = GridFineness::for_answer(TARGET);
         let near = task.solve_from(start, fineness, &mut workspace, &Unmonitored);
-        let near = near.unwrap().map(|found| task.found(found).unwrap());
+        let near = near
+            .unwrap()
+            .map(|found| task.found(found, Edges::Found).unwrap());
         let searched = task.solve_for(TARGET, &mut workspace, &Unmonitored);
         (near, searched.unwrap())
     }

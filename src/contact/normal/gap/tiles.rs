@@ -286,11 +286,13 @@ fn own_resolution(resolution: GridFineness, share: f64) -> GridFineness {
         GridFineness {
             contact: CELLS_TINY,
             patch: CELLS_TINY,
+            settles: false,
             ..resolution
         }
     } else if share < SHARE_LARGE {
         GridFineness {
             contact: RESOLUTION_SMALL * resolution.contact,
+            settles: false,
             ..resolution
         }
     } else {

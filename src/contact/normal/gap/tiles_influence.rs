@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
+use crate::contact::normal::gap::cell_sums::{CellWeights, LANES};
 use crate::contact::normal::gap::conjugate_gradients::PressureInfluence;
 use crate::contact::normal::gap::coupling::Coupling;
 use crate::contact::normal::gap::grid::PressureGrid;
@@ -84,11 +85,15 @@ impl PressureInfluence for TilesInfluence {
         self.own[0].own()
     }
 
-    fn area(&self, cell: usize) -> f64 {
-        self.area[cell]
-    }
-
-    fn yielding(&self, cell: usize) -> f64 {
-        self.yielding[cell]
+    fn weights(&self, cells: usize) -> CellWeights {
+        let padded = |values: &[f64]| {
+            let mut values = values.to_vec();
+            values.resize(cells.next_multiple_of(LANES), 1.0);
+            values
+        };
+        CellWeights {
+            area: padded(&self.area),
+            yielding: padded(&self.yielding),
+        }
     }
 }

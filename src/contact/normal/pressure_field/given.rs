@@ -82,6 +82,7 @@ impl GridPressure {
             grid,
             q,
             smooth: Vec::new(),
+            runs: Vec::new(),
             cells,
             pressure_max,
             shapes: Vec::new(),
@@ -101,6 +102,13 @@ impl GridPressure {
             .into_iter()
             .map(|state| state == State::Smooth)
             .collect();
+        let run = |row: &[f64]| {
+            let first = row.iter().position(|q| *q > 0.0)?;
+            let last = row.iter().rposition(|q| *q > 0.0)?;
+            let single = row[first..=last].iter().all(|q| *q > 0.0);
+            single.then_some([first, last])
+        };
+        self.runs = self.q.chunks_exact(self.grid.x.len()).map(run).collect();
         for label in 0..self.shapes.len() {
             let (extent, area) = self.measure(label, &self.shapes[label]);
             let patch = &mut self.shapes[label].patch;
@@ -254,12 +262,23 @@ impl GridPressure {
         let line = GridLine {
             axis: x,
             intervals: shape.columns.clone(),
+            whole: self.whole(label, j),
             value: |i| self.value_on_column(i, j, weights),
             inside: |i| self.q[j * x.len() + i] > 0.0 && self.q[(j + 1) * x.len() + i] > 0.0,
             smooth: |i| self.is_smooth(i, j),
             allowed: |i| self.allowed(label, i, j, t),
         };
         line.segments()
+    }
+
+    /// The columns between which a patch has all samples of row j and the next one, where each of the two has one run of positive samples.
+    fn whole(&self, label: usize, j: usize) -> Option<[usize; 2]> {
+        let [one, other] = [*self.runs.get(j)?, *self.runs.get(j + 1)?];
+        let [first, last] = [one?, other?]
+            .into_iter()
+            .reduce(|a, b| [a[0].max(b[0]), a[1].min(b[1])])?;
+        let own = usize::from(self.cells[j * self.grid.x.len() + first]) == label;
+        (own && first < last).then_some([first, last])
     }
 
     /// The part of cell (i, j) along x that may belong to a patch, on the line at the fraction t of its width.

@@ -13,6 +13,8 @@ pub struct GridPressure {
     pub(crate) q: Vec<f64>,
     /// Samples that are positive or continued by a parabola.
     pub(crate) smooth: Vec<bool>,
+    /// The first and the last positive sample of every row that has one run of them; empty before edges are found.
+    pub(crate) runs: Vec<Option<[usize; 2]>>,
     /// The patch of every cell that has one of its samples as a corner.
     pub(crate) cells: Vec<u8>,
     /// Largest pressure in MPa.

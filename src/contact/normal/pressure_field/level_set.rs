@@ -64,16 +64,26 @@ pub(crate) fn extend(grid: &SampleGrid, q: &mut [f64]) -> Vec<State> {
     states
 }
 
-/// Marks the samples with a positive sample at most [`RINGS`] away along x and along y.
+/// Marks the samples with a positive sample at most [`RINGS`] away along x and along y. The padding of the grid is at least as wide, so that
+/// no sample is near one at the other end of the next row.
 fn near_positive(grid: &SampleGrid, q: &[f64]) -> Vec<bool> {
-    let (nx, ny) = (grid.x.len(), grid.y.len());
-    let reach = |k: usize, n: usize| k.saturating_sub(RINGS)..(k + RINGS + 1).min(n);
-    let along: Vec<bool> = (0..nx * ny)
-        .map(|k| reach(k % nx, nx).any(|i| q[k / nx * nx + i] > 0.0))
-        .collect();
-    (0..nx * ny)
-        .map(|k| reach(k / nx, ny).any(|j| along[j * nx + k % nx]))
-        .collect()
+    let positive: Vec<bool> = q.iter().map(|q| *q > 0.0).collect();
+    widened(&widened(&positive, 1), grid.x.len())
+}
+
+/// Marks what is marked, and what lies at most [`RINGS`] strides away from it.
+fn widened(marked: &[bool], stride: usize) -> Vec<bool> {
+    let mut out = marked.to_vec();
+    for ring in 1..=RINGS {
+        let by = (ring * stride).min(marked.len());
+        for (to, from) in out[by..].iter_mut().zip(marked) {
+            *to |= *from;
+        }
+        for (to, from) in out.iter_mut().zip(&marked[by..]) {
+            *to |= *from;
+        }
+    }
+    out
 }
 
 /// Value of the unknown sample `k` from the most reliable extrapolations along the axes, if there are any. Their harmonic mean

@@ -8,6 +8,8 @@ pub(crate) struct GridLine<'f, V, I, S, A> {
     pub(crate) axis: &'f [f64],
     /// The intervals, each named by the node at its start. Values are asked for one node before and one after them as well.
     pub(crate) intervals: std::ops::RangeInclusive<usize>,
+    /// Nodes between which all are surely positive and every interval belongs to the patch, if that is known.
+    pub(crate) whole: Option<[usize; 2]>,
     /// The value at a node.
     pub(crate) value: V,
     /// Is the value at a node surely positive?
@@ -36,7 +38,17 @@ where
     pub(crate) fn segments(&self) -> Vec<(f64, f64)> {
         let mut segments: Vec<(f64, f64)> = Vec::new();
         let mut known: Option<(usize, [f64; 4])> = None;
-        for node in self.intervals.clone() {
+        let mut nodes = self.intervals.clone();
+        while let Some(node) = nodes.next() {
+            if let Some([first, last]) = self.whole.filter(|[first, _]| *first == node) {
+                let (low, high) = (self.axis[first], self.axis[last]);
+                match segments.last_mut() {
+                    Some(before) if before.1 == low => before.1 = high,
+                    _ => segments.push((low, high)),
+                }
+                nodes = last..=*self.intervals.end();
+                continue;
+            }
             let [from, to] = (self.allowed)(node);
             if to <= from {
                 continue;

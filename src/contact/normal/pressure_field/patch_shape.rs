@@ -6,7 +6,7 @@ use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::patch_cells::PatchShape;
-use crate::contact::normal::pressure_field::sample_grid::PADDING;
+use crate::contact::normal::pressure_field::sample_grid::{PADDING, SampleGrid};
 use crate::contact::numerics::bisection::bisect;
 use crate::contact::numerics::maximum::maximum;
 use crate::contact::remark::entry::RemarkEntry;
@@ -100,6 +100,26 @@ impl GridPressure {
             y_max,
         ];
         (extent, area)
+    }
+
+    /// Region of a patch from its samples alone: the box around them, and the area that they stand for.
+    pub(crate) fn measure_samples(&self, samples: &[u8], label: usize) -> ([f64; 4], f64) {
+        let shape = &self.shapes[label];
+        let share = |axis: &[f64], k: usize| 0.5 * (axis[k + 1] - axis[k - 1]);
+        let ends = |axis: &[f64], first: usize, last: usize| {
+            [
+                axis[first] - 0.5 * share(axis, first),
+                axis[last] + 0.5 * share(axis, last),
+            ]
+        };
+        let SampleGrid { x, y } = &self.grid;
+        let (columns, rows) = (&shape.columns, &shape.rows);
+        let [x_min, x_max] = ends(x, columns.start() + 2, columns.end() - 1);
+        let [y_min, y_max] = ends(y, rows.start() + 2, rows.end() - 1);
+        let own = samples.iter().enumerate();
+        let own = own.filter(|(_, patch)| usize::from(**patch) == label);
+        let area = own.map(|(k, _)| share(x, k % x.len()) * share(y, k / x.len()));
+        ([x_min, x_max, y_min, y_max], area.sum())
     }
 
     /// First and last y of lines that meet the patch.

@@ -6,41 +6,19 @@
 //! and solved coarsely.
 
 use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
+use crate::contact::geometry::local_gap::GapSampling;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
-use crate::contact::normal::gap::grid::GridFineness;
-use crate::contact::normal::gap::seen::GapSeen;
-use crate::contact::normal::gap::surface::GapSurface;
-use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::gap::tile::Tile;
-use crate::contact::normal::hertz::NormalLoad;
 use crate::contact::normal::neighbours::{Neighbour, neglected};
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
-use crate::contact::normal::wheel_height::gap_remarks::{cut_patches, missed_beside};
-use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
-use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
+use crate::contact::normal::wheel_height::lowered::Fineness;
+use crate::contact::normal::wheel_height::task::{Accuracy, NormalPass, WheelLoad, WheelTask};
+use crate::contact::normal::wheel_height::wheel_contact::WheelContact;
 use crate::contact::remark::list::Remark;
 
 /// Heights after which the search is given up. Keeps the numbers safe; not tuned.
 const HEIGHTS_MAX: u32 = 40;
-/// Bounds of the tolerance of the force, which is the target of the resultants' error. The contact is then scaled to the force as Hertz's
-/// contacts scale; the error left is of second order for these, and at worst about a third of the tolerance in pressures and lengths.
-/// Below the lower bound the forces of neighbouring heights differ by no more than those of different grids.
-const FORCE_TOLERANCE: [f64; 2] = [5e-4, 5e-3];
-/// A gap whose overlap is less than this fraction of the deepest one is left out: its force is about the power 3/2 of this, 1e-4.
-const DEPTH_SHARE_MIN: f64 = 2e-3;
-
-/// How a wheel should come to rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NormalPass {
-    /// Of a vertical force the normal forces carry the part `1 / (1 + friction_share)`.
-    pub friction_share: f64,
-    /// How exactly.
-    pub accuracy: Accuracy,
-}
-
 /// Tells from a wheel at some height what friction will carry, see [`NormalPass::friction_share`]; nothing where it cannot be told.
 pub type ShareForecast<'a> = dyn Fn(&WheelContact) -> Option<f64> + 'a;
 
@@ -51,66 +29,6 @@ pub struct HeightStart<'a> {
     pub before: Option<&'a WheelContact>,
     /// Asked at coarse heights, in place of [`NormalPass::friction_share`].
     pub forecast: Option<&'a ShareForecast<'a>>,
-}
-
-/// How exactly a force is to be carried.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Accuracy {
-    /// It may be missed by this part, by coarse gaps: a place to go on from.
-    About(f64),
-    /// As resultants with this error relative to μN need it; the contact is corrected to the force.
-    For(f64),
-}
-
-impl Accuracy {
-    fn tolerance(self) -> f64 {
-        let [low, high] = FORCE_TOLERANCE;
-        match self {
-            Accuracy::About(part) => part,
-            Accuracy::For(target) => target.clamp(low, high),
-        }
-    }
-}
-
-/// How finely the wheel is solved at one height.
-#[derive(Debug, Clone, Copy)]
-struct Fineness {
-    detail: GapSampling,
-    /// Target of the resultants' error relative to μN.
-    target: f64,
-}
-
-impl Fineness {
-    /// At the first height: coarse where it is not near the one sought.
-    fn first(wanted: NormalPass, near: bool) -> Fineness {
-        let mut fineness = Fineness::fine(wanted);
-        if !near {
-            fineness.detail = GapSampling::Coarse;
-        }
-        fineness
-    }
-
-    fn fine(wanted: NormalPass) -> Fineness {
-        let target = match wanted.accuracy {
-            Accuracy::About(_) => f64::INFINITY,
-            Accuracy::For(target) => target,
-        };
-        Fineness {
-            detail: GapSampling::Fine,
-            target,
-        }
-    }
-}
-
-/// One gap at one height of the wheel's centre.
-struct LoweredGap<'a> {
-    gap: &'a LocalGap,
-    /// Deepest overlap in mm.
-    depth: f64,
-    /// Height of the wheel's centre in mm.
-    centre: f64,
-    /// What it is solved from, if anything is known.
-    start: Option<Tile>,
 }
 
 impl WheelTask {
@@ -239,7 +157,7 @@ impl WheelTask {
             lowering = if closed { found.lowering } else { next };
             if closed || !fine && found.is_near(force) {
                 // Forces of coarse gaps are too inexact as ends of the bracket; their slope is exact enough.
-                fineness.detail = GapSampling::Fine;
+                fineness = fineness.finer();
                 bracket = bracket.opened(found.found[1]);
             }
             last = Some(found);
@@ -261,124 +179,11 @@ impl WheelTask {
     ) -> Result<WheelContact, NormalError> {
         match self.lowered(search, lowering, fineness, near, workspace, monitor) {
             Err(NormalError::NoAnswer(_)) if fineness.detail == GapSampling::Coarse => {
-                let fine = Fineness {
-                    detail: GapSampling::Fine,
-                    ..fineness
-                };
+                let fine = fineness.finer();
                 self.lowered(search, lowering, fine, near, workspace, monitor)
             }
             found => found,
         }
-    }
-
-    /// The wheel at one height.
-    fn lowered(
-        &self,
-        search: &ContactLocus,
-        lowering: f64,
-        fineness: Fineness,
-        near: Option<&WheelContact>,
-        workspace: &mut GridWorkspace<f32>,
-        monitor: &dyn Monitor,
-    ) -> Result<WheelContact, NormalError> {
-        let centre = search.touch - lowering;
-        let gaps = search
-            .gaps(lowering, fineness.detail)
-            .map_err(NormalError::NoAnswer)?;
-        let depths: Vec<f64> = gaps.iter().map(depth).collect();
-        let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
-        let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
-        let patches = touching
-            .map(|(gap, depth)| {
-                let start = near.and_then(|near| near.start_for(gap, *depth));
-                let place = LoweredGap {
-                    gap,
-                    depth: *depth,
-                    centre,
-                    start,
-                };
-                self.solve_gap(place, fineness, workspace, monitor)
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        if patches.is_empty() {
-            return Err(NormalError::NoAnswer(
-                "wheel and rail do not overlap at this height of the wheel".to_owned(),
-            ));
-        }
-        let mut wheel = WheelContact {
-            lowering,
-            found: [0.0; 2],
-            load_error: 0.0,
-            force_residual: 0.0,
-            centre,
-            heights: 1,
-            friction_share: 0.0,
-            met: false,
-            patches,
-            remarks: Vec::new(),
-        };
-        let carried = self.carried(&wheel);
-        wheel.found = [carried, self.slope(&wheel, carried)];
-        Ok(wheel)
-    }
-
-    /// One gap under the overlap it has; approaches count from the first touch of its patch along the normal.
-    fn solve_gap(
-        &self,
-        place: LoweredGap,
-        fineness: Fineness,
-        workspace: &mut GridWorkspace<f32>,
-        monitor: &dyn Monitor,
-    ) -> Result<GapContact, NormalError> {
-        let LoweredGap {
-            gap,
-            depth,
-            centre,
-            start,
-        } = place;
-        if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
-            return Err(NormalError::Stopped(stop));
-        }
-        let above: Vec<Vec<f64>> = gap
-            .gap
-            .iter()
-            .map(|row| row.iter().map(|height| height + depth).collect())
-            .collect();
-        let contact = GapTask {
-            gap: GapSurface::grid(&gap.x, &gap.y, &above),
-            loading: NormalLoad::Approach(depth),
-            contact_modulus: self.contact_modulus,
-            seen: GapSeen::default(),
-        };
-        let resolution = match fineness.detail {
-            GapSampling::Coarse => GridFineness::coarse(),
-            GapSampling::Fine => GridFineness::for_answer(fineness.target),
-        };
-        let found = contact.solve_near(start, resolution, workspace, monitor)?;
-        let mut remarks = found.remarks;
-        remarks.extend(missed_beside(gap, &found.field));
-        if fineness.detail == GapSampling::Fine {
-            let cut = cut_patches(&self.geometry, gap, &found.field);
-            remarks.extend(cut.map_err(|miss| NormalError::NoAnswer(miss.to_string()))?);
-        }
-        let moved = |to: [f64; 2]| {
-            let place = self.geometry.moved(&gap.frame, to, centre);
-            place.map_err(|miss| NormalError::NoAnswer(miss.to_string()))
-        };
-        if fineness.detail == GapSampling::Fine {
-            for patch in 0..found.field.patches().len() {
-                moved(found.field.load_centre(Some(patch)))?;
-            }
-        }
-        let middle = found.field.load_centre(None);
-        Ok(GapContact {
-            frame: moved(middle)?,
-            approach: depth,
-            field: found.field.from_origin(middle),
-            report: found.report,
-            remarks,
-            start: found.start,
-        })
     }
 
     /// A remark if the patches in gaps of their own would change each other's forces by more than a part of the load.
@@ -394,38 +199,4 @@ impl WheelTask {
         let [share, distance_mm] = neglected(&gaps, self.contact_modulus, keeps_load)?;
         (share > part).then_some(Remark::PatchesUncoupled { share, distance_mm })
     }
-
-    /// The force that is prescribed, as it came out.
-    fn carried(&self, found: &WheelContact) -> f64 {
-        match self.loading {
-            WheelLoad::Vertical(_) => found.vertical_force(),
-            WheelLoad::Normal(_) | WheelLoad::Lowering(_) => {
-                found.patches.iter().map(GapContact::normal_force).sum()
-            }
-        }
-    }
-
-    /// Estimated derivative of that force by the lowering.
-    fn slope(&self, found: &WheelContact, carried: f64) -> f64 {
-        let part = |gap: &GapContact| {
-            let cos = gap.frame.angle.cos();
-            let own = 2.0 * self.contact_modulus * gap.stiffness() * cos;
-            match self.loading {
-                WheelLoad::Vertical(_) => own * cos,
-                WheelLoad::Normal(_) | WheelLoad::Lowering(_) => own,
-            }
-        };
-        let slope: f64 = found.patches.iter().map(part).sum();
-        // The power 3/2 of Hertz's contacts is a bound for anything that grows as it is pressed.
-        slope.max(carried / found.lowering)
-    }
-}
-
-/// Deepest overlap of a gap in mm.
-fn depth(gap: &LocalGap) -> f64 {
-    -gap.gap
-        .iter()
-        .flatten()
-        .copied()
-        .fold(f64::INFINITY, f64::min)
 }

@@ -2,6 +2,11 @@
 
 use crate::contact::geometry::wheel_rail::WheelRail;
 
+/// Bounds of the tolerance of the force, which is the target of the resultants' error. The contact is then scaled to the force as Hertz's
+/// contacts scale; the error left is of second order for these, and at worst about a third of the tolerance in pressures and lengths.
+/// Below the lower bound the forces of neighbouring heights differ by no more than those of different grids.
+const FORCE_TOLERANCE: [f64; 2] = [5e-4, 5e-3];
+
 /// What presses the wheel on the rail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WheelLoad {
@@ -33,4 +38,33 @@ pub struct ProfileTrust {
     pub auto: [bool; 2],
     /// Profiles are solved that are too rough or too coarse for an answer that can be relied on.
     pub accept_rough: bool,
+}
+
+/// How a wheel should come to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NormalPass {
+    /// Of a vertical force the normal forces carry the part `1 / (1 + friction_share)`.
+    pub friction_share: f64,
+    /// How exactly.
+    pub accuracy: Accuracy,
+}
+
+/// How exactly a force is to be carried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Accuracy {
+    /// It may be missed by this part, by coarse gaps: a place to go on from.
+    About(f64),
+    /// As resultants with this error relative to μN need it; the contact is corrected to the force.
+    For(f64),
+}
+
+impl Accuracy {
+    /// Part of the force that may be missed.
+    pub(crate) fn tolerance(self) -> f64 {
+        let [low, high] = FORCE_TOLERANCE;
+        match self {
+            Accuracy::About(part) => part,
+            Accuracy::For(target) => target.clamp(low, high),
+        }
+    }
 }

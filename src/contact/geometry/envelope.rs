@@ -1,0 +1,110 @@
+//! The upper edge of a plane curve over equally spaced places.
+
+/// Upper edge of a curve on the lines `k step`: height and parameter.
+#[derive(Debug, Clone)]
+pub(crate) struct Envelope {
+    /// Distance of the lines in mm.
+    pub(crate) step: f64,
+    /// k of the first line.
+    pub(crate) first: i64,
+    pub(crate) points: Vec<Option<[f64; 2]>>,
+}
+
+/// `curve` lists `[y, height, parameter]`; lines over a part without points have none. Between two points the curve is a parabola that bends as the
+/// points around do.
+pub(crate) fn envelope(curve: &[Option<[f64; 3]>], step: f64) -> Envelope {
+    let y = || curve.iter().flatten().map(|point| point[0] / step);
+    let first = y().fold(f64::INFINITY, f64::min).ceil() as i64;
+    let last = y().fold(f64::NEG_INFINITY, f64::max).floor() as i64;
+    let mut points: Vec<Option<[f64; 2]>> =
+        vec![None; usize::try_from(last - first + 1).unwrap_or(0)];
+    for (n, pair) in curve.windows(2).enumerate() {
+        let [Some(from), Some(to)] = pair else {
+            continue;
+        };
+        let (low, high) = (from[0].min(to[0]) / step, from[0].max(to[0]) / step);
+        // Casts cut toward zero, which costs less than a call that rounds.
+        let (lowest, highest) = (low as i64, high as i64);
+        let lowest = lowest + i64::from((lowest as f64) < low);
+        let highest = highest - i64::from(highest as f64 > high);
+        if lowest > highest {
+            continue;
+        }
+        let span = to[0] - from[0];
+        let around = [n.checked_sub(1), Some(n + 2)]
+            .map(|k| k.and_then(|k| curve.get(k).copied().flatten()));
+        let bends = [
+            around[0].and_then(|before| bend([before, *from, *to])),
+            around[1].and_then(|after| bend([*from, *to, after])),
+        ];
+        // Where the two bends differ in sign the curve has a corner or hardly bends, and is taken to be straight.
+        let bends = [0, 1].map(|part| match bends {
+            [Some(a), Some(b)] if a[part] * b[part] > 0.0 => 0.5 * (a[part] + b[part]),
+            _ => 0.0,
+        });
+        for k in lowest..=highest {
+            let t = if span == 0.0 {
+                0.0
+            } else {
+                (k as f64 * step - from[0]) / span
+            };
+            let sag = 0.5 * t * (1.0 - t) * span * span;
+            let at =
+                [1, 2].map(|part| from[part] + t * (to[part] - from[part]) - sag * bends[part - 1]);
+            let place = &mut points[(k - first) as usize];
+            if place.is_none_or(|highest| at[0] > highest[0]) {
+                *place = Some(at);
+            }
+        }
+    }
+    Envelope {
+        step,
+        first,
+        points,
+    }
+}
+
+/// Second derivatives of height and parameter by y through three points, if y goes on in one direction.
+fn bend([a, b, c]: [[f64; 3]; 3]) -> Option<[f64; 2]> {
+    let (before, after) = (b[0] - a[0], c[0] - b[0]);
+    (before * after > 0.0).then(|| {
+        [1, 2].map(|part| {
+            2.0 * ((c[part] - b[part]) / after - (b[part] - a[part]) / before) / (before + after)
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arc_is_met_between_its_points() {
+        let arc = |s: f64| Some([13.0 * (s / 13.0).sin(), 13.0 * (s / 13.0).cos(), s]);
+        let curve: Vec<_> = (-100..=100).map(|k| arc(0.08 * f64::from(k))).collect();
+        let found = envelope(&curve, 0.04);
+        for (k, point) in found.points.iter().enumerate().skip(10).take(300) {
+            let y = (found.first + k as i64) as f64 * found.step;
+            let [height, s] = point.unwrap();
+            assert!((height - (169.0 - y * y).sqrt()).abs() < 1e-6, "{y}");
+            assert!((s - 13.0 * (y / 13.0).asin()).abs() < 1e-5, "{y}");
+        }
+    }
+
+    #[test]
+    fn of_two_branches_the_upper_one_counts() {
+        let curve: Vec<_> = (0..=40)
+            .map(|k| 0.1 * f64::from(k))
+            .map(|s| {
+                if s < 2.0 {
+                    Some([s, s, s])
+                } else {
+                    Some([4.0 - s, 2.0 + s, s])
+                }
+            })
+            .collect();
+        let found = envelope(&curve, 0.25);
+        let [height, s] = found.points[4].unwrap();
+        assert!((height - 5.0).abs() < 1e-9 && (s - 3.0).abs() < 1e-9);
+    }
+}

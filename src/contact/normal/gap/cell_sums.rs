@@ -1,0 +1,224 @@
+//! The loops over all cells of the conjugate gradients, in the machine's lanes.
+
+use pulp::{Arch, Simd, WithSimd};
+
+/// Arrays over cells go on to a multiple of this: no machine has more lanes.
+pub(crate) const LANES: usize = 8;
+
+/// Areas of cells relative to that of the first one, and how much their distances count in the direction of steepest descent; both go on
+/// with 1 to a multiple of [`LANES`].
+pub(crate) struct CellWeights {
+    pub(crate) area: Vec<f64>,
+    pub(crate) yielding: Vec<f64>,
+}
+
+/// Puts `displacement + gap` into the distances; the answer is their weighted sum over the contact, and that of the weights.
+pub(crate) struct Distances<'a> {
+    pub(crate) distance: &'a mut [f64],
+    pub(crate) displacement: &'a [f64],
+    pub(crate) gap: &'a [f64],
+    pub(crate) pressure: &'a [f64],
+    pub(crate) weights: &'a CellWeights,
+}
+
+/// Subtracts the approach from the distances; the answer is their largest violation and the weighted sum of their squares in the contact.
+pub(crate) struct Parting<'a> {
+    pub(crate) distance: &'a mut [f64],
+    pub(crate) pressure: &'a [f64],
+    pub(crate) weights: &'a CellWeights,
+    pub(crate) approach: f64,
+}
+
+/// The next direction: steepest descent, and a part of the direction before; 0 outside the contact.
+pub(crate) struct Direction<'a> {
+    pub(crate) direction: &'a mut [f64],
+    pub(crate) distance: &'a [f64],
+    pub(crate) pressure: &'a [f64],
+    pub(crate) weights: &'a CellWeights,
+    pub(crate) factor: f64,
+}
+
+/// Sums over the contact that give the length of a step along a direction: distance times direction, displacement times direction, direction
+/// alone, weighted displacement, weights.
+pub(crate) struct StepSums<'a> {
+    pub(crate) distance: &'a [f64],
+    pub(crate) direction: &'a [f64],
+    pub(crate) displacement: &'a [f64],
+    pub(crate) pressure: &'a [f64],
+    pub(crate) weights: &'a CellWeights,
+}
+
+/// Takes a step along a direction in all pressures. Those that are not in contact, or leave it, become 0, or what their overlap gives; `off` is
+/// the difference from the full step. The answer is whether no cell came into contact.
+pub(crate) struct Advance<'a> {
+    pub(crate) pressure: &'a mut [f64],
+    pub(crate) off: &'a mut [f64],
+    pub(crate) direction: &'a [f64],
+    pub(crate) distance: &'a [f64],
+    pub(crate) weights: &'a CellWeights,
+    pub(crate) step: f64,
+}
+
+/// Sum of the products of two numbers of each cell.
+pub(crate) struct CellProduct<'a>(pub(crate) &'a [f64], pub(crate) &'a [f64]);
+
+/// Runs a loop in the lanes of this machine.
+pub(crate) fn run<W: WithSimd>(work: W) -> W::Output {
+    Arch::new().dispatch(work)
+}
+
+impl WithSimd for Distances<'_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> [f64; 2] {
+        let zero = simd.splat_f64s(0.0);
+        let (mut sum, mut count) = (zero, zero);
+        let (g, _) = S::as_mut_simd_f64s(self.distance);
+        let [u, h, p, area, yielding] = [
+            self.displacement,
+            self.gap,
+            self.pressure,
+            &self.weights.area,
+            &self.weights.yielding,
+        ]
+        .map(|values| &S::as_simd_f64s(values).0[..g.len()]);
+        for k in 0..g.len() {
+            g[k] = simd.add_f64s(u[k], h[k]);
+            let inside = simd.greater_than_f64s(p[k], zero);
+            let weight = simd.mul_f64s(area[k], yielding[k]);
+            let weight = simd.select_f64s(inside, weight, zero);
+            // Outside the contact a gap may be infinite.
+            let own = simd.select_f64s(inside, g[k], zero);
+            sum = simd.mul_add_e_f64s(weight, own, sum);
+            count = simd.add_f64s(count, weight);
+        }
+        [sum, count].map(|sums| simd.reduce_sum_f64s(sums))
+    }
+}
+
+impl WithSimd for Parting<'_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> [f64; 2] {
+        let zero = simd.splat_f64s(0.0);
+        let approach = simd.splat_f64s(self.approach);
+        let (mut violation, mut square) = (zero, zero);
+        let (g, _) = S::as_mut_simd_f64s(self.distance);
+        let [p, area, yielding] = [self.pressure, &self.weights.area, &self.weights.yielding]
+            .map(|values| &S::as_simd_f64s(values).0[..g.len()]);
+        for k in 0..g.len() {
+            let here = simd.sub_f64s(g[k], approach);
+            g[k] = here;
+            let inside = simd.greater_than_f64s(p[k], zero);
+            let [apart, over] = [simd.abs_f64s(here), simd.neg_f64s(here)];
+            violation = simd.max_f64s(violation, simd.select_f64s(inside, apart, over));
+            let own = simd.select_f64s(inside, here, zero);
+            let weight = simd.mul_f64s(area[k], yielding[k]);
+            square = simd.mul_add_e_f64s(weight, simd.mul_f64s(own, own), square);
+        }
+        [
+            simd.reduce_max_f64s(violation),
+            simd.reduce_sum_f64s(square),
+        ]
+    }
+}
+
+impl WithSimd for Direction<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let zero = simd.splat_f64s(0.0);
+        let factor = simd.splat_f64s(self.factor);
+        let (t, _) = S::as_mut_simd_f64s(self.direction);
+        let [g, p, yielding] = [self.distance, self.pressure, &self.weights.yielding]
+            .map(|values| &S::as_simd_f64s(values).0[..t.len()]);
+        for k in 0..t.len() {
+            let next = simd.mul_add_e_f64s(yielding[k], g[k], simd.mul_f64s(factor, t[k]));
+            let inside = simd.greater_than_f64s(p[k], zero);
+            t[k] = simd.select_f64s(inside, next, zero);
+        }
+    }
+}
+
+impl WithSimd for StepSums<'_> {
+    type Output = [f64; 5];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> [f64; 5] {
+        let zero = simd.splat_f64s(0.0);
+        let mut sums = [zero; 5];
+        let (p, _) = S::as_simd_f64s(self.pressure);
+        let [g, t, r, area, yielding] = [
+            self.distance,
+            self.direction,
+            self.displacement,
+            &self.weights.area,
+            &self.weights.yielding,
+        ]
+        .map(|values| &S::as_simd_f64s(values).0[..p.len()]);
+        for k in 0..p.len() {
+            let inside = simd.greater_than_f64s(p[k], zero);
+            let area = simd.select_f64s(inside, area[k], zero);
+            let own = simd.select_f64s(inside, g[k], zero);
+            let weight = simd.mul_f64s(area, yielding[k]);
+            let along = simd.mul_f64s(area, t[k]);
+            sums = [
+                simd.mul_add_e_f64s(along, own, sums[0]),
+                simd.mul_add_e_f64s(along, r[k], sums[1]),
+                simd.add_f64s(along, sums[2]),
+                simd.mul_add_e_f64s(weight, r[k], sums[3]),
+                simd.add_f64s(weight, sums[4]),
+            ];
+        }
+        sums.map(|sums| simd.reduce_sum_f64s(sums))
+    }
+}
+
+impl WithSimd for Advance<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> bool {
+        let zero = simd.splat_f64s(0.0);
+        let back = simd.splat_f64s(-self.step);
+        let mut deepest = zero;
+        let (p, _) = S::as_mut_simd_f64s(self.pressure);
+        let off = &mut S::as_mut_simd_f64s(self.off).0[..p.len()];
+        let [t, g, yielding] = [self.direction, self.distance, &self.weights.yielding]
+            .map(|values| &S::as_simd_f64s(values).0[..p.len()]);
+        for k in 0..p.len() {
+            let stepped = simd.mul_add_e_f64s(back, t[k], p[k]);
+            let overlap = simd.min_f64s(g[k], zero);
+            let other = simd.mul_f64s(simd.mul_f64s(back, yielding[k]), overlap);
+            // Of a cell outside neither the pressure nor the step is more than 0.
+            let was = simd.greater_than_f64s(p[k], zero);
+            let stepped_in = simd.select_f64s(was, stepped, zero);
+            let stays = simd.greater_than_f64s(stepped_in, zero);
+            let next = simd.select_f64s(stays, stepped, other);
+            p[k] = next;
+            off[k] = simd.sub_f64s(next, stepped);
+            deepest = simd.min_f64s(deepest, simd.select_f64s(stays, zero, overlap));
+        }
+        simd.reduce_min_f64s(deepest) >= 0.0
+    }
+}
+
+impl WithSimd for CellProduct<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        let mut sum = simd.splat_f64s(0.0);
+        for (a, b) in S::as_simd_f64s(self.0)
+            .0
+            .iter()
+            .zip(S::as_simd_f64s(self.1).0)
+        {
+            sum = simd.mul_add_e_f64s(*a, *b, sum);
+        }
+        simd.reduce_sum_f64s(sum)
+    }
+}
