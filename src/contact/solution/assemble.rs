@@ -290,6 +290,7 @@ fn point_solution(
         subsurface: None,
         damage: None,
         temperature: None,
+        region: None,
     }
 }
 

@@ -242,6 +242,32 @@ pub struct PointSolution {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub temperature: Option<TemperatureSummary>,
+    /// Region and pressure of this motion; only of several motions of bodies that differ, whose tractions change both. Those of the patch are
+    /// those of its first motion.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub region: Option<Box<MotionRegion>>,
+}
+
+/// Region and pressure of a patch under one motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct MotionRegion {
+    /// Normal force in N.
+    pub normal_force_n: f64,
+    /// The largest tangential force that friction allows, in N.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub friction_limit_n: Option<f64>,
+    /// Approach of distant points in mm.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub approach_mm: Option<f64>,
+    /// Contact area in mm².
+    pub area_mm2: f64,
+    /// Largest pressure in MPa.
+    pub pressure_max_mpa: f64,
+    /// Extent `[x_min, x_max, y_min, y_max]` in mm.
+    pub extent_mm: [f64; 4],
 }
 
 /// A point of a history.
