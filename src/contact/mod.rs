@@ -58,6 +58,7 @@ pub mod time_limit;
 pub mod trial;
 pub mod unlike_bodies;
 pub(crate) mod unlike_motions;
+pub(crate) mod wheel_balance;
 pub mod wheel_on_rail;
 pub mod wheelset;
 

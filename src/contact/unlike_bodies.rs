@@ -50,6 +50,8 @@ const LEFT: f64 = 0.25;
 const LEFT_BY_PRESSURE: f64 = 0.02;
 /// The change that is left has to be below this part of the target. Chosen by judgement; how much it matters was not measured.
 const PART_OF_TARGET: f64 = 0.3;
+/// Forces grow as this power of approaches, as in Hertz's contacts.
+const FORCE_POWER: f64 = 1.5;
 /// The opening is sampled on so many points along each axis, over the patches and by a part of their size around them; beyond it
 /// is taken as constant. It is smooth but for the edges of the cells. On the 12 contacts of `tests/physics/unlike.rs` 81 points move forces by at
 /// most 0.0014 of μN; 25 take half the time, and the estimate of one contact no longer covers its error.
@@ -68,6 +70,18 @@ pub(crate) struct UnlikeGap {
     pub(crate) without: SolvedFootprint,
     /// By how much, relatively, their load may differ from the one wanted.
     pub(crate) load_error: f64,
+    /// What the load is that is kept.
+    pub(crate) kept: KeptLoad,
+}
+
+/// The load of a gap that region and pressure keep while tractions change them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum KeptLoad {
+    /// The one that was asked for.
+    Asked,
+    /// What the contact carries of a wheel at rest without tractions: others carry the rest, or the height was asked for, so that tractions
+    /// would change it a little.
+    OfWheel,
 }
 
 impl UnlikeGap {
@@ -83,6 +97,7 @@ impl UnlikeGap {
             task: gap_task(case),
             without: normal_stage::solve(case, monitor)?,
             load_error: 0.0,
+            kept: KeptLoad::Asked,
         })
     }
 
@@ -131,7 +146,9 @@ impl UnlikeGap {
         let Some(mut solved) = found else {
             unreachable!("there is a first round")
         };
-        solved.coupling_error = left.hypot(LEFT_BY_PRESSURE * case.problem.elasticity.difference);
+        solved.coupling_error = left
+            .hypot(LEFT_BY_PRESSURE * case.problem.elasticity.difference)
+            .hypot(self.load_unshared(&solved));
         if left > PART_OF_TARGET * target {
             let remark = rounds_used_up(left, PART_OF_TARGET * target);
             solved.remarks.push(remark.into());
@@ -144,6 +161,25 @@ impl UnlikeGap {
             .report
             .map(|report| NormalReport { seconds, ..report });
         Ok(solved)
+    }
+}
+
+impl UnlikeGap {
+    /// By how much, relatively, the load would be another if approaches were kept in place of loads. Those of several contacts of one wheel
+    /// change together, so that this is a bound.
+    fn load_unshared(&self, solved: &SolvedFootprint) -> f64 {
+        let approach = |solved: &SolvedFootprint| {
+            let patches = solved.footprint.patches().iter();
+            patches
+                .filter_map(|patch| patch.approach)
+                .fold(0.0, f64::max)
+        };
+        match self.kept {
+            KeptLoad::Asked => 0.0,
+            KeptLoad::OfWheel => {
+                FORCE_POWER * (approach(solved) / approach(&self.without) - 1.0).abs()
+            }
+        }
     }
 }
 

@@ -59,6 +59,7 @@ const TUPLES: [(&str, &str, usize); 31] = [
     ("Outlines", "patch", 2),
     ("Outlines", "slip", 2),
     ("Outlines", "stick", 2),
+    ("MotionRegion", "extent_mm", 4),
     ("PatchSolution", "extent_mm", 4),
     ("PatchSolution", "semi_axes_mm", 2),
     ("PlacedProfiles", "rail_mm", 2),

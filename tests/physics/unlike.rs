@@ -1,14 +1,21 @@
 //! Bodies that differ: references, laws and faults.
 
+use std::sync::Arc;
+
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
+use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
+use railhead::contact::rolling::operator_store::OperatorStore;
+use railhead::contact::slices::slices;
 use railhead::contact::solution::words::answer::Solution;
+use railhead::contact::solution::words::fields::Fields;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::cases::assert_fault;
 use crate::reference::{Converged, assert_none, read, solve};
+use crate::sweeps::timeless;
 
 /// A contact solved elsewhere; forces over the friction limit, moment over that and `arm_mm`.
 #[derive(Debug, Deserialize)]
@@ -241,6 +248,38 @@ fn motions_of_a_list_are_those_of_cases_of_their_own() {
         );
         assert!(apart < 2e-3, "{apart}");
     }
+}
+
+#[test]
+fn a_sweep_of_unlike_bodies_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
+    let reference = soft_on_rigid("dis_steel_alu_ab1_mu0.3_free0");
+    let sweep = json!({ "sweep": { "creepage_x": { "from": 0.0, "to": 0.002, "points": 30 } } });
+    let mut case = reference.case(sweep);
+    case["outputs"] = json!(["resultants", "pressure"]);
+    let checked = contact::check(&case, &Limits::default()).expect("a good case");
+    let ranges = slices(&checked);
+    assert!(ranges.len() > 1, "{ranges:?}");
+    let began = std::time::Instant::now();
+    let whole = timeless(contact::solve(&checked, &Unmonitored).expect("an answer"));
+    println!(
+        "30 motions in {} slices, {:.2} s ({:.2} told)",
+        ranges.len(),
+        began.elapsed().as_secs_f64(),
+        checked.cost().seconds
+    );
+    let parts = ranges.iter().rev().map(|range| {
+        let store = Arc::new(OperatorStore::new(0));
+        contact::solve_slice(&store, &checked, range.clone(), &Unmonitored).expect("an answer")
+    });
+    let mut parts: Vec<(Solution, Fields)> = parts.collect();
+    let (mut solution, mut fields) = parts.pop().expect("a slice");
+    while let Some((more, more_fields)) = parts.pop() {
+        solution.append(more);
+        fields.append(more_fields);
+    }
+    let joined = timeless((solution, fields));
+    assert_eq!(joined.0, whole.0);
+    assert!(joined.1 == whole.1, "fields differ");
 }
 
 /// Friction and K exchange their signs with the direction of rolling, motion by motion.

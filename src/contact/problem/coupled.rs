@@ -32,12 +32,15 @@ impl Problem {
     /// history that goes on share their patches.
     #[must_use]
     pub fn is_coupled(&self, run: &Run) -> bool {
-        let known = matches!(self.task, NormalTask::Hertz(_) | NormalTask::Gap(_));
-        let single = match &self.history {
-            None => true,
-            Some(history) => history.only_presses() && self.forces == [[None; 2]],
+        let solved = match (&self.task, &self.history) {
+            (NormalTask::Given(_), _) => false,
+            (_, None) => true,
+            (NormalTask::Hertz(_) | NormalTask::Gap(_), Some(history)) => {
+                history.only_presses() && self.forces == [[None; 2]]
+            }
+            (NormalTask::Wheel(_) | NormalTask::Wheelset(_), Some(_)) => false,
         };
-        known && single && self.first_order_error(run.method) > negligible(run)
+        solved && self.first_order_error(run.method) > negligible(run)
     }
 
     /// The remark if the pressure should feel the tractions and does not.

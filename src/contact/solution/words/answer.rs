@@ -25,10 +25,11 @@ pub struct Solution {
     /// What the client should know before using the numbers.
     #[serde(default)]
     pub remarks: Vec<RemarkEntry>,
-    /// How region and pressure were found; absent where they were known beforehand.
+    /// How region and pressure were found; absent where they were known beforehand. Of several motions of bodies that differ, those of the first.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub normal: Option<NormalReport>,
-    /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`.
+    /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`. Where bodies differ, it is that of a wheel
+    /// without tractions.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub wheel_lowering_mm: Option<f64>,
     /// Angular velocity of the wheelset in rad/s, found for the longitudinal force that was prescribed; only for `profiles` with `wheelset.force_x_n`.
@@ -124,7 +125,8 @@ pub struct CombinedMaterial {
     pub difference_parameter: f64,
 }
 
-/// One contact patch with its answers for every motion.
+/// One contact patch with its answers for every motion. Of several motions of bodies that differ its numbers are those of the first; every
+/// point has its own in `region`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PatchSolution {
     /// Normal force in N.
@@ -242,8 +244,7 @@ pub struct PointSolution {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub temperature: Option<TemperatureSummary>,
-    /// Region and pressure of this motion; only of several motions of bodies that differ, whose tractions change both. Those of the patch are
-    /// those of its first motion.
+    /// Region and pressure under this motion; only of several motions of bodies that differ, whose tractions change both.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub region: Option<Box<MotionRegion>>,
