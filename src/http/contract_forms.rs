@@ -44,7 +44,7 @@ const MEMBERS: [(&str, usize, Option<usize>); 3] = [
 ];
 
 /// Members that are lists of so many numbers, or lists of those.
-const TUPLES: [(&str, &str, usize); 31] = [
+const TUPLES: [(&str, &str, usize); 32] = [
     ("ArchardFigures", "speeds_mm_per_s", 2),
     ("CrossSection", "points_mm", 2),
     ("EquivalentConicity", "turns_mm", 2),

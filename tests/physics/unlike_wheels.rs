@@ -1,5 +1,6 @@
 //! Wheels and rails of unlike materials: patches of profiles against the same patches by their radii, and balance.
 
+use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::solution::words::answer::{PatchSolution, Solution};
 use serde_json::{Value, json};
 
@@ -140,15 +141,19 @@ fn the_load_kept_at_a_height_is_within_the_estimate() {
 #[test]
 fn patches_of_another_material_carry_the_load_together() {
     let mut several = 0;
-    for (shift, load) in [(4.0, 1450.0), (5.0, 200.0), (5.5, 1450.0), (6.0, 1450.0)] {
-        let place = json!({ "lateral_shift_mm": shift });
+    for (shift, yaw) in [(-6.45, -0.02), (-6.0, 0.0), (5.0, 0.0)] {
+        let place = json!({ "lateral_shift_mm": shift, "yaw_rad": yaw });
         let mut case = soft(&put(&generated(), "contact", place), SOFT[1]);
-        case["load"] = json!({ "vertical_force_n": load });
+        case["load"] = json!({ "normal_force_n": LOAD });
         case["motion"] = json!({ "creepage_x": 0.001, "creepage_y": 0.0, "spin_per_mm": 0.0 });
         let (solution, _) = solve(&case);
         not_of_first_order(&solution);
-        let vertical = -solution.total[0].force_z_n.expect("a vertical force");
-        assert!((vertical / load - 1.0).abs() < 1e-3, "{vertical}");
+        let carried: f64 = solution
+            .patches
+            .iter()
+            .map(|patch| patch.normal_force_n)
+            .sum();
+        assert!((carried / LOAD - 1.0).abs() < 1e-3, "{carried}");
         several += usize::from(solution.patches.len() > 1);
         case["material"] = json!({ "shear_modulus_mpa": 1585.0, "poisson_ratio": 0.25 });
         let like = solve(&case).0;
@@ -172,7 +177,7 @@ fn a_wheel_that_moves_with_its_wheelset_is_coupled_too() {
     let mut case = soft(&generated(), SOFT[0]);
     case["load"] = json!({ "normal_force_n": LOAD });
     case["motion"] =
-        json!({ "wheelset": { "speed_mm_per_s": 1e4, "free_rolling_radius_mm": 460 } });
+        json!({ "wheelset": { "speed_mm_per_s": 1e4, "angular_velocity_rad_per_s": 21.7 } });
     let (solution, _) = solve(&case);
     not_of_first_order(&solution);
     // The same wheel with the creepages that were found for its patch.
@@ -182,4 +187,58 @@ fn a_wheel_that_moves_with_its_wheelset_is_coupled_too() {
     assert_eq!(solution.patches.len(), 1);
     let off = apart(&solution.patches[0], &known.patches[0], 0);
     assert!(off < 1e-6, "{off}");
+}
+
+/// A lobe beside another one, `height` mm lower.
+fn two_lobes(height: f64) -> Value {
+    let y: Vec<f64> = (-60..=180).map(|k| 0.1 * f64::from(k)).collect();
+    let lobe = |y: f64| (y * y / 600.0).min(height + (y - 12.0).powi(2) / 600.0);
+    let gap: Vec<f64> = y.iter().map(|y| lobe(*y)).collect();
+    let mut case = soft(&cone_on_arc(), SOFT[1]);
+    case["contact"] =
+        json!({ "type": "gap_profile", "rolling_mm": 300.0, "y_mm": y, "gap_mm": gap });
+    case["load"] = json!({ "normal_force_n": 500.0 });
+    case["solver"] = json!({ "mesh": { "strips": 12, "cells": 12 } });
+    case
+}
+
+/// An answer has one list of patches: a motion whose tractions lift a patch off that touches without them is answered in first order.
+#[test]
+fn a_motion_whose_tractions_take_a_patch_away_says_that_it_is_of_first_order() {
+    let patches = |height: f64| {
+        let mut like = two_lobes(height);
+        like["material"] = json!({ "shear_modulus_mpa": 1585.0, "poisson_ratio": 0.25 });
+        like["motion"] = json!({ "creepage_x": 0.001 });
+        solve(&like).0.patches.len()
+    };
+    let (mut low, mut high) = (0.001, 0.1);
+    assert_eq!([patches(low), patches(high)], [2, 1]);
+    for _ in 0..8 {
+        let middle = 0.5 * (low + high);
+        match patches(middle) {
+            1 => high = middle,
+            _ => low = middle,
+        }
+    }
+    let mut told = 0;
+    for part in [0.98, 0.99, 0.995] {
+        let mut case = two_lobes(part * low);
+        let motion = |x: f64| json!({ "creepage_x": x, "creepage_y": 0.0, "spin_per_mm": 0.0 });
+        case["motion"] = json!([motion(0.0), motion(0.02)]);
+        let (solution, _) = solve(&case);
+        let said = |remark: &&RemarkEntry| remark.code == "coupling-first-order";
+        let points: Vec<_> = solution
+            .remarks
+            .iter()
+            .filter(said)
+            .map(|r| r.point)
+            .collect();
+        println!("{part}: {} patches, {points:?}", solution.patches.len());
+        assert!(points.iter().all(Option::is_some));
+        told += points.len();
+        for patch in &solution.patches {
+            assert_eq!(patch.points.len(), 2);
+        }
+    }
+    assert!(told > 0);
 }
