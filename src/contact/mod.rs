@@ -9,7 +9,7 @@
 //! | motions, from coarse to fine levels | footprint, [`friction`] | [`MotionAnswer`](rolling::motion_answer::MotionAnswer) | [`rolling_stage`], [`rolling`], [`mesh`], [`half_space`] |
 //! | answer | answers of motions | [`Solution`], [`Fields`] | [`post`], [`solution`] |
 //!
-//! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`], [`wheel_on_rail`] (in [`profile_trust`]), [`wheelset`].
+//! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`] (in `unlike_motions`), [`wheel_on_rail`] (in [`profile_trust`]), [`wheelset`].
 //! Frame, signs, units and words: [`conventions`].
 //!
 //! # The way of a motion
@@ -57,6 +57,8 @@ pub mod solution;
 pub mod time_limit;
 pub mod trial;
 pub mod unlike_bodies;
+pub(crate) mod unlike_motions;
+pub(crate) mod wheel_balance;
 pub mod wheel_on_rail;
 pub mod wheelset;
 
@@ -78,6 +80,7 @@ use crate::contact::solution::finish::finish;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
 use crate::contact::time_limit::TimeLimit;
+use crate::contact::unlike_bodies::UnlikeGap;
 
 /// Reads and checks a case.
 ///
@@ -166,13 +169,14 @@ fn solve_motions(
         }
         NormalTask::Hertz(_) | NormalTask::Given(_) | NormalTask::Gap(_) => {
             let monitor = &TimeLimit::new(monitor, case.run.time_limit, case.problem.motions.len());
-            let footprint = if case.problem.is_coupled(&case.run) {
-                unlike_bodies::solve(operators, case, monitor)
+            let explained = |error| monitor.explained(error, case);
+            if case.problem.is_coupled(&case.run) {
+                let gap = UnlikeGap::of_case(case, monitor).map_err(explained)?;
+                unlike_motions::solve(operators, case, &gap, monitor)?
             } else {
-                normal_stage::solve(case, monitor)
-            };
-            let footprint = footprint.map_err(|error| monitor.explained(error, case))?;
-            rolling_stage::solve(operators, case, &footprint, monitor)?
+                let footprint = normal_stage::solve(case, monitor).map_err(explained)?;
+                rolling_stage::solve(operators, case, &footprint, monitor)?
+            }
         }
     };
     finish(case, answer, monitor.elapsed().saturating_sub(began))

@@ -32,20 +32,21 @@ pub struct SolvedFootprint {
 /// # Panics
 /// On a wheel, whose patches have a frame each: see [`wheel_on_rail`](crate::contact::wheel_on_rail).
 pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprint, SolveError> {
-    let known = |footprint| SolvedFootprint {
+    let first_order_error = case.problem.first_order_error(case.run.method);
+    let known = |footprint, coupling_error| SolvedFootprint {
         footprint,
         report: None,
-        coupling_error: case.problem.first_order_error(case.run.method),
+        coupling_error,
         remarks: Vec::new(),
     };
     match &case.problem.task {
-        NormalTask::Hertz(ellipse) => Ok(known(Footprint::hertz(*ellipse))),
-        NormalTask::Given(field) => Ok(known(Footprint::given(field.clone()))),
+        NormalTask::Hertz(ellipse) => Ok(known(Footprint::hertz(*ellipse), first_order_error)),
+        NormalTask::Given(field) => Ok(known(Footprint::given(field.clone()), first_order_error)),
         NormalTask::Gap(task) => {
             let began = monitor.elapsed();
             let workspace = &mut GridWorkspace::default();
-            let mut found = solve_gap(case, task, workspace, monitor)?;
-            found.coupling_error = case.problem.first_order_error(case.run.method);
+            let mut found = solve_gap(case, task, 0.0, workspace, monitor)?;
+            found.coupling_error = first_order_error;
             found.report = found.report.map(|report| NormalReport {
                 seconds: (monitor.elapsed() - began).as_secs_f64(),
                 ..report
@@ -58,19 +59,21 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprin
     }
 }
 
-/// Patches and pressures of a gap, checked against the memory allowed; coupling error and time are left 0.
+/// Patches and pressures of a gap, whose load may be off by a part `load_error`, checked against the memory allowed; coupling error
+/// and time are left 0.
 ///
 /// # Errors
 /// As [`solve`].
 pub(crate) fn solve_gap(
     case: &CheckedCase,
     task: &GapTask,
+    load_error: f64,
     workspace: &mut GridWorkspace<f32>,
     monitor: &dyn Monitor,
 ) -> Result<SolvedFootprint, SolveError> {
     let found = task.solve_for(case.run.target(), workspace, monitor)?;
     let solved = SolvedFootprint {
-        footprint: Footprint::computed(found.field, 0.0),
+        footprint: Footprint::computed(found.field, load_error),
         report: Some(found.report.with_time(0.0)),
         coupling_error: 0.0,
         remarks: found.remarks,

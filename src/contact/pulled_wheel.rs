@@ -26,7 +26,8 @@ use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
-use crate::contact::wheel_on_rail::{BALANCE, SolvedWheel};
+use crate::contact::wheel_balance::BALANCE;
+use crate::contact::wheel_on_rail::SolvedWheel;
 
 /// A force may be missed by this part of the target, and by this part of μN at least: what the normal problem leaves open from trial to
 /// trial is noise to the search. Chosen by judgement; how much it matters was not measured.

@@ -1,8 +1,9 @@
-//! Region and pressure of one motion of bodies that differ: pressure and tractions in turn, until each belongs to the other.
+//! Region and pressure of a motion of bodies that differ: pressure and tractions in turn, until each belongs to the other.
 //!
 //! The pressure of unlike bodies makes the surfaces slip, and their tractions open and close the gap. The tractions are solved with the
 //! slips of the present pressure, the gap is changed by what they open, region and pressure are found anew, and so on (Panagiotopoulos
-//! 1975). Each round leaves a hundredth to a fifth of the change before it.
+//! 1975). Each round leaves a hundredth to a fifth of the change before it. The first round begins with the contact of a motion nearby, or with the
+//! one without tractions.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -49,6 +50,8 @@ const LEFT: f64 = 0.25;
 const LEFT_BY_PRESSURE: f64 = 0.02;
 /// The change that is left has to be below this part of the target. Chosen by judgement; how much it matters was not measured.
 const PART_OF_TARGET: f64 = 0.3;
+/// Forces grow as this power of approaches, as in Hertz's contacts.
+const FORCE_POWER: f64 = 1.5;
 /// The opening is sampled on so many points along each axis, over the patches and by a part of their size around them; beyond it
 /// is taken as constant. It is smooth but for the edges of the cells. On the 12 contacts of `tests/physics/unlike.rs` 81 points move forces by at
 /// most 0.0014 of μN; 25 take half the time, and the estimate of one contact no longer covers its error.
@@ -58,18 +61,130 @@ const AROUND: f64 = 0.25;
 /// Samples of the parabola across that stands for an ellipse, and how far they reach over its semi-axis. Parabolas are reproduced exactly.
 const PARABOLA: (i32, f64) = (8, 6.0);
 
-/// Region and pressure of one motion of bodies that differ and whose gap is known.
-///
-/// # Errors
-/// A named reason why there is no answer; or the monitor stopped the work.
-pub(crate) fn solve(
-    operators: &Arc<OperatorStore>,
-    case: &CheckedCase,
-    watch: &TimeLimit,
-) -> Result<SolvedFootprint, SolveError> {
-    let began = watch.elapsed();
-    let mut solved = normal_stage::solve(case, watch)?;
-    let task = gap_task(case);
+/// A gap between bodies that differ, and the contact in it that knows nothing of tractions.
+#[derive(Debug)]
+pub(crate) struct UnlikeGap {
+    /// The gap of the undeformed bodies, and how they are pressed together.
+    pub(crate) task: GapTask,
+    /// Region and pressure without tractions.
+    pub(crate) without: SolvedFootprint,
+    /// By how much, relatively, their load may differ from the one wanted.
+    pub(crate) load_error: f64,
+    /// What the load is that is kept.
+    pub(crate) kept: KeptLoad,
+}
+
+/// The load of a gap that region and pressure keep while tractions change them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum KeptLoad {
+    /// The one that was asked for.
+    Asked,
+    /// What the contact carries of a wheel at rest without tractions: others carry the rest, or the height was asked for, so that tractions
+    /// would change it a little.
+    OfWheel,
+}
+
+impl UnlikeGap {
+    /// The gap of a case: of radii, an ellipse, or as given.
+    ///
+    /// # Errors
+    /// Why there is no contact without tractions; or the monitor stopped the work.
+    pub(crate) fn of_case(
+        case: &CheckedCase,
+        monitor: &dyn Monitor,
+    ) -> Result<UnlikeGap, SolveError> {
+        Ok(UnlikeGap {
+            task: gap_task(case),
+            without: normal_stage::solve(case, monitor)?,
+            load_error: 0.0,
+            kept: KeptLoad::Asked,
+        })
+    }
+
+    /// Region and pressure of a case of one motion, from those of a `neighbour` on, where there is one.
+    ///
+    /// # Errors
+    /// A named reason why there is no answer; or the monitor stopped the work.
+    pub(crate) fn solve(
+        &self,
+        operators: &Arc<OperatorStore>,
+        case: &CheckedCase,
+        neighbour: Option<&SolvedFootprint>,
+        watch: &TimeLimit,
+    ) -> Result<SolvedFootprint, SolveError> {
+        let began = watch.elapsed();
+        let rough = rough(case);
+        let target = case.run.resolution.target_or_usual();
+        let workspace = &mut GridWorkspace::default();
+        let mut found: Option<SolvedFootprint> = None;
+        let mut before = None;
+        let mut left = f64::INFINITY;
+        for _ in 0..ROUNDS_MAX {
+            let present = found.as_ref().or(neighbour).unwrap_or(&self.without);
+            let (gap, force) = opened(operators, &rough, present, &self.task, watch)?;
+            let change = before.map(|before| distance(before, force));
+            before = Some(force);
+            let task = GapTask {
+                gap,
+                seen: GapSeen::default(),
+                ..self.task.clone()
+            };
+            found = Some(normal_stage::solve_gap(
+                case,
+                &task,
+                self.load_error,
+                workspace,
+                watch,
+            )?);
+            if let Some(change) = change {
+                left = LEFT * change;
+                if left <= PART_OF_TARGET * target {
+                    break;
+                }
+            }
+        }
+        let Some(mut solved) = found else {
+            unreachable!("there is a first round")
+        };
+        solved.coupling_error = left
+            .hypot(LEFT_BY_PRESSURE * case.problem.elasticity.difference)
+            .hypot(self.load_unshared(&solved));
+        if left > PART_OF_TARGET * target {
+            let remark = rounds_used_up(left, PART_OF_TARGET * target);
+            solved.remarks.push(remark.into());
+        }
+        let mut seconds = (watch.elapsed() - began).as_secs_f64();
+        if neighbour.is_none() {
+            seconds += self.without.report.map_or(0.0, |report| report.seconds);
+        }
+        solved.report = solved
+            .report
+            .map(|report| NormalReport { seconds, ..report });
+        Ok(solved)
+    }
+}
+
+impl UnlikeGap {
+    /// By how much, relatively, the load would be another if approaches were kept in place of loads. Those of several contacts of one wheel
+    /// change together, so that this is a bound.
+    fn load_unshared(&self, solved: &SolvedFootprint) -> f64 {
+        let approach = |solved: &SolvedFootprint| {
+            let patches = solved.footprint.patches().iter();
+            patches
+                .filter_map(|patch| patch.approach)
+                .fold(0.0, f64::max)
+        };
+        match self.kept {
+            KeptLoad::Asked => 0.0,
+            KeptLoad::OfWheel => {
+                FORCE_POWER * (approach(solved) / approach(&self.without) - 1.0).abs()
+            }
+        }
+    }
+}
+
+/// The case as the rounds solve it: for resultants, no more closely than they need.
+fn rough(case: &CheckedCase) -> CheckedCase {
     let mut rough = CheckedCase {
         run: case.run.for_resultants(TARGET_OF_ROUNDS),
         ..case.clone()
@@ -77,42 +192,16 @@ pub(crate) fn solve(
     if case.problem.history.is_some() {
         rough.run.resolution = Resolution::Mesh(MESH_OF_PRESSING);
     }
-    let target = case.run.resolution.target_or_usual();
-    let workspace = &mut GridWorkspace::default();
-    let mut before = None;
-    let mut left = f64::INFINITY;
-    for _ in 0..ROUNDS_MAX {
-        let (gap, force) = opened(operators, &rough, &solved, &task, watch)?;
-        let change = before.map(|before| distance(before, force));
-        before = Some(force);
-        let task = GapTask {
-            gap,
-            seen: GapSeen::default(),
-            ..task.clone()
-        };
-        solved = normal_stage::solve_gap(case, &task, workspace, watch)?;
-        if let Some(change) = change {
-            left = LEFT * change;
-            if left <= PART_OF_TARGET * target {
-                break;
-            }
-        }
+    rough
+}
+
+fn rounds_used_up(residual: f64, tolerance: f64) -> Remark {
+    Remark::IterationInexact {
+        iteration: "pressure and tractions of unlike bodies",
+        reason: "the rounds were used up",
+        residual,
+        tolerance,
     }
-    solved.coupling_error = left.hypot(LEFT_BY_PRESSURE * case.problem.elasticity.difference);
-    if left > PART_OF_TARGET * target {
-        let remark = Remark::IterationInexact {
-            iteration: "pressure and tractions of unlike bodies",
-            reason: "the rounds were used up",
-            residual: left,
-            tolerance: PART_OF_TARGET * target,
-        };
-        solved.remarks.push(remark.into());
-    }
-    let seconds = (watch.elapsed() - began).as_secs_f64();
-    solved.report = solved
-        .report
-        .map(|report| NormalReport { seconds, ..report });
-    Ok(solved)
 }
 
 /// The gap of a case, and how it is loaded; that of an ellipse is a paraboloid.

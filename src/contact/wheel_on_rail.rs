@@ -12,6 +12,7 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::wheel_height::search::HeightStart;
 use crate::contact::normal::wheel_height::task::{Accuracy, NormalPass, WheelLoad, WheelTask};
 use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
@@ -27,19 +28,10 @@ use crate::contact::solution::track_axes::in_track;
 use crate::contact::solution::words::answer::{NormalReport, Solution};
 use crate::contact::solution::words::fields::Fields;
 use crate::contact::time_limit::TimeLimit;
+use crate::contact::unlike_bodies::{KeptLoad, UnlikeGap};
+use crate::contact::unlike_motions;
+use crate::contact::wheel_balance::{BALANCE, BalanceExit, ROUNDS_MAX, next_share, tolerance};
 
-/// The vertical force may be missed by this fraction; it bounds the change of friction's share in one round. Chosen by judgement; how much it
-/// matters was not measured.
-pub(crate) const BALANCE: f64 = 5e-4;
-/// Upper limit of that fraction, relative to the target error. Chosen by judgement; how much it matters was not measured.
-const BALANCE_OF_TARGET: f64 = 0.1;
-/// When the rounds are used up, a share that still changes by no more than this is answered with a remark. Chosen by judgement; how much it matters
-/// was not measured.
-const BALANCE_POOR: f64 = 5e-3;
-/// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third, less by the secant.
-const ROUNDS_MAX: u32 = 12;
-/// Range of the slope of the friction found over the friction assumed that a secant step uses. Numeric safety, not tuned.
-const SLOPES: [f64; 2] = [-0.9, 0.6];
 /// Least fraction of the vertical part of its normal forces that a wheel carries; on a steep flange friction may take away all of it. Chosen by
 /// judgement; how much it matters was not measured.
 const CARRIED_MIN: f64 = 0.1;
@@ -167,6 +159,7 @@ impl WheelSolve<'_> {
         let (wheel, geometry) = (&at_rest.wheel, &self.contact.geometry);
         let count = wheel.patches.len();
         let watch = TimeLimit::new(self.monitor, run.time_limit, count * problem.motions.len());
+        let tasks = self.coupled_tasks(wheel, run)?;
         let mut answers = Vec::with_capacity(count);
         for (k, gap) in wheel.patches.iter().enumerate() {
             // What all gaps share is charged to the first.
@@ -196,10 +189,38 @@ impl WheelSolve<'_> {
                 remarks: Vec::new(),
             };
             part.fits(&solved.footprint)?;
-            let answered = rolling_stage::solve(self.operators, &part, &solved, &watch);
+            let answered = match tasks.get(k) {
+                None => rolling_stage::solve(self.operators, &part, &solved, &watch),
+                Some(task) => {
+                    let unlike = UnlikeGap {
+                        task: task.clone(),
+                        without: solved,
+                        load_error,
+                        kept: self.kept(count),
+                    };
+                    unlike_motions::solve(self.operators, &part, &unlike, &watch)
+                }
+            };
             answers.push(answered.map_err(|error| of_gap(error, gap, geometry))?);
         }
         Ok(answers)
+    }
+
+    /// The gaps of all contacts where bodies differ so much that tractions change their pressures; otherwise none.
+    fn coupled_tasks(&self, wheel: &WheelContact, run: &Run) -> Result<Vec<GapTask>, SolveError> {
+        if !self.case.problem.is_coupled(run) {
+            return Ok(Vec::new());
+        }
+        let tasks = self.contact.gap_tasks(&self.search, wheel);
+        tasks.map_err(|reason| SolveError::NormalProblem { reason })
+    }
+
+    /// What of a contact is kept while its pressure changes with the tractions.
+    fn kept(&self, contacts: usize) -> KeptLoad {
+        match self.contact.loading {
+            WheelLoad::Vertical(_) | WheelLoad::Normal(_) if contacts == 1 => KeptLoad::Asked,
+            _ => KeptLoad::OfWheel,
+        }
     }
 
     /// The first rest with friction's share in it, and whether it is an exact one: the share is forecast while the height is sought, or
@@ -266,66 +287,6 @@ impl WheelSolve<'_> {
         }
         let answers = exit.judged(last, tolerance, share, &mut at_rest.wheel)?;
         at_rest.found(case, contact, answers)
-    }
-}
-
-/// How the rounds of friction end.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum BalanceExit {
-    /// Friction's share is what it was taken for.
-    Balanced,
-    /// In the last round the vertical force changed by this part.
-    RoundsUsedUp { change: f64 },
-    /// Friction takes nearly all that the normal forces carry.
-    NothingCarried,
-}
-
-impl BalanceExit {
-    /// The answers of the last round, if they are good enough: with a remark where they are not quite.
-    fn judged<A>(
-        self,
-        last: Option<A>,
-        tolerance: f64,
-        share: f64,
-        wheel: &mut WheelContact,
-    ) -> Result<A, SolveError> {
-        match (self, last) {
-            (BalanceExit::Balanced, Some(answers)) => Ok(answers),
-            (BalanceExit::RoundsUsedUp { change }, Some(answers)) if change <= BALANCE_POOR => {
-                let remark = Remark::IterationInexact {
-                    iteration: "balance of friction and the vertical force",
-                    reason: "the rounds were used up",
-                    residual: change,
-                    tolerance,
-                };
-                wheel.remarks.push(remark.into());
-                Ok(answers)
-            }
-            _ => Err(SolveError::NormalProblem {
-                reason: format!(
-                    "normal and tangential forces do not come to balance the vertical force in {ROUNDS_MAX} rounds; \
-                     friction carries {share:+.3} of what the normal forces do. Give a normal_force_n or an approach_mm"
-                ),
-            }),
-        }
-    }
-}
-
-/// The friction to count on next, after rounds that counted on the first of two numbers and found the second: a secant step
-/// where two rounds tell the slope, because friction found may swing about friction counted on where a flange is steep.
-fn next_share((counted, found): (f64, f64), before: Option<(f64, f64)>) -> f64 {
-    let slope = match before {
-        Some((at, was)) if (counted - at).abs() > f64::EPSILON => (found - was) / (counted - at),
-        _ => 0.0,
-    };
-    counted + (found - counted) / (1.0 - slope.clamp(SLOPES[0], SLOPES[1]))
-}
-
-/// By which part the vertical force may be missed.
-fn tolerance(resolution: Resolution) -> f64 {
-    match resolution {
-        Resolution::Target(target) => BALANCE.min(BALANCE_OF_TARGET * target),
-        Resolution::Mesh(_) => BALANCE,
     }
 }
 
@@ -419,31 +380,5 @@ impl From<SurfaceMissed> for SolveError {
         SolveError::NormalProblem {
             reason: miss.to_string(),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_second_round_hits_the_balance_of_a_straight_line_however_it_swings() {
-        for slope in [-0.8, -0.3, 0.2, 0.5] {
-            let found = |counted: f64| 0.1 + slope * counted;
-            let first = (0.3, found(0.3));
-            let counted = next_share(first, None);
-            assert!(
-                (counted - first.1).abs() < 1e-12,
-                "nothing is known of the slope yet"
-            );
-            let balanced = next_share((counted, found(counted)), Some(first));
-            assert!((found(balanced) - balanced).abs() < 1e-12, "{slope}");
-        }
-    }
-
-    #[test]
-    fn a_slope_beyond_belief_makes_no_wild_step() {
-        let step = next_share((0.2, 0.3), Some((0.2 - 1e-6, 0.1))) - 0.2;
-        assert!((step - 0.25).abs() < 1e-9, "{step}");
     }
 }

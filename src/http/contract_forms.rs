@@ -44,7 +44,7 @@ const MEMBERS: [(&str, usize, Option<usize>); 3] = [
 ];
 
 /// Members that are lists of so many numbers, or lists of those.
-const TUPLES: [(&str, &str, usize); 31] = [
+const TUPLES: [(&str, &str, usize); 32] = [
     ("ArchardFigures", "speeds_mm_per_s", 2),
     ("CrossSection", "points_mm", 2),
     ("EquivalentConicity", "turns_mm", 2),
@@ -59,6 +59,7 @@ const TUPLES: [(&str, &str, usize); 31] = [
     ("Outlines", "patch", 2),
     ("Outlines", "slip", 2),
     ("Outlines", "stick", 2),
+    ("MotionRegion", "extent_mm", 4),
     ("PatchSolution", "extent_mm", 4),
     ("PatchSolution", "semi_axes_mm", 2),
     ("PlacedProfiles", "rail_mm", 2),

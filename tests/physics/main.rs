@@ -96,6 +96,7 @@ mod targets;
 #[path = "../../benches/calibrate/truth.rs"]
 mod truth;
 mod unlike;
+mod unlike_wheels;
 mod watched;
 mod wheelset;
 mod wheelset_pulls;

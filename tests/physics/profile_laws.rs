@@ -34,7 +34,7 @@ fn load(case: &Value, name: &str, value: f64) -> Value {
 }
 
 /// A rail of radius 300 mm under a wheel coned 1:20.
-fn cone_on_arc() -> Value {
+pub fn cone_on_arc() -> Value {
     let arc: Vec<[f64; 2]> = (-60..=60)
         .map(|k| 0.5 * f64::from(k))
         .map(|y| [y, 300.0 - (9e4 - y * y).sqrt()])

@@ -169,6 +169,9 @@ fn gap_guesses(task: &GapTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
 const UNLIKE_ROUNDS: f64 = 3.0;
 /// See [`UNLIKE_ROUNDS`].
 const GAP_ROUND: f64 = 0.015;
+/// Times longer of a round that seeks the creepages of a force: of four such motions of two of these contacts single ones took 0.02 to 1 s, the
+/// longest without creepage and force at K = 0.25.
+const UNLIKE_SOUGHT: f64 = 3.0;
 /// Time of a motion whose surfaces slip by their pressure too over that of like bodies: rounds, and a displacement from the pressure of
 /// every cell at the edges of all others (same contacts).
 const UNLIKE_TIMES: f64 = 4.0;
@@ -216,7 +219,7 @@ impl CheckedCase {
             (method, _) => self.on_one_mesh(method, patches.len()),
         };
         let tangential = self.friction_times() * tangential;
-        let (normal, tangential) = self.unlike_seconds([normal, tangential]);
+        let (normal, tangential) = self.unlike_seconds([normal, tangential], patches.len());
         let motions = self.problem.motions.len() as f64;
         let after = motions * self.after_seconds(patches.len());
         let whole = normal + tangential + after;
@@ -251,14 +254,25 @@ impl CheckedCase {
         once * rounds * task.poses.len() as f64 + kinematics
     }
 
-    /// Times of the normal and the tangential problem where bodies differ.
-    fn unlike_seconds(&self, [normal, tangential]: [f64; 2]) -> (f64, f64) {
+    /// Times of the normal and the tangential problem where bodies differ: rounds belong to the motions, since each has a region of its own.
+    fn unlike_seconds(&self, [normal, tangential]: [f64; 2], patches: usize) -> (f64, f64) {
         let coupled = self.run.method == Method::BoundaryElement;
         if self.problem.is_coupled(&self.run) {
-            (
-                normal.max(GAP_ROUND) * UNLIKE_ROUNDS,
-                UNLIKE_TIMES * tangential,
-            )
+            let sought = |k: usize| {
+                if self.is_prescribed(k) {
+                    UNLIKE_SOUGHT
+                } else {
+                    1.0
+                }
+            };
+            let motions: f64 = (0..self.problem.motions.len()).map(sought).sum();
+            let round = match self.problem.task {
+                // Most of it is the search for the height, and rounds keep the load.
+                NormalTask::Wheel(_) | NormalTask::Wheelset(_) => GAP_ROUND * patches as f64,
+                _ => normal.max(GAP_ROUND),
+            };
+            let rounds = motions * UNLIKE_ROUNDS * round;
+            (normal, rounds + UNLIKE_TIMES * tangential)
         } else if coupled && self.problem.elasticity.difference != 0.0 {
             (normal, UNLIKE_TIMES * tangential)
         } else {
@@ -314,6 +328,7 @@ impl CheckedCase {
         let finer = (TARGET_USUAL / target.max(TARGET_LEAST)).max(1.0);
         let spin_share = SWEEP_SHARE_SPIN * finer.powf(SWEEP_SPIN_POWER);
         let fields = FIELDS_SECONDS_PER_CELL * self.field_cells();
+        let alone = problem.is_coupled(&self.run);
         let mut before: Option<Vec<MotionGuess>> = None;
         let motions = problem.motions.iter().enumerate().map(|(k, motion)| {
             let prescribed = self.is_prescribed(k);
@@ -336,7 +351,8 @@ impl CheckedCase {
                 precise * (share * guess.seconds).max(MOTION_SECONDS_MIN)
             };
             let seconds: f64 = guesses.iter().enumerate().map(of_patch).sum();
-            before = Some(guesses);
+            // Where each motion has a region of its own, none starts from another.
+            before = (!alone).then_some(guesses);
             seconds.max(crowd) + fields
         });
         SECONDS_MIN + motions.sum::<f64>()
@@ -362,6 +378,10 @@ impl CheckedCase {
             Method::Table => (0.0, TABLE_SECONDS),
         };
         let motions = self.problem.motions.len();
+        let first = match self.problem.is_coupled(&self.run) {
+            true => first * motions as f64,
+            false => first,
+        };
         let prescribed = (0..motions).filter(|k| self.is_prescribed(*k)).count();
         let solves = motions as f64 + TRIALS * prescribed as f64;
         SECONDS_MIN * patches as f64 + first + each * solves + fields * motions as f64

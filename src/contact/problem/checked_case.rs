@@ -68,7 +68,7 @@ impl CheckedCase {
             forces: &problem.forces,
             speeds: &problem.speeds,
             first_motion: problem.part.before,
-            single_motion: problem.part.all == 1,
+            single_motion: problem.part.all == 1 || problem.is_coupled(run),
             method: run.method,
             traction_bound: run.traction_bound,
             resolution: run.resolution,

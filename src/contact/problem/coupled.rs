@@ -13,10 +13,13 @@ const FIRST_ORDER: f64 = 0.6;
 const PART_OF_TARGET: f64 = 0.1;
 
 impl Problem {
-    /// Error of forces, relative to μN, that is left if only tractions feel the other: 0 where the bodies are alike or without friction.
+    /// Error of forces, relative to μN, that is left if only tractions feel the other: 0 where the bodies are alike or without friction, and
+    /// where the pressure is given, since it is that of the contact whatever the tractions are.
     #[must_use]
     pub fn first_order_error(&self, method: Method) -> f64 {
-        let coupled = method == Method::BoundaryElement && !self.friction.is_frictionless();
+        let coupled = method == Method::BoundaryElement
+            && !self.friction.is_frictionless()
+            && !matches!(self.task, NormalTask::Given(_));
         let difference = if coupled {
             self.elasticity.difference.abs()
         } else {
@@ -25,26 +28,33 @@ impl Problem {
         FIRST_ORDER * difference * self.friction.largest()
     }
 
-    /// Is the pressure found together with the tractions? It is of one motion or one pressing alone, since all motions of a case share their
-    /// patches, and where the gap is known.
+    /// Is the pressure found together with the tractions? It is of motions and of one pressing alone, where the gap is known. Points of a
+    /// history that goes on share their patches.
     #[must_use]
     pub fn is_coupled(&self, run: &Run) -> bool {
-        let known = matches!(self.task, NormalTask::Hertz(_) | NormalTask::Gap(_));
-        let alone = match &self.history {
-            None => self.part.all == 1,
-            Some(history) => history.only_presses() && self.forces == [[None; 2]],
+        let solved = match (&self.task, &self.history) {
+            (NormalTask::Given(_), _) => false,
+            (_, None) => true,
+            (NormalTask::Hertz(_) | NormalTask::Gap(_), Some(history)) => {
+                history.only_presses() && self.forces == [[None; 2]]
+            }
+            (NormalTask::Wheel(_) | NormalTask::Wheelset(_), Some(_)) => false,
         };
-        known && alone && self.first_order_error(run.method) > negligible(run)
+        solved && self.first_order_error(run.method) > negligible(run)
     }
 
     /// The remark if the pressure should feel the tractions and does not.
     pub(crate) fn first_order(&self, run: &Run) -> Option<Remark> {
-        let error = self.first_order_error(run.method);
-        let needed = error > negligible(run) && !self.is_coupled(run);
-        needed.then_some(Remark::CouplingFirstOrder {
+        let needed = self.first_order_error(run.method) > negligible(run) && !self.is_coupled(run);
+        needed.then(|| self.first_order_remark(run.method))
+    }
+
+    /// What is said of motions whose pressure does not feel the tractions.
+    pub(crate) fn first_order_remark(&self, method: Method) -> Remark {
+        Remark::CouplingFirstOrder {
             difference_parameter: self.elasticity.difference,
-            error,
-        })
+            error: self.first_order_error(method),
+        }
     }
 }
 

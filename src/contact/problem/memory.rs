@@ -48,7 +48,7 @@ pub(crate) struct SizeInput {
     /// Segments per strip, for each patch.
     pub(crate) segments: Vec<f64>,
     pub(crate) motions: usize,
-    /// Motions with spin, which may each want a mesh about a pole of its own.
+    /// Motions that may each want a mesh of their own: about a pole where they have spin, on a region where bodies differ.
     pub(crate) spinning: usize,
     /// Values per cell are kept motion by motion.
     pub(crate) fields: bool,
@@ -252,7 +252,12 @@ impl CheckedCase {
             resolution: self.run.resolution,
             segments: segments(&self.problem.task),
             motions: self.problem.motions.len() * positions(&self.problem.task),
-            spinning: spinning(&self.problem.motions) * positions(&self.problem.task),
+            spinning: if self.problem.is_coupled(&self.run) {
+                // Each motion has a region, and with it meshes, of its own.
+                self.problem.motions.len()
+            } else {
+                spinning(&self.problem.motions) * positions(&self.problem.task)
+            },
             history: self.problem.history.is_some(),
             pressed: (self.problem.history.iter()).any(|h| h.start == HistoryStart::Pressed),
             fields: self.run.outputs.iter().any(|output| output.is_per_cell()),

@@ -4,6 +4,8 @@ use crate::contact::mesh::size::MeshSize;
 
 /// The target that stands for an explicit mesh where a search needs one. Chosen by judgement; how much it matters was not measured.
 const TARGET_OF_MESH: f64 = 0.005;
+/// Part of a target that another error may take up while the rest of it is still sought.
+const ERROR_MAX: f64 = 0.95;
 
 /// Mesh chosen by the solver for a target, or given by the client.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,12 +32,12 @@ impl Resolution {
         self.target().unwrap_or(TARGET_OF_MESH)
     }
 
-    /// The target reduced so that its root sum of squares with another error equals the original; unchanged if that error is 0 or at least
-    /// the target.
+    /// The target reduced so that its root sum of squares with another error equals the original; unchanged if that error is 0, or takes up
+    /// the target so that the finest meshes would hardly meet the rest.
     #[must_use]
     pub fn beside(self, error: f64) -> Resolution {
         match self {
-            Resolution::Target(target) if 0.0 < error && error < target => {
+            Resolution::Target(target) if 0.0 < error && error < ERROR_MAX * target => {
                 Resolution::Target((target * target - error * error).sqrt())
             }
             unchanged => unchanged,

@@ -45,7 +45,7 @@ pub struct RollingTask<'a> {
     pub speeds: &'a [Option<f64>],
     /// The number of the first of these motions in its case.
     pub first_motion: usize,
-    /// Does the case ask about one motion alone?
+    /// Is there one motion alone on this footprint, whatever the case asks besides?
     pub single_motion: bool,
     /// The method.
     pub method: Method,

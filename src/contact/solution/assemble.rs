@@ -290,6 +290,7 @@ fn point_solution(
         subsurface: None,
         damage: None,
         temperature: None,
+        region: None,
     }
 }
 
@@ -303,14 +304,7 @@ fn target_met(case: &CheckedCase, point: &MotionAnswer) -> Option<bool> {
     let Resolution::Target(target) = case.run.resolution else {
         return None;
     };
-    Some(
-        point
-            .errors
-            .last()
-            .copied()
-            .flatten()
-            .is_some_and(|e| e <= target),
-    )
+    Some(point.error().is_some_and(|error| error <= target))
 }
 
 #[derive(Clone, Copy)]

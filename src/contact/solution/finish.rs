@@ -79,6 +79,11 @@ fn clear_dust(case: &CheckedCase, solution: &mut Solution) {
             let speed = creepage.hypot(motion.spin_per_mm * length);
             clear(&mut point.friction_power_n, limit * speed);
             clear(&mut point.friction_power_without_spin_n, limit * speed);
+            let extent = point
+                .region
+                .iter_mut()
+                .flat_map(|region| &mut region.extent_mm);
+            extent.for_each(|end| clear(end, length));
         }
         patch
             .extent_mm

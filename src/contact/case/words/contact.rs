@@ -47,7 +47,8 @@ pub enum Contact {
         /// Distance of the undeformed surfaces, in mm: `gap_mm[j][i]` at `(x_mm[i], y_mm[j])`; any constant may be added.
         gap_mm: Vec<Vec<f64>>,
     },
-    /// A given pressure on a grid; its positive part is the contact region, which may have several patches.
+    /// A given pressure on a grid; its positive part is the contact region, which may have several patches. It is kept as it stands, also where
+    /// the bodies differ, so that it has to contain what tractions do to it.
     PressureGrid {
         /// Strictly increasing coordinates along the rolling direction, in mm.
         x_mm: Vec<f64>,

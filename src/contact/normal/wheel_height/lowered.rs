@@ -227,7 +227,7 @@ impl WheelTask {
 }
 
 /// Deepest overlap of a gap in mm.
-fn depth(gap: &LocalGap) -> f64 {
+pub(crate) fn depth(gap: &LocalGap) -> f64 {
     -gap.gap
         .iter()
         .flatten()

@@ -40,7 +40,7 @@ macro_rules! case_remarks {
             }
             code: "coupling-first-order",
             severity: Warning,
-            advice: "Ask for each motion in a case of its own, with `radii`, `ellipse` or a gap as its contact: such cases also include the effect of tractions on pressure.",
+            advice: "The error is part of the estimates. Steady motions also include the effect of tractions on pressure, but for those whose tractions part or join patches.",
             detail: format!(
                 "the two bodies differ (K = {difference_parameter:.4}); the effect of pressure on tractions is included, the effect of tractions on \
                  pressure is not; this leaves an error of {error:.4} of the friction limit"

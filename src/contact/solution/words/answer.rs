@@ -25,10 +25,11 @@ pub struct Solution {
     /// What the client should know before using the numbers.
     #[serde(default)]
     pub remarks: Vec<RemarkEntry>,
-    /// How region and pressure were found; absent where they were known beforehand.
+    /// How region and pressure were found; absent where they were known beforehand. Of several motions of bodies that differ, those of the first.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub normal: Option<NormalReport>,
-    /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`.
+    /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`. Where bodies differ, it is that of a wheel
+    /// without tractions.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub wheel_lowering_mm: Option<f64>,
     /// Angular velocity of the wheelset in rad/s, found for the longitudinal force that was prescribed; only for `profiles` with `wheelset.force_x_n`.
@@ -124,7 +125,8 @@ pub struct CombinedMaterial {
     pub difference_parameter: f64,
 }
 
-/// One contact patch with its answers for every motion.
+/// One contact patch with its answers for every motion. Of several motions of bodies that differ its numbers are those of the first; every
+/// point has its own in `region`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PatchSolution {
     /// Normal force in N.
@@ -242,6 +244,31 @@ pub struct PointSolution {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub temperature: Option<TemperatureSummary>,
+    /// Region and pressure under this motion; only of several motions of bodies that differ, whose tractions change both.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub region: Option<Box<MotionRegion>>,
+}
+
+/// Region and pressure of a patch under one motion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct MotionRegion {
+    /// Normal force in N.
+    pub normal_force_n: f64,
+    /// The largest tangential force that friction allows, in N.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub friction_limit_n: Option<f64>,
+    /// Approach of distant points in mm.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub approach_mm: Option<f64>,
+    /// Contact area in mm².
+    pub area_mm2: f64,
+    /// Largest pressure in MPa.
+    pub pressure_max_mpa: f64,
+    /// Extent `[x_min, x_max, y_min, y_max]` in mm.
+    pub extent_mm: [f64; 4],
 }
 
 /// A point of a history.
