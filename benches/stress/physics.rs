@@ -12,13 +12,18 @@ use crate::random::Random;
 /// A class, how many cases of it are solved, and how one is made.
 type Class = (&'static str, usize, fn(&mut Random, &mut Value));
 
-const CLASSES: [Class; 6] = [
+/// A wheel on a rail, tread on crown.
+const WHEEL: &str = include_str!("../../api/examples/wheel-rail.case.json");
+
+const CLASSES: [Class; 8] = [
     ("friction falls with slip", 600, falling),
     ("friction varies across", 400, across),
     ("friction falls with temperature", 300, heated),
     ("a layer, a reduction", 400, layered),
     ("a layer that yields", 200, yielding),
     ("bodies differ", 60, unlike),
+    ("bodies differ, several motions", 40, unlike_motions),
+    ("bodies differ, a wheel on a rail", 40, unlike_wheel),
 ];
 
 fn falling(random: &mut Random, case: &mut Value) {
@@ -79,6 +84,22 @@ fn unlike(random: &mut Random, case: &mut Value) {
     case["solver"] = json!({ "target_error": 0.01 });
 }
 
+fn unlike_motions(random: &mut Random, case: &mut Value) {
+    unlike(random, case);
+    let motions: Vec<Value> = (0..3).map(|_| base(random)["motion"].take()).collect();
+    case["motion"] = json!({ "list": motions });
+}
+
+fn unlike_wheel(random: &mut Random, case: &mut Value) {
+    let motion = case["motion"].take();
+    *case = serde_json::from_str(WHEEL).expect("an example");
+    unlike(random, case);
+    case["motion"] = motion;
+    case["contact"]["lateral_shift_mm"] = json!(random.between(-5.0, 3.0));
+    case["load"]["vertical_force_n"] = json!(random.decades(10_000.0, 120_000.0));
+    case["outputs"] = json!(["resultants"]);
+}
+
 /// A case to begin with: like bodies, a coefficient of friction, an ellipse, creepages of a wheel on a rail.
 pub fn base(random: &mut Random) -> Value {
     let ratio = random.decades(0.3, 3.0).sqrt();
@@ -132,28 +153,33 @@ pub fn table(seed: u64) -> String {
     text + "\n" + &troubles
 }
 
-/// Whether the target was met and a second state found; nothing if the case was refused.
+/// Whether the target was met in all points and a second state found; nothing if the case was refused.
 fn one(case: &Value) -> Result<Option<[bool; 2]>, String> {
     let Ok(checked) = contact::check(case, &Limits::default()) else {
         return Ok(None);
     };
     let (solution, _) =
         contact::solve(&checked, &Unmonitored).map_err(|error| error.to_string())?;
-    let patch = &solution.patches[0];
-    let point = &patch.points[0];
-    let limit = patch.friction_limit_n.unwrap_or(0.0);
-    let force = point.force_x_n.hypot(point.force_y_n);
-    if force > 1.02 * limit {
-        return Err(format!("a force of {force} N beyond {limit} N"));
-    }
-    if point.friction_power_n
-        < -0.01 * limit * point.motion.creepage_x.hypot(point.motion.creepage_y)
-    {
-        return Err(format!("a friction power of {} N", point.friction_power_n));
+    let mut met = true;
+    for patch in &solution.patches {
+        for point in &patch.points {
+            met &= point.target_met == Some(true);
+            let own = point.region.as_ref();
+            let limit = own.map_or(patch.friction_limit_n, |region| region.friction_limit_n);
+            let limit = limit.unwrap_or(0.0);
+            let force = point.force_x_n.hypot(point.force_y_n);
+            if force > 1.02 * limit {
+                return Err(format!("a force of {force} N beyond {limit} N"));
+            }
+            let creepage = point.motion.creepage_x.hypot(point.motion.creepage_y);
+            if point.friction_power_n < -0.01 * limit * creepage {
+                return Err(format!("a friction power of {} N", point.friction_power_n));
+            }
+        }
     }
     let several = solution
         .remarks
         .iter()
         .any(|remark| remark.code == "several-solutions");
-    Ok(Some([point.target_met == Some(true), several]))
+    Ok(Some([met, several]))
 }
