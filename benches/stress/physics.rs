@@ -87,7 +87,7 @@ fn unlike(random: &mut Random, case: &mut Value) {
 fn unlike_motions(random: &mut Random, case: &mut Value) {
     unlike(random, case);
     let motions: Vec<Value> = (0..3).map(|_| base(random)["motion"].take()).collect();
-    case["motion"] = json!({ "list": motions });
+    case["motion"] = json!(motions);
 }
 
 fn unlike_wheel(random: &mut Random, case: &mut Value) {

@@ -175,6 +175,29 @@ fn a_shift_is_cattaneos_by_force_and_by_displacement() {
     }
 }
 
+#[test]
+fn the_error_of_a_shift_covers_that_to_cattaneo() {
+    let mut failures = Vec::new();
+    for part in 1..=17 {
+        let part = 0.05 * f64::from(part);
+        let motion =
+            json!({ "history": { "distance_mm": 0, "force_x_n": part * LIMIT }, "start": "rest" });
+        let (solution, _) = solve(&sphere(0.0, motion));
+        let found = of_history(&solution.patches[0].points[0]);
+        let shift = found.shift_x_mm.unwrap();
+        let off = (shift - cattaneo(0.0, part)).abs();
+        println!(
+            "{part:.2}: {:.5} {:.5}",
+            off / shift,
+            found.shift_x_error_mm.unwrap() / shift
+        );
+        if off > found.shift_x_error_mm.unwrap() {
+            failures.push(format!("{part}: {off} of {shift}"));
+        }
+    }
+    assert_none("shifts without cover", &failures);
+}
+
 /// Points on one level, with the energies that answers do not have.
 fn on_level(case: &Value, size: MeshSize, longest: f64) -> Vec<PointRecord> {
     let case = contact::check(case, &Limits::default()).unwrap();

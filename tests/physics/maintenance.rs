@@ -237,3 +237,26 @@ fn the_highest_temperature_is_that_of_contact() {
     }
     assert_none("temperatures differ", &failures);
 }
+
+#[test]
+fn a_contact_too_slow_for_its_temperatures_is_told() {
+    let told = |speed: f64| {
+        let reference = &read::<Vec<HeatReference>>("temperature.json")[0];
+        let mut case = reference.case();
+        case["motion"]["speed_mm_per_s"] = json!(speed);
+        let (solution, _) = solve(&case);
+        let peclet = solution.patches[0].points[0]
+            .temperature
+            .expect("asked for")
+            .peclet;
+        let remarks = &solution.remarks;
+        (
+            peclet,
+            remarks.iter().any(|remark| remark.code == "heat-spreads"),
+        )
+    };
+    let (fast, said) = told(30_000.0);
+    assert!(fast > 10.0 && !said);
+    let (slow, said) = told(1.0);
+    assert!(slow < 10.0 && said);
+}

@@ -67,6 +67,20 @@ impl Reference {
 }
 
 #[test]
+fn a_wheel_that_pulls_nothing_is_found_without_a_warning() {
+    let mut failures = Vec::new();
+    for reference in read::<Vec<Reference>>("unlike.json") {
+        let (solution, _) = solve(&reference.case(json!({ "force_x_n": 0 })));
+        let inexact = solution
+            .remarks
+            .iter()
+            .find(|r| r.code == "iteration-inexact");
+        failures.extend(inexact.map(|remark| format!("{}: {}", reference.id, remark.detail)));
+    }
+    assert_none("forces not found", &failures);
+}
+
+#[test]
 fn unlike_bodies_agree_with_contact_within_one_percent_and_the_estimate() {
     let all: Vec<Reference> = read("unlike.json");
     let (mut failures, mut covered) = (Vec::new(), 0);

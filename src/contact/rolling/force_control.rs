@@ -316,7 +316,9 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
             _ => MISSED,
         };
         let wanted = length(self.forces.map(|f| f.unwrap_or(0.0) / self.limit));
-        let scale = self.first.unwrap_or(1.0).max(wanted).min(1.0);
+        // Where pressure alone pulls, the forces of the first motion tried say nothing of the size of those to be sought.
+        let first = self.first.filter(|_| !self.task.is_coupled());
+        let scale = first.unwrap_or(1.0).max(wanted).min(1.0);
         let left = (NEAR_LIMIT * (1.0 - wanted)).max(0.0);
         let most = if self.rough {
             MISSED_ON_COARSEST.max(most)

@@ -113,7 +113,8 @@ impl<'a> Assembly<'a> {
                 None => maintain::add_rest(case, solved, &mut points, monitor)?,
             };
             let number = case.problem.part.before + index;
-            self.remarks.extend(kept.remark.map(|r| r.at_point(number)));
+            self.remarks
+                .extend(kept.remarks.into_iter().map(|r| r.at_point(number)));
             if wants_fields(case) {
                 self.add_fields(level, fields, kept.fields);
             }

@@ -34,6 +34,8 @@ use crate::contact::solution::words::maintenance::{SubsurfaceSummary, Temperatur
 /// to cell would show, whose stresses grow without bound. There the largest error in the reference contacts is 0.3 % of the largest pressure
 /// (`cargo test --test physics -- stresses_are --nocapture`).
 const LEAST_DEPTH: f64 = 0.01;
+/// Péclet number from which heat may be taken to flow only into the depth (Jaeger 1942): below it the temperatures are too high.
+const PECLET_LEAST: f64 = 10.0;
 /// Points between two looks at the monitor.
 const POINTS_UNASKED: usize = 1024;
 
@@ -43,7 +45,7 @@ pub(crate) struct KeptValues {
     /// The values that are kept of every patch.
     pub(crate) fields: Vec<PointFields>,
     /// What there is to say of them.
-    pub(crate) remark: Option<Remark>,
+    pub(crate) remarks: Vec<Remark>,
 }
 
 /// A motion solved on a level.
@@ -122,9 +124,15 @@ pub(crate) fn add_rest(
             }
         }
     }
-    let remark = add_stresses(case, solved, points, &mut kept, monitor)?;
-    let fields = kept;
-    Ok(KeptValues { fields, remark })
+    let slow = points
+        .iter()
+        .filter_map(|point| point.temperature.map(|found| found.peclet));
+    let slow = slow_remark(slow.fold(f64::INFINITY, f64::min));
+    let stresses = add_stresses(case, solved, points, &mut kept, monitor)?;
+    Ok(KeptValues {
+        fields: kept,
+        remarks: slow.into_iter().chain(stresses).collect(),
+    })
 }
 
 /// The same of a point of a history, whose slips are those of its step.
@@ -144,9 +152,11 @@ pub(crate) fn add_of_history(
             (kept.slip_x, kept.slip_y) = (Some(x), Some(y));
         }
     }
-    let remark = add_stresses(case, solved, points, &mut kept, monitor)?;
-    let fields = kept;
-    Ok(KeptValues { fields, remark })
+    let stresses = add_stresses(case, solved, points, &mut kept, monitor)?;
+    Ok(KeptValues {
+        fields: kept,
+        remarks: stresses.into_iter().collect(),
+    })
 }
 
 /// Stresses below the surface, where they are asked for; what there is to say of them is returned.
@@ -167,6 +177,15 @@ fn add_stresses(
         kept.subsurface = Some(found.points);
     }
     Ok(ball_remark(gap))
+}
+
+/// The remark on a contact that passes too slowly for heat to flow only into the depth, at this smallest Péclet number of its patches; infinite where
+/// no temperatures are asked for.
+fn slow_remark(peclet: f64) -> Option<Remark> {
+    (peclet < PECLET_LEAST).then_some(Remark::HeatSpreads {
+        peclet,
+        least: PECLET_LEAST,
+    })
 }
 
 /// The remark on a passage whose smallest ball about the stresses was not found to its tolerance.

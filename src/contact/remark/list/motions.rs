@@ -46,6 +46,20 @@ macro_rules! motion_remarks {
                  the friction limit; the answer is the one reached from rest"
             ),
 
+            /// The contact passes so slowly that heat also flows along the surface.
+            HeatSpreads {
+                /// Péclet number.
+                peclet: f64 = 0.24,
+                /// The least that passes without a remark.
+                least: f64 = 10.0,
+            }
+            code: "heat-spreads",
+            severity: Warning,
+            advice: "Take the temperatures as an upper bound; check the speed, which is in mm/s.",
+            detail: format!(
+                "the Péclet number is {peclet:.3}; temperatures are computed as if heat flowed only into the depth, which holds from about {least} on"
+            ),
+
             /// The error is not known to be below the target.
             TargetMissed {
                 /// Estimated error relative to μN; absent if it is unknown.

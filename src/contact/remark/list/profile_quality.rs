@@ -89,7 +89,11 @@ macro_rules! profile_remarks {
             code: "smoothing-chosen",
             severity: Info,
             advice: "Nothing; give `smoothing_mm` as a number to use the same for other cases.",
-            detail: format!("{profile}: smoothed by {smoothing_mm:.2} mm, chosen from the noise of its points"),
+            detail: if *smoothing_mm > 0.0 {
+                format!("{profile}: smoothed by {smoothing_mm:.2} mm, chosen from the noise of its points")
+            } else {
+                format!("{profile}: not smoothed, since its points are hardly noisy")
+            },
 
             /// The points of a profile are too few or too far apart to tell their noise from its shape, so that `smoothing_mm: "auto"` chose no smoothing.
             SmoothingUndecided {
