@@ -7,8 +7,8 @@
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
-use crate::contact::half_space::kernels::{Rectangle, rectangle};
 use crate::contact::normal::gap::grid::PressureGrid;
+use crate::contact::normal::gap::near_cells::NearCells;
 
 /// Chebyshev points per axis. Displacements differ from the exact sum by less than 5e-5 of the largest one that the other grid
 /// causes (the test below; with 6 points by 1e-4). That is the error of interpolation alone: 11 points leave 2e-7.
@@ -314,28 +314,24 @@ impl Near {
         acting: Cells,
         contact_modulus: f64,
     ) -> Near {
-        let (places, centres) = (
-            [to.centres(0), to.centres(1)],
-            [from.centres(0), from.centres(1)],
-        );
-        let half = from.step.map(|step| 0.5 * step);
-        let mut coefficients = Vec::with_capacity(acted.number() * acting.number());
-        for source in acting.cells(from.cells[0]) {
-            let [x, y] = [
-                centres[0][source % from.cells[0]],
-                centres[1][source / from.cells[0]],
-            ];
-            let pressed = Rectangle {
-                x0: x - half[0],
-                x1: x + half[0],
-                y0: y - half[1],
-                y1: y + half[1],
-            };
-            for cell in acted.cells(to.cells[0]) {
-                let [x, y] = [places[0][cell % to.cells[0]], places[1][cell / to.cells[0]]];
-                coefficients.push((rectangle(x, y, pressed, 0.0).zz / contact_modulus) as f32);
-            }
-        }
+        let centres = [to.centres(0), to.centres(1)];
+        let of_cells = |axis: usize| -> Vec<f64> {
+            let index = |cell: usize| [cell % to.cells[0], cell / to.cells[0]][axis];
+            let cells = acted.cells(to.cells[0]);
+            cells.map(|cell| centres[axis][index(cell)]).collect()
+        };
+        let edges = |axis: usize| -> Vec<f64> {
+            let low = from.range(axis)[0];
+            let first = acting.first[axis];
+            let edges = first..=first + acting.count[axis];
+            edges.map(|i| low + i as f64 * from.step[axis]).collect()
+        };
+        let cells = NearCells {
+            places: [&of_cells(0), &of_cells(1)],
+            edges: [&edges(0), &edges(1)],
+            contact_modulus,
+        };
+        let coefficients = cells.coefficients();
         Near {
             to: acted,
             from: acting,

@@ -7,6 +7,7 @@ pub mod constants;
 pub mod coupling;
 pub mod edges;
 pub mod grid;
+pub mod near_cells;
 pub mod outcome;
 pub mod pilot;
 pub mod pilot_solve;

@@ -75,11 +75,8 @@ impl GapTask {
         }
         remarks.extend(self.remarks(&field, pressed.approach - outcome.least));
         let depth = pressed.approach - outcome.least;
-        let mut tiles = outcome.tiles;
-        let start = match (tiles.pop(), tiles.is_empty()) {
-            (Some(tile), true) => Some(GapStart::new(tile, depth, field.load_centre(None))),
-            _ => None,
-        };
+        let centre = field.load_centre(None);
+        let start = Some(GapStart::new(outcome.tiles, depth, centre));
         Ok(NormalAnswer {
             field,
             report,

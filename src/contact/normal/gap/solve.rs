@@ -63,21 +63,27 @@ impl GapTask {
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
         let resolution = RESOLUTION.for_target(target);
-        let found = self.solve_near(None, resolution, workspace, monitor)?;
+        let found = self.solve_near(Vec::new(), resolution, workspace, monitor)?;
         self.found(found, Edges::Found)
     }
 
-    /// The solution from a start, if it has one there.
+    /// The solution from a start of any number of grids, if it has one there.
     pub(crate) fn solve_near(
         &self,
-        start: Option<Tile>,
+        mut start: Vec<Tile>,
         resolution: GridFineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<GapOutcome, NormalError> {
-        if let Some(start) = start
-            && let Some(found) = self.solve_from(start, resolution, workspace, monitor)?
-        {
+        let found = match (start.len(), start.pop()) {
+            (1, Some(one)) => self.solve_from(one, resolution, workspace, monitor)?,
+            (_, Some(last)) => {
+                start.push(last);
+                self.solve_from_tiles(start, resolution, workspace, monitor)?
+            }
+            (_, None) => None,
+        };
+        if let Some(found) = found {
             return Ok(found);
         }
         self.solve_on(resolution, workspace, monitor)

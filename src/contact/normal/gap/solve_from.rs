@@ -7,11 +7,12 @@ use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
 use crate::contact::normal::gap::constants::NEAR;
-use crate::contact::normal::gap::grid::{GridFineness, PressureGrid};
+use crate::contact::normal::gap::grid::{GridFineness, PressureGrid, within};
 use crate::contact::normal::gap::search_box::SearchBox;
 use crate::contact::normal::gap::surface::Window;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
+use crate::contact::normal::gap::tiles::merged;
 use crate::contact::normal::hertz::NormalLoad;
 
 /// Grids that are tried from a start; each is larger than the one before. Numeric safety.
@@ -49,6 +50,10 @@ impl GapTask {
         let wanted = start
             .grid
             .wanted(&start.pressed, NEAR * depth, resolution, limits);
+        if wanted.capped {
+            let found = self.solve_on_tiles(start, least, resolution, workspace, monitor);
+            return settled(found);
+        }
         let mut grid = PressureGrid::new(wanted.window, wanted.cells, self.gap.is_mirrored());
         let reach = SearchBox {
             window: wanted.window,
@@ -87,6 +92,48 @@ impl GapTask {
         Ok(None)
     }
 
+    /// The same from several grids, one per patch.
+    ///
+    /// # Errors
+    /// The monitor stopped the work.
+    pub(crate) fn solve_from_tiles(
+        &self,
+        start: Vec<Tile>,
+        resolution: GridFineness,
+        workspace: &mut GridWorkspace<f32>,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<GapOutcome>, NormalError> {
+        if !matches!(self.loading, NormalLoad::Approach(_)) {
+            return Ok(None);
+        }
+        let (limits, mirrored) = (self.gap.window(), self.gap.is_mirrored());
+        let inside = |Tile { grid, .. }: &Tile| {
+            let window = within([0, 1].map(|axis| grid.range(axis)), limits);
+            let mirrored = [0, 1].map(|axis| grid.mirrored[axis] && mirrored[axis]);
+            PressureGrid::new(window, grid.cells, mirrored)
+        };
+        let grids: Vec<PressureGrid> = merged(start.iter().map(inside).collect());
+        if grids
+            .iter()
+            .any(|grid| grid.step.iter().any(|step| *step <= 0.0))
+        {
+            // One of them lies beside the samples of this gap.
+            return Ok(None);
+        }
+        let [least, _] = self.gap.extremes();
+        let from = GapOutcome {
+            tiles: start,
+            iterations: 0,
+            exit: GridsExit::GridsUsedUp,
+            pressure_change: 0.0,
+            least,
+        };
+        settled(
+            self.on_tiles(grids, from, resolution, workspace, monitor)
+                .map(Some),
+        )
+    }
+
     /// May the bodies touch at a sample outside a grid, under the pressures on it?
     fn touches_beside(&self, grid: &PressureGrid, pressed: &PressureAnswer) -> bool {
         let Some([x, y, gap]) = self.gap.grid_samples() else {
@@ -109,6 +156,17 @@ impl GapTask {
             let at = [x[k % x.len()], y[k / x.len()]];
             *gap < pressed.approach && outside(at) && gap + sunk(at) < pressed.approach
         })
+    }
+}
+
+/// An outcome whose grids settled; that there is none is no error.
+fn settled(
+    found: Result<Option<GapOutcome>, NormalError>,
+) -> Result<Option<GapOutcome>, NormalError> {
+    match found {
+        Ok(found) => Ok(found.filter(|found| found.exit.settled())),
+        Err(NormalError::NoAnswer(_)) => Ok(None),
+        Err(stopped) => Err(stopped),
     }
 }
 
@@ -154,9 +212,14 @@ mod tests {
 
     /// A bump at y = −6 mm, and another at 6 mm that is `lift` lower, pressed together by an approach.
     fn bumps(lift: f64, approach: f64) -> GapTask {
+        bumps_of([300.0, 100.0], lift, approach)
+    }
+
+    /// The same with these diameters across.
+    fn bumps_of([one, other]: [f64; 2], lift: f64, approach: f64) -> GapTask {
         let [x, y] = [140, 120]
             .map(|most| -> Vec<f64> { (-most..=most).map(|k| 0.1 * f64::from(k)).collect() });
-        let across = |y: f64| ((y + 6.0).powi(2) / 300.0).min((y - 6.0).powi(2) / 100.0 + lift);
+        let across = |y: f64| ((y + 6.0).powi(2) / one).min((y - 6.0).powi(2) / other + lift);
         let line = |y: &f64| x.iter().map(|x| x * x / 920.0 + across(*y)).collect();
         let gap: Vec<Vec<f64>> = y.iter().map(line).collect();
         GapTask {
@@ -172,7 +235,8 @@ mod tests {
         let mut workspace = GridWorkspace::default();
         let before = bumps(lift, 0.05).solve_for(TARGET, &mut workspace, &Unmonitored);
         let start = before.unwrap().start.expect("one grid");
-        let (task, start) = (bumps(lift, 0.06), start.at([0.0, -6.0], 0.06));
+        let task = bumps(lift, 0.06);
+        let start = start.at([0.0, -6.0], 0.06).remove(0);
         let fineness = GridFineness::for_answer(TARGET);
         let near = task.solve_from(start, fineness, &mut workspace, &Unmonitored);
         let near = near
@@ -193,6 +257,30 @@ mod tests {
         assert_eq!(near.field.patches().len(), 1);
         let ratio = force(&near.field) / force(&searched.field);
         assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
+        assert!(near.report.iterations < searched.report.iterations);
+    }
+
+    #[test]
+    fn patches_of_different_size_are_found_from_their_grids_at_another_height() {
+        let mut workspace = GridWorkspace::default();
+        let task = |approach| bumps_of([300.0, 4.0], 0.01, approach);
+        let before = task(0.05).solve_for(TARGET, &mut workspace, &Unmonitored);
+        let before = before.unwrap();
+        let start = before.start.expect("grids that settled");
+        let start = start.at(before.field.load_centre(None), 0.06);
+        assert_eq!(start.len(), 2);
+        let fineness = GridFineness::for_answer(TARGET);
+        let task = task(0.06);
+        let near = task.solve_from_tiles(start, fineness, &mut workspace, &Unmonitored);
+        let near = near.unwrap().expect("nothing else touches");
+        let near = task.found(near, Edges::Found).unwrap();
+        let searched = task.solve_for(TARGET, &mut workspace, &Unmonitored);
+        let searched = searched.unwrap();
+        assert_eq!(near.field.patches().len(), 2);
+        for (found, known) in near.field.patches().iter().zip(searched.field.patches()) {
+            let ratio = found.normal_force / known.normal_force;
+            assert!((ratio - 1.0).abs() < 2e-3, "{ratio}");
+        }
         assert!(near.report.iterations < searched.report.iterations);
     }
 

@@ -58,24 +58,37 @@ impl GapTask {
         monitor: &dyn Monitor,
     ) -> Result<Option<GapOutcome>, NormalError> {
         let limits = self.gap.window();
-        let mut grids = boxes(&whole, limits);
+        let grids = boxes(&whole, limits);
         if !(2..=TILES_MAX).contains(&grids.len()) {
             return Ok(None);
         }
-        let mut found = GapOutcome {
+        let found = GapOutcome {
             tiles: vec![whole],
             iterations: 0,
             exit: GridsExit::GridsUsedUp,
             pressure_change: 0.0,
             least,
         };
+        self.on_tiles(grids, found, resolution, workspace, monitor)
+            .map(Some)
+    }
+
+    /// Refines, moves and enlarges the grids of several patches until they settle; `found` has what is known of them.
+    pub(crate) fn on_tiles(
+        &self,
+        mut grids: Vec<PressureGrid>,
+        mut found: GapOutcome,
+        resolution: GridFineness,
+        workspace: &mut GridWorkspace<f32>,
+        monitor: &dyn Monitor,
+    ) -> Result<GapOutcome, NormalError> {
         for _ in 0..GRIDS_MAX {
             let tiles = self.press_tiles(grids, &found.tiles, workspace, monitor)?;
             let before = std::mem::replace(&mut found.tiles, tiles);
             found.iterations += found.tiles[0].pressed.iterations;
             let peak = |tiles: &[Tile]| tiles.iter().map(Tile::largest).fold(0.0, f64::max);
             found.pressure_change = peak(&before) / peak(&found.tiles) - 1.0;
-            let depth = found.tiles[0].pressed.approach - least;
+            let depth = found.tiles[0].pressed.approach - found.least;
             let total: f64 = found.tiles.iter().map(Tile::load).sum();
             let (mut next, mut changed, mut rough) = (Vec::new(), false, false);
             for tile in &found.tiles {
@@ -109,7 +122,7 @@ impl GapTask {
                 break;
             }
         }
-        Ok(Some(found))
+        Ok(found)
     }
 
     fn press_tiles(
@@ -325,7 +338,7 @@ fn boxes(whole: &Tile, limits: [[f64; 2]; 2]) -> Vec<PressureGrid> {
 }
 
 /// The grids, those that overlap replaced by one over both with the finer cells.
-fn merged(mut grids: Vec<PressureGrid>) -> Vec<PressureGrid> {
+pub(crate) fn merged(mut grids: Vec<PressureGrid>) -> Vec<PressureGrid> {
     let overlap = |a: &PressureGrid, b: &PressureGrid| {
         (0..2).all(|k| a.range(k)[0] < b.range(k)[1] && b.range(k)[0] < a.range(k)[1])
     };

@@ -71,8 +71,8 @@ pub(crate) struct LoweredGap<'a> {
     depth: f64,
     /// Height of the wheel's centre in mm.
     centre: f64,
-    /// What it is solved from, if anything is known.
-    start: Option<Tile>,
+    /// What it is solved from; empty if nothing is known.
+    start: Vec<Tile>,
 }
 
 impl WheelTask {
@@ -100,7 +100,7 @@ impl WheelTask {
                     gap,
                     depth: *depth,
                     centre,
-                    start,
+                    start: start.unwrap_or_default(),
                 };
                 self.solve_gap(place, fineness, workspace, monitor)
             })

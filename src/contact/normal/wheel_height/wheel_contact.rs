@@ -67,7 +67,7 @@ pub struct GapContact {
 
 impl GapContact {
     /// The start for a gap of the same contact at another height, whose deepest overlap is given in mm; nothing if it is another contact.
-    pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Tile> {
+    pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Vec<Tile>> {
         let from = [1, 2].map(|k| self.frame.origin[k]);
         let along = self.frame.origin[0] - gap.frame.origin[0];
         let [across, _] = gap.frame.plane().across(from);
@@ -132,7 +132,7 @@ impl WheelContact {
     }
 
     /// The start for a gap at another height of the wheel.
-    pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Tile> {
+    pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Vec<Tile>> {
         let apart = |known: &&GapContact| (known.frame.rail - gap.frame.rail).abs();
         self.patches
             .iter()
