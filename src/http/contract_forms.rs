@@ -25,7 +25,12 @@ const FORMS: [(&str, &[&str]); 6] = [
     ),
     (
         "Motions",
-        &["SweepMotions", "HistoryMotion", "WheelsetMotion"],
+        &[
+            "SweepMotions",
+            "HistoryMotion",
+            "WheelsetMotion",
+            "WheelsetMotions",
+        ],
     ),
     ("Material", &["TwoMaterials"]),
     ("Field", &["CellField"]),

@@ -4,6 +4,7 @@ use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::solution::words::wheelset::{Kinematics, WheelsetAnswer};
 use serde_json::{Value, json};
 
+use crate::cases::assert_fault;
 use crate::profile_cases::put;
 use crate::profile_shapes::{rail_60e1, s1002};
 use crate::reference::solve;
@@ -65,6 +66,67 @@ fn a_mirrored_wheelset_has_its_sides_exchanged() {
         near(left.contact_angle_rad, -right.contact_angle_rad, 1e-4);
         near(left.moment_z_n_mm, -right.moment_z_n_mm, 2e4);
     }
+}
+
+/// Motions of a list are answered as each by itself, together with positions and in a grid of both.
+#[test]
+fn several_motions_are_those_of_cases_of_their_own() {
+    let moving = |radius: f64| json!({ "speed_mm_per_s": 20000, "free_rolling_radius_mm": radius });
+    let turning = json!({ "speed_mm_per_s": 30000, "drive_torque_n_mm": 2e6 });
+    let motions = [moving(459.0), turning];
+    let (shifts, yaw) = ([0.0, 2.0], 0.001);
+    let ask = |place: Value, motion: Value| {
+        let mut case = put(&wheelset(), "contact", place);
+        case["motion"] = json!({ "wheelset": motion });
+        let (solution, _) = solve(&case);
+        answer(&solution).positions.clone()
+    };
+    let alone = |k: usize, m: usize| {
+        let place = json!({ "lateral_shift_mm": shifts[k], "yaw_rad": yaw });
+        ask(place, motions[m].clone()).remove(0)
+    };
+    let several = json!({ "lateral_shift_mm": { "values": shifts }, "yaw_rad": yaw });
+    let together = ask(several.clone(), json!(motions));
+    let mut in_grid = several;
+    in_grid["combine"] = json!("grid");
+    let grid = ask(in_grid, json!(motions));
+    assert_eq!([together.len(), grid.len()], [2, 4]);
+    for (found, k, m) in [
+        (&together[0], 0, 0),
+        (&together[1], 1, 1),
+        (&grid[1], 0, 1),
+        (&grid[2], 1, 0),
+    ] {
+        let known = alone(k, m);
+        near(found.lateral_shift_mm, shifts[k], 0.0);
+        near(found.roll_rad, known.roll_rad, 1e-6);
+        near(
+            found.angular_velocity_rad_per_s,
+            known.angular_velocity_rad_per_s,
+            1e-3,
+        );
+        for (found, known) in [(&found.left, &known.left), (&found.right, &known.right)] {
+            near(found.force_x_n, known.force_x_n, 60.0);
+            near(found.force_y_n, known.force_y_n, 60.0);
+        }
+    }
+}
+
+#[test]
+fn faulty_lists_of_motions_are_told() {
+    let moving = json!({ "speed_mm_per_s": 20000, "free_rolling_radius_mm": 460 });
+    let place = json!({ "lateral_shift_mm": { "values": [0, 1, 2] } });
+    let mut case = put(&wheelset(), "contact", place);
+    case["motion"] = json!({ "wheelset": [moving, moving] });
+    assert_fault(
+        &case,
+        "/motion/wheelset",
+        &["2 motions given for 3 positions"],
+    );
+    case["motion"] = json!({ "wheelset": [moving, { "speed_mm_per_s": -1, "free_rolling_radius_mm": 460 }, moving] });
+    assert_fault(&case, "/motion/wheelset/1/speed_mm_per_s", &["-1"]);
+    case["motion"] = json!({ "wheelset": [] });
+    assert_fault(&case, "/motion/wheelset", &["an object"]);
 }
 
 /// Vertical forces are those of the load, the totals are the sums of both wheels, and a torque that is given is balanced.

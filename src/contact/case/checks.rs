@@ -74,7 +74,7 @@ impl CheckedParts {
         let task = normal_task(given.contact, given.load, elasticity.as_ref(), limits);
         let task = match (task, given.contact) {
             (None, Some(contact)) if contact.has_profiles() => {
-                on_rails(contact, given.load, elasticity, limits).unwrap_or_else(|found| {
+                on_rails(contact, &given, elasticity, limits).unwrap_or_else(|found| {
                     faults.extend(found);
                     None
                 })
@@ -156,14 +156,16 @@ fn history_faults(
 /// The task of a wheel or a wheelset with its remarks; `None` without faults where something it depends on is not known.
 fn on_rails(
     contact: &Contact,
-    load: Option<&Load>,
+    given: &PartialCase,
     elasticity: Option<Elasticity>,
     limits: &Limits,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
     let modulus = elasticity.map(|elasticity| elasticity.contact_modulus());
     match contact {
-        Contact::Wheelset { .. } => wheelsets::task(contact, load, modulus, limits),
-        _ => wheel_task::task(contact, load, modulus),
+        Contact::Wheelset { .. } => {
+            wheelsets::task(contact, given.load, given.motion, modulus, limits)
+        }
+        _ => wheel_task::task(contact, given.load, modulus),
     }
 }
 

@@ -46,6 +46,10 @@ pub(crate) fn digest(
             Motions::Wheelset { wheelset } => Some(wheelset),
             _ => None,
         },
+        wheelsets: match &case.motion {
+            Motions::Wheelsets { wheelset } => Some(wheelset),
+            _ => None,
+        },
         history: match &case.motion {
             Motions::History { history, start } => Some((history, *start)),
             _ => None,

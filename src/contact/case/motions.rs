@@ -2,7 +2,7 @@
 
 use crate::contact::case::limits::Limits;
 use crate::contact::case::words::history::{History, HistoryCourse, HistoryStartName};
-use crate::contact::case::words::motion::{AskedMotion, Combine, Motions, Sweep, Swept};
+use crate::contact::case::words::motion::{AskedMotion, Combine, Motions, Sweep, Swept, Wheelset};
 use crate::contact::error::Fault;
 use crate::contact::rolling::history::task::{HistoryStart, HistoryTask};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
@@ -138,7 +138,9 @@ fn pointer(given: &Motions, index: usize, name: &str) -> String {
         Motions::Many(_) => format!("/motion/{index}/{name}"),
         Motions::Sweep { .. } => format!("/motion/sweep/{name}"),
         Motions::History { .. } => format!("/motion/history/{name}"),
-        Motions::One(_) | Motions::Wheelset { .. } => format!("/motion/{name}"),
+        Motions::One(_) | Motions::Wheelset { .. } | Motions::Wheelsets { .. } => {
+            format!("/motion/{name}")
+        }
     }
 }
 
@@ -149,7 +151,8 @@ fn pointer(given: &Motions, index: usize, name: &str) -> String {
 /// A fault at `/motion` if there are more than the limits allow.
 fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
     let count = match motions {
-        Motions::One(_) | Motions::Wheelset { .. } => 1,
+        // Those of a wheelset are counted with its positions.
+        Motions::One(_) | Motions::Wheelset { .. } | Motions::Wheelsets { .. } => 1,
         Motions::Many(list) => list.len() as u128,
         Motions::Sweep { sweep } => sweep_length(sweep),
         Motions::History { history, .. } => history.distance_mm.points() as u128,
@@ -169,11 +172,17 @@ fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
         Motions::Sweep { sweep } => write_out(sweep),
         Motions::History { history, .. } => point_by_point(history),
         // Every patch gets its own creepages when it is found.
-        Motions::Wheelset { wheelset } => vec![AskedMotion {
-            speed_mm_per_s: Some(wheelset.speed_mm_per_s),
-            ..STILL
-        }],
+        Motions::Wheelset { wheelset } => vec![still_at(wheelset)],
+        Motions::Wheelsets { wheelset } => wheelset.first().map(still_at).into_iter().collect(),
     })
+}
+
+/// What stands for the motion of a wheelset before patches are found.
+fn still_at(wheelset: &Wheelset) -> AskedMotion {
+    AskedMotion {
+        speed_mm_per_s: Some(wheelset.speed_mm_per_s),
+        ..STILL
+    }
 }
 
 /// The values of a component at so many points, if it is given.

@@ -17,6 +17,7 @@ use crate::contact::method::Method;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::normal::wheel_height::wheelset_task::WheelsetMove;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::profile_points;
 use crate::contact::rolling::history::solve::usual_work;
@@ -244,14 +245,15 @@ impl CheckedCase {
         let NormalTask::Wheelset(task) = &self.problem.task else {
             return once;
         };
-        let rounds = match self.problem.drive_torque {
+        let rounds_of = |moving: &WheelsetMove| match moving.drive_torque {
             Some(_) => ROUNDS_TORQUE,
             None => ROUNDS_ROLL,
         };
+        let rounds: f64 = task.moves.iter().map(rounds_of).sum();
         let kinematics = task.kinematics.as_ref().map_or(0.0, |asked| {
             RIGID + RIGID_SHIFT * (2.0 * asked.reach / asked.step)
         });
-        once * rounds * task.poses.len() as f64 + kinematics
+        once * rounds + kinematics
     }
 
     /// Times of the normal and the tangential problem where bodies differ: rounds belong to the motions, since each has a region of its own.

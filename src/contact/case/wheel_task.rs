@@ -12,6 +12,7 @@ use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
+use crate::contact::normal::wheel_height::wheelset_task::WheelsetMove;
 use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::rolling::motion::PrescribedForces;
@@ -50,9 +51,24 @@ pub(crate) fn task(
 /// The motion of the wheelset, if the case gives it instead of creepages; its angular and its lateral velocity are NaN where they have to be
 /// found.
 pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
-    let Motions::Wheelset { wheelset } = motions else {
-        return None;
+    moves(motions).first().map(|first| first.motion)
+}
+
+/// The motions of a wheelset, if the case gives them instead of creepages, each with the torque that the rails are to balance.
+pub(crate) fn moves(motions: &Motions) -> Vec<WheelsetMove> {
+    let words = match motions {
+        Motions::Wheelset { wheelset } => std::slice::from_ref(wheelset),
+        Motions::Wheelsets { wheelset } => wheelset,
+        _ => &[],
     };
+    let of_words = |words: &Wheelset| WheelsetMove {
+        motion: wheelset_motion(words),
+        drive_torque: words.drive_torque_n_mm,
+    };
+    words.iter().map(of_words).collect()
+}
+
+fn wheelset_motion(words: &Wheelset) -> WheelsetMotion {
     let Wheelset {
         speed_mm_per_s: speed,
         angular_velocity_rad_per_s,
@@ -63,23 +79,20 @@ pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
         force_y_n: _,
         yaw_rate_rad_per_s,
         roll_rate_rad_per_s,
-    } = *wheelset;
+    } = *words;
     let free = free_rolling_radius_mm.map(|radius| speed / radius);
-    Some(WheelsetMotion {
+    WheelsetMotion {
         speed,
         angular_velocity: angular_velocity_rad_per_s.or(free).unwrap_or(f64::NAN),
         lateral_velocity: lateral_velocity_mm_per_s.unwrap_or(f64::NAN),
         yaw_rate: yaw_rate_rad_per_s,
         roll_rate: roll_rate_rad_per_s,
-    })
+    }
 }
 
 /// The torque about the axle in N mm that the rails are to balance.
 pub(crate) fn drive_torque(motions: &Motions) -> Option<f64> {
-    match motions {
-        Motions::Wheelset { wheelset } => wheelset.drive_torque_n_mm,
-        _ => None,
-    }
+    moves(motions).first().and_then(|first| first.drive_torque)
 }
 
 /// The forces in N, along and across, that the rail is to carry under a wheelset's wheel.

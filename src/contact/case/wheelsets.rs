@@ -4,16 +4,18 @@ use std::sync::Arc;
 
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::swept_values;
-use crate::contact::case::wheel_task::{exchanged, profile_at};
+use crate::contact::case::wheel_task::{exchanged, moves, profile_at};
 use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing};
-use crate::contact::case::words::motion::{Combine, Swept};
+use crate::contact::case::words::motion::{Combine, Motions, Swept};
 use crate::contact::error::Fault;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::wheel_rail::{Placement, Side, WheelRail};
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
-use crate::contact::normal::wheel_height::wheelset_task::{KinematicsTask, WheelsetTask};
+use crate::contact::normal::wheel_height::wheelset_task::{
+    KinematicsTask, WheelsetMove, WheelsetTask,
+};
 use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 
@@ -27,6 +29,7 @@ const LEFT_SHARE: f64 = 0.5;
 pub(crate) fn task(
     contact: &Contact,
     load: Option<&Load>,
+    motion: Option<&Motions>,
     contact_modulus: Option<f64>,
     limits: &Limits,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
@@ -42,6 +45,7 @@ pub(crate) fn task(
         return Ok(None);
     };
     let poses = poses(lateral_shift_mm, yaw_rad, *combine, limits)?;
+    let (poses, moves) = moving(poses, motion, *combine, limits)?;
     let sections = sections(contact);
     let profiles = sections.map(|[rail, wheel]| {
         let rail = profile_at(rail.0, Body::Rail, rail.1);
@@ -49,8 +53,7 @@ pub(crate) fn task(
     });
     let [left, right_profiles] = profiles;
     let sides = [both(left)?, both(right_profiles)?];
-    let mut geometries = Vec::with_capacity(2);
-    let mut remarks = Vec::new();
+    let (mut geometries, mut remarks) = (Vec::with_capacity(2), Vec::new());
     for (k, profiles) in sides.into_iter().enumerate() {
         let pointers = sections[k].map(|(pointer, _)| pointer);
         let geometry = in_place(contact, k, profiles, pointers, poses[0])?;
@@ -78,6 +81,7 @@ pub(crate) fn task(
     let task = WheelsetTask {
         sides: [left, right_side],
         poses,
+        moves,
         kinematics: kinematics.as_ref().map(|asked| KinematicsTask {
             reach: asked.reach_mm,
             step: asked.step_mm,
@@ -122,6 +126,46 @@ fn poses(
             .map(|k| [shifts[k.min(shifts.len() - 1)], yaws[k.min(yaws.len() - 1)]])
             .collect(),
     })
+}
+
+/// Shift and yaw of every position, and how the wheelset moves there.
+type Moving = (Vec<[f64; 2]>, Vec<WheelsetMove>);
+
+/// Every position with its motion; without motions the positions alone.
+fn moving(
+    poses: Vec<[f64; 2]>,
+    motion: Option<&Motions>,
+    combine: Combine,
+    limits: &Limits,
+) -> Result<Moving, Vec<Fault>> {
+    let moves = motion.map_or_else(Vec::new, moves);
+    let fault = |detail| Err(vec![Fault::new("/motion/wheelset", detail)]);
+    let (places, motions) = (poses.len(), moves.len());
+    if motions == 0 {
+        return Ok((poses, moves));
+    }
+    let together = combine == Combine::Together;
+    if together && motions > 1 && places > 1 && motions != places {
+        return fault(format!(
+            "{motions} motions given for {places} positions; as many as positions are needed, or one, or \"combine\": \"grid\" in the contact"
+        ));
+    }
+    let count = if together {
+        places.max(motions)
+    } else {
+        places.saturating_mul(motions)
+    };
+    if count > limits.motions_max {
+        return fault(format!(
+            "{count} positions with motions given; at most {} are allowed in one case",
+            limits.motions_max
+        ));
+    }
+    let pair = |k: usize| match together {
+        true => (poses[k.min(places - 1)], moves[k.min(motions - 1)]),
+        false => (poses[k / motions], moves[k % motions]),
+    };
+    Ok((0..count).map(pair).unzip())
 }
 
 /// Of the left and of the right side, the cross-sections of rail and wheel with their pointers.

@@ -77,6 +77,17 @@ impl Problem {
         }
     }
 
+    /// The same question about a wheelset that moves in this way.
+    #[must_use]
+    pub(crate) fn of_move(&self, motion: WheelsetMotion, drive_torque: Option<f64>) -> Problem {
+        Problem {
+            wheelset: Some(motion),
+            drive_torque,
+            speeds: vec![Some(motion.speed)],
+            ..self.clone()
+        }
+    }
+
     /// The same question about one wheel of a wheelset that moves as a whole.
     #[must_use]
     pub(crate) fn of_wheel(&self, wheel: Arc<WheelTask>, wheelset: WheelsetMotion) -> Problem {

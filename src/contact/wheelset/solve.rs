@@ -31,18 +31,23 @@ pub(crate) fn solve(
     let mut gathering = WheelsetGathering::new(case, task);
     let count = task.poses.len();
     let mut roll = 0.0;
-    for (k, [shift, yaw]) in task.poses.iter().copied().enumerate() {
+    let places = task.poses.iter().zip(&task.moves).enumerate();
+    for (k, ([shift, yaw], moving)) in places {
         let part = MonitorPart {
             inner: monitor,
             before: k as f64 / count as f64,
             own: 1.0 / count as f64,
         };
-        let rigid = rails.pose(shift, yaw, roll);
+        let rigid = rails.pose(*shift, *yaw, roll);
         let rigid = rigid.map_err(|reason| SolveError::NormalProblem { reason })?;
         roll = rigid.roll;
+        let case = CheckedCase {
+            problem: case.problem.of_move(moving.motion, moving.drive_torque),
+            ..case.clone()
+        };
         let solve = WheelsetSolve {
             operators,
-            case,
+            case: &case,
             task,
             sides: &sides,
             monitor: &part,

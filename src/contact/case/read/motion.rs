@@ -71,8 +71,16 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
                 );
                 return None;
             }
-            let wheelset = wheelset(&mut block.child("wheelset")?, of_wheelset)?;
-            Some(Motions::Wheelset { wheelset })
+            match members.get("wheelset") {
+                Some(Value::Array(motions)) if of_wheelset && !motions.is_empty() => {
+                    let pointer = block.pointer_to("wheelset");
+                    wheelsets(motions, &pointer, block.faults())
+                }
+                _ => {
+                    let wheelset = wheelset(&mut block.child("wheelset")?, of_wheelset)?;
+                    Some(Motions::Wheelset { wheelset })
+                }
+            }
         }
         _ if of_wheelset => {
             let what = "the motion of the wheelset is needed, such as {\"wheelset\": {\"speed_mm_per_s\": 20000, \"drive_torque_n_mm\": 0}}, from which \
@@ -128,6 +136,20 @@ fn speed(block: &mut Object) -> Option<Option<f64>> {
         true => block.number(SPEED_NAME, SPEED).map(Some),
         false => Some(None),
     }
+}
+
+/// Several motions of a wheelset on both rails.
+fn wheelsets(motions: &[Value], pointer: &str, faults: &mut Faults) -> Option<Motions> {
+    let read: Vec<Option<Wheelset>> = motions
+        .iter()
+        .enumerate()
+        .map(|(k, motion)| {
+            let mut block = Object::open(motion, join(pointer, k), faults)?;
+            wheelset(&mut block, true)
+        })
+        .collect();
+    let wheelset = read.into_iter().collect::<Option<_>>()?;
+    Some(Motions::Wheelsets { wheelset })
 }
 
 /// The motion of a wheelset; on both rails a torque can be balanced, on one a longitudinal and a lateral force.

@@ -31,6 +31,8 @@ pub(crate) struct Canonical<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) wheelset: Option<&'a Wheelset>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) wheelsets: Option<&'a [Wheelset]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) history: Option<(&'a History, HistoryStartName)>,
     pub(crate) method: MethodName,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -76,6 +76,12 @@ pub enum Motions {
         /// How the wheelset moves.
         wheelset: Wheelset,
     },
+    /// Several motions of the wheelset, for the contact `wheelset` only: with `combine: together` one for each position, or all in the same
+    /// position; with `grid` every position with every motion, motions fastest.
+    Wheelsets {
+        /// How the wheelset moves; never empty.
+        wheelset: Vec<Wheelset>,
+    },
 }
 
 /// Motion of a wheelset. Exactly one of `angular_velocity_rad_per_s`, `free_rolling_radius_mm`, `drive_torque_n_mm` and `force_x_n` is given;

@@ -1,5 +1,6 @@
 //! A wheelset over both rails, with what presses it down and what is asked of it.
 
+use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::wheel_height::task::WheelTask;
 
 /// A wheelset over both rails, in all positions that are asked for.
@@ -9,6 +10,8 @@ pub struct WheelsetTask {
     pub sides: [WheelTask; 2],
     /// Shift to the left in mm and yaw in rad of every position; never empty.
     pub poses: Vec<[f64; 2]>,
+    /// How the wheelset moves in every position.
+    pub moves: Vec<WheelsetMove>,
     /// What is asked of the rigid wheelset.
     pub kinematics: Option<KinematicsTask>,
     /// Whether the right rail and wheel have cross-sections of their own, to which remarks are to point.
@@ -26,6 +29,15 @@ impl WheelsetTask {
         }
         pointer.to_owned()
     }
+}
+
+/// How a wheelset moves in a position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WheelsetMove {
+    /// Its motion; the angular velocity is NaN where it has to be found.
+    pub motion: WheelsetMotion,
+    /// Torque about the axle in N mm that the rails are to balance.
+    pub drive_torque: Option<f64>,
 }
 
 /// Shifts and amplitudes, in mm.
