@@ -10,6 +10,7 @@ mod machine;
 use std::hint::black_box;
 use std::sync::Arc;
 
+use railhead::contact::case::known_pair::KnownPair;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::half_space::grid_operator::GridWorkspace;
 use railhead::contact::monitor::Unmonitored;
@@ -17,7 +18,7 @@ use railhead::contact::normal::normal_task::NormalTask;
 use railhead::contact::normal::wheel_height::search::HeightStart;
 use railhead::contact::normal::wheel_height::task::{Accuracy, NormalPass};
 use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::{check, solve, solve_with};
+use railhead::contact::{check, check_with, solve, solve_with};
 use serde_json::{Value, json};
 
 use machine::{lu_seconds, quantile, seconds_of};
@@ -99,11 +100,13 @@ fn rest(problem: &CheckedCase) -> u32 {
 
 fn rows(count: usize) {
     let pair = example("wheel-rail.case.json");
-    let operators = Arc::default();
+    let (operators, known) = (Arc::default(), KnownPair::default());
     let lu = lu_seconds();
     let (mut checks, mut solves, mut failed) = (Vec::new(), Vec::new(), 0);
     for k in 0..count {
-        let (seconds, problem) = seconds_of(|| checked(&row(&pair, k)));
+        let case = row(&pair, k);
+        let (seconds, problem) = seconds_of(|| check_with(&known, &case, &Limits::default()));
+        let problem = problem.expect("a valid case");
         checks.push(seconds / lu);
         let (seconds, answer) = seconds_of(|| solve_with(&operators, &problem, &Unmonitored));
         solves.push(seconds / lu);

@@ -67,6 +67,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
+use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::read::draft;
 use crate::contact::error::{CaseError, SolveError};
@@ -87,12 +88,24 @@ use crate::contact::unlike_bodies::UnlikeGap;
 /// # Errors
 /// Every fault of the case at once: those of the text, and those of its sound parts against physics and limits.
 pub fn check(case: &Value, limits: &Limits) -> Result<CheckedCase, CaseError> {
+    check_with(&KnownPair::default(), case, limits)
+}
+
+/// The same for one of many cases: profiles that were read for the one before are not read again.
+///
+/// # Errors
+/// The same.
+pub fn check_with(
+    known: &KnownPair,
+    case: &Value,
+    limits: &Limits,
+) -> Result<CheckedCase, CaseError> {
     let (draft, mut faults) = draft::draft(case);
     if !faults.is_empty() {
         faults.extend(draft.faults_beside(limits));
         return Err(CaseError(faults));
     }
-    CheckedCase::new(&draft.complete().ok_or(CaseError(faults))?, limits)
+    CheckedCase::new(&draft.complete().ok_or(CaseError(faults))?, limits, known)
 }
 
 /// Solves a checked case, slice by slice.

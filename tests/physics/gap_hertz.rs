@@ -91,6 +91,25 @@ fn load_and_approach_belong_together_as_in_hertzs_contact() {
 }
 
 #[test]
+fn a_loose_target_takes_fewer_cells_and_region_and_pressure_stay_within_it() {
+    for (rolling, lateral, force) in CONTACTS {
+        let ellipse = hertz(rolling, lateral, force);
+        let contact = by_grid(rolling, lateral, &ellipse, 60);
+        let mut case = steel(contact, json!({ "normal_force_n": force }), [0.0; 3]);
+        let [default, loose] = [0.005, 0.02].map(|target| {
+            case["solver"] = json!({ "target_error": target });
+            let (solution, _) = solve(&case);
+            let cells = solution.normal.as_ref().expect("a gap").cells;
+            let off = differences(&solution, &ellipse, force).map(f64::abs);
+            (cells, off.into_iter().fold(0.0, f64::max))
+        });
+        let told = format!("{rolling} {lateral}: {default:?} {loose:?}");
+        assert!(default.1 < 0.003 && loose.1 < 0.012, "{told}");
+        assert!((0..2).all(|k| 4 * loose.0[k] < 3 * default.0[k]), "{told}");
+    }
+}
+
+#[test]
 fn few_samples_of_a_parabola_are_enough() {
     let mut failures = Vec::new();
     let (rolling, lateral, force) = CONTACTS[0];

@@ -14,6 +14,7 @@ use railhead::contact::{self};
 use serde_json::{Value, json};
 
 use crate::gap_samples::steel;
+use crate::profile_cases::generated;
 
 fn case(method: &str) -> Value {
     let contact = json!({ "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 });
@@ -144,4 +145,32 @@ fn a_row_that_cannot_be_solved_has_a_status_and_costs_no_other_row() {
     assert_eq!(answer.status, refused);
     assert!(answer.numbers[1][1].is_nan() && answer.method[1].is_none());
     assert_eq!(answer.without_answer(), 1);
+}
+
+#[test]
+fn a_row_whose_profiles_were_read_for_another_one_is_the_case_solved_alone() {
+    let mut case = generated();
+    case["solver"] = json!({ "target_error": 0.02 });
+    case["outputs"] = json!(["resultants"]);
+    let columns = [
+        numbers("/contact/cant_rad", &[0.025, 0.05, 0.025, 0.025]),
+        numbers("/contact/rail/smoothing_mm", &[0.0, 0.0, 0.0, 4.0]),
+        numbers("/contact/lateral_shift_mm", &[0.5, 0.5, -2.0, 0.5]),
+        numbers("/contact/yaw_rad", &[0.0, 0.0, 0.006, 0.0]),
+    ];
+    let answer = solved(&case, &columns);
+    let mut forces = Vec::new();
+    for row in 0..4 {
+        let single = case_of_row(&case, &columns, &BTreeMap::new(), row).expect("a place in it");
+        let checked = contact::check(&single, &Limits::default()).expect("a sound case");
+        let (alone, _) = contact::solve(&checked, &Unmonitored).expect("it is solved");
+        let [total] = &alone.total[..] else {
+            panic!("one motion")
+        };
+        let found = [answer.numbers[1][row], answer.numbers[2][row]];
+        assert_eq!(found, [total.force_x_n, total.force_y_n], "row {row}");
+        forces.push(found);
+    }
+    // Rows that differ have answers that do.
+    assert!((1..4).all(|row| forces[row] != forces[0]), "{forces:?}");
 }

@@ -99,14 +99,14 @@ fn a_hole_of_8_mm_and_every_tenth_point_are_told_or_refused() {
 
 #[test]
 fn linear_resampling_is_named_and_the_smoothing_named_heals_it() {
+    // A loose target has a grid too coarse for the peaks between two chords.
+    let on_rail =
+        |rail: &[[f64; 2]]| put(&on_rail(rail), "solver", json!({ "target_error": 0.005 }));
     let sound = pressure_max(&solved(&on_rail(&rail_60e1())));
     let rail = linear(&resampled(&rail_60e1(), 1.5), 5000);
     let found = solved(&on_rail(&rail));
-    assert!(
-        pressure_max(&found) > 1.2 * sound,
-        "{}",
-        pressure_max(&found)
-    );
+    let peak = pressure_max(&found);
+    assert!(peak > 1.2 * sound, "{peak}");
     let remark = found
         .remarks
         .iter()

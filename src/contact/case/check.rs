@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::contact::case::checks::{CheckedParts, PartialCase, missing_load, unusual_friction};
 use crate::contact::case::digest::digest;
+use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
@@ -21,11 +22,11 @@ use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::solution::words::answer::Asked;
 
 impl CheckedCase {
-    /// Checks a case against the limits and prepares its numbers.
+    /// Checks a case against the limits and prepares its numbers; profiles that are known are not read again.
     ///
     /// # Errors
     /// Every fault found, each with its JSON pointer.
-    pub fn new(case: &Case, limits: &Limits) -> Result<CheckedCase, CaseError> {
+    pub fn new(case: &Case, limits: &Limits, known: &KnownPair) -> Result<CheckedCase, CaseError> {
         let given = PartialCase {
             material: Some(&case.material),
             friction: Some(&case.friction),
@@ -35,6 +36,7 @@ impl CheckedCase {
             solver: Some(&case.solver),
             outputs: &case.outputs,
             after: case.after_words(),
+            known,
         };
         let (parts, mut faults) = CheckedParts::check(given, limits);
         if faults.is_empty() && parts.task.is_none() {

@@ -2,6 +2,7 @@
 
 use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::history::BesideHistory;
+use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
@@ -40,6 +41,8 @@ pub(crate) struct PartialCase<'a> {
     pub(crate) solver: Option<&'a Solver>,
     pub(crate) outputs: &'a [Output],
     pub(crate) after: AfterWords<'a>,
+    /// Cross-sections that were read for another case.
+    pub(crate) known: &'a KnownPair,
 }
 
 /// Faults of the parts of a case that can be checked although others are faulty.
@@ -165,7 +168,7 @@ fn on_rails(
         Contact::Wheelset { .. } => {
             wheelsets::task(contact, given.load, given.motion, modulus, limits)
         }
-        _ => wheel_task::task(contact, given.load, modulus),
+        _ => wheel_task::task(contact, given.load, modulus, given.known),
     }
 }
 

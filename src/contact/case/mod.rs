@@ -10,6 +10,7 @@ pub mod cost;
 pub mod digest;
 pub mod elasticity;
 pub mod history;
+pub mod known_pair;
 pub mod limits;
 pub mod motions;
 pub mod pair_quality;

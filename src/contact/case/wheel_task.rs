@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing, SmoothingWord};
 use crate::contact::case::words::motion::{Motions, Wheelset};
 use crate::contact::error::Fault;
@@ -17,7 +18,7 @@ use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::rolling::motion::PrescribedForces;
 
-/// The task of a wheel on a rail with its remarks; `None` without faults where the load or the contact
+/// The task of a wheel on a rail, whose profiles may be known, with its remarks; `None` without faults where the load or the contact
 /// modulus in MPa is not known.
 ///
 /// # Errors
@@ -26,8 +27,9 @@ pub(crate) fn task(
     contact: &Contact,
     load: Option<&Load>,
     contact_modulus: Option<f64>,
+    known: &KnownPair,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
-    let geometry = wheel_rail(contact)?;
+    let geometry = wheel_rail(contact, known)?;
     if let Err(detail) = ContactLocus::new(&geometry) {
         return Err(vec![fault("/contact".to_owned(), detail)]);
     }
@@ -112,7 +114,7 @@ fn loading(load: &Load) -> Option<WheelLoad> {
     }
 }
 
-fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
+fn wheel_rail(contact: &Contact, known: &KnownPair) -> Result<WheelRail, Vec<Fault>> {
     let Contact::Profiles {
         rail,
         wheel,
@@ -134,16 +136,6 @@ fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
             "no profiles".to_owned(),
         )]);
     };
-    let rail = profile(Body::Rail, rail).map_err(|fault| vec![fault]);
-    let wheel = profile(Body::Wheel, wheel).map_err(|fault| vec![fault]);
-    let (rail, wheel) = match (rail, wheel) {
-        (Ok(rail), Ok(wheel)) => (rail, wheel),
-        (Err(rail), Err(wheel)) => return Err([rail, wheel].concat()),
-        (Err(faults), Ok(_)) | (Ok(_), Err(faults)) => return Err(faults),
-    };
-    if !accept_rough_profiles {
-        exchanged([&rail, &wheel], ["/contact/rail", "/contact/wheel"])?;
-    }
     let placement = Placement {
         side: (*side).into(),
         rolling_radius: *rolling_radius_mm,
@@ -156,8 +148,29 @@ fn wheel_rail(contact: &Contact) -> Result<WheelRail, Vec<Fault>> {
         yaw: *yaw_rad,
         roll: *roll_rad,
     };
-    WheelRail::new(rail, wheel, placement)
-        .map_err(|detail| vec![fault("/contact/rolling_radius_mm".to_owned(), detail)])
+    let in_order = |profiles: [&Profile; 2]| {
+        if *accept_rough_profiles {
+            return Ok(());
+        }
+        exchanged(profiles, ["/contact/rail", "/contact/wheel"])
+    };
+    let sections: [&CrossSection; 2] = [rail, wheel];
+    if let Some(geometry) = known.placed(sections, &placement) {
+        in_order(geometry.profiles())?;
+        return Ok(geometry);
+    }
+    let rail = profile(Body::Rail, rail).map_err(|fault| vec![fault]);
+    let wheel = profile(Body::Wheel, wheel).map_err(|fault| vec![fault]);
+    let (rail, wheel) = match (rail, wheel) {
+        (Ok(rail), Ok(wheel)) => (rail, wheel),
+        (Err(rail), Err(wheel)) => return Err([rail, wheel].concat()),
+        (Err(faults), Ok(_)) | (Ok(_), Err(faults)) => return Err(faults),
+    };
+    in_order([&rail, &wheel])?;
+    let geometry = WheelRail::new(rail, wheel, placement)
+        .map_err(|detail| vec![fault("/contact/rolling_radius_mm".to_owned(), detail)])?;
+    known.keep(sections, &geometry);
+    Ok(geometry)
 }
 
 /// Faults of two profiles that both look like the other body's, at the pointers of both; one of them alone may be an unusual shape.

@@ -1,8 +1,8 @@
 //! Solves many rows: one case with columns of values in place of some of its members.
 //!
 //! A row's answer depends on its own case alone, to the last bit: not on the rows beside it, on their order or number, or on the machine's
-//! load. So nothing is started from another row. What rows share are operators of patches of one shape, which are equal whoever computed
-//! them; rows of one shape therefore follow each other.
+//! load. So nothing is started from another row. What rows share are operators of patches of one shape, and profiles that were read, which
+//! are equal whoever computed them; rows of one shape therefore follow each other.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -13,6 +13,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use crate::contact;
+use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::solve_time::TABLE_SECONDS;
 use crate::contact::case::words::solver::{MethodName, Output};
@@ -66,6 +67,7 @@ pub fn solve_many(
         open.retain(|row| !take(&mut answer, *row, method, &evaluated, patches[*row]));
     }
     open.sort_by(|a, b| near(task.columns, *a, *b));
+    let known = KnownPair::default();
     for (done, row) in open.iter().enumerate() {
         let watch = RowMonitor {
             inner: monitor,
@@ -76,7 +78,7 @@ pub fn solve_many(
         if watch.tick(0.0).is_break() {
             return Err(SolveError::Cancelled);
         }
-        match solve_row(task, solve, *row, &watch) {
+        match solve_row(task, &known, solve, *row, &watch) {
             Ok(solution) => answer.set_solution(*row, &solution),
             Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
             Err(RowEnd::Status(status)) => answer.status[*row] = status,
@@ -93,10 +95,11 @@ pub fn expected_seconds(task: &ManyTask) -> f64 {
         return rows as f64 * REFUSED_SECONDS;
     };
     let Some((evaluable, method)) = evaluable(task, &checked) else {
+        let known = KnownPair::default();
         let step = rows.div_ceil(SAMPLED).max(1);
         let sampled: Vec<f64> = (0..rows)
             .step_by(step)
-            .map(|row| match row_checked(task, row) {
+            .map(|row| match row_checked(task, &known, row) {
                 Ok(checked) => checked.cost().seconds,
                 Err(_) => REFUSED_SECONDS,
             })
@@ -192,20 +195,21 @@ fn take(
     true
 }
 
-fn row_checked(task: &ManyTask, row: usize) -> Result<CheckedCase, CaseError> {
+fn row_checked(task: &ManyTask, known: &KnownPair, row: usize) -> Result<CheckedCase, CaseError> {
     let case = case_of_row(task.case, task.columns, task.profiles, row)
         .map_err(|(pointer, reason)| CaseError(vec![Fault::new(pointer, reason)]))?;
-    contact::check(&case, task.limits)
+    contact::check_with(known, &case, task.limits)
 }
 
 fn solve_row(
     task: &ManyTask,
+    known: &KnownPair,
     solve: &RowSolver,
     row: usize,
     watch: &RowMonitor,
 ) -> Result<Solution, RowEnd> {
     let refused = |_| RowEnd::Status(ManyStatus::Refused);
-    let mut checked = row_checked(task, row).map_err(refused)?;
+    let mut checked = row_checked(task, known, row).map_err(refused)?;
     let own = checked.run.time_limit;
     checked.run.time_limit = Some(own.map_or(task.time_limit, |own| own.min(task.time_limit)));
     let solved = catch_unwind(AssertUnwindSafe(|| solve(&checked, watch)));

@@ -66,12 +66,13 @@ pub(crate) fn rail_points(
 /// Places the wheel above the rail and finds the height of first touch.
 fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
     let [rail, wheel] = geometry.parameters(CURVE_STEP);
-    let rail = rail_points(geometry, rail);
+    let edge = || envelope(&rail_points(geometry, rail), STEP);
+    let rail = geometry.rail_edge.get_or_make(edge);
     let wheel: Vec<_> = wheel
         .into_iter()
         .map(|s| geometry.lowest(s).map(|[_, y, z]| [y, -z, s]))
         .collect();
-    let (rail, wheel) = (envelope(&rail, STEP), envelope(&wheel, STEP));
+    let wheel = envelope(&wheel, STEP);
     let first = rail.first.max(wheel.first);
     let last = (rail.first + rail.points.len() as i64).min(wheel.first + wheel.points.len() as i64);
     let mut lines = Vec::with_capacity(usize::try_from(last - first).unwrap_or(0));

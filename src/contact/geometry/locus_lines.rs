@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
+use crate::contact::geometry::envelope::Envelope;
+
 /// One line along x: its y, the upper edge of the rail, and the clearance above first touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LocusPoint {
@@ -35,5 +37,23 @@ pub(crate) struct LocusOnce(pub(crate) OnceLock<Arc<Result<LocusLines, String>>>
 impl PartialEq for LocusOnce {
     fn eq(&self, _: &LocusOnce) -> bool {
         true
+    }
+}
+
+/// The upper edge of a rail in its place, once it was looked for: the same for every place of the wheelset over it. It follows from the rest of
+/// the geometry as well.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct RailEdgeOnce(Arc<OnceLock<Envelope>>);
+
+impl PartialEq for RailEdgeOnce {
+    fn eq(&self, _: &RailEdgeOnce) -> bool {
+        true
+    }
+}
+
+impl RailEdgeOnce {
+    /// The edge; made at the first call.
+    pub(crate) fn get_or_make(&self, make: impl FnOnce() -> Envelope) -> &Envelope {
+        self.0.get_or_init(make)
     }
 }

@@ -6,7 +6,9 @@
 //! radius `r − z` at the distance `d/2 − p + y` from the centre along the axle, with the flange-back distance d and the
 //! flange-back position p. Conventions of the Manchester contact benchmark (Shackleton and Iwnicki 2008).
 
-use crate::contact::geometry::locus_lines::LocusOnce;
+use std::sync::Arc;
+
+use crate::contact::geometry::locus_lines::{LocusOnce, RailEdgeOnce};
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile::Profile;
 use crate::contact::remark::entry::RemarkEntry;
@@ -61,11 +63,13 @@ pub struct Placement {
 pub struct WheelRail {
     /// Their placement.
     pub placement: Placement,
-    rail_given: Profile,
+    rail_given: Arc<Profile>,
     /// The rail in track axes.
-    rail: PlaneCurve,
-    wheel: Profile,
+    rail: Arc<PlaneCurve>,
+    wheel: Arc<Profile>,
     axes: AxleAxes,
+    /// The rail's upper edge, once it was looked for.
+    pub(crate) rail_edge: RailEdgeOnce,
     /// Rail and wheel line by line, once they were looked for.
     pub(crate) locus: LocusOnce,
 }
@@ -130,10 +134,10 @@ impl WheelRail {
                 placement.rolling_radius
             ));
         }
-        Ok(WheelRail::placed(rail, wheel, placement))
+        Ok(WheelRail::placed(rail, Arc::new(wheel), placement))
     }
 
-    fn placed(rail: Profile, wheel: Profile, placement: Placement) -> WheelRail {
+    fn placed(rail: Profile, wheel: Arc<Profile>, placement: Placement) -> WheelRail {
         let canted = rail.curve().placed(placement.cant, [0.0; 2], 1.0);
         let places: Vec<[f64; 2]> = canted
             .parameters(0.05)
@@ -149,12 +153,14 @@ impl WheelRail {
         let axes = AxleAxes::new(&placement);
         WheelRail {
             placement,
-            rail: rail
-                .curve()
-                .placed(placement.cant, origin, placement.side.sign()),
-            rail_given: rail,
+            rail: Arc::new(
+                rail.curve()
+                    .placed(placement.cant, origin, placement.side.sign()),
+            ),
+            rail_given: Arc::new(rail),
             wheel,
             axes,
+            rail_edge: RailEdgeOnce::default(),
             locus: LocusOnce::default(),
         }
     }
@@ -195,7 +201,7 @@ impl WheelRail {
     #[must_use]
     pub fn smoothed(&self, smoothing: [f64; 2]) -> WheelRail {
         let rail = self.rail_given.smoothed(smoothing[0]);
-        let wheel = self.wheel.smoothed(smoothing[1]);
+        let wheel = Arc::new(self.wheel.smoothed(smoothing[1]));
         let placement = self.placement;
         // What a wheel's profile may reach was checked; a smoothed one reaches hardly farther.
         WheelRail::placed(rail, wheel, placement)

@@ -1,5 +1,7 @@
 //! The solved normal problem of one frame: its patches and their pressures.
 
+use std::f64::consts::PI;
+
 use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::load_across::{LoadAcross, LoadsOnce};
@@ -32,6 +34,31 @@ pub struct NormalUncertainty {
     pub cells_across: Vec<f64>,
     /// By how much, relatively, the load may differ from the one asked for.
     pub load: f64,
+}
+
+/// Cosines and sines of the mid-points of N equal parts of 0 … π.
+#[derive(Debug, Clone, Copy)]
+pub struct LineAngles<const N: usize> {
+    cosines: [f64; N],
+    sines: [f64; N],
+}
+
+impl<const N: usize> LineAngles<N> {
+    /// Those angles.
+    #[must_use]
+    pub fn new() -> LineAngles<N> {
+        let angles: [f64; N] = std::array::from_fn(|k| (k as f64 + 0.5) * PI / N as f64);
+        LineAngles {
+            cosines: angles.map(f64::cos),
+            sines: angles.map(f64::sin),
+        }
+    }
+}
+
+impl<const N: usize> Default for LineAngles<N> {
+    fn default() -> LineAngles<N> {
+        LineAngles::new()
+    }
 }
 
 impl Footprint {
@@ -173,6 +200,26 @@ impl Footprint {
         match &self.shape {
             FootprintShape::Hertz(ellipse) => ellipse.mean_pressure(chord, x0, x1),
             FootprintShape::Sampled(field) => field.mean_pressure(chord, x0, x1),
+        }
+    }
+
+    /// Mean pressure in MPa over the line of a chord (not yet scaled to the patch's force).
+    ///
+    /// Of a pressure that was computed by the mid-points of N equal angles u, at which `x = −half · cos u` from the middle: exact for Hertz's
+    /// semi-ellipse, and otherwise as exact as N points resolve the pressure.
+    #[must_use]
+    pub fn mean_of_line<const N: usize>(&self, chord: &Chord, angles: &LineAngles<N>) -> f64 {
+        match &self.shape {
+            FootprintShape::Sampled(field) if self.uncertainty.is_some() => {
+                let pressures = self.pressures(chord, (&angles.cosines, &angles.sines));
+                let sum: f64 = pressures
+                    .iter()
+                    .zip(&angles.sines)
+                    .map(|(p, sin)| p * sin)
+                    .sum();
+                0.5 * PI / N as f64 * sum
+            }
+            _ => self.mean_pressure(chord, chord.left, chord.right),
         }
     }
 

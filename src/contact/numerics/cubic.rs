@@ -109,18 +109,21 @@ impl Cubic {
 
     /// The root in a monotone piece over which the sign changes.
     fn root(&self, low: f64, high: f64) -> f64 {
-        const CLOSE: f64 = 4.0 * f64::EPSILON;
+        /// A step of Newton's method by less leaves an error of its square.
+        const CLOSE: f64 = 1e-8;
         let [_, c1, c2, c3] = self.coefficients;
-        let course = if self.value(high) > 0.0 {
+        let [at_low, at_high] = [low, high].map(|s| self.value(s));
+        let course = if at_high > 0.0 {
             Course::Rising
         } else {
             Course::Falling
         };
         let close = CloseEnough {
             value: 0.0,
-            place: CLOSE.next_up(),
+            place: CLOSE,
         };
-        monotone_root::find([low, high], 0.5 * (low + high), course, close, |at| {
+        let secant = low + (high - low) * at_low / (at_low - at_high);
+        monotone_root::find([low, high], secant, course, close, |at| {
             let slope = c1 + at * (2.0 * c2 + 3.0 * at * c3);
             [self.value(at), slope]
         })

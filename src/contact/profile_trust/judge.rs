@@ -1,7 +1,5 @@
 //! Examines the points of both profiles under the patches found, and reports their defects.
 
-use realfft::RealFftPlanner;
-
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
@@ -65,19 +63,13 @@ struct Under<'a> {
 }
 
 impl<'a> Under<'a> {
-    fn new(
-        body: Body,
-        profile: &'a Profile,
-        contact: [f64; 2],
-        modulus: f64,
-        planner: &mut RealFftPlanner<f64>,
-    ) -> Under<'a> {
+    fn new(body: Body, profile: &'a Profile, contact: [f64; 2], modulus: f64) -> Under<'a> {
         let (points, smoothing) = (profile.points(), profile.smoothing());
         Under {
             body,
             profile,
             contact,
-            found: under_contact(points, smoothing, contact, modulus, planner),
+            found: under_contact(points, smoothing, contact, modulus),
         }
     }
 
@@ -132,10 +124,9 @@ pub fn judge(
         sorted(ends.map(|end| end.wheel)),
     ];
     let [rail, wheel] = geometry.profiles();
-    let planner = &mut RealFftPlanner::new();
     let both = [
-        Under::new(Body::Rail, rail, contacts[0], modulus, planner),
-        Under::new(Body::Wheel, wheel, contacts[1], modulus, planner),
+        Under::new(Body::Rail, rail, contacts[0], modulus),
+        Under::new(Body::Wheel, wheel, contacts[1], modulus),
     ];
     // Without the lower bound, a lightly loaded patch would need far more smoothing than the one that carries the load.
     let pressure = patch.pressure.max(PRESSURE_LIGHT);

@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::checks::{PartialCase, faults_of};
+use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::read::faults::Faults;
 use crate::contact::case::read::object::{Object, has_controls, join, shown};
@@ -84,7 +85,9 @@ pub(crate) fn draft(value: &Value) -> (CaseDraft, Vec<Fault>) {
 impl CaseDraft {
     /// Faults against physics and limits of the parts that could be read.
     pub(crate) fn faults_beside(&self, limits: &Limits) -> Vec<Fault> {
+        let known = &KnownPair::default();
         let given = PartialCase {
+            known,
             material: self.material.as_ref(),
             friction: self.friction.as_ref(),
             contact: self.contact.as_ref(),

@@ -4,6 +4,7 @@
 //! or `q = E* |k| r / 2` for the wavenumber k. Every difference r(s) is thus converted to a pressure that can be compared with that of the
 //! contact.
 
+use std::cell::RefCell;
 use std::f64::consts::{PI, TAU};
 
 use realfft::RealFftPlanner;
@@ -13,14 +14,13 @@ const TAPER: f64 = 2.0;
 /// Padded length relative to that of the heights; the zeros keep the periodic transform from coupling the two ends.
 const PADDING: usize = 2;
 
-/// Pressure in MPa that flattens `heights` in mm, `step` mm apart, with the contact modulus in MPa; one value per height. The planner keeps
-/// the plans of the transforms, which take longer to make than to use.
-pub fn flattening(
-    heights: &[f64],
-    step: f64,
-    modulus: f64,
-    planner: &mut RealFftPlanner<f64>,
-) -> Vec<f64> {
+thread_local! {
+    /// Plans of the transforms, which take longer to make than to use. They follow from their lengths alone; there are a dozen at most.
+    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+}
+
+/// Pressure in MPa that flattens `heights` in mm, `step` mm apart, with the contact modulus in MPa; one value per height.
+pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
     let count = heights.len();
     let padded = (PADDING * count).max(2).next_power_of_two();
     let mut values = vec![0.0; padded];
@@ -32,8 +32,12 @@ pub fn flattening(
             *height
         };
     }
-    let forward = planner.plan_fft_forward(padded);
-    let backward = planner.plan_fft_inverse(padded);
+    let (forward, backward) = PLANNER.with_borrow_mut(|planner| {
+        (
+            planner.plan_fft_forward(padded),
+            planner.plan_fft_inverse(padded),
+        )
+    });
     let mut spectrum = forward.make_output_vec();
     // The buffers have the lengths of the plans, so that neither transform can fail.
     let done = forward.process(&mut values, &mut spectrum);

@@ -1,7 +1,5 @@
 //! The quality of a profile under a contact, and the smoothing that its noise requires.
 
-use realfft::RealFftPlanner;
-
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
@@ -52,7 +50,6 @@ pub fn under_contact(
     smoothing: f64,
     contact: [f64; 2],
     modulus: f64,
-    planner: &mut RealFftPlanner<f64>,
 ) -> UnderContact {
     let [low, high] = contact;
     let half = 0.5 * (high - low);
@@ -78,7 +75,7 @@ pub fn under_contact(
         over_width: points.chord(widest) / (high - low),
         spacing,
         noise: noise::noise(points, around).or_else(|| noise::noise(points, whole)),
-        roughness: roughness(points, smoothing, contact, modulus, planner),
+        roughness: roughness(points, smoothing, contact, modulus),
         polygon: noise::polygon(points, around),
         outlier,
         step,

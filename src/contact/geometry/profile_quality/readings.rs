@@ -1,7 +1,5 @@
 //! Compares two readings of the same points: the spline in use with a smoother one, and with Akima's curve.
 
-use realfft::RealFftPlanner;
-
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::flattening::flattening;
 use crate::contact::geometry::profile_quality::noise::{MEDIAN_OF_NORMAL, median};
@@ -9,8 +7,10 @@ use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::numerics::hermite::{akima_slopes, value};
 use crate::contact::numerics::spline::Spline;
 
-/// Spacing of the comparison in mm.
-const STEP: f64 = 0.05;
+/// Bounds of the spacing of the comparison in mm.
+const STEP: [f64; 2] = [0.05, 0.1];
+/// Places of the comparison from one point to the next, within these bounds.
+const PLACES: f64 = 5.0;
 /// Distance in mm by which the comparison extends beyond twice the half width of the contact.
 const BEYOND: f64 = 10.0;
 /// Distance, in cut wavelengths, beyond which points do not affect a smoothed curve.
@@ -34,13 +34,7 @@ pub struct Roughness {
 /// Roughness of a profile at the contact `middle ± half` (mm along the profile); the contact modulus is in MPa. The planner keeps what it has
 /// planned for the next contact.
 #[must_use]
-pub fn roughness(
-    points: Points,
-    smoothing: f64,
-    contact: [f64; 2],
-    modulus: f64,
-    planner: &mut RealFftPlanner<f64>,
-) -> Roughness {
+pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64) -> Roughness {
     let [low, high] = contact;
     let half = 0.5 * (high - low);
     let last = points.along.len() - 1;
@@ -53,16 +47,19 @@ pub fn roughness(
         window[0] - SUPPORT * reference,
         window[1] + SUPPORT * reference,
     ]);
-    let step = STEP.max((window[1] - window[0]) / SAMPLES_MAX as f64);
+    let spacing =
+        (part.along[part.along.len() - 1] - part.along[0]) / (part.along.len() - 1) as f64;
+    let step = (spacing / PLACES).clamp(STEP[0], STEP[1]);
+    let step = step.max((window[1] - window[0]) / SAMPLES_MAX as f64);
     let count = ((window[1] - window[0]) / step).floor() as usize + 1;
     let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
     let used = spline(part, smoothing);
     let used: Vec<CurvePoint> = places.iter().map(|s| used.at(*s)).collect();
-    let mut pressures = |other: &dyn Fn(f64) -> [f64; 2]| {
+    let pressures = |other: &dyn Fn(f64) -> [f64; 2]| {
         let heights: Vec<f64> = (used.iter().zip(&places))
             .map(|(used, s)| above(used, other(*s)))
             .collect();
-        flattening(&heights, step, modulus, planner)
+        flattening(&heights, step, modulus)
     };
     let over_contact = |pressures: &[f64]| {
         let (mut sum, mut count) = (0.0, 0.0_f64);
@@ -131,13 +128,7 @@ mod tests {
             at: &at,
             along: &along,
         };
-        roughness(
-            points,
-            smoothing,
-            CONTACT,
-            MODULUS,
-            &mut RealFftPlanner::new(),
-        )
+        roughness(points, smoothing, CONTACT, MODULUS)
     }
 
     #[test]
@@ -191,14 +182,7 @@ mod tests {
                 at: &at,
                 along: &along,
             };
-            roughness(
-                points,
-                smoothing,
-                CONTACT,
-                MODULUS,
-                &mut RealFftPlanner::new(),
-            )
-            .ambiguity
+            roughness(points, smoothing, CONTACT, MODULUS).ambiguity
         };
         assert!(
             open(8, 0.0) > 3.0 * open(1, 0.0),

@@ -227,20 +227,23 @@ impl GridPressure {
     pub fn pressures<const N: usize>(&self, chord: &Chord, places: [f64; N]) -> [f64; N] {
         let x = &self.grid.x;
         let (j, weights) = self.row_weights(chord);
-        let mut known = None;
+        let value = |column: usize| self.value_on_column(column, j, weights);
+        let last = x.len() - 3;
+        let mut i = self.column_interval(places[0].max(chord.left));
+        let mut values: [f64; 4] = std::array::from_fn(|k| value(i - 1 + k));
+        let mut cubic = line::cubic(x, i, values);
         places.map(|place| {
             if place < chord.left || place > chord.right {
                 return 0.0;
             }
-            let i = self.column_interval(place);
-            let cubic = match known {
-                Some((column, cubic)) if column == i => cubic,
-                _ => {
-                    let value = |k| self.value_on_column(i - 1 + k, j, weights);
-                    line::cubic(x, i, std::array::from_fn(value))
-                }
-            };
-            known = Some((i, cubic));
+            let before = i;
+            while i < last && x[i + 1] <= place {
+                i += 1;
+                values = [values[1], values[2], values[3], value(i + 2)];
+            }
+            if i != before {
+                cubic = line::cubic(x, i, values);
+            }
             self.pressure_max * cubic.at(place).sqrt()
         })
     }

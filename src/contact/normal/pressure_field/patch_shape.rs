@@ -7,7 +7,6 @@ use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::patch_cells::PatchShape;
 use crate::contact::normal::pressure_field::sample_grid::{PADDING, SampleGrid};
-use crate::contact::numerics::bisection::bisect;
 use crate::contact::numerics::maximum::maximum;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -15,6 +14,28 @@ use crate::contact::remark::list::Remark;
 /// With fewer samples along or across, the edge of a patch is uncertain and its force wrong by more than about 2 %: for
 /// Hertz's pressure, the sum of the samples is wrong by up to 2 % with 9 samples, 0.5 % with 18.
 const SAMPLES_ACROSS_MIN: usize = 8;
+
+/// The ends of a patch along x, each with the line that reaches it.
+struct FarthestLines {
+    left: (f64, f64),
+    right: (f64, f64),
+}
+
+impl FarthestLines {
+    const NONE: FarthestLines = FarthestLines {
+        left: (f64::INFINITY, 0.0),
+        right: (f64::NEG_INFINITY, 0.0),
+    };
+
+    fn widen(&mut self, line: f64, left: f64, right: f64) {
+        if left < self.left.0 {
+            self.left = (left, line);
+        }
+        if right > self.right.0 {
+            self.right = (right, line);
+        }
+    }
+}
 
 impl GridPressure {
     /// Patches before their regions are found: force, rows and columns, from the samples.
@@ -74,32 +95,39 @@ impl GridPressure {
             let right = segments.last().map_or(f64::NEG_INFINITY, |last| last.1);
             (left, right, length)
         };
-        let (mut x_min, mut x_max) = ((f64::INFINITY, 0.0), (f64::NEG_INFINITY, 0.0));
-        let mut widen = |n: f64, left: f64, right: f64| {
-            x_min = if left < x_min.0 { (left, n) } else { x_min };
-            x_max = if right > x_max.0 { (right, n) } else { x_max };
-        };
+        let mut reach = FarthestLines::NONE;
         let mut area = 0.0;
         for n in 0..lines {
             let n = n as f64 + 0.5;
             let (left, right, length) = ends(at(n));
             area += length * half * (n * step).sin() * step;
-            widen(n, left, right);
+            reach.widen(n, left, right);
         }
         // The longest chord of a rough patch may lie on a row of samples.
-        for y in self.grid.y.iter().filter(|y| y_min < **y && **y < y_max) {
-            let (left, right, _) = ends(*y);
-            widen(((middle - y) / half).acos() / step, left, right);
+        for (j, y) in self.grid.y.iter().enumerate() {
+            if y_min < *y && *y < y_max && self.may_reach(j, &reach) {
+                let (left, right, _) = ends(*y);
+                reach.widen(((middle - y) / half).acos() / step, left, right);
+            }
         }
+        let FarthestLines { left, right } = reach;
         let (first, last) = (|n: f64| -ends(at(n)).0, |n: f64| ends(at(n)).1);
         let bracket = |n: f64| [(n - 1.0).max(0.0), (n + 1.0).min(lines as f64)];
         let extent = [
-            -maximum(bracket(x_min.1), first).max(-x_min.0),
-            maximum(bracket(x_max.1), last).max(x_max.0),
+            -maximum(bracket(left.1), first).max(-left.0),
+            maximum(bracket(right.1), last).max(right.0),
             y_min,
             y_max,
         ];
         (extent, area)
+    }
+
+    /// May the line of row j reach farther than all lines so far? An edge lies at most two samples beyond the positive ones.
+    fn may_reach(&self, j: usize, reach: &FarthestLines) -> bool {
+        self.runs[j].is_none_or(|[first, last]| {
+            let x = &self.grid.x;
+            x[first - 2] < reach.left.0 || x[last + 2] > reach.right.0
+        })
     }
 
     /// Region of a patch from its samples alone: the box around them, and the area that they stand for.
@@ -124,16 +152,51 @@ impl GridPressure {
 
     /// First and last y of lines that meet the patch.
     fn extent_across(&self, shape: &PatchShape, label: usize) -> [f64; 2] {
-        // Two spacings halved this often are below rounding error.
-        const HALVINGS: u32 = 36;
         let y = &self.grid.y;
         // The outermost samples are two lines inside the range of cells (see `shapes_from_samples`).
         let [first, last] = [*shape.rows.start(), *shape.rows.end() + 1];
-        [(first, first + 2), (last, last - 2)].map(|(outside, inside)| {
-            let empty = |y: f64| self.segments(label, y).is_empty();
-            let [_, inside] = bisect([y[outside], y[inside]], HALVINGS, empty);
-            inside
-        })
+        [(first, first + 2), (last, last - 2)]
+            .map(|(outside, inside)| self.end_across(label, [y[outside], y[inside]]))
+    }
+
+    /// The last place that meets the patch on the way from `inside` to `outside`. The square of a chord falls linearly to 0 at the end of a
+    /// smooth patch, so that two chords tell where that is: the bracket is closed by lines on both sides of it.
+    fn end_across(&self, label: usize, [outside, inside]: [f64; 2]) -> f64 {
+        const LINES_MAX: usize = 60;
+        /// Width of the bracket at the end relative to the one at the beginning.
+        const CLOSE: f64 = 1e-12;
+        /// How far from the place expected the lines lie, relative to its distance.
+        const ASIDE: f64 = 0.03;
+        let squared = |y: f64| {
+            let segments = self.segments(label, y);
+            let ends = segments.first().zip(segments.last());
+            ends.map(|((left, _), (_, right))| (right - left) * (right - left))
+        };
+        let (mut outer, mut inner) = (outside, (inside, squared(inside).unwrap_or(0.0)));
+        let mut before: Option<(f64, f64)> = None;
+        for k in 0..LINES_MAX {
+            let (at, square) = inner;
+            if (outer - at).abs() <= CLOSE * (outside - inside).abs() {
+                break;
+            }
+            let expected = before.map(|(y, larger)| square * (at - y) / (larger - square));
+            let aside = if k % 2 == 0 { 1.0 - ASIDE } else { 1.0 + ASIDE };
+            let next = expected.map_or(f64::NAN, |distance| at + aside * distance);
+            let (low, high) = (at.min(outer), at.max(outer));
+            let next = if next > low && next < high && k % 5 < 4 {
+                next
+            } else {
+                0.5 * (low + high)
+            };
+            match squared(next) {
+                Some(square) => {
+                    before = Some(inner);
+                    inner = (next, square);
+                }
+                None => outer = next,
+            }
+        }
+        inner.0
     }
 
     pub(crate) fn remarks(&self, samples: &[u8], shapes: &[PatchShape]) -> Vec<RemarkEntry> {

@@ -57,11 +57,14 @@ pub const JUMPING: f64 = 1.5;
 pub const SURPRISES: [f64; 2] = [0.06, 0.31];
 /// Factor on the change of the moments of such a pressure to twice as many strips and cells; .3 to 1 are alike.
 pub const DATA: f64 = 0.5;
-/// Error of the resultants from region and pressure of a gap on so many cells of the normal problem across a patch (216 gaps:
-/// change to three times as many cells .0003 at 75 %, .0006 at 90 %).
-pub const REGION: f64 = 5e-4;
+/// Error of the resultants from region and pressure of a gap on so many cells of the normal problem across a patch. Change to 100 cells at
+/// 75 and 90 % of 100 gaps and of 96 patches of wheels on rails: .0003 to .0007 from 44 cells, .0005 to .0016 from 28, .0012 to .0027 from
+/// 20. 5e-4 and 7e-4 cover as many of these.
+pub const REGION: f64 = 6e-4;
 /// The cells that [`REGION`] belongs to.
 pub const REGION_CELLS: f64 = 44.0;
+/// Power of the cells that it falls with; see [`REGION`].
+pub const REGION_POWER: f64 = 1.75;
 /// Relative error of resultants over that of the load they are found under: 2/3 for small creepages (areas of Hertz's
 /// contacts), 1 in full slip.
 pub const LOAD: f64 = 1.0;

@@ -12,9 +12,9 @@ use crate::contact::rolling::refinement::caution::caution;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::constants::{
     CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, HERTZ, JUMPING,
-    LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, RULES_ON_MESH,
-    RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW, SURPRISES,
-    WITHOUT_COMPANION,
+    LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, REGION_POWER,
+    RULES_ON_MESH, RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW,
+    SURPRISES, WITHOUT_COMPANION,
 };
 use crate::contact::rolling::refinement::distances::distances;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
@@ -266,14 +266,14 @@ pub fn jumps(task: &RollingTask) -> bool {
     task.footprint.jumps()
 }
 
-/// Errors of region and pressure that were found from a gap, and of the load they carry. The first falls as the power 3/2 of the
-/// cells of the normal problem across a patch.
+/// Errors of region and pressure that were found from a gap, and of the load they carry. The first falls as a power of the cells of the
+/// normal problem across a patch.
 fn normal_errors(task: &RollingTask, patches: &[Patch]) -> Vec<f64> {
     let Some(uncertainty) = task.footprint.uncertainty() else {
         return vec![0.0; patches.len() + 1];
     };
     let of = |cells: &f64| {
-        let region = REGION * (REGION_CELLS / cells.max(1.0)).powf(1.5);
+        let region = REGION * (REGION_CELLS / cells.max(1.0)).powf(REGION_POWER);
         region.hypot(LOAD * uncertainty.load)
     };
     weighted(patches, uncertainty.cells_across.iter().map(of).collect())
