@@ -44,6 +44,7 @@ pub mod monitor;
 pub mod normal;
 pub mod normal_stage;
 pub mod numerics;
+pub mod once;
 pub mod post;
 pub mod problem;
 pub mod profile_trust;

@@ -6,6 +6,7 @@ const ORDER: &[&str] = &[
     "contact::conventions",
     "contact::monitor",
     "contact::remark",
+    "contact::once",
     "contact::numerics",
     "contact::mesh",
     "contact::geometry",

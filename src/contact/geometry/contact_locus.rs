@@ -125,10 +125,7 @@ impl<'g> ContactLocus<'g> {
     /// # Errors
     /// A sentence, if no part of the wheel lies above the rail.
     pub fn new(geometry: &'g WheelRail) -> Result<ContactLocus<'g>, String> {
-        let found = geometry
-            .locus
-            .0
-            .get_or_init(|| Arc::new(lines_of(geometry)));
+        let found = geometry.locus.get_or_make(|| Arc::new(lines_of(geometry)));
         let found = found.as_ref().as_ref().map_err(String::clone)?;
         Ok(ContactLocus {
             geometry,

@@ -8,9 +8,11 @@
 
 use std::sync::Arc;
 
-use crate::contact::geometry::locus_lines::{LocusOnce, RailEdgeOnce};
+use crate::contact::geometry::envelope::Envelope;
+use crate::contact::geometry::locus_lines::LocusLines;
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile::Profile;
+use crate::contact::once::Once;
 use crate::contact::remark::entry::RemarkEntry;
 
 /// Left or right rail, seen along rolling.
@@ -68,10 +70,10 @@ pub struct WheelRail {
     rail: Arc<PlaneCurve>,
     wheel: Arc<Profile>,
     axes: AxleAxes,
-    /// The rail's upper edge, once it was looked for.
-    pub(crate) rail_edge: RailEdgeOnce,
-    /// Rail and wheel line by line, once they were looked for.
-    pub(crate) locus: LocusOnce,
+    /// The rail's upper edge, which is the same for every place of the wheelset over it.
+    pub(crate) rail_edge: Arc<Once<Envelope>>,
+    /// Rail and wheel line by line, or why there are no lines.
+    pub(crate) locus: Once<Arc<Result<LocusLines, String>>>,
 }
 
 /// Unit vectors of the wheelset in track axes.
@@ -160,8 +162,8 @@ impl WheelRail {
             rail_given: Arc::new(rail),
             wheel,
             axes,
-            rail_edge: RailEdgeOnce::default(),
-            locus: LocusOnce::default(),
+            rail_edge: Arc::default(),
+            locus: Once::default(),
         }
     }
 
@@ -177,7 +179,7 @@ impl WheelRail {
         WheelRail {
             axes: AxleAxes::new(&placement),
             placement,
-            locus: LocusOnce::default(),
+            locus: Once::default(),
             ..self.clone()
         }
     }
@@ -188,7 +190,7 @@ impl WheelRail {
         self.placement.yaw = yaw;
         self.placement.roll = roll;
         self.axes = AxleAxes::new(&self.placement);
-        self.locus = LocusOnce::default();
+        self.locus = Once::default();
     }
 
     /// The profiles of rail (before cant) and wheel.

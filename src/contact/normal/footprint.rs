@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 
 use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::hertz::Ellipse;
-use crate::contact::normal::load_across::{LoadAcross, LoadsOnce};
+use crate::contact::normal::load_across::LoadAcross;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
+use crate::contact::once::Once;
 
 /// The patches of one frame with their pressures; never empty. It answers where the patches are, how long their chords are,
 /// and what pressure acts on them, and nothing else.
@@ -15,7 +16,7 @@ pub struct Footprint {
     shape: FootprintShape,
     patches: Vec<Patch>,
     uncertainty: Option<NormalUncertainty>,
-    loads: LoadsOnce,
+    loads: Once<Vec<LoadAcross>>,
 }
 
 /// Where the pressure comes from.
@@ -69,7 +70,7 @@ impl Footprint {
             patches: vec![ellipse.patch()],
             shape: FootprintShape::Hertz(ellipse),
             uncertainty: None,
-            loads: LoadsOnce::default(),
+            loads: Once::default(),
         }
     }
 
@@ -80,7 +81,7 @@ impl Footprint {
             patches: field.patches(),
             shape: FootprintShape::Sampled(field),
             uncertainty: None,
-            loads: LoadsOnce::default(),
+            loads: Once::default(),
         }
     }
 

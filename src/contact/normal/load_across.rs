@@ -1,7 +1,6 @@
 //! How the load of a patch is spread across rolling: its line load by y, a chain of parabolas.
 
 use std::f64::consts::PI;
-use std::sync::OnceLock;
 
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::numerics::lagrange;
@@ -84,23 +83,6 @@ impl LoadAcross {
             (end - begin) / 6.0 * (value(begin) + 4.0 * middle + value(end))
         };
         parabolas.map(over).sum()
-    }
-}
-
-/// The loads of all patches, once they were asked for. They follow from the pressures, so that two of them never make footprints differ.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct LoadsOnce(OnceLock<Vec<LoadAcross>>);
-
-impl PartialEq for LoadsOnce {
-    fn eq(&self, _: &LoadsOnce) -> bool {
-        true
-    }
-}
-
-impl LoadsOnce {
-    /// The loads; made at the first call.
-    pub(crate) fn get_or_make(&self, make: impl FnOnce() -> Vec<LoadAcross>) -> &[LoadAcross] {
-        self.0.get_or_init(make)
     }
 }
 

@@ -67,7 +67,8 @@ impl Cubic {
     }
 
     /// Points where the sign changes from or to positive, from smaller to larger x, each with the sign after it
-    /// (`true` is positive). Accurate to a few units in the last place of x.
+    /// (`true` is positive). Accurate to a few units in the last place of x; where
+    /// two of them nearly meet, to 1e-8 of the interval.
     pub(crate) fn sign_changes(&self) -> impl Iterator<Item = (f64, bool)> + use<> {
         let cubic = *self;
         let [first, second] = self.turning_points();

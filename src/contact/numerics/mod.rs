@@ -6,6 +6,7 @@
 //! | a root of an increasing function without bounds, without slopes | [`bracketed_root`] |
 //! | two arguments at which two values are 0, without bounds, without slopes | [`pair_root`] |
 //! | the boundary of a condition | [`bisection`] |
+//! | where something that falls to 0 ends | [`vanishing`] |
 //! | the largest value in an interval | [`maximum`] |
 //! | values between nodes | [`cubic`] (one interval), [`hermite`] (given slopes, or slopes without overshoot), [`spline`] (smoothing), [`lagrange`] (one polynomial) |
 //! | integrals | [`quadrature`] |
@@ -43,3 +44,4 @@ pub mod quadrature;
 pub mod simd_ln;
 pub mod small_lu;
 pub mod spline;
+pub mod vanishing;

@@ -1,32 +1,8 @@
 //! What a look at the samples of a gap shows, kept once it was taken: the check of a case asks for it several times, and its solution again.
 
-use std::sync::OnceLock;
-
 use crate::contact::normal::gap::pilot::GapPilot;
 use crate::contact::normal::gap::search_box::SearchBox;
-
-/// Something computed at the first call. It follows from the rest of its task, so that two of them never make tasks differ.
-#[derive(Debug, Clone)]
-pub(super) struct Once<T>(OnceLock<T>);
-
-impl<T> Default for Once<T> {
-    fn default() -> Once<T> {
-        Once(OnceLock::new())
-    }
-}
-
-impl<T> PartialEq for Once<T> {
-    fn eq(&self, _: &Once<T>) -> bool {
-        true
-    }
-}
-
-impl<T> Once<T> {
-    /// It; made at the first call.
-    pub(super) fn get_or_make(&self, make: impl FnOnce() -> T) -> &T {
-        self.0.get_or_init(make)
-    }
-}
+use crate::contact::once::Once;
 
 /// What is known of a contact before it is solved.
 #[derive(Debug, Clone, Copy, PartialEq)]

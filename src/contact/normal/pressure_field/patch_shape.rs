@@ -8,6 +8,7 @@ use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::patch_cells::PatchShape;
 use crate::contact::normal::pressure_field::sample_grid::{PADDING, SampleGrid};
 use crate::contact::numerics::maximum::maximum;
+use crate::contact::numerics::vanishing;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
@@ -159,44 +160,14 @@ impl GridPressure {
             .map(|(outside, inside)| self.end_across(label, [y[outside], y[inside]]))
     }
 
-    /// The last place that meets the patch on the way from `inside` to `outside`. The square of a chord falls linearly to 0 at the end of a
-    /// smooth patch, so that two chords tell where that is: the bracket is closed by lines on both sides of it.
-    fn end_across(&self, label: usize, [outside, inside]: [f64; 2]) -> f64 {
-        const LINES_MAX: usize = 60;
-        /// Width of the bracket at the end relative to the one at the beginning.
-        const CLOSE: f64 = 1e-12;
-        /// How far from the place expected the lines lie, relative to its distance.
-        const ASIDE: f64 = 0.03;
-        let squared = |y: f64| {
+    /// The last place that meets the patch on the way from `inside` to `outside`: at the end of a smooth patch the square of a chord falls
+    /// linearly to 0.
+    fn end_across(&self, label: usize, bracket: [f64; 2]) -> f64 {
+        vanishing::end(bracket, |y| {
             let segments = self.segments(label, y);
             let ends = segments.first().zip(segments.last());
             ends.map(|((left, _), (_, right))| (right - left) * (right - left))
-        };
-        let (mut outer, mut inner) = (outside, (inside, squared(inside).unwrap_or(0.0)));
-        let mut before: Option<(f64, f64)> = None;
-        for k in 0..LINES_MAX {
-            let (at, square) = inner;
-            if (outer - at).abs() <= CLOSE * (outside - inside).abs() {
-                break;
-            }
-            let expected = before.map(|(y, larger)| square * (at - y) / (larger - square));
-            let aside = if k % 2 == 0 { 1.0 - ASIDE } else { 1.0 + ASIDE };
-            let next = expected.map_or(f64::NAN, |distance| at + aside * distance);
-            let (low, high) = (at.min(outer), at.max(outer));
-            let next = if next > low && next < high && k % 5 < 4 {
-                next
-            } else {
-                0.5 * (low + high)
-            };
-            match squared(next) {
-                Some(square) => {
-                    before = Some(inner);
-                    inner = (next, square);
-                }
-                None => outer = next,
-            }
-        }
-        inner.0
+        })
     }
 
     pub(crate) fn remarks(&self, samples: &[u8], shapes: &[PatchShape]) -> Vec<RemarkEntry> {

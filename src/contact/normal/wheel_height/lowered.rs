@@ -96,14 +96,8 @@ impl WheelTask {
         let depths: Vec<f64> = gaps.iter().map(depth).collect();
         let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
         // Patches that share a load exchange it for small errors of each, see `GridFineness::alone`.
-        let one = |near: &WheelContact| {
-            near.patches
-                .iter()
-                .map(|gap| gap.field.patches().len())
-                .sum::<usize>()
-                == 1
-        };
-        let alone = depths.iter().filter(|d| **d > least).count() == 1 && near.is_none_or(one);
+        let alone = depths.iter().filter(|d| **d > least).count() == 1
+            && near.is_none_or(WheelContact::is_one_patch);
         let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
         let patches = touching
             .map(|(gap, depth)| {

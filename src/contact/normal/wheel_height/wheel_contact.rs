@@ -140,10 +140,18 @@ impl WheelContact {
             .start_for(gap, depth)
     }
 
+    /// Does one patch carry everything?
+    pub(crate) fn is_one_patch(&self) -> bool {
+        matches!(&self.patches[..], [gap] if gap.field.patches().len() == 1)
+    }
+
     /// Is the force near enough to go on with fine gaps?
     pub(crate) fn is_near(&self, target: f64) -> bool {
-        let single = matches!(&self.patches[..], [gap] if gap.field.patches().len() == 1);
-        let near = if single { NEAR_SINGLE } else { NEAR };
+        let near = if self.is_one_patch() {
+            NEAR_SINGLE
+        } else {
+            NEAR
+        };
         (self.found[0] / target - 1.0).abs() <= near
     }
 
