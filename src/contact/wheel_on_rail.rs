@@ -47,7 +47,8 @@ const TOLERANCE_FIRST: f64 = 0.1;
 ///
 /// A vertical force is balanced by the normal and the tangential forces together if the case has one motion: friction's share
 /// is found on a coarse mesh, the wheel brought to rest again, and so on until the share is what it was taken for. Several
-/// motions share their patches, as the points of a history do, so that only normal forces balance then; a remark says so.
+/// motions share their patches, as the points of a history do, so that only normal forces balance then; a remark says so. `near` is the
+/// wheel at rest with nearly the same profiles, if that is known.
 ///
 /// # Errors
 /// A named reason why there is no answer, with what `judge` says of it.
@@ -55,6 +56,7 @@ pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     contact: &WheelTask,
+    near: Option<&WheelContact>,
     judge: &mut dyn Judge,
     monitor: &dyn Monitor,
 ) -> Result<SolvedWheel, SolveError> {
@@ -67,6 +69,7 @@ pub(crate) fn solve(
         operators,
         case,
         contact,
+        near: near.map(|near| near.of_other_profiles(search.touch)),
         search,
         balanced: vertical && case.problem.part.all == 1 && case.problem.history.is_none(),
         judge,
@@ -76,7 +79,9 @@ pub(crate) fn solve(
     if solve.balanced {
         return solve.balance(workspace);
     }
-    let mut at_rest = solve.rest(solve.exactly(0.0), HeightStart::default(), workspace)?;
+    let near = solve.near.take();
+    let start = near.as_ref().map(HeightStart::of_other_profiles);
+    let mut at_rest = solve.rest(solve.exactly(0.0), start.unwrap_or_default(), workspace)?;
     let answers = solve.answers(&at_rest, &case.run)?;
     if vertical {
         let remark = Remark::NormalForcesAloneBalance {};
@@ -103,6 +108,8 @@ struct WheelSolve<'a> {
     case: &'a CheckedCase,
     contact: &'a WheelTask,
     search: ContactLocus<'a>,
+    /// The wheel at rest with nearly the same profiles.
+    near: Option<WheelContact>,
     balanced: bool,
     judge: &'a mut dyn Judge,
     monitor: &'a dyn Monitor,
@@ -223,18 +230,23 @@ impl WheelSolve<'_> {
         }
     }
 
-    /// The first rest with friction's share in it, and whether it is an exact one: the share is forecast while the height is sought, or
-    /// found on a coarse mesh at about the right height.
+    /// The first rest with friction's share in it, and whether it is an exact one: the share is that of nearly the same profiles, or
+    /// forecast while the height is sought, or found on a coarse mesh at about the right height.
     fn first_rest(
         &mut self,
         workspace: &mut GridWorkspace<f32>,
     ) -> Result<(RestingWheel, bool), SolveError> {
+        if let Some(near) = self.near.take() {
+            let wanted = self.exactly(near.friction_share);
+            let start = HeightStart::of_other_profiles(&near);
+            return Ok((self.rest(wanted, start, workspace)?, true));
+        }
         let WheelSolve { case, contact, .. } = *self;
         let share = |wheel: &WheelContact| forecast(&case.problem, &contact.geometry, wheel);
         if can_forecast(&case.problem) {
             let start = HeightStart {
-                before: None,
                 forecast: Some(&share),
+                ..HeightStart::default()
             };
             return Ok((self.rest(self.exactly(0.0), start, workspace)?, true));
         }
@@ -265,10 +277,7 @@ impl WheelSolve<'_> {
                 break;
             }
             if !exact {
-                let start = HeightStart {
-                    before: Some(&at_rest.wheel),
-                    forecast: None,
-                };
+                let start = HeightStart::near(Some(&at_rest.wheel));
                 let later = self.rest(self.exactly(counted), start, workspace)?;
                 at_rest = at_rest.again(later);
             }

@@ -34,7 +34,7 @@ pub(crate) fn solve(
     let settled = settle::settled(case, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
     let mut judgement = Judgement::new(contact);
-    let found = wheel_on_rail::solve(operators, case, contact, &mut judgement, monitor)?;
+    let found = wheel_on_rail::solve(operators, case, contact, None, &mut judgement, monitor)?;
     let found = assessed(operators, case, &judgement, found, monitor)?;
     Ok((found.solution, found.fields))
 }
@@ -53,6 +53,7 @@ pub(crate) fn judged(
         operators,
         case,
         contact,
+        None,
         &mut Judgement::new(contact),
         monitor,
     )
@@ -81,7 +82,9 @@ fn assessed(
 ) -> Result<SolvedWheel, SolveError> {
     let contact = judgement.contact;
     let (qualities, findings) = judgement.of(&found.wheel)?;
-    let solution = &mut found.solution;
+    let SolvedWheel {
+        wheel, solution, ..
+    } = &mut found;
     for (patch, quality) in solution.patches.iter_mut().zip(qualities) {
         patch.quality = Some(quality);
     }
@@ -89,7 +92,9 @@ fn assessed(
         finding.of_roughness() && finding.has_evidence() && finding.share > uncertainty::HARMLESS
     });
     let suspicious = rough || settle::undecided(contact);
-    let changes = uncertainty::add(operators, case, contact, suspicious, solution, monitor)?;
+    let changes = uncertainty::add(
+        operators, case, contact, wheel, suspicious, solution, monitor,
+    )?;
     let reported = findings
         .into_iter()
         .filter(|finding| finding.is_reported(changes[finding.patch]));

@@ -83,6 +83,7 @@ pub(crate) fn add(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     contact: &WheelTask,
+    wheel: &WheelContact,
     suspicious: bool,
     solution: &mut Solution,
     monitor: &dyn Monitor,
@@ -105,6 +106,7 @@ pub(crate) fn add(
                 operators,
                 &companion(case, &chosen),
                 &other,
+                Some(wheel),
                 &mut NoJudge,
                 &Afterwards(monitor),
             ) {

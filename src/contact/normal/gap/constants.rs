@@ -14,7 +14,6 @@ pub(crate) const RESOLUTION: GridFineness = GridFineness {
     contact: 44.0,
     patch: 24.0,
     share_min: 0.02,
-    alone: 1.0,
     settles: true,
 };
 
@@ -23,7 +22,6 @@ pub(crate) const RESOLUTION_COARSE: GridFineness = GridFineness {
     contact: 22.0,
     patch: 12.0,
     share_min: 0.05,
-    alone: 1.0,
     settles: false,
 };
 
@@ -34,13 +32,13 @@ pub(crate) const TARGET_USUAL: f64 = 0.002;
 /// Power of the target over [`TARGET_USUAL`] by which the cells grow: the inverse of that 3/2.
 pub(crate) const TARGET_POWER: f64 = -2.0 / 3.0;
 
-/// Between these targets one patch by itself has fewer cells, the looser the target: that of a case that gives none still has all.
+/// Between these targets patches have fewer cells, the looser the target: that of a case that gives none still has all.
 pub(crate) const TARGETS_LOOSE: [f64; 2] = [0.005, 0.02];
 
 /// Power of the target by which they fall: 25 cells at 0.02. At that target gaps take two thirds of the time that they
-/// take with all cells, patches of wheels three quarters; .97 and .95 of them are covered, .985 and .99 with all cells (`cargo bench --bench
-/// calibrate gap profiles`).
-pub(crate) const ALONE_POWER: f64 = -0.4;
+/// take with all cells, patches of wheels three quarters, two of them half; .97 and .95 of them are covered, .985 and .99 with all cells
+/// (`cargo bench --bench calibrate gap profiles`).
+pub(crate) const LOOSE_POWER: f64 = -0.4;
 
 /// A grid is fine enough if the cells that are wanted are no smaller than this times its own.
 pub(crate) const COARSER_MAX: f64 = 0.8;

@@ -56,8 +56,6 @@ pub(crate) struct GridFineness {
     pub(crate) patch: f64,
     /// Patches that carry a smaller fraction of the load do not count.
     pub(crate) share_min: f64,
-    /// What is left of these cells where one patch carries all that counts.
-    pub(crate) alone: f64,
     /// The result is compared with that of the grid before.
     pub(crate) settles: bool,
 }
@@ -271,22 +269,19 @@ impl PressureGrid {
         let mut contact = Extent::default();
         let total: f64 = pressed.pressure.iter().sum();
         let mut steps = [f64::INFINITY; 2];
-        let mut count = 0;
         for patch in self.patches(&pressed.pressure) {
             let extent = self.extent(&patch);
             patch.iter().for_each(|k| contact.add(cell(*k)));
             let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
             if load >= resolution.share_min * total {
-                count += 1;
                 for (k, step) in steps.iter_mut().enumerate() {
                     *step = step.min(extent.length(k) * self.step[k] / resolution.patch);
                 }
             }
         }
-        let coarser = if count > 1 { 1.0 } else { resolution.alone };
         let window = [0, 1].map(|k| {
             let length = contact.length(k) * self.step[k];
-            steps[k] = steps[k].min(length / resolution.contact) / coarser;
+            steps[k] = steps[k].min(length / resolution.contact);
             let margin = (0.3 * self.step[k]).max(1.5 * steps[k]);
             let low = self.range(k)[0];
             let [first, last] = whole.0[k].map(|i| i as f64);

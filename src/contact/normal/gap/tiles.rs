@@ -295,11 +295,6 @@ fn point_loads(tile: &Tile) -> Vec<[f64; 3]> {
 
 /// The resolution that a part of the load asks for.
 fn own_resolution(resolution: GridFineness, share: f64) -> GridFineness {
-    // No patch is alone here.
-    let resolution = GridFineness {
-        alone: 1.0,
-        ..resolution
-    };
     if share < resolution.share_min {
         GridFineness {
             contact: CELLS_TINY,

@@ -5,7 +5,6 @@ use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
-use crate::contact::normal::gap::constants::TARGET_USUAL;
 use crate::contact::normal::gap::grid::GridFineness;
 use crate::contact::normal::gap::seen::GapSeen;
 use crate::contact::normal::gap::surface::GapSurface;
@@ -67,8 +66,6 @@ impl Fineness {
 
 /// One gap at one height of the wheel's centre.
 pub(crate) struct LoweredGap<'a> {
-    /// Nothing else touches, as far as is known.
-    alone: bool,
     gap: &'a LocalGap,
     /// Deepest overlap in mm.
     depth: f64,
@@ -95,15 +92,11 @@ impl WheelTask {
             .map_err(NormalError::NoAnswer)?;
         let depths: Vec<f64> = gaps.iter().map(depth).collect();
         let least = DEPTH_SHARE_MIN * depths.iter().copied().fold(0.0, f64::max);
-        // Patches that share a load exchange it for small errors of each, see `GridFineness::alone`.
-        let alone = depths.iter().filter(|d| **d > least).count() == 1
-            && near.is_none_or(WheelContact::is_one_patch);
         let touching = gaps.iter().zip(&depths).filter(|(_, d)| **d > least);
         let patches = touching
             .map(|(gap, depth)| {
                 let start = near.and_then(|near| near.start_for(gap, *depth));
                 let place = LoweredGap {
-                    alone,
                     gap,
                     depth: *depth,
                     centre,
@@ -148,7 +141,6 @@ impl WheelTask {
         monitor: &dyn Monitor,
     ) -> Result<GapContact, NormalError> {
         let LoweredGap {
-            alone,
             gap,
             depth,
             centre,
@@ -171,8 +163,7 @@ impl WheelTask {
         };
         let resolution = match fineness.detail {
             GapSampling::Coarse => GridFineness::coarse(),
-            GapSampling::Fine if alone => GridFineness::for_answer(fineness.target),
-            GapSampling::Fine => GridFineness::for_answer(fineness.target.min(TARGET_USUAL)),
+            GapSampling::Fine => GridFineness::for_answer(fineness.target),
         };
         let found = contact.solve_near(start, resolution, workspace, monitor)?;
         let found = contact.found(found, fineness.edges)?;

@@ -27,8 +27,39 @@ pub type ShareForecast<'a> = dyn Fn(&WheelContact) -> Option<f64> + 'a;
 pub struct HeightStart<'a> {
     /// An earlier rest under a similar load.
     pub before: Option<&'a WheelContact>,
+    /// Lowering in mm to begin with, where that rest was of other profiles and tells nothing of the forces.
+    pub lowering: Option<f64>,
     /// Asked at coarse heights, in place of [`NormalPass::friction_share`].
     pub forecast: Option<&'a ShareForecast<'a>>,
+}
+
+impl<'a> HeightStart<'a> {
+    /// From an earlier rest, if there is one.
+    pub(crate) fn near(before: Option<&'a WheelContact>) -> HeightStart<'a> {
+        HeightStart {
+            before,
+            ..HeightStart::default()
+        }
+    }
+
+    /// From a rest with other readings of the profiles, whose lowering is that of these.
+    #[must_use]
+    pub fn of_other_profiles(rest: &'a WheelContact) -> HeightStart<'a> {
+        HeightStart {
+            before: Some(rest),
+            lowering: Some(rest.lowering),
+            forecast: None,
+        }
+    }
+
+    /// The lowering in mm that a search for a force in N begins with, if the start tells.
+    fn first_lowering(&self, bracket: &mut Bracket, force: f64) -> Option<f64> {
+        let of_before = |known: &WheelContact| {
+            let [carried, slope] = known.found;
+            bracket.next(known.lowering, carried, force, slope)
+        };
+        self.lowering.or_else(|| self.before.map(of_before))
+    }
 }
 
 impl WheelTask {
@@ -100,10 +131,11 @@ impl WheelTask {
         &self,
         search: &ContactLocus,
         wanted: NormalPass,
-        HeightStart { before, forecast }: HeightStart,
+        start: HeightStart,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<WheelContact, NormalError> {
+        let (before, forecast) = (start.before, start.forecast);
         let target = |friction_share: f64| self.target(friction_share).unwrap_or_default();
         let mut friction_share = wanted.friction_share;
         let mut force = target(friction_share);
@@ -112,10 +144,9 @@ impl WheelTask {
         let starts_near = exact && before.is_some_and(|before| before.is_near(force));
         let mut fineness = Fineness::first(wanted, starts_near);
         let (mut bracket, mut last) = (Bracket::default(), None::<WheelContact>);
-        let mut lowering = match before {
-            Some(known) => bracket.next(known.lowering, known.found[0], force, known.found[1]),
-            None => search.estimated_lowering(force / self.contact_modulus),
-        };
+        let mut lowering = start
+            .first_lowering(&mut bracket, force)
+            .unwrap_or_else(|| search.estimated_lowering(force / self.contact_modulus));
         for heights in 1..=HEIGHTS_MAX {
             let near = last.as_ref().or(before);
             let pressed = self.at_height(search, lowering, fineness, near, workspace, monitor);

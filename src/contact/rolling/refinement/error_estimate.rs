@@ -12,9 +12,9 @@ use crate::contact::rolling::refinement::caution::caution;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::constants::{
     CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, HERTZ, JUMPING,
-    LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, REGION_POWER,
-    RULES_ON_MESH, RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE, STRIPS_FEW,
-    SURPRISES, WITHOUT_COMPANION,
+    LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, REGION_CELLS_FEW,
+    REGION_POWER, RULES_ON_MESH, RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE,
+    STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
 };
 use crate::contact::rolling::refinement::distances::distances;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
@@ -273,7 +273,9 @@ fn normal_errors(task: &RollingTask, patches: &[Patch]) -> Vec<f64> {
         return vec![0.0; patches.len() + 1];
     };
     let of = |cells: &f64| {
-        let region = REGION * (REGION_CELLS / cells.max(1.0)).powf(REGION_POWER);
+        let cells = cells.max(1.0);
+        let region = REGION * (REGION_CELLS / cells).powf(REGION_POWER);
+        let region = region * (1.0 + (REGION_CELLS_FEW / cells).powi(2));
         region.hypot(LOAD * uncertainty.load)
     };
     weighted(patches, uncertainty.cells_across.iter().map(of).collect())
