@@ -91,9 +91,11 @@ fn main() -> ExitCode {
     }
     if let Some(at) = arguments.iter().position(|argument| argument == "--case") {
         let number = arguments.get(at + 1).and_then(|text| text.parse().ok());
-        let found = number.and_then(|number: usize| samples(number + 1, SEED).nth(number));
+        let seed = arguments.get(at + 2).and_then(|text| text.parse().ok());
+        let seed = seed.unwrap_or(SEED);
+        let found = number.and_then(|number: usize| samples(number + 1, seed).nth(number));
         let Some(sample) = found else {
-            eprintln!("--case takes the number of a case");
+            eprintln!("--case takes the number of a case, and the seed of its run");
             return ExitCode::FAILURE;
         };
         println!("{}", sample.case);
