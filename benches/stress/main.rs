@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench stress [-- cases seed]` prints the table and writes it to `docs/stability.md`; it ends with an error if a
 //! case crashes, hangs or breaks a law. `-- --only` with `times`, `after`, `physics`, `maintenance`, `histories`, `rows`, `creep-map`, `sweep-with-zones` or
-//! `damaged-profile` prints one section, `-- --case 1511` one case as JSON.
+//! `damaged-profile` prints one section, `-- --case 1511` one case as JSON, of another run with its seed behind the number.
 
 extern crate railhead_contact as railhead;
 

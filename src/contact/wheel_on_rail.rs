@@ -69,7 +69,7 @@ pub(crate) fn solve(
         operators,
         case,
         contact,
-        near: near.map(|near| near.of_other_profiles(search.touch)),
+        near,
         search,
         balanced: vertical && case.problem.part.all == 1 && case.problem.history.is_none(),
         judge,
@@ -79,8 +79,7 @@ pub(crate) fn solve(
     if solve.balanced {
         return solve.balance(workspace);
     }
-    let near = solve.near.take();
-    let start = near.as_ref().map(HeightStart::of_other_profiles);
+    let start = solve.near.map(|near| solve.from_near(near));
     let mut at_rest = solve.rest(solve.exactly(0.0), start.unwrap_or_default(), workspace)?;
     let answers = solve.answers(&at_rest, &case.run)?;
     if vertical {
@@ -109,13 +108,17 @@ struct WheelSolve<'a> {
     contact: &'a WheelTask,
     search: ContactLocus<'a>,
     /// The wheel at rest with nearly the same profiles.
-    near: Option<WheelContact>,
+    near: Option<&'a WheelContact>,
     balanced: bool,
     judge: &'a mut dyn Judge,
     monitor: &'a dyn Monitor,
 }
 
-impl WheelSolve<'_> {
+impl<'a> WheelSolve<'a> {
+    fn from_near(&self, near: &'a WheelContact) -> HeightStart<'a> {
+        HeightStart::of_other_profiles(near, self.search.touch)
+    }
+
     fn exactly(&self, friction_share: f64) -> NormalPass {
         NormalPass {
             friction_share,
@@ -236,10 +239,9 @@ impl WheelSolve<'_> {
         &mut self,
         workspace: &mut GridWorkspace<f32>,
     ) -> Result<(RestingWheel, bool), SolveError> {
-        if let Some(near) = self.near.take() {
+        if let Some(near) = self.near {
             let wanted = self.exactly(near.friction_share);
-            let start = HeightStart::of_other_profiles(&near);
-            return Ok((self.rest(wanted, start, workspace)?, true));
+            return Ok((self.rest(wanted, self.from_near(near), workspace)?, true));
         }
         let WheelSolve { case, contact, .. } = *self;
         let share = |wheel: &WheelContact| forecast(&case.problem, &contact.geometry, wheel);
@@ -277,7 +279,7 @@ impl WheelSolve<'_> {
                 break;
             }
             if !exact {
-                let start = HeightStart::near(Some(&at_rest.wheel));
+                let start = HeightStart::near(&at_rest.wheel);
                 let later = self.rest(self.exactly(counted), start, workspace)?;
                 at_rest = at_rest.again(later);
             }

@@ -34,22 +34,28 @@ pub struct HeightStart<'a> {
 }
 
 impl<'a> HeightStart<'a> {
-    /// From an earlier rest, if there is one.
-    pub(crate) fn near(before: Option<&'a WheelContact>) -> HeightStart<'a> {
+    /// From an earlier rest.
+    pub(crate) fn near(before: &'a WheelContact) -> HeightStart<'a> {
         HeightStart {
-            before,
+            before: Some(before),
             ..HeightStart::default()
         }
     }
 
-    /// From a rest with other readings of the profiles, whose lowering is that of these.
+    /// From a rest with other readings of the profiles; with these the wheel touches first with its centre at the height `touch` in mm. The
+    /// centre at rest hardly moves, however far the highest points of both readings lie apart.
     #[must_use]
-    pub fn of_other_profiles(rest: &'a WheelContact) -> HeightStart<'a> {
+    pub fn of_other_profiles(rest: &'a WheelContact, touch: f64) -> HeightStart<'a> {
         HeightStart {
-            before: Some(rest),
-            lowering: Some(rest.lowering),
-            forecast: None,
+            lowering: Some(touch - rest.centre),
+            ..HeightStart::near(rest)
         }
+    }
+
+    /// The earlier rest corrected to a force, where that is exact enough.
+    fn carrying(&self, force: f64, tolerance: f64) -> Option<WheelContact> {
+        let same_profiles = self.before.filter(|_| self.lowering.is_none());
+        same_profiles.and_then(|rest| rest.carrying(force, tolerance))
     }
 
     /// The lowering in mm that a search for a force in N begins with, if the start tells.
@@ -114,10 +120,7 @@ impl WheelTask {
         }
         let force = self.target(wanted.friction_share).unwrap_or_default();
         let tolerance = wanted.accuracy.tolerance();
-        let corrected = start
-            .before
-            .and_then(|wheel| wheel.carrying(force, tolerance));
-        match (corrected, wanted.accuracy) {
+        match (start.carrying(force, tolerance), wanted.accuracy) {
             (Some(wheel), Accuracy::For(_)) => Ok(WheelContact {
                 friction_share: wanted.friction_share,
                 ..wheel

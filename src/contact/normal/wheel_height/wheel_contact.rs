@@ -131,17 +131,6 @@ impl WheelContact {
         })
     }
 
-    /// The same as a start for other readings of its profiles, with which the wheel touches at another height, `touch` in mm: its centre
-    /// hardly moves, however far their highest points lie apart.
-    #[must_use]
-    pub fn of_other_profiles(&self, touch: f64) -> WheelContact {
-        WheelContact {
-            lowering: touch - self.centre,
-            met: false,
-            ..self.clone()
-        }
-    }
-
     /// The start for a gap at another height of the wheel.
     pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Vec<Tile>> {
         let apart = |known: &&GapContact| (known.frame.rail - gap.frame.rail).abs();
