@@ -79,7 +79,7 @@ pub(crate) fn solve(
     if solve.balanced {
         return solve.balance(workspace);
     }
-    let start = solve.near.map(|near| solve.from_near(near));
+    let start = solve.near.map(|near| solve.start_near(near));
     let mut at_rest = solve.rest(solve.exactly(0.0), start.unwrap_or_default(), workspace)?;
     let answers = solve.answers(&at_rest, &case.run)?;
     if vertical {
@@ -115,7 +115,7 @@ struct WheelSolve<'a> {
 }
 
 impl<'a> WheelSolve<'a> {
-    fn from_near(&self, near: &'a WheelContact) -> HeightStart<'a> {
+    fn start_near(&self, near: &'a WheelContact) -> HeightStart<'a> {
         HeightStart::of_other_profiles(near, self.search.touch)
     }
 
@@ -241,7 +241,7 @@ impl<'a> WheelSolve<'a> {
     ) -> Result<(RestingWheel, bool), SolveError> {
         if let Some(near) = self.near {
             let wanted = self.exactly(near.friction_share);
-            return Ok((self.rest(wanted, self.from_near(near), workspace)?, true));
+            return Ok((self.rest(wanted, self.start_near(near), workspace)?, true));
         }
         let WheelSolve { case, contact, .. } = *self;
         let share = |wheel: &WheelContact| forecast(&case.problem, &contact.geometry, wheel);
