@@ -92,6 +92,7 @@ mod subsurface;
 mod subsurface_passage;
 mod sweeps;
 mod table;
+mod table_check;
 mod table_rows;
 mod targets;
 #[path = "../../benches/calibrate/truth.rs"]

@@ -100,8 +100,9 @@ fn a_creep_map_stays_within_the_bound_of_the_store() {
 #[test]
 fn the_memory_of_a_long_sweep_of_resultants_is_some_kilobytes_a_motion() {
     let bytes = |side: u32| problem(&creep_map(side, 0.005)).cost().bytes as f64;
-    let (few, many) = (bytes(10), bytes(100));
-    assert!(many - few < 9900.0 * 4e3, "{few} and {many}");
+    // From so many motions on their operators fill the store.
+    let (few, many) = (bytes(25), bytes(100));
+    assert!(many - few < 9375.0 * 4e3, "{few} and {many}");
     assert!(many < 300e6, "{many}");
 }
 
@@ -119,7 +120,8 @@ fn the_cost_counts_the_operators_that_a_case_leaves_in_the_store() {
     let all = json!([{ "creepage_x": 0.001, "creepage_y": 0.0005, "spin_per_mm": 0.0004 }]);
     let cases = [
         (ellipse(&mesh, &all), 1.01),
-        (ellipse(&target, &creep), 6.0),
+        // Solved on the first mesh alone, which the table of creep forces finds good enough.
+        (ellipse(&target, &creep), 8.0),
         (ellipse(&target, &all), 6.0),
         (creep_map(9, 0.005), 2.5),
     ];

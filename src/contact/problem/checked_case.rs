@@ -72,6 +72,7 @@ impl CheckedCase {
             method: run.method,
             traction_bound: run.traction_bound,
             resolution: run.resolution,
+            compares_with_table: run.compares_with_table,
             wants_slips: run.after.needs_power(&run.outputs),
         }
     }

@@ -18,6 +18,8 @@ pub struct Run {
     pub traction_bound: TractionBound,
     /// Target or mesh.
     pub resolution: Resolution,
+    /// See [`RollingTask::compares_with_table`](crate::contact::rolling::task::RollingTask::compares_with_table).
+    pub compares_with_table: bool,
     /// Time allowed for the whole case.
     pub time_limit: Option<Duration>,
     /// Memory the solve may use, in bytes.

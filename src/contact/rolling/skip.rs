@@ -17,6 +17,8 @@ pub enum Skip {
     HalfTheOperator,
     /// Neighbours of a sweep were solved on the companions of the mesh, and lent what they told.
     Companions,
+    /// The table of creep forces told the error.
+    CompanionsByTable,
 }
 
 impl Skip {
@@ -36,6 +38,9 @@ impl Skip {
             }
             Skip::Companions => {
                 "the error and the extrapolation of the resultants follow from neighbours in the sweep: no coarser mesh was solved"
+            }
+            Skip::CompanionsByTable => {
+                "the error follows from the distance to the table of creep forces: no coarser mesh was solved"
             }
         }
     }

@@ -53,6 +53,8 @@ pub struct RollingTask<'a> {
     pub traction_bound: TractionBound,
     /// Target or mesh.
     pub resolution: Resolution,
+    /// Is the table of creep forces asked for the error, where it covers the contact? Not where the table itself is made or judged.
+    pub compares_with_table: bool,
     /// Are slips asked for, or what follows from them? Forces do not depend on it.
     pub wants_slips: bool,
 }

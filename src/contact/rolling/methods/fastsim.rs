@@ -124,6 +124,7 @@ impl EllipseMesh {
             method: Method::Fastsim,
             traction_bound: bound,
             resolution: Resolution::Mesh(size),
+            compares_with_table: false,
             wants_slips: false,
         };
         let level = StripMesh::new(&task, size)?;

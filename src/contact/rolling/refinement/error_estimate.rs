@@ -19,6 +19,7 @@ use crate::contact::rolling::refinement::constants::{
 use crate::contact::rolling::refinement::distances::distances;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
 use crate::contact::rolling::refinement::regime::pole_error;
+use crate::contact::rolling::refinement::table_check::TableCheck;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -52,6 +53,8 @@ pub struct EstimateContext<'a> {
     pub slenderness: f64,
     /// Residual of the solve.
     pub tolerance: f64,
+    /// What the table says, where it covers the patch, and the error by it.
+    pub table: Option<(TableCheck, f64)>,
 }
 
 /// The quantities that the error of a solved level is estimated from, relative to μN (moment: μN√(A/π)), for every patch, then for the
@@ -60,6 +63,8 @@ pub struct EstimateContext<'a> {
 pub enum Indicators {
     /// The error is known without companions.
     Known(RelativeErrors),
+    /// The table of creep forces tells that the error meets the target: what it says, and that error.
+    ByTable(TableCheck, f64),
     /// Differences whose root of squares, times a factor, is the estimate.
     Measured(Box<Measured>),
 }
@@ -89,6 +94,8 @@ pub struct Measured {
     pub(super) scale: f64,
     /// By how much what neighbours lent may be off.
     pub(super) lent: Vec<f64>,
+    /// What the table says, and the error of the resultants by it.
+    table: Option<(TableCheck, f64)>,
 }
 
 impl Indicators {
@@ -155,6 +162,7 @@ impl Indicators {
             },
             tolerance: context.tolerance,
             scale: scale(task, level, patches.len()),
+            table: context.table,
         }))
     }
 
@@ -186,7 +194,7 @@ impl Indicators {
     pub fn rules(&self) -> Option<&Vec<f64>> {
         match self {
             Indicators::Measured(measured) => measured.rules.as_ref(),
-            Indicators::Known(_) => None,
+            Indicators::Known(_) | Indicators::ByTable(..) => None,
         }
     }
 
@@ -200,6 +208,25 @@ impl Indicators {
     pub fn apart(&mut self, task: &RollingTask, found: &[Resultants], summed: &[Resultants]) {
         if let Indicators::Measured(measured) = self {
             measured.extrapolated = distances(task, task.footprint.patches(), found, summed);
+            if let Some((table, error)) = &mut measured.table {
+                *error = table.error(task, found);
+            }
+        }
+    }
+
+    /// Does the table tell the error?
+    #[must_use]
+    pub(crate) fn is_by_table(&self) -> bool {
+        matches!(self, Indicators::ByTable(..))
+    }
+
+    /// What the error by the table would be on half as many cells, if it is the estimate: the resultants of the tractions are off about as 1
+    /// over the number of cells.
+    #[must_use]
+    pub(crate) fn by_table_on_half(&self) -> Option<f64> {
+        match self {
+            Indicators::ByTable(table, error) => Some(table.with_distance_times(2.0, *error)),
+            Indicators::Known(_) | Indicators::Measured(_) => None,
         }
     }
 
@@ -208,6 +235,7 @@ impl Indicators {
     pub fn errors(&self) -> RelativeErrors {
         match self {
             Indicators::Known(errors) => errors.clone(),
+            Indicators::ByTable(_, error) => vec![Some(*error); 2],
             Indicators::Measured(measured) => (0..measured.sums.len())
                 .map(|k| measured.error(k))
                 .collect(),
@@ -216,9 +244,20 @@ impl Indicators {
 }
 
 impl Measured {
-    /// The estimate for patch `k`, or for the sum: the root of the sum of the squares of all indicators, with one factor for
-    /// all regimes, shapes and motions. Without companions it is a lower bound, by which a mesh can be refused.
+    /// The estimate for patch `k`, or for the sum. Once the companions are solved, the error by the table counts if it is smaller.
     fn error(&self, k: usize) -> Option<f64> {
+        let by_table = self.table.map(|(_, error)| error.max(self.extrapolated[k]));
+        let by_meshes = self.error_by_meshes(k);
+        let compared = self.companions.iter().all(Option::is_some);
+        match by_table.filter(|_| compared || self.missing) {
+            Some(by_table) => Some(by_meshes.map_or(by_table, |error| error.min(by_table))),
+            None => by_meshes,
+        }
+    }
+
+    /// The root of the sum of the squares of all indicators, with one factor for all regimes, shapes and motions. Without companions it is
+    /// a lower bound, by which a mesh can be refused.
+    fn error_by_meshes(&self, k: usize) -> Option<f64> {
         let rules = DIFFERENCES * self.rules.as_ref()?[k];
         let rules = if self.missing {
             WITHOUT_COMPANION * rules

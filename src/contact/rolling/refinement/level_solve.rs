@@ -4,7 +4,7 @@ use crate::contact::error::SolveError;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
-use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work};
+use crate::contact::rolling::answer::{LevelAnswer, LevelExit, LevelFailure, Work};
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
 use crate::contact::rolling::methods::boundary_element::task::LevelTask;
@@ -23,6 +23,7 @@ use crate::contact::rolling::refinement::slender::slender;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::refinement::warm_start::from_coarser;
 use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::start::Start;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
@@ -198,6 +199,9 @@ pub(crate) fn answer_on(
     let indicators = indicators_on(task, state, &level, &point, before);
     point.rules = indicators.rules().cloned();
     point.errors = indicators.errors();
+    if indicators.is_by_table() {
+        point.tangential.skips.push(Skip::CompanionsByTable);
+    }
     JudgedAnswer { point, indicators }
 }
 
@@ -209,6 +213,13 @@ pub(crate) fn indicators_on(
     point: &SolvedLevel,
     before: Option<CoarserLevel>,
 ) -> Indicators {
+    let covered = state.covered.as_ref();
+    let covered = covered.filter(|_| point.tangential.exit == LevelExit::Solved);
+    let table = covered.map(|covered| covered.answer(&point.motion));
+    let table = table.map(|table| (table, table.error(task, &point.summed)));
+    if let Some((table, error)) = table.filter(|(_, error)| settles(task, *error)) {
+        return Indicators::ByTable(table, error);
+    }
     let finer = finer_for_sums(task, level, &point.motion, &point.tangential);
     let context = EstimateContext {
         motion: &point.motion,
@@ -217,8 +228,15 @@ pub(crate) fn indicators_on(
         finer: finer.as_ref(),
         slenderness: state.policy.slenderness(),
         tolerance: task.tolerance(),
+        table,
     };
     Indicators::of_level(task, level, &point.tangential, &point.summed, context)
+}
+
+/// Is an error by the table enough? A search for creepages needs resultants that are a continuous function of them, so that it compares
+/// all its motions with the same meshes.
+fn settles(task: &RollingTask, error: f64) -> bool {
+    !task.has_prescribed_forces() && task.target().is_some_and(|target| error <= target)
 }
 
 /// The task of a motion on a level.

@@ -174,12 +174,18 @@ impl MeshPolicy {
     /// keeps estimates and values continuous, until it is much finer than it need be.
     #[must_use]
     pub fn next_begin(&self, plan: MeshPlan, cells: usize, excess: Option<f64>) -> MeshPlan {
-        let here = self.half_doublings(cells);
         let slack = match plan.regime {
             Regime::Spinning(_) => SLACK_POLE,
             Regime::Unknown | Regime::Sticking { .. } => SLACK,
         };
-        if here >= 2 && excess.is_some_and(|excess| excess < slack) {
+        self.coarser_if(excess.is_some_and(|excess| excess < slack), plan, cells)
+    }
+
+    /// A mesh of half as many cells as that of a plan if one is `enough`, and not coarser than the first one; else the same.
+    #[must_use]
+    pub fn coarser_if(&self, enough: bool, plan: MeshPlan, cells: usize) -> MeshPlan {
+        let here = self.half_doublings(cells);
+        if enough && here >= 2 {
             return self.at(here - 2, plan.regime);
         }
         plan

@@ -18,4 +18,5 @@ pub mod slender;
 pub mod state;
 pub mod stretch;
 mod sweep_line;
+mod table_check;
 pub mod warm_start;

@@ -10,7 +10,9 @@ use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::companions::Companion;
-use crate::contact::rolling::refinement::constants::{CELLS_FINE, EXTRAPOLATED, FINE_TARGET};
+use crate::contact::rolling::refinement::constants::{
+    CELLS_FINE, EXTRAPOLATED, FINE_TARGET, MARGIN,
+};
 use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::level_solve::{
     JudgedAnswer, MotionTask, SolvedLevel, add_three_point, solve_level,
@@ -255,17 +257,24 @@ pub(crate) fn refined(
             found.companions = judge(task, state, asked, &mut found.answer, target, monitor)?;
         }
     }
-    state.sweep.begin = Some(next_begin(state, &found.answer.point, target));
+    state.sweep.begin = Some(next_begin(state, &found.answer, target));
     Ok(found)
 }
 
 /// Where the motion after this one should begin.
-pub(crate) fn next_begin(state: &RefinementState, point: &SolvedLevel, target: f64) -> MeshPlan {
-    let level = state.levels.get(point.level);
-    let excess = point.error().map(|error| error / target);
-    state
-        .policy
-        .next_begin(level.plan, level.mesh.cells(), excess)
+pub(crate) fn next_begin(
+    state: &mut RefinementState,
+    solved: &JudgedAnswer,
+    target: f64,
+) -> MeshPlan {
+    let level = state.levels.get(solved.point.level);
+    let cells = level.mesh.cells();
+    if let Some(error) = solved.indicators.by_table_on_half() {
+        let enough = state.sweep.is_coarser_enough(error <= MARGIN * target);
+        return state.policy.coarser_if(enough, level.plan, cells);
+    }
+    let excess = solved.point.error().map(|error| error / target);
+    state.policy.next_begin(level.plan, cells, excess)
 }
 
 /// An answer, and those on the companions of its mesh.
@@ -377,10 +386,13 @@ fn begin_on(
     let number = state.levels.level(plan)?;
     let level = state.levels.get(number);
     let motion = level.scale.motion(&asked.motion);
-    if state.sweep.start(number, &level, &motion).is_none() {
+    if state.sweep.start(number, &level, &motion).is_none() && !state.carry(number, &asked.motion) {
         return Ok(None);
     }
     let solved = solve_level(task, state, asked, plan, None, monitor)?;
+    if solved.indicators.is_by_table() {
+        return Ok(Some(solved));
+    }
     let found = regime_of(state, asked, &solved.point);
     if plan.serves(found) {
         return Ok(Some(solved));

@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::refinement::mesh_policy::MeshPolicy;
-use crate::contact::rolling::refinement::warm_start::SweepState;
+use crate::contact::rolling::refinement::table_check::CoveredPatch;
+use crate::contact::rolling::refinement::warm_start::{SweepState, nested_tractions};
 use crate::contact::rolling::task::RollingTask;
 
 /// The state of the refinement of one footprint.
@@ -23,6 +25,8 @@ pub struct RefinementState<'a> {
     pub policy: MeshPolicy,
     /// Buffers of the iterations on all levels.
     pub workspace: NewtonWorkspace,
+    /// The patch as the table of creep forces has it, where that covers what is asked.
+    pub(crate) covered: Option<CoveredPatch>,
     /// The ellipses that stand for the patches, where a method has asked for them.
     ellipses: OnceCell<Vec<LoadEllipse>>,
 }
@@ -37,8 +41,27 @@ impl<'a> RefinementState<'a> {
             sweep: SweepState::default(),
             policy: MeshPolicy::new(task.footprint),
             workspace: NewtonWorkspace::default(),
+            covered: CoveredPatch::of(task),
             ellipses: OnceCell::new(),
         }
+    }
+
+    /// Carries the start of a motion from the level that was solved last to another one; is there such a start?
+    pub(crate) fn carry(&mut self, number: usize, motion: &Motion) -> bool {
+        let Some(last) = self.sweep.last_level() else {
+            return false;
+        };
+        let (from, to) = (self.levels.get(last), self.levels.get(number));
+        let start = self.sweep.start(last, &from, &from.scale.motion(motion));
+        let Some(start) = start else { return false };
+        let nested = |traction| nested_tractions(&from, traction, &to);
+        let three_point = nested(&start.three_point);
+        let trapezoid = start.trapezoid.as_ref().map(nested);
+        let trapezoid = trapezoid.unwrap_or_else(|| three_point.clone());
+        let motion = to.scale.motion(motion);
+        self.sweep
+            .remember_rules(number, motion, three_point, trapezoid);
+        true
     }
 
     /// The ellipses that stand for the patches.

@@ -9,6 +9,7 @@ use crate::contact::rolling::methods::boundary_element::solve as boundary_elemen
 use crate::contact::rolling::methods::boundary_element::task::FEW_STEPS;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::MotionAnswer;
+use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::lender::{Lender, apart, bent, borrow, is_straight};
 use crate::contact::rolling::refinement::level_solve::{
@@ -41,6 +42,13 @@ struct Waiting {
     compared: Option<Compared>,
 }
 
+impl Waiting {
+    /// Is nothing known of its error yet?
+    fn is_open(&self) -> bool {
+        self.compared.is_none() && !self.solved.indicators.is_by_table()
+    }
+}
+
 /// What came of the comparison of a motion with its companions.
 #[derive(Debug)]
 enum Compared {
@@ -55,6 +63,8 @@ enum Compared {
 pub struct Stretch {
     /// The first motion.
     first: Option<Motion>,
+    /// The place of the last motion, once there is one.
+    last: Option<f64>,
     /// Through the first motion and the second.
     line: Option<SweepLine>,
     /// The number of the level.
@@ -95,6 +105,12 @@ impl Stretch {
             self.tried(begun.is_some());
         }
         if let Some((place, solved)) = place.zip(begun) {
+            self.last = Some(place);
+            if self.waiting.is_empty() && solved.indicators.is_by_table() {
+                return self
+                    .settled(task, state, solved, asked, target, monitor)
+                    .map(|point| vec![point]);
+            }
             self.waiting.push(Waiting {
                 asked,
                 place,
@@ -113,7 +129,7 @@ impl Stretch {
             .point
             .work
             .add_lost(std::mem::take(&mut self.lost));
-        self.begin_anew(state, asked, &found, target);
+        self.begin_anew(state, asked, &found.answer, &found.companions, target);
         done.push(found.answer.point.into());
         Ok(done)
     }
@@ -159,8 +175,7 @@ impl Stretch {
 
     /// The place of a motion that may follow on the line and the mesh of the stretch.
     fn place(&mut self, state: &RefinementState, motion: &Motion) -> Option<f64> {
-        let last = self.waiting.last().map(|waiting| waiting.place);
-        let last = last.or_else(|| self.lenders.last().map(|lender| lender.place))?;
+        let last = self.last?;
         let plan = state.sweep.begin?;
         if state.levels.get(self.level).plan != plan {
             return None;
@@ -201,10 +216,15 @@ impl Stretch {
         let sweep = &mut state.sweep;
         sweep.remember_alone(self.level, motion, &tangential.traction, &self.apart);
         let mut solved = answer_on(task, state, self.level, asked, tangential, None);
-        let found = refine::regime_of(state, asked, &solved.point);
-        let measured = matches!(solved.indicators, Indicators::Measured(_));
-        let serves = level.plan.regime == Regime::Unknown || level.plan.serves(found);
-        if !measured || !serves {
+        let serves = match solved.indicators {
+            Indicators::ByTable(..) => true,
+            Indicators::Known(_) => false,
+            Indicators::Measured(_) => {
+                let found = refine::regime_of(state, asked, &solved.point);
+                level.plan.regime == Regime::Unknown || level.plan.serves(found)
+            }
+        };
+        if !serves {
             self.lost.add(solved.point.work);
             return Ok(None);
         }
@@ -217,7 +237,8 @@ impl Stretch {
         &mut self,
         state: &RefinementState,
         asked: MotionTask,
-        found: &ComparedAnswer,
+        answer: &JudgedAnswer,
+        companions: &[CompanionAnswer; 2],
         target: f64,
     ) {
         debug_assert!(self.waiting.is_empty());
@@ -228,15 +249,16 @@ impl Stretch {
             pause: self.pause,
             ..Stretch::default()
         };
-        let point = &found.answer.point;
+        let point = &answer.point;
         let level = state.levels.get(point.level);
         let met = point.error().is_some_and(|error| error <= target);
-        let lender = Lender::new(0.0, &level, &found.answer, &found.companions);
-        if let Some(lender) = lender.filter(|_| met) {
+        let lender = Lender::new(0.0, &level, answer, companions);
+        if met && (lender.is_some() || answer.indicators.is_by_table()) {
             self.first = Some(asked.motion);
+            self.last = Some(0.0);
             self.level = point.level;
             self.apart = apart(&point.tangential);
-            self.lenders.push(lender);
+            self.lenders.extend(lender);
         }
     }
 
@@ -253,14 +275,24 @@ impl Stretch {
             return Ok(Vec::new());
         };
         let mut lenders = std::mem::take(&mut self.lenders);
-        let mut next = Some(last);
-        while let Some(k) = next {
+        if waiting[last].is_open() {
+            self.compare(task, state, &mut waiting[last], &mut lenders, monitor)?;
+        }
+        while let Some(k) = self.wrong(task, state, &mut waiting, &lenders, target) {
             self.compare(task, state, &mut waiting[k], &mut lenders, monitor)?;
-            next = self.wrong(task, state, &mut waiting, &lenders, target);
         }
         let each = (waiting[last].place - waiting[0].place) / last.max(1) as f64;
         let mut done = Vec::with_capacity(waiting.len());
         for (k, mut one) in waiting.into_iter().enumerate() {
+            if one.solved.indicators.is_by_table() {
+                if k == last {
+                    let untried = [CompanionAnswer::Untried, CompanionAnswer::Untried];
+                    self.begin_anew(state, one.asked, &one.solved, &untried, target);
+                    lenders.clear();
+                }
+                done.push(self.settled(task, state, one.solved, one.asked, target, monitor)?);
+                continue;
+            }
             let Some(compared) = one.compared.take() else {
                 done.push(self.borrowed(task, state, one, monitor)?);
                 continue;
@@ -272,7 +304,7 @@ impl Stretch {
                 .error()
                 .is_some_and(|error| error <= target);
             let mut found = if met {
-                state.sweep.begin = Some(refine::next_begin(state, &found.answer.point, target));
+                state.sweep.begin = Some(refine::next_begin(state, &found.answer, target));
                 found
             } else {
                 refine::refined(task, state, one.asked, target, found, monitor)?
@@ -290,7 +322,7 @@ impl Stretch {
                 if on_level && met && lends {
                     self.apart = apart(&found.answer.point.tangential);
                 } else {
-                    self.begin_anew(state, one.asked, &found, target);
+                    self.begin_anew(state, one.asked, &found.answer, &found.companions, target);
                     lenders = std::mem::take(&mut self.lenders);
                 }
             }
@@ -363,7 +395,7 @@ impl Stretch {
             .iter()
             .any(|one| matches!(one.compared, Some(Compared::Alone(_))));
         for k in 0..waiting.len() {
-            if waiting[k].compared.is_some() {
+            if !waiting[k].is_open() {
                 continue;
             }
             let end = lenders.partition_point(|lender| lender.place < waiting[k].place);
@@ -384,7 +416,7 @@ impl Stretch {
             if !lent {
                 // The middle one of those between the same lenders.
                 let between = |one: &&Waiting| {
-                    one.compared.is_none()
+                    one.is_open()
                         && lenders.partition_point(|lender| lender.place < one.place) == end
                 };
                 let count = waiting[k..].iter().take_while(between).count();
@@ -392,6 +424,25 @@ impl Stretch {
             }
         }
         None
+    }
+
+    /// The answer of a motion whose error the table told.
+    fn settled(
+        &mut self,
+        task: &RollingTask,
+        state: &mut RefinementState,
+        solved: JudgedAnswer,
+        asked: MotionTask,
+        target: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<MotionAnswer, SolveError> {
+        state.sweep.begin = Some(refine::next_begin(state, &solved, target));
+        let mut point = solved.point;
+        if task.wants_slips {
+            self.add_slips(task, state, &mut point, asked, monitor)?;
+        }
+        point.work.add_lost(std::mem::take(&mut self.lost));
+        Ok(point.into())
     }
 
     /// The answer of a motion that has borrowed.
