@@ -21,6 +21,7 @@ use crate::contact::normal::wheel_height::wheelset_task::WheelsetMove;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::profile_points;
 use crate::contact::rolling::history::solve::usual_work;
+use crate::contact::rolling::methods::table::solve::{outside, tells};
 use crate::contact::rolling::refinement::mesh_policy::CELLS_MAX;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::task::precision_of;
@@ -38,8 +39,15 @@ const NEAR: f64 = 0.01;
 const SWEEP_SHARE_SPIN: f64 = 1.1;
 /// See [`SWEEP_SHARE_SPIN`].
 const SWEEP_SPIN_POWER: f64 = 0.9;
+/// Where the table of creep forces tells the error, for targets from `BY_TABLE_FROM` on: time of a motion alone over that of one that is compared
+/// with other meshes, and the same within a sweep.
+const BY_TABLE_TIMES: f64 = 0.5;
+/// See [`BY_TABLE_TIMES`].
+const BY_TABLE_SWEEP_TIMES: f64 = 0.25;
+/// See [`BY_TABLE_TIMES`].
+const BY_TABLE_FROM: f64 = 0.003;
 /// Least time in s of a motion within a sweep, on every patch.
-const MOTION_SECONDS_MIN: f64 = 6e-5;
+const MOTION_SECONDS_MIN: f64 = 2e-5;
 /// How many times longer motions take where a given pressure jumps. Where a sample may be anything beside its
 /// neighbours, the number grows below `JUMP_TARGET` with this power of how much finer the target is: errors fall more slowly with the cells
 /// than those of a smooth pressure. Of 63 jumping pressures of the seed 20261122 of the bench 76 % are within a factor of 3
@@ -319,6 +327,19 @@ impl CheckedCase {
         SECONDS_MIN + steps * trials * (STEP_SECONDS + STEP_CELLS_SECONDS * cells * cells)
     }
 
+    /// Does the table of creep forces cover the patch?
+    fn is_in_table(&self) -> bool {
+        let NormalTask::Hertz(ellipse) = &self.problem.task else {
+            return false;
+        };
+        outside(ellipse.a / ellipse.b).is_none()
+            && tells(
+                &self.problem.elasticity,
+                self.problem.interface,
+                &self.problem.friction,
+            )
+    }
+
     fn to_target(&self, patches: &[PatchGuess], target: f64) -> f64 {
         let precise = match precision_of(self.run.resolution) {
             Precision::Single => 1.0,
@@ -331,6 +352,7 @@ impl CheckedCase {
         let spin_share = SWEEP_SHARE_SPIN * finer.powf(SWEEP_SPIN_POWER);
         let fields = FIELDS_SECONDS_PER_CELL * self.field_cells();
         let alone = problem.is_coupled(&self.run);
+        let by_table = target >= BY_TABLE_FROM && self.is_in_table();
         let mut before: Option<Vec<MotionGuess>> = None;
         let motions = problem.motions.iter().enumerate().map(|(k, motion)| {
             let prescribed = self.is_prescribed(k);
@@ -339,9 +361,12 @@ impl CheckedCase {
             };
             let guesses: Vec<MotionGuess> = patches.iter().map(guess).collect();
             let of_patch = |(at, guess): (usize, &MotionGuess)| {
+                let told = by_table && !prescribed;
                 let Some(before) = &before else {
-                    return precise * guess.seconds;
+                    let times = if told { BY_TABLE_TIMES } else { 1.0 };
+                    return precise * times * guess.seconds;
                 };
+                let times = if told { BY_TABLE_SWEEP_TIMES } else { 1.0 };
                 let spins = guess.tractions == Tractions::Spin;
                 let share = if !prescribed && guess.distance(&before[at]) < NEAR {
                     NEAR_SHARES[usize::from(spins)]
@@ -350,7 +375,7 @@ impl CheckedCase {
                 } else {
                     SWEEP_SHARE
                 };
-                precise * (share * guess.seconds).max(MOTION_SECONDS_MIN)
+                precise * (times * share * guess.seconds).max(MOTION_SECONDS_MIN)
             };
             let seconds: f64 = guesses.iter().enumerate().map(of_patch).sum();
             // Where each motion has a region of its own, none starts from another.
