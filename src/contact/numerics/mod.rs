@@ -11,6 +11,7 @@
 //! | values between nodes | [`cubic`] (one interval), [`hermite`] (given slopes, or slopes without overshoot), [`spline`] (smoothing), [`lagrange`] (one polynomial) |
 //! | integrals | [`quadrature`] |
 //! | linear equations | [`dense_lu`], up to 32 unknowns [`small_lu`], [`gmres`]; few unknowns fitted to samples: [`least_squares`] |
+//! | lengths of vectors in inner loops | [`length`] |
 //! | connected cells | [`flood_fill`] |
 //! | logarithms in bulk | [`simd_ln`] |
 //!
@@ -37,6 +38,7 @@ pub mod gmres;
 pub mod hermite;
 pub mod lagrange;
 pub mod least_squares;
+pub mod length;
 pub mod maximum;
 pub mod monotone_root;
 pub mod pair_root;

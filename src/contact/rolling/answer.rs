@@ -1,6 +1,7 @@
 //! The tangential answer on one level: tractions, slips and zones, how they came about, and the work done for them.
 
 use crate::contact::monitor::Stop;
+use crate::contact::numerics::length::length;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::skip::Skip;
 
@@ -120,7 +121,7 @@ pub(crate) fn project_on_bound(
 ) -> [Vec<f64>; 2] {
     let mut slip = [vec![0.0; bound.len()], vec![0.0; bound.len()]];
     for i in 0..bound.len() {
-        let length = traction[0][i].hypot(traction[1][i]);
+        let length = length(traction[0][i], traction[1][i]);
         if length == 0.0 {
             // Without traction (no pressure) the slip is free.
             if slips[i] {

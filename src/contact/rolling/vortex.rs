@@ -1,5 +1,7 @@
 //! The spin pole of the elastic problem, read off the tractions of a solution.
 
+use crate::contact::numerics::length::length;
+
 /// The point around which tractions turn: least squares of `n·(x − x_p) = 0` over all cells, `n = T/|T|`, each cell
 /// weighted with the load `weight` it carries.
 ///
@@ -10,11 +12,11 @@ pub fn vortex_centre(t: &[f64], x: &[f64], y: &[f64], weight: &[f64]) -> Option<
     let n = x.len();
     let (mut xx, mut xy, mut yy, mut rhs) = (0.0, 0.0, 0.0, [0.0; 2]);
     for i in 0..n {
-        let length = t[i].hypot(t[n + i]);
-        if length == 0.0 || !length.is_finite() {
+        let size = length(t[i], t[n + i]);
+        if size == 0.0 || !size.is_finite() {
             continue;
         }
-        let (nx, ny) = (t[i] / length, t[n + i] / length);
+        let (nx, ny) = (t[i] / size, t[n + i] / size);
         let along = weight[i] * (nx * x[i] + ny * y[i]);
         xx += weight[i] * nx * nx;
         xy += weight[i] * nx * ny;

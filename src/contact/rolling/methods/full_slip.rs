@@ -1,5 +1,6 @@
 //! States that need no Newton iteration: nothing slips because nothing moves, or everything slips.
 
+use crate::contact::numerics::length::length;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::skip::Skip;
@@ -34,7 +35,7 @@ fn along(level: &StripMesh, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
     let lengths: Vec<f64> = slip[0]
         .iter()
         .zip(&slip[1])
-        .map(|(x, y)| x.hypot(*y))
+        .map(|(x, y)| length(*x, *y))
         .collect();
     [0, 1].map(|k| {
         let cells = slip[k].iter().zip(&lengths).zip(&level.bound);
@@ -56,7 +57,7 @@ fn along(level: &StripMesh, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
 pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
     let cells = level.mesh.cells();
     let slip = rigid_slip(level, motion);
-    let sizes = slip[0].iter().zip(&slip[1]).map(|(x, y)| x.hypot(*y));
+    let sizes = slip[0].iter().zip(&slip[1]).map(|(x, y)| length(*x, *y));
     let smallest = sizes.fold(f64::INFINITY, f64::min);
     let still = motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0;
     let (exit, skip) = if still {

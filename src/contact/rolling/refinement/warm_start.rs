@@ -1,5 +1,6 @@
 //! Warm starts: the answers of the last motions on each level, from which the next motion of a sweep starts.
 
+use crate::contact::numerics::length::length;
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::motion::Motion;
@@ -252,10 +253,10 @@ fn is_near(motion: &Motion, last: &Motion) -> bool {
 fn shrink(traction: &mut [Vec<f64>; 2], bound: &[f64]) {
     let [x, y] = traction;
     for ((x, y), bound) in x.iter_mut().zip(y.iter_mut()).zip(bound) {
-        let length = x.hypot(*y);
-        if length > *bound {
-            *x *= bound / length;
-            *y *= bound / length;
+        let long = length(*x, *y);
+        if long > *bound {
+            *x *= bound / long;
+            *y *= bound / long;
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::contact::friction::falling::BoundFall;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::length::length;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, NewtonExit, NewtonTask,
@@ -33,7 +34,7 @@ pub fn fixed_point(
     let padded = t.len() / 2;
     let cells = newton.cells();
     let smallest = (0..cells)
-        .map(|i| law.rigid[i].hypot(law.rigid[padded + i]))
+        .map(|i| length(law.rigid[i], law.rigid[padded + i]))
         .fold(f64::INFINITY, f64::min);
     if smallest < FIXED_POINT_FROM {
         return Ok(None);
@@ -63,7 +64,7 @@ pub fn fixed_point(
 pub(crate) fn slide_along(slip: &[f64], bound: &[f64], fall: Option<&BoundFall>, t: &mut [f64]) {
     let padded = t.len() / 2;
     for (i, rest) in bound.iter().enumerate() {
-        let size = slip[i].hypot(slip[padded + i]);
+        let size = length(slip[i], slip[padded + i]);
         let bound = fall.map_or(*rest, |fall| rest * fall.at(size).0);
         let factor = if size > 0.0 { bound / size } else { 0.0 };
         t[i] = factor * slip[i];

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use crate::contact::friction::falling::BoundFall;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::length::length;
 use crate::contact::rolling::methods::boundary_element::falling_rows::FallingRow;
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
 use crate::contact::rolling::methods::boundary_element::newton_system::NewtonSystem;
@@ -420,12 +421,8 @@ impl<'a> Newton<'a> {
             if linear.slips(i) {
                 let (ux, uy) = linear.direction[i];
                 let (x, y) = (t[i] + ux * step[i], t[padded + i] + uy * step[i]);
-                let length = x.hypot(y);
-                let factor = if length > 0.0 {
-                    law.bound[i] / length
-                } else {
-                    0.0
-                };
+                let size = length(x, y);
+                let factor = if size > 0.0 { law.bound[i] / size } else { 0.0 };
                 next[i] = factor * x;
                 next[padded + i] = factor * y;
             } else {

@@ -6,6 +6,7 @@ use crate::contact::friction::falling::{BoundFall, CONTINUATION};
 use crate::contact::friction::passage::Passage;
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::length::length;
 use crate::contact::rolling::answer::{LevelFailure, Work};
 use crate::contact::rolling::methods::boundary_element::fixed_point::{
     SAME_SOLUTION, fixed_point, force_change, slide_along,
@@ -281,7 +282,7 @@ impl<'a> RuleSequence<'a> {
             let slips = self.control.workspace.slip();
             let padded = slips.len() / 2;
             let sizes = (0..cells).map(|i| match newton.slips(&self.bound, t, slips, i) {
-                true => slips[i].hypot(slips[padded + i]),
+                true => length(slips[i], slips[padded + i]),
                 false => 0.0,
             });
             let sizes: Vec<f64> = sizes.collect();
