@@ -1,5 +1,7 @@
 //! Do iterations and products use the buffers of their workspaces alone, and can threads share what they only read?
 
+use std::sync::Arc;
+
 use railhead::contact::case::limits::Limits;
 use railhead::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use railhead::contact::mesh::size::MeshSize;
@@ -14,10 +16,11 @@ use railhead::contact::rolling::operator_store::{CaseOperators, LevelOperator, O
 use railhead::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 use railhead::contact::rolling::slip_rules::Rule;
 use railhead::contact::rolling::strip_mesh::StripMesh;
-use railhead::contact::{check, solve};
+use railhead::contact::{check, solve, solve_with};
 use serde_json::{Value, json};
 
 use crate::allocations::during;
+use crate::sweeps::timeless;
 
 #[test]
 fn operators_equations_meshes_and_stores_are_shared_by_threads() {
@@ -149,4 +152,21 @@ fn a_small_solve_allocates_a_bounded_number_of_times() {
     // Most are made with meshes, operators and factors, each once.
     assert!(on_mesh < 225, "{on_mesh} allocations on one mesh");
     assert!(to_target < 1450, "{to_target} allocations to the target");
+}
+
+/// On the mesh that the table of creep forces finds good enough, by a worker that has solved its like.
+#[test]
+fn a_small_solve_takes_fewer_than_a_hundred_allocations() {
+    let store = Arc::new(OperatorStore::default());
+    for motion in [
+        json!({ "creepage_x": 0.001, "creepage_y": 0.0005 }),
+        json!({ "creepage_x": 0.0005, "creepage_y": 0.0005, "spin_per_mm": 0.0004 }),
+    ] {
+        let checked = case(&json!({ "target_error": 0.02 }), &motion);
+        let again = || solve_with(&store, &checked, &Unmonitored).expect("an answer");
+        let first = again();
+        let count = during(again);
+        assert!(count < 100, "{count} allocations: {motion}");
+        assert_eq!(timeless(again()).0, timeless(first).0);
+    }
 }

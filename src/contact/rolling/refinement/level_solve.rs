@@ -156,8 +156,10 @@ pub fn solve_level(
             found
         }
     };
-    state.sweep.remember(number, motion, &tangential);
-    // A search for creepages solves its later trials on the same levels.
+    // A motion by itself leaves nothing to another one, but a search for creepages solves its later trials on the same levels.
+    if !task.single_motion || task.has_prescribed_forces() {
+        state.sweep.remember(number, motion, &tangential);
+    }
     state.sweep.path.push(number);
     let mut work = coarser.as_ref().map_or(Work::default(), |point| point.work);
     work.add(tangential.work);

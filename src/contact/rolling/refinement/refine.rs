@@ -208,7 +208,11 @@ pub(crate) fn to_target(
         found.companions = judge(task, state, asked, &mut found.answer, target, monitor)?;
     }
     let found = refined(task, state, asked, target, found, monitor)?;
-    if let Some(begin) = state.sweep.begin.filter(|_| !follows) {
+    let begin = state
+        .sweep
+        .begin
+        .filter(|_| !follows && !task.single_motion);
+    if let Some(begin) = begin {
         state.sweep.remember_head(found.answer.point.level, begin);
     }
     Ok(found)

@@ -17,6 +17,7 @@ use crate::contact::rolling::task::RollingTask;
 #[derive(Debug)]
 pub struct RefinementState<'a> {
     task: &'a RollingTask<'a>,
+    store: Arc<OperatorStore>,
     /// The meshes that exist.
     pub levels: Levels<'a>,
     /// What the motions solved so far left on them.
@@ -32,15 +33,16 @@ pub struct RefinementState<'a> {
 }
 
 impl<'a> RefinementState<'a> {
-    /// Before the first motion; operators come from a store.
+    /// Before the first motion; operators and buffers come from a store.
     #[must_use]
     pub fn new(task: &'a RollingTask<'a>, store: &Arc<OperatorStore>) -> RefinementState<'a> {
         RefinementState {
             task,
+            store: Arc::clone(store),
             levels: Levels::new(task, store),
             sweep: SweepState::default(),
             policy: MeshPolicy::new(task.footprint),
-            workspace: NewtonWorkspace::default(),
+            workspace: store.workspaces().take(),
             covered: CoveredPatch::of(task),
             ellipses: OnceCell::new(),
         }
@@ -78,5 +80,12 @@ impl<'a> RefinementState<'a> {
         for number in self.levels.trim() {
             self.sweep.forget(number);
         }
+    }
+}
+
+impl Drop for RefinementState<'_> {
+    fn drop(&mut self) {
+        let workspace = std::mem::take(&mut self.workspace);
+        self.store.workspaces().give_back(workspace);
     }
 }

@@ -1,5 +1,7 @@
 //! Buffers of the Newton iteration, kept by the caller.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use crate::contact::numerics::gmres::Gmres;
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
 use crate::contact::rolling::methods::boundary_element::preconditioner::StripFactors;
@@ -19,6 +21,35 @@ pub struct NewtonWorkspace {
     /// Unknowns of the linear system as tractions.
     pub(crate) expanded: Vec<f64>,
     pub(crate) vectors: StepVectors,
+}
+
+/// Largest workspace that is kept, in numbers of a vector: two for each of 640 cells, with which all buffers take about a megabyte.
+const KEPT_LENGTH: usize = 1280;
+/// Workspaces that are kept at most; more threads than these rarely share a store.
+const KEPT: usize = 8;
+
+/// Workspaces of solves that ended, for those that begin. They say nothing of an answer.
+#[derive(Debug, Default)]
+pub struct Workspaces(Mutex<Vec<NewtonWorkspace>>);
+
+impl Workspaces {
+    /// One that was given back, or a new one.
+    #[must_use]
+    pub fn take(&self) -> NewtonWorkspace {
+        self.all().pop().unwrap_or_default()
+    }
+
+    /// Keeps a workspace, if it is not large and there are not enough.
+    pub fn give_back(&self, workspace: NewtonWorkspace) {
+        let mut all = self.all();
+        if workspace.slip.capacity() <= KEPT_LENGTH && all.len() < KEPT {
+            all.push(workspace);
+        }
+    }
+
+    fn all(&self) -> MutexGuard<'_, Vec<NewtonWorkspace>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// Vectors of one Newton step.
