@@ -11,8 +11,8 @@ use crate::contact::rolling::motion_answer::RelativeErrors;
 use crate::contact::rolling::refinement::caution::caution;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::constants::{
-    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, HERTZ, JUMPING,
-    LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, REGION_CELLS_FEW,
+    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, HERTZ, HERTZ_DECAY,
+    JUMPING, LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, REGION_CELLS_FEW,
     REGION_POWER, RULES_ON_MESH, RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE,
     STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
 };
@@ -293,7 +293,7 @@ fn scale(task: &RollingTask, level: &StripMesh, patches: usize) -> f64 {
             let mixed = |smooth: f64, jumping: f64| smooth + between * (jumping - smooth);
             (mixed(SAMPLED, JUMPING), mixed(SAMPLED_DECAY, DECAY))
         }
-        None if task.single_motion && task.footprint.is_closed_form() => (HERTZ, DECAY),
+        None if task.single_motion && task.footprint.is_closed_form() => (HERTZ, HERTZ_DECAY),
         None => (1.0, DECAY),
     };
     caution(task) * samples * finer.powf(decay) * few_strips(level).sqrt()
