@@ -15,6 +15,9 @@ use crate::machine::seconds_of;
 use crate::questions::{problem, timed};
 
 const REPEATS: usize = 21;
+const HEAD: &str = "## What skipping saves\n\nWheel on rail (radii 460 and 300 mm, 100 kN, μ 0.3), target 0.005. Times are those of solves on their own, \
+allocations those of a worker of the service that has solved the case before.\n\n\
+| case | LU | products | allocations |\n|---|---|---|---|\n";
 const CASES_OF_A_SHAPE: u32 = 500;
 
 pub fn section(lu: f64) -> String {
@@ -28,10 +31,7 @@ pub fn section(lu: f64) -> String {
         "spin_per_mm": { "from": 0.003, "to": 0.003, "points": 1 },
         "combine": "grid",
     } });
-    let mut text = "## What skipping saves\n\nWheel on rail (radii 460 and 300 mm, 100 kN, μ 0.3), target 0.005. Times are those of solves on their own, \
-                    allocations those of a worker of the service that has solved the case before.\n\n\
-                    | case | LU | products | allocations |\n|---|---|---|---|\n"
-        .to_owned();
+    let mut text = HEAD.to_owned();
     for (name, motion, outputs, friction) in [
         (
             "longitudinal creepage, resultants only",

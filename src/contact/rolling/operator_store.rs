@@ -13,7 +13,6 @@ use crate::contact::half_space::strip_operator::operator;
 use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::mesh::strips::{Mesh, Segment};
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::rolling::methods::boundary_element::workspace::Workspaces;
 use crate::contact::rolling::own_blocks;
 use crate::contact::rolling::own_blocks::SharedBlocks;
 
@@ -73,8 +72,6 @@ impl OperatorKind {
 pub struct OperatorStore {
     bytes_max: u64,
     kept: Mutex<Shelf>,
-    /// Buffers of solves, beside the bound.
-    workspaces: Workspaces,
 }
 
 /// The operators that are kept, by digest, and the order of their last use.
@@ -115,7 +112,6 @@ impl OperatorStore {
         OperatorStore {
             bytes_max,
             kept: Mutex::default(),
-            workspaces: Workspaces::default(),
         }
     }
 
@@ -163,12 +159,6 @@ impl OperatorStore {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.shelf().bytes
-    }
-
-    /// Buffers that solves leave to each other.
-    #[must_use]
-    pub fn workspaces(&self) -> &Workspaces {
-        &self.workspaces
     }
 
     /// The bound of the store in bytes.

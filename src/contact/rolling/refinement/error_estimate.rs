@@ -11,15 +11,17 @@ use crate::contact::rolling::motion_answer::RelativeErrors;
 use crate::contact::rolling::refinement::caution::caution;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::constants::{
-    CAUTION, DATA, DECAY, DENSE_LEVELS, DENSE_LEVELS_NEAR, DIFFERENCES, HERTZ, HERTZ_DECAY,
-    JUMPING, LEVELS_LIKE, LEVELS_UNLIKE, LOAD, POLE_WEIGHT, REGION, REGION_CELLS, REGION_CELLS_FEW,
-    REGION_POWER, RULES_ON_MESH, RULES_ON_MESH_SAMPLED, SAMPLED, SAMPLED_DECAY, SHARE_LARGE,
-    STRIPS_FEW, SURPRISES, WITHOUT_COMPANION,
+    DATA, DECAY, DIFFERENCES, HERTZ, HERTZ_DECAY, JUMPING, LEVELS_LIKE, LEVELS_UNLIKE, LOAD,
+    POLE_WEIGHT, REGION, REGION_CELLS, REGION_CELLS_FEW, REGION_POWER, SAMPLED, SAMPLED_DECAY,
+    SURPRISES, WITHOUT_COMPANION,
 };
 use crate::contact::rolling::refinement::distances::distances;
+use crate::contact::rolling::refinement::estimate_context::{CoarserLevel, EstimateContext};
+use crate::contact::rolling::refinement::few_strips::few_strips;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_FIRST;
 use crate::contact::rolling::refinement::regime::pole_error;
 use crate::contact::rolling::refinement::table_check::TableCheck;
+use crate::contact::rolling::refinement::without_companions::{dense_errors, mesh_errors};
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -27,35 +29,6 @@ use crate::contact::rolling::task::RollingTask;
 
 /// Relative error where everything slips along the rigid slip.
 const RIGID: f64 = 1e-6;
-/// The coarser level that was solved before this one, if it is coarse enough to compare with.
-#[derive(Debug, Clone, Copy)]
-pub struct CoarserLevel<'a> {
-    /// Its resultants.
-    pub summed: &'a [Resultants],
-    /// What it was made for.
-    pub regime: Regime,
-    /// 1 over (ratio of cells − 1).
-    pub share: f64,
-}
-
-/// What an estimate depends on, apart from the answer on its level.
-#[derive(Debug, Clone, Copy)]
-pub struct EstimateContext<'a> {
-    /// The motion in mm.
-    pub motion: &'a Motion,
-    /// The level before.
-    pub before: Option<CoarserLevel<'a>>,
-    /// What is left of the difference of the two rules on a coarser level, for a level that was solved with one of them.
-    pub carried: Option<&'a [f64]>,
-    /// A finer level, where everything slips or the pressure jumps.
-    pub finer: Option<&'a StripMesh>,
-    /// Slenderness of the patch over that of the population of the factors for explicit meshes; at least 1.
-    pub slenderness: f64,
-    /// Residual of the solve.
-    pub tolerance: f64,
-    /// What the table says, where it covers the patch, and the error by it.
-    pub table: Option<(TableCheck, f64)>,
-}
 
 /// The quantities that the error of a solved level is estimated from, relative to μN (moment: μN√(A/π)), for every patch, then for the
 /// sum. A difference of resultants counts by its largest component, since single components cross zero.
@@ -392,54 +365,6 @@ fn change(
     change
 }
 
-/// The dense method has one rule, so that only the change between its levels is known.
-fn dense_errors(
-    task: &RollingTask,
-    patches: &[Patch],
-    found: &[Resultants],
-    context: EstimateContext,
-) -> RelativeErrors {
-    let Some(CoarserLevel { summed, share, .. }) = context.before else {
-        return vec![None; patches.len() + 1];
-    };
-    let factor = if share > SHARE_LARGE {
-        DENSE_LEVELS_NEAR
-    } else {
-        DENSE_LEVELS
-    };
-    let factor = factor * share * context.slenderness.powf(CAUTION);
-    distances(task, patches, found, summed)
-        .iter()
-        .map(|d| Some((factor * d).max(context.tolerance)))
-        .collect()
-}
-
-/// Errors on a mesh of the client's, which has no companions: from the difference of the two rules, the sums, and the vortex.
-fn mesh_errors(
-    task: &RollingTask,
-    level: &StripMesh,
-    rules: Option<&[f64]>,
-    sums: &[f64],
-    pole: f64,
-    context: EstimateContext,
-) -> RelativeErrors {
-    let factor = if task.footprint.is_closed_form() {
-        RULES_ON_MESH
-    } else {
-        RULES_ON_MESH_SAMPLED
-    };
-    let factor = factor * context.slenderness.powf(CAUTION) * few_strips(level);
-    let factor = factor * caution(task);
-    let Some(rules) = rules else {
-        return vec![None; sums.len()];
-    };
-    let least = pole.max(context.tolerance);
-    let errors = rules.iter().zip(sums);
-    errors
-        .map(|(rule, sum)| Some((factor * rule).max(*sum).max(least)))
-        .collect()
-}
-
 /// Errors of the sums over cells, which both rules share: where everything slips along the rigid slip there is no other error. They are
 /// estimated by the change to a level of four times as many cells.
 fn sum_errors(
@@ -457,32 +382,4 @@ fn sum_errors(
     let mut errors = distances(task, patches, &here, &finer);
     errors.iter_mut().for_each(|e| *e *= 4.0 / 3.0);
     errors
-}
-
-/// A factor for a patch whose load lies on few of its strips.
-fn few_strips(level: &StripMesh) -> f64 {
-    let mut loads: Vec<(usize, usize, f64)> = Vec::new();
-    for segment in &level.mesh.segments {
-        let load = |i: usize| level.pressure[i] * level.area[i];
-        let load: f64 = segment.cells.clone().map(load).sum();
-        let (patch, strip) = (segment.chord.patch, segment.chord.strip);
-        match loads.last_mut() {
-            Some(last) if (last.0, last.1) == (patch, strip) => last.2 += load,
-            _ => loads.push((patch, strip, load)),
-        }
-    }
-    let counted = |patch: &[(usize, usize, f64)]| {
-        let sum = |power: i32| patch.iter().map(|(.., load)| load.powi(power)).sum::<f64>();
-        let (load, squares) = (sum(1), sum(2));
-        if squares > 0.0 {
-            load * load / squares
-        } else {
-            STRIPS_FEW
-        }
-    };
-    let fewest = loads
-        .chunk_by(|a, b| a.0 == b.0)
-        .map(counted)
-        .fold(STRIPS_FEW, f64::min);
-    (STRIPS_FEW / fewest).powi(2)
 }

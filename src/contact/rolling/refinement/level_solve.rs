@@ -15,9 +15,8 @@ use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{MotionAnswer, RelativeErrors, SolvedFields};
 use crate::contact::rolling::refinement::constants::LEVEL_RATIO_MIN;
 use crate::contact::rolling::refinement::error_estimate;
-use crate::contact::rolling::refinement::error_estimate::{
-    CoarserLevel, EstimateContext, Indicators,
-};
+use crate::contact::rolling::refinement::error_estimate::Indicators;
+use crate::contact::rolling::refinement::estimate_context::{CoarserLevel, EstimateContext};
 use crate::contact::rolling::refinement::one_rule;
 use crate::contact::rolling::refinement::slender::slender;
 use crate::contact::rolling::refinement::state::RefinementState;

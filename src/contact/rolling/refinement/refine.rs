@@ -291,6 +291,14 @@ pub(crate) struct ComparedAnswer {
 }
 
 impl ComparedAnswer {
+    /// Does its estimate meet a target?
+    pub(crate) fn met(&self, target: f64) -> bool {
+        self.answer
+            .point
+            .error()
+            .is_some_and(|error| error <= target)
+    }
+
     fn untried(answer: JudgedAnswer) -> ComparedAnswer {
         ComparedAnswer {
             answer,

@@ -17,7 +17,6 @@ use crate::contact::rolling::task::RollingTask;
 #[derive(Debug)]
 pub struct RefinementState<'a> {
     task: &'a RollingTask<'a>,
-    store: Arc<OperatorStore>,
     /// The meshes that exist.
     pub levels: Levels<'a>,
     /// What the motions solved so far left on them.
@@ -33,16 +32,15 @@ pub struct RefinementState<'a> {
 }
 
 impl<'a> RefinementState<'a> {
-    /// Before the first motion; operators and buffers come from a store.
+    /// Before the first motion; operators come from a store.
     #[must_use]
     pub fn new(task: &'a RollingTask<'a>, store: &Arc<OperatorStore>) -> RefinementState<'a> {
         RefinementState {
             task,
-            store: Arc::clone(store),
             levels: Levels::new(task, store),
             sweep: SweepState::default(),
             policy: MeshPolicy::new(task.footprint),
-            workspace: store.workspaces().take(),
+            workspace: NewtonWorkspace::of_thread(),
             covered: CoveredPatch::of(task),
             ellipses: OnceCell::new(),
         }
@@ -85,7 +83,6 @@ impl<'a> RefinementState<'a> {
 
 impl Drop for RefinementState<'_> {
     fn drop(&mut self) {
-        let workspace = std::mem::take(&mut self.workspace);
-        self.store.workspaces().give_back(workspace);
+        std::mem::take(&mut self.workspace).give_back();
     }
 }

@@ -9,7 +9,6 @@ use crate::contact::rolling::methods::boundary_element::solve as boundary_elemen
 use crate::contact::rolling::methods::boundary_element::task::FEW_STEPS;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::MotionAnswer;
-use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::lender::{Lender, apart, bent, borrow, is_straight};
 use crate::contact::rolling::refinement::level_solve::{
@@ -19,6 +18,7 @@ use crate::contact::rolling::refinement::refine;
 use crate::contact::rolling::refinement::refine::ComparedAnswer;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::refinement::sweep_line::SweepLine;
+use crate::contact::rolling::refinement::waiting::{Compared, Waiting};
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::task::RollingTask;
 
@@ -31,32 +31,6 @@ const STRIDE_FIRST: usize = 8;
 /// Largest number of motions that are solved in the usual way after a failed start, before another start is tried. Of 80 rays and curves of
 /// `benches/calibrate` at 0.005 the slowest takes 6 % more products than without borrowing, 14 % without a pause.
 const PAUSE_MAX: usize = 16;
-
-/// A motion with one rule solved.
-#[derive(Debug)]
-struct Waiting {
-    asked: MotionTask,
-    place: f64,
-    solved: JudgedAnswer,
-    /// Comparison with the companions, once it is made.
-    compared: Option<Compared>,
-}
-
-impl Waiting {
-    /// Is nothing known of its error yet?
-    fn is_open(&self) -> bool {
-        self.compared.is_none() && !self.solved.indicators.is_by_table()
-    }
-}
-
-/// What came of the comparison of a motion with its companions.
-#[derive(Debug)]
-enum Compared {
-    /// It can lend.
-    Lends(ComparedAnswer),
-    /// It cannot.
-    Alone(ComparedAnswer),
-}
 
 /// The stretch that the last motions of a sweep belong to.
 #[derive(Debug, Default)]
@@ -124,12 +98,9 @@ impl Stretch {
         }
         let mut done = self.settle(task, state, target, monitor)?;
         let mut found = refine::to_target(task, state, asked, target, monitor)?;
-        found
-            .answer
-            .point
-            .work
-            .add_lost(std::mem::take(&mut self.lost));
-        self.begin_anew(state, asked, &found.answer, &found.companions, target);
+        let work = &mut found.answer.point.work;
+        work.add_lost(std::mem::take(&mut self.lost));
+        self.begin_anew(state, asked, &found, target);
         done.push(found.answer.point.into());
         Ok(done)
     }
@@ -237,8 +208,7 @@ impl Stretch {
         &mut self,
         state: &RefinementState,
         asked: MotionTask,
-        answer: &JudgedAnswer,
-        companions: &[CompanionAnswer; 2],
+        found: &ComparedAnswer,
         target: f64,
     ) {
         debug_assert!(self.waiting.is_empty());
@@ -249,11 +219,11 @@ impl Stretch {
             pause: self.pause,
             ..Stretch::default()
         };
-        let point = &answer.point;
+        let point = &found.answer.point;
         let level = state.levels.get(point.level);
-        let met = point.error().is_some_and(|error| error <= target);
-        let lender = Lender::new(0.0, &level, answer, companions);
-        if met && (lender.is_some() || answer.indicators.is_by_table()) {
+        let lender = Lender::new(0.0, &level, &found.answer, &found.companions);
+        let told = found.answer.indicators.is_by_table();
+        if found.met(target) && (lender.is_some() || told) {
             self.first = Some(asked.motion);
             self.last = Some(0.0);
             self.level = point.level;
@@ -283,55 +253,52 @@ impl Stretch {
         }
         let each = (waiting[last].place - waiting[0].place) / last.max(1) as f64;
         let mut done = Vec::with_capacity(waiting.len());
-        for (k, mut one) in waiting.into_iter().enumerate() {
-            if one.solved.indicators.is_by_table() {
-                if k == last {
-                    let untried = [CompanionAnswer::Untried, CompanionAnswer::Untried];
-                    self.begin_anew(state, one.asked, &one.solved, &untried, target);
-                    lenders.clear();
-                }
-                done.push(self.settled(task, state, one.solved, one.asked, target, monitor)?);
-                continue;
-            }
-            let Some(compared) = one.compared.take() else {
-                done.push(self.borrowed(task, state, one, monitor)?);
-                continue;
-            };
-            let (Compared::Lends(found) | Compared::Alone(found)) = compared;
-            let met = found
-                .answer
-                .point
-                .error()
-                .is_some_and(|error| error <= target);
-            let mut found = if met {
-                state.sweep.begin = Some(refine::next_begin(state, &found.answer, target));
-                found
-            } else {
-                refine::refined(task, state, one.asked, target, found, monitor)?
-            };
-            found
-                .answer
-                .point
-                .work
-                .add_lost(std::mem::take(&mut self.lost));
-            if k == last {
-                let on_level = found.answer.point.level == self.level;
-                let lends = lenders
-                    .last()
-                    .is_some_and(|lender| lender.place == one.place);
-                if on_level && met && lends {
-                    self.apart = apart(&found.answer.point.tangential);
-                } else {
-                    self.begin_anew(state, one.asked, &found.answer, &found.companions, target);
-                    lenders = std::mem::take(&mut self.lenders);
-                }
-            }
-            done.push(found.answer.point.into());
+        for (k, one) in waiting.into_iter().enumerate() {
+            let ends = (k == last).then_some(&mut lenders);
+            done.push(self.close(task, state, one, ends, target, monitor)?);
         }
         lenders.drain(..lenders.len().saturating_sub(3));
         self.lenders = lenders;
         self.stride = self.next_stride(task, each, target);
         Ok(done)
+    }
+
+    /// The answer of a motion that waited. From the last one, which gets the lenders, the stretch goes on or begins anew.
+    fn close(
+        &mut self,
+        task: &RollingTask,
+        state: &mut RefinementState,
+        one: Waiting,
+        lenders: Option<&mut Vec<Lender>>,
+        target: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<MotionAnswer, SolveError> {
+        if one.solved.indicators.is_by_table() {
+            return self.settled(task, state, one.solved, one.asked, target, monitor);
+        }
+        let Some(Compared::Lends(found) | Compared::Alone(found)) = one.compared else {
+            return self.borrowed(task, state, one, monitor);
+        };
+        let met = found.met(target);
+        let mut found = if met {
+            state.sweep.begin = Some(refine::next_begin(state, &found.answer, target));
+            found
+        } else {
+            refine::refined(task, state, one.asked, target, found, monitor)?
+        };
+        let work = &mut found.answer.point.work;
+        work.add_lost(std::mem::take(&mut self.lost));
+        if let Some(lenders) = lenders {
+            let on_level = found.answer.point.level == self.level;
+            let lends = lenders.last().is_some_and(|l| l.place == one.place);
+            if on_level && met && lends {
+                self.apart = apart(&found.answer.point.tangential);
+            } else {
+                self.begin_anew(state, one.asked, &found, target);
+                *lenders = std::mem::take(&mut self.lenders);
+            }
+        }
+        Ok(found.answer.point.into())
     }
 
     /// How many motions to go on to the next that is compared, where they are `each` apart.

@@ -1,6 +1,6 @@
 //! Buffers of the Newton iteration, kept by the caller.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::cell::Cell;
 
 use crate::contact::numerics::gmres::Gmres;
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
@@ -25,30 +25,24 @@ pub struct NewtonWorkspace {
 
 /// Largest workspace that is kept, in numbers of a vector: two for each of 640 cells, with which all buffers take about a megabyte.
 const KEPT_LENGTH: usize = 1280;
-/// Workspaces that are kept at most; more threads than these rarely share a store.
-const KEPT: usize = 8;
 
-/// Workspaces of solves that ended, for those that begin. They say nothing of an answer.
-#[derive(Debug, Default)]
-pub struct Workspaces(Mutex<Vec<NewtonWorkspace>>);
+thread_local! {
+    /// The workspace of the last solve of this thread. No answer depends on it.
+    static LAST: Cell<Option<NewtonWorkspace>> = const { Cell::new(None) };
+}
 
-impl Workspaces {
-    /// One that was given back, or a new one.
+impl NewtonWorkspace {
+    /// The workspace that the last solve of this thread gave back, or a new one.
     #[must_use]
-    pub fn take(&self) -> NewtonWorkspace {
-        self.all().pop().unwrap_or_default()
+    pub fn of_thread() -> NewtonWorkspace {
+        LAST.take().unwrap_or_default()
     }
 
-    /// Keeps a workspace, if it is not large and there are not enough.
-    pub fn give_back(&self, workspace: NewtonWorkspace) {
-        let mut all = self.all();
-        if workspace.slip.capacity() <= KEPT_LENGTH && all.len() < KEPT {
-            all.push(workspace);
+    /// Leaves the workspace to the next solve of this thread, unless it is large.
+    pub fn give_back(self) {
+        if self.slip.capacity() <= KEPT_LENGTH {
+            LAST.set(Some(self));
         }
-    }
-
-    fn all(&self) -> MutexGuard<'_, Vec<NewtonWorkspace>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
