@@ -36,8 +36,15 @@ const RIGID: f64 = 1e-6;
 pub enum Indicators {
     /// The error is known without companions.
     Known(RelativeErrors),
-    /// The table of creep forces tells that the error meets the target: what it says, and that error.
-    ByTable(TableCheck, f64),
+    /// The table of creep forces tells that the error meets the target.
+    ByTable {
+        /// What it says.
+        table: TableCheck,
+        /// The error by it.
+        error: f64,
+        /// Difference of the two rules, for a finer mesh.
+        rules: Option<Vec<f64>>,
+    },
     /// Differences whose root of squares, times a factor, is the estimate.
     Measured(Box<Measured>),
 }
@@ -167,7 +174,8 @@ impl Indicators {
     pub fn rules(&self) -> Option<&Vec<f64>> {
         match self {
             Indicators::Measured(measured) => measured.rules.as_ref(),
-            Indicators::Known(_) | Indicators::ByTable(..) => None,
+            Indicators::ByTable { rules, .. } => rules.as_ref(),
+            Indicators::Known(_) => None,
         }
     }
 
@@ -190,7 +198,7 @@ impl Indicators {
     /// Does the table tell the error?
     #[must_use]
     pub(crate) fn is_by_table(&self) -> bool {
-        matches!(self, Indicators::ByTable(..))
+        matches!(self, Indicators::ByTable { .. })
     }
 
     /// What the error by the table would be on half as many cells, if it is the estimate: the resultants of the tractions are off about as 1
@@ -198,7 +206,9 @@ impl Indicators {
     #[must_use]
     pub(crate) fn by_table_on_half(&self) -> Option<f64> {
         match self {
-            Indicators::ByTable(table, error) => Some(table.with_distance_times(2.0, *error)),
+            Indicators::ByTable { table, error, .. } => {
+                Some(table.with_distance_times(2.0, *error))
+            }
             Indicators::Known(_) | Indicators::Measured(_) => None,
         }
     }
@@ -208,7 +218,7 @@ impl Indicators {
     pub fn errors(&self) -> RelativeErrors {
         match self {
             Indicators::Known(errors) => errors.clone(),
-            Indicators::ByTable(_, error) => vec![Some(*error); 2],
+            Indicators::ByTable { error, .. } => vec![Some(*error); 2],
             Indicators::Measured(measured) => (0..measured.sums.len())
                 .map(|k| measured.error(k))
                 .collect(),
@@ -328,7 +338,7 @@ fn weighted(patches: &[Patch], mut errors: Vec<f64>) -> Vec<f64> {
 }
 
 /// The difference of the two rules, or what was `carried` on to a level of one rule.
-fn between_rules(
+pub(crate) fn between_rules(
     task: &RollingTask,
     level: &StripMesh,
     answer: &LevelAnswer,

@@ -219,7 +219,14 @@ pub(crate) fn indicators_on(
     let table = covered.map(|covered| covered.answer(&point.motion));
     let table = table.map(|table| (table, table.error(task, &point.summed)));
     if let Some((table, error)) = table.filter(|(_, error)| settles(task, *error)) {
-        return Indicators::ByTable(table, error);
+        let carried = point.rules.as_deref();
+        let rules =
+            error_estimate::between_rules(task, level, &point.tangential, &point.summed, carried);
+        return Indicators::ByTable {
+            table,
+            error,
+            rules,
+        };
     }
     let finer = finer_for_sums(task, level, &point.motion, &point.tangential);
     let context = EstimateContext {

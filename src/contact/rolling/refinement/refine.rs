@@ -4,14 +4,14 @@ use crate::contact::error::SolveError;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
-use crate::contact::rolling::answer::Work;
+use crate::contact::rolling::answer::{LevelExit, Work};
 use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
 use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
 use crate::contact::rolling::refinement::companions::Companion;
 use crate::contact::rolling::refinement::constants::{
-    CELLS_FINE, EXTRAPOLATED, FINE_TARGET, MARGIN,
+    CELLS_FINE, CELLS_SHOWN, EXTRAPOLATED, FINE_TARGET, MARGIN, SHOWN_TARGET,
 };
 use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::level_solve::{
@@ -223,6 +223,19 @@ fn is_small(cells: usize, target: f64) -> bool {
     target < FINE_TARGET && cells < CELLS_FINE
 }
 
+/// Is an answer whose error the table may tell one that is looked at: a motion by itself, with zones, at a target that asks for more than
+/// a sketch?
+fn is_shown(
+    task: &RollingTask,
+    state: &RefinementState,
+    solved: &JudgedAnswer,
+    target: f64,
+) -> bool {
+    let answer = &solved.point.tangential;
+    let zones = answer.exit == LevelExit::Solved && answer.slips.iter().any(|slips| !slips);
+    task.single_motion && target <= SHOWN_TARGET && state.covered.is_some() && zones
+}
+
 /// Solves on from an answer that was compared with its companions, or is on too small a mesh for that, up to the first mesh that meets the
 /// target.
 ///
@@ -242,11 +255,16 @@ pub(crate) fn refined(
         let cells = state.levels.get(solved.point.level).mesh.cells();
         let larger = state.policy.is_refinable(cells, planned);
         let met = solved.point.error().is_some_and(|error| error <= target);
-        if !larger || met && !is_small(cells, target) {
+        let shown = match is_shown(task, state, &solved, target) {
+            true => CELLS_SHOWN,
+            false => 0,
+        };
+        if !larger || met && !is_small(cells, target) && cells >= shown {
             found.answer = solved;
             break;
         }
         let excess = solved.point.error().map_or(1.0, |error| error / target);
+        let excess = excess.max(shown as f64 / (MARGIN * cells as f64));
         let regime = regime_of(state, asked, &solved.point);
         let plan;
         (plan, planned) = state

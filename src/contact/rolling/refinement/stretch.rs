@@ -188,7 +188,7 @@ impl Stretch {
         sweep.remember_alone(self.level, motion, &tangential.traction, &self.apart);
         let mut solved = answer_on(task, state, self.level, asked, tangential, None);
         let serves = match solved.indicators {
-            Indicators::ByTable(..) => true,
+            Indicators::ByTable { .. } => true,
             Indicators::Known(_) => false,
             Indicators::Measured(_) => {
                 let found = refine::regime_of(state, asked, &solved.point);
