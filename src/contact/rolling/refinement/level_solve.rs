@@ -13,7 +13,7 @@ use crate::contact::rolling::methods::liu_hsu::on_level;
 use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{MotionAnswer, RelativeErrors, SolvedFields};
-use crate::contact::rolling::refinement::constants::LEVEL_RATIO_MIN;
+use crate::contact::rolling::refinement::constants::{LEVEL_RATIO_MIN, SHOWN_TARGET};
 use crate::contact::rolling::refinement::error_estimate;
 use crate::contact::rolling::refinement::error_estimate::Indicators;
 use crate::contact::rolling::refinement::estimate_context::{CoarserLevel, EstimateContext};
@@ -219,9 +219,11 @@ pub(crate) fn indicators_on(
     let table = covered.map(|covered| covered.answer(&point.motion));
     let table = table.map(|table| (table, table.error(task, &point.summed)));
     if let Some((table, error)) = table.filter(|(_, error)| settles(task, *error)) {
-        let carried = point.rules.as_deref();
-        let rules =
-            error_estimate::between_rules(task, level, &point.tangential, &point.summed, carried);
+        // Only a mesh that is refined all the same has a use for the rules.
+        let refined = task.target().is_some_and(|target| target <= SHOWN_TARGET);
+        let (answer, carried) = (&point.tangential, point.rules.as_deref());
+        let rules = || error_estimate::between_rules(task, level, answer, &point.summed, carried);
+        let rules = if refined { rules() } else { None };
         return Indicators::ByTable {
             table,
             error,
