@@ -109,6 +109,10 @@ impl CheckedParts {
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),
                 stress_points: given.after.stress_points(),
                 ellipse: task.as_ref().and_then(|(task, _)| length_over_width(task)),
+                // Friction may not be known.
+                by_table: task
+                    .as_ref()
+                    .is_some_and(|(task, _)| length_over_width(task).is_some()),
                 store: limits.operator_store_bytes,
             };
             faults.extend(size.faults(limits));

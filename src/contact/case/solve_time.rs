@@ -21,7 +21,6 @@ use crate::contact::normal::wheel_height::wheelset_task::WheelsetMove;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::profile_points;
 use crate::contact::rolling::history::solve::usual_work;
-use crate::contact::rolling::methods::table::solve::{outside, tells};
 use crate::contact::rolling::refinement::mesh_policy::CELLS_MAX;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::task::precision_of;
@@ -327,19 +326,6 @@ impl CheckedCase {
         SECONDS_MIN + steps * trials * (STEP_SECONDS + STEP_CELLS_SECONDS * cells * cells)
     }
 
-    /// Does the table of creep forces cover the patch?
-    fn is_in_table(&self) -> bool {
-        let NormalTask::Hertz(ellipse) = &self.problem.task else {
-            return false;
-        };
-        outside(ellipse.a / ellipse.b).is_none()
-            && tells(
-                &self.problem.elasticity,
-                self.problem.interface,
-                &self.problem.friction,
-            )
-    }
-
     fn to_target(&self, patches: &[PatchGuess], target: f64) -> f64 {
         let precise = match precision_of(self.run.resolution) {
             Precision::Single => 1.0,
@@ -352,7 +338,7 @@ impl CheckedCase {
         let spin_share = SWEEP_SHARE_SPIN * finer.powf(SWEEP_SPIN_POWER);
         let fields = FIELDS_SECONDS_PER_CELL * self.field_cells();
         let alone = problem.is_coupled(&self.run);
-        let by_table = target >= BY_TABLE_FROM && self.is_in_table();
+        let by_table = target >= BY_TABLE_FROM && problem.is_in_table();
         let mut before: Option<Vec<MotionGuess>> = None;
         let motions = problem.motions.iter().enumerate().map(|(k, motion)| {
             let prescribed = self.is_prescribed(k);

@@ -8,7 +8,6 @@ use crate::contact::post::subsurface::task::SubsurfaceTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::history::solve::{pressed_bytes, pressed_cells_max};
 use crate::contact::rolling::history::task::HistoryStart;
-use crate::contact::rolling::methods::table::solve::outside;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::{OperatorKind, kept_bytes};
 use crate::contact::rolling::refinement::levels::LEVELS_KEPT;
@@ -19,7 +18,7 @@ use crate::contact::rolling::task::precision_of;
 
 /// Cells of the finest mesh for a target of 0.02, on average.
 const TARGET_CELLS: f64 = 160.0;
-/// The same for an ellipse whose error the table of creep forces tells (62 Hertz contacts of the report; 110 at 0.005, 600 at 0.001).
+/// The same for an ellipse whose error the table of creep forces tells (62 Hertz contacts of the report; 150 at 0.005, 500 at 0.001).
 const TARGET_CELLS_BY_TABLE: f64 = 64.0;
 /// Power by which they grow as the target falls.
 const TARGET_GROWTH: f64 = 0.65;
@@ -59,6 +58,8 @@ pub(crate) struct SizeInput {
     pub(crate) stress_points: usize,
     /// Length over width of an ellipse; nothing for other regions.
     pub(crate) ellipse: Option<f64>,
+    /// Does the table of creep forces tell the error?
+    pub(crate) by_table: bool,
     /// Are the motions the points of a history, which is kept whole on two levels?
     pub(crate) history: bool,
     /// Does it begin with bodies pressed together?
@@ -239,8 +240,7 @@ impl SizeInput {
     fn usual_cells(&self, finest: f64) -> f64 {
         match (self.resolution, self.method) {
             (Resolution::Target(target), Method::BoundaryElement) => {
-                let by_table = self.ellipse.is_some_and(|ratio| outside(ratio).is_none());
-                let cells = if by_table {
+                let cells = if self.by_table {
                     TARGET_CELLS_BY_TABLE
                 } else {
                     TARGET_CELLS
@@ -272,6 +272,12 @@ impl CheckedCase {
             fields: self.run.outputs.iter().any(|output| output.is_per_cell()),
             stress_points: self.run.after.subsurface.as_ref().map_or(0, places),
             ellipse: length_over_width(&self.problem.task),
+            by_table: self.problem.is_in_table()
+                && self
+                    .problem
+                    .forces
+                    .iter()
+                    .all(|forces| *forces == [None; 2]),
             store: self.run.operator_store_bytes,
         }
     }
@@ -286,6 +292,7 @@ impl CheckedCase {
         let bytes = SizeInput {
             segments,
             ellipse: None,
+            by_table: false,
             ..self.size_input()
         }
         .bytes() as u64;

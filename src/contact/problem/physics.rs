@@ -11,6 +11,7 @@ use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::rolling::methods::table::solve::{outside, tells};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 
 /// What is asked: the physics.
@@ -97,6 +98,15 @@ impl Problem {
             drive_torque: None,
             ..self.clone()
         }
+    }
+
+    /// Does the table of creep forces cover the patch?
+    pub(crate) fn is_in_table(&self) -> bool {
+        let NormalTask::Hertz(ellipse) = &self.task else {
+            return false;
+        };
+        outside(ellipse.a / ellipse.b).is_none()
+            && tells(&self.elasticity, self.interface, &self.friction)
     }
 
     /// The forces in N that the rail is to carry under one wheel, along and across the track, if any is prescribed. That across
