@@ -86,11 +86,11 @@ impl CheckedParts {
         };
         let motions = given.motion.map(|motion| motions::expand(motion, limits));
         let motions = motions.and_then(|motions| collect_fault(motions, &mut faults));
-        let force = normal_force(task.as_ref().map(|(task, _)| task), given.load);
+        let region = task.as_ref().map(|(task, _)| task);
+        let force = normal_force(region, given.load);
         faults.extend(motion_faults(&given, motions.as_ref(), force, limits));
         if let Some(history) = motions.as_ref().and_then(|all| all.history.as_ref()) {
-            let task = task.as_ref().map(|(task, _)| task);
-            faults.extend(history_faults(&given, history, task, limits));
+            faults.extend(history_faults(&given, history, region, limits));
         }
         if let Some(solver) = given.solver {
             let size = SizeInput {
@@ -108,11 +108,9 @@ impl CheckedParts {
                 pressed: motions.as_ref().is_some_and(ExpandedMotions::begin_pressed),
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),
                 stress_points: given.after.stress_points(),
-                ellipse: task.as_ref().and_then(|(task, _)| length_over_width(task)),
+                ellipse: region.and_then(length_over_width),
                 // Friction may not be known.
-                by_table: task
-                    .as_ref()
-                    .is_some_and(|(task, _)| length_over_width(task).is_some()),
+                by_table: region.and_then(length_over_width).is_some(),
                 store: limits.operator_store_bytes,
             };
             faults.extend(size.faults(limits));
@@ -129,10 +127,7 @@ impl CheckedParts {
         });
         faults.extend(of_friction);
         if method == Some(Method::Table) {
-            faults.extend(not_in_table(
-                elasticity.as_ref(),
-                task.as_ref().map(|(task, _)| task),
-            ));
+            faults.extend(not_in_table(elasticity.as_ref(), region));
         }
         let parts = CheckedParts {
             elasticity,
