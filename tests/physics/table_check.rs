@@ -1,6 +1,9 @@
 //! The table of creep forces tells the error of an ellipse's forces where it covers the contact: is what it tells right, does it save work,
 //! and is it left alone elsewhere?
 
+use railhead::contact::case::limits::Limits;
+use railhead::contact::check;
+use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::population::{Class, case};
@@ -33,6 +36,14 @@ fn ellipse() -> Value {
     })
 }
 
+/// The larger difference of F_x and F_y of two answers, and the estimate of each, in N.
+fn compared_forces(answers: [&Solution; 2]) -> (f64, [f64; 2]) {
+    let [a, b] = answers.map(|solution| solution.total[0]);
+    let apart = [a.force_x_n - b.force_x_n, a.force_y_n - b.force_y_n];
+    let estimates = [a, b].map(|total| total.error_estimate.expect("an estimate").force_x_n);
+    (apart[0].abs().max(apart[1].abs()), estimates)
+}
+
 #[test]
 fn what_the_table_tells_holds_and_saves_products() {
     let (mut told, mut beyond) = (0, Vec::new());
@@ -54,12 +65,7 @@ fn what_the_table_tells_holds_and_saves_products() {
         products[0] += found_point.solver.products;
         products[1] += compared_point.solver.products;
         let (truth, _) = solve_without_table(&at(0.001));
-        let (found, truth) = (found.total[0], truth.total[0]);
-        let [estimate, uncertainty] =
-            [found, truth].map(|total| total.error_estimate.expect("an estimate").force_x_n);
-        let off = (found.force_x_n - truth.force_x_n)
-            .abs()
-            .max((found.force_y_n - truth.force_y_n).abs());
+        let (off, [estimate, uncertainty]) = compared_forces([&found, &truth]);
         if off > estimate + 0.5 * uncertainty {
             beyond.push(format!("{number}: {off} N, estimate {estimate} N"));
         }
@@ -83,12 +89,7 @@ fn the_estimate_is_no_less_than_the_distance_to_the_table() {
         assert!(is_told(&found.patches[0].points[0].solver.skipped));
         question["solver"] = json!({ "method": "table" });
         let (by_table, _) = solve(&question);
-        let (found, by_table) = (found.total[0], by_table.total[0]);
-        let [estimate, bound] =
-            [found, by_table].map(|total| total.error_estimate.expect("an estimate").force_x_n);
-        let apart = (found.force_x_n - by_table.force_x_n)
-            .abs()
-            .max((found.force_y_n - by_table.force_y_n).abs());
+        let (apart, [estimate, bound]) = compared_forces([&found, &by_table]);
         assert!(apart > 0.0 && apart + 0.5 * bound <= estimate);
     }
 }
@@ -144,4 +145,52 @@ fn the_table_tells_the_same_of_reduced_stiffness_as_of_a_softer_material() {
     }
     let (a, b) = (reduced.total[0], softer.total[0]);
     assert!((a.force_x_n - b.force_x_n).abs() < 1e-4 * 24_000.0);
+}
+
+/// The estimate counts 1.5 |K|/μ for what the table does not know of bodies that differ.
+#[test]
+fn forces_of_bodies_that_differ_are_near_those_of_like_bodies_by_k_over_friction() {
+    let steel = json!({ "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 });
+    let others = [(800.0, 0.45), (800.0, 0.4), (27000.0, 0.33), (800.0, 0.2)];
+    let motions = [
+        [0.0, 0.0, 1e-9],
+        [0.7, 0.7, 0.7],
+        [0.0, 0.0, 1.0],
+        [1.0, 0.0, 0.0],
+    ];
+    for ((modulus, nu), friction) in others
+        .into_iter()
+        .flat_map(|o| [0.1, 0.6].map(|mu| (o, mu)))
+    {
+        let mut question = ellipse();
+        question["friction"]["coefficient"] = json!(friction);
+        question["solver"]["target_error"] = json!(0.002);
+        let upper = json!({ "shear_modulus_mpa": modulus, "poisson_ratio": nu });
+        question["material"] = json!({ "upper": upper, "lower": steel });
+        let pair = check(&question, &Limits::default())
+            .expect("a case")
+            .problem
+            .elasticity;
+        let mut like = question.clone();
+        like["material"] =
+            json!({ "shear_modulus_mpa": pair.shear_modulus, "poisson_ratio": pair.poisson_ratio });
+        let limit = friction * 80_000.0;
+        let unit = limit / (pair.shear_modulus * 24.0);
+        for [x, y, spin] in motions {
+            let motion = json!({ "creepage_x": unit * x, "creepage_y": unit * y,
+                                 "spin_per_mm": unit * spin / 24.0_f64.sqrt() });
+            let [a, b] = [&question, &like].map(|case| {
+                let mut case = case.clone();
+                case["motion"] = motion.clone();
+                solve_without_table(&case).0
+            });
+            let (apart, [uncertain, _]) = compared_forces([&a, &b]);
+            let allowed = 1.5 * pair.difference.abs() / friction * limit + uncertain;
+            assert!(
+                apart <= allowed,
+                "K {}, μ {friction}, {motion}: {apart} N of {allowed}",
+                pair.difference
+            );
+        }
+    }
 }

@@ -105,7 +105,8 @@ impl Problem {
         let NormalTask::Hertz(ellipse) = &self.task else {
             return false;
         };
-        outside(ellipse.a / ellipse.b).is_none()
+        matches!(self.friction, FrictionLaw::Constant(_))
+            && outside(ellipse.a / ellipse.b).is_none()
             && tells(&self.elasticity, self.interface, &self.friction)
     }
 

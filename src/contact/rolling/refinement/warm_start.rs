@@ -17,8 +17,8 @@ const STEP_MAX: f64 = 1.5;
 /// Answers remembered on every level. Starts from three, by a parabola, take 8 to 15 % more products on creep curves of 51 points and maps of
 /// 1000.
 const STEPS: usize = 2;
-/// Motions in a row for which half the cells would be enough, before a sweep goes on with them. 1 takes 2 % more products on a map of 1000
-/// motions and 60 % more on a curve of 41 under a spin of 0.0015/mm, 6 is alike.
+/// Motions in a row for which half the cells would be enough, before a sweep goes on with them. 1 takes 3 % more products on a creep map of
+/// 1000 motions at 0.005 and two thirds more on a curve of 41 under a spin of 0.0015/mm, 2 takes 1 and 6 % more, 6 is alike.
 const SLACK_MOTIONS: usize = 4;
 /// Longest step, relative to the motion, over which the last tractions serve as a start unchanged. On 12 sweeps of 9 motions on ellipses
 /// of `benches/calibrate`, 0.12 takes 6 % more products and 0.5 takes 6 % fewer; on 40 straight sweeps, where starts are extrapolated, 0.5
