@@ -3,6 +3,7 @@
 pub mod elasticity;
 pub mod grid_coefficients;
 pub mod grid_operator;
+pub mod line_sums;
 pub mod kernels;
 pub mod point_loads;
 #[cfg(test)]

@@ -1,9 +1,8 @@
-//! Fourier transforms of rows and columns of a grid, in single or double precision.
+//! Fourier transforms of the lines of a grid, in single or double precision.
 
 use std::sync::Arc;
 
-use realfft::{FftNum, RealFftPlanner, RealToComplex};
-use rustfft::{Fft, FftPlanner};
+use rustfft::{Fft, FftNum, FftPlanner};
 
 /// The floating-point precision of the transforms.
 pub trait FftFloat: FftNum + Into<f64> {
@@ -23,40 +22,28 @@ impl FftFloat for f64 {
     }
 }
 
-/// FftPlans for the transforms of rows and columns: of a real row, of two rows at once as real and imaginary part, and of columns.
+/// Plans for the transforms of a padded line, forward and backward.
 pub struct FftPlans<T> {
-    pub(crate) forward: Arc<dyn RealToComplex<T>>,
-    pub(crate) rows_forward: Arc<dyn Fft<T>>,
-    pub(crate) rows_backward: Arc<dyn Fft<T>>,
-    pub(crate) columns_forward: Arc<dyn Fft<T>>,
-    pub(crate) columns_backward: Arc<dyn Fft<T>>,
+    pub(crate) forward: Arc<dyn Fft<T>>,
+    pub(crate) backward: Arc<dyn Fft<T>>,
 }
 
-/// FftPlans made so far. A solve uses few padded sizes, and planning one takes 2 µs (64 × 64) to 14 µs (400 × 400), about a tenth
-/// of a product; plans are therefore kept only during one solve.
-pub struct FftPlanners<T: FftNum> {
-    real: RealFftPlanner<T>,
-    complex: FftPlanner<T>,
-}
+/// Plans made so far. A solve uses few padded sizes, and planning one takes 2 to 14 µs, about a tenth of a product; plans are therefore kept
+/// only during one solve.
+pub struct FftPlanners<T: FftNum>(FftPlanner<T>);
 
 impl<T: FftNum> Default for FftPlanners<T> {
     fn default() -> Self {
-        FftPlanners {
-            real: RealFftPlanner::new(),
-            complex: FftPlanner::new(),
-        }
+        FftPlanners(FftPlanner::new())
     }
 }
 
 impl<T: FftNum> FftPlanners<T> {
-    /// FftPlans for a padded grid of `width` by `height`.
-    pub fn plans(&mut self, width: usize, height: usize) -> FftPlans<T> {
+    /// Plans for lines of a padded length.
+    pub fn plans(&mut self, width: usize) -> FftPlans<T> {
         FftPlans {
-            forward: self.real.plan_fft_forward(width),
-            rows_forward: self.complex.plan_fft_forward(width),
-            rows_backward: self.complex.plan_fft_inverse(width),
-            columns_forward: self.complex.plan_fft_forward(height),
-            columns_backward: self.complex.plan_fft_inverse(height),
+            forward: self.0.plan_fft_forward(width),
+            backward: self.0.plan_fft_inverse(width),
         }
     }
 }
