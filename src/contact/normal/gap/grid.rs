@@ -87,6 +87,12 @@ impl PressureGrid {
         }
     }
 
+    /// The grid over the same box with fewer cells along either axis, by about a factor.
+    pub(crate) fn coarser(&self, factor: f64) -> PressureGrid {
+        let cells = self.cells.map(|n| (n as f64 / factor) as usize);
+        PressureGrid::new([self.range(0), self.range(1)], cells, self.mirrored)
+    }
+
     /// The grid of as many cells with lengths from the origin times a factor, the origin being moved to a place in mm.
     pub(crate) fn placed(&self, size: f64, origin: [f64; 2]) -> PressureGrid {
         PressureGrid {

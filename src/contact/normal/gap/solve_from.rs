@@ -6,9 +6,10 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
-use crate::contact::normal::gap::constants::NEAR;
+use crate::contact::normal::gap::constants::{NEAR, REFINEMENT};
 use crate::contact::normal::gap::grid::{GridFineness, PressureGrid, within};
 use crate::contact::normal::gap::search_box::SearchBox;
+use crate::contact::normal::gap::solve::NextStep;
 use crate::contact::normal::gap::surface::Window;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
@@ -16,7 +17,7 @@ use crate::contact::normal::gap::tiles::merged;
 use crate::contact::normal::hertz::NormalLoad;
 
 /// Grids that are tried from a start; each is larger than the one before. Numeric safety.
-const GRIDS_MAX: usize = 3;
+const GRIDS_MAX: usize = 4;
 /// Blocks of cells along either axis whose loads stand for the pressure far from it. 3 and 12, with 0.02 and 0.1 for `RING`, change no figure
 /// of `cargo bench --bench calibrate profiles`.
 const BLOCKS: usize = 6;
@@ -77,14 +78,43 @@ impl GapTask {
                 last = Some((std::mem::replace(&mut grid, larger), pressed));
                 continue;
             }
-            let next = self.next_grid(&grid, &pressed, Some(&start), depth, resolution);
-            if !next.is_ok_and(|next| next.is_settled()) || self.touches_beside(&grid, &pressed) {
-                return Ok(None);
+            let alone = GridFineness {
+                settles: false,
+                ..resolution
+            };
+            match self.next_grid(&grid, &pressed, None, depth, alone) {
+                // A patch turned out smaller than at the start.
+                Ok(NextStep::PressureGrid(finer)) => {
+                    last = Some((std::mem::replace(&mut grid, finer), pressed));
+                    continue;
+                }
+                Ok(next) if next.is_settled() && !self.touches_beside(&grid, &pressed) => {}
+                _ => return Ok(None),
+            }
+            let settled = |before: &(PressureGrid, PressureAnswer)| {
+                let next = self.next_grid(&grid, &pressed, Some(before), depth, resolution);
+                next.is_ok_and(|next| next.is_settled())
+            };
+            let pressure_change = from.1.largest() / pressed.largest() - 1.0;
+            if resolution.settles && !settled(from) {
+                // The start was of another height, or of other profiles: a coarser grid of this gap tells.
+                let coarse = grid.coarser(REFINEMENT);
+                let found = (grid.clone(), pressed.clone());
+                let checked =
+                    match self.pressure_on(&coarse, Some(&found), &reach, workspace, monitor) {
+                        Ok(checked) => checked,
+                        Err(NormalError::NoAnswer(_)) => return Ok(None),
+                        Err(stopped) => return Err(stopped),
+                    };
+                iterations += checked.iterations;
+                if !settled(&(coarse, checked)) {
+                    return Ok(None);
+                }
             }
             return Ok(Some(GapOutcome {
                 iterations,
                 exit: GridsExit::Settled,
-                pressure_change: start.1.largest() / pressed.largest() - 1.0,
+                pressure_change,
                 least,
                 tiles: vec![Tile { grid, pressed }],
             }));

@@ -27,6 +27,8 @@ pub(crate) struct Fineness {
     pub(crate) target: f64,
     /// Whether edges are placed: not where a height is only looked at on the way.
     pub(crate) edges: Edges,
+    /// Whether each pressure is compared with that of a coarser grid.
+    pub(crate) settles: bool,
 }
 
 impl Fineness {
@@ -60,6 +62,7 @@ impl Fineness {
             detail: GapSampling::Fine,
             target,
             edges: Edges::Found,
+            settles: true,
         }
     }
 }
@@ -163,7 +166,10 @@ impl WheelTask {
         };
         let resolution = match fineness.detail {
             GapSampling::Coarse => GridFineness::coarse(),
-            GapSampling::Fine => GridFineness::for_answer(fineness.target),
+            GapSampling::Fine => GridFineness {
+                settles: fineness.settles,
+                ..GridFineness::for_answer(fineness.target)
+            },
         };
         let found = contact.solve_near(start, resolution, workspace, monitor)?;
         let found = contact.found(found, fineness.edges)?;

@@ -146,6 +146,8 @@ impl WheelTask {
         let exact = matches!(wanted.accuracy, Accuracy::For(_));
         let starts_near = exact && before.is_some_and(|before| before.is_near(force));
         let mut fineness = Fineness::first(wanted, starts_near);
+        // Other readings of the profiles only tell how far their answers lie apart.
+        fineness.settles = start.lowering.is_none();
         let (mut bracket, mut last) = (Bracket::default(), None::<WheelContact>);
         let mut lowering = start
             .first_lowering(&mut bracket, force)
