@@ -15,6 +15,7 @@ pub(crate) const RESOLUTION: GridFineness = GridFineness {
     patch: 24.0,
     share_min: 0.02,
     settles: true,
+    tolerance: 2e-4,
 };
 
 /// The same for the search of a height, where forces within some tenths of a per cent are enough.
@@ -23,6 +24,7 @@ pub(crate) const RESOLUTION_COARSE: GridFineness = GridFineness {
     patch: 12.0,
     share_min: 0.05,
     settles: false,
+    tolerance: 1e-3,
 };
 
 /// Below this target of the resultants' error (relative to μN) grids are finer: the error of a normal problem falls with the
@@ -56,9 +58,6 @@ pub(crate) const REFINEMENT: f64 = 1.6;
 /// Violation of the contact conditions relative to the deepest overlap that ends the iteration on the first grid, which only finds the
 /// box.
 pub(crate) const TOLERANCE_FIRST: f64 = 2e-3;
-
-/// The same on later grids.
-pub(crate) const TOLERANCE: f64 = 2e-4;
 
 /// Most grids that are tried; each is larger, shifted or finer than the one before. Numeric safety.
 pub(crate) const GRIDS_MAX: usize = 12;

@@ -58,6 +58,8 @@ pub(crate) struct GridFineness {
     pub(crate) share_min: f64,
     /// The result is compared with that of the grid before.
     pub(crate) settles: bool,
+    /// Violation of the contact conditions relative to the deepest overlap that ends the iteration on all grids but the first.
+    pub(crate) tolerance: f64,
 }
 
 impl GridSide {

@@ -6,6 +6,7 @@ use crate::contact::normal::gap::constants::{CELLS_FIRST, LEVEL_BEYOND, NEAR, RE
 use crate::contact::normal::gap::grid::PressureGrid;
 use crate::contact::normal::gap::pilot::{GapPilot, PilotPatch};
 use crate::contact::normal::gap::search_box::reach_of_level;
+use crate::contact::normal::gap::solve::GridStart;
 use crate::contact::normal::gap::task::GapTask;
 
 /// Boxes tried: each is larger than the one before. A product on the coarse grid takes 20 µs, and an iteration one or two of them,
@@ -27,8 +28,13 @@ impl GapTask {
         let mut reach = self.reach();
         for _ in 0..BOXES_MAX {
             let grid = PressureGrid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored());
+            let start = GridStart {
+                before: None,
+                reach: &reach,
+                tolerance: RESOLUTION.tolerance,
+            };
             let pressed = self
-                .pressure_on(&grid, None, &reach, &mut workspace, &Unmonitored)
+                .pressure_on(&grid, start, &mut workspace, &Unmonitored)
                 .ok()?;
             let depth = pressed.approach - reach.least;
             if pressed.approach > reach.level {

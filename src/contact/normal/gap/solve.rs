@@ -13,7 +13,7 @@ use crate::contact::normal::gap::conjugate_gradients::{
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, LOOSE_POWER, NEAR,
     PRESSURE_CHANGE, REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL,
-    TARGETS_LOOSE, TOLERANCE, TOLERANCE_FIRST,
+    TARGETS_LOOSE, TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
 use crate::contact::normal::gap::search_box::{SearchBox, reach_of_level};
@@ -109,7 +109,14 @@ impl GapTask {
         let (mut iterations, mut pressure_change) = (0, 0.0);
         let (mut exit, mut capped) = (GridsExit::GridsUsedUp, false);
         for _ in 0..GRIDS_MAX {
-            let pressed = self.pressure_on(&grid, solved.as_ref(), &reach, workspace, monitor)?;
+            let pressed = {
+                let start = GridStart {
+                    before: solved.as_ref(),
+                    reach: &reach,
+                    tolerance: resolution.tolerance,
+                };
+                self.pressure_on(&grid, start, workspace, monitor)?
+            };
             iterations += pressed.iterations;
             if let Some((_, before)) = &solved {
                 pressure_change = before.largest() / pressed.largest() - 1.0;
@@ -158,15 +165,18 @@ impl GapTask {
     pub(crate) fn pressure_on(
         &self,
         grid: &PressureGrid,
-        before: Option<&(PressureGrid, PressureAnswer)>,
-        reach: &SearchBox,
+        GridStart {
+            before,
+            reach,
+            tolerance,
+        }: GridStart,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<PressureAnswer, NormalError> {
         let gap = grid.gap(&self.gap);
         let (start, tolerance) = match before {
             Some((coarse, pressed)) => {
-                (grid.interpolate(coarse, &pressed.pressure, &gap), TOLERANCE)
+                (grid.interpolate(coarse, &pressed.pressure, &gap), tolerance)
             }
             None => (
                 grid.first_pressure(&gap, reach, self.contact_modulus),
@@ -233,6 +243,32 @@ impl GapTask {
     }
 }
 
+/// What a grid is solved from, and how exactly.
+#[derive(Clone, Copy)]
+pub(crate) struct GridStart<'a> {
+    /// An earlier grid; none before the first one.
+    pub(crate) before: Option<&'a (PressureGrid, PressureAnswer)>,
+    /// The box of the contact.
+    pub(crate) reach: &'a SearchBox,
+    /// See [`GridFineness::tolerance`].
+    pub(crate) tolerance: f64,
+}
+
+impl<'a> GridStart<'a> {
+    /// From an earlier grid.
+    pub(crate) fn new(
+        before: &'a (PressureGrid, PressureAnswer),
+        reach: &'a SearchBox,
+        tolerance: f64,
+    ) -> GridStart<'a> {
+        GridStart {
+            before: Some(before),
+            reach,
+            tolerance,
+        }
+    }
+}
+
 /// What follows a grid.
 pub(crate) enum NextStep {
     PressureGrid(PressureGrid),
@@ -262,13 +298,16 @@ impl GridFineness {
     /// The resolution for a target of the resultants' error relative to μN; without one, that of [`TARGET_USUAL`].
     fn for_target(self, target: f64) -> GridFineness {
         let mut cells = (target.min(TARGET_USUAL) / TARGET_USUAL).powf(TARGET_POWER);
+        let mut looser = 1.0;
         if target.is_finite() {
             let [least, most] = TARGETS_LOOSE;
-            cells *= (target.clamp(least, most) / least).powf(LOOSE_POWER);
+            looser = target.clamp(least, most) / least;
         }
+        cells *= looser.powf(LOOSE_POWER);
         GridFineness {
             contact: cells * self.contact,
             patch: cells * self.patch,
+            tolerance: looser * self.tolerance,
             ..self
         }
     }

@@ -9,7 +9,7 @@ use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
 use crate::contact::normal::gap::constants::{NEAR, REFINEMENT};
 use crate::contact::normal::gap::grid::{GridFineness, PressureGrid, within};
 use crate::contact::normal::gap::search_box::SearchBox;
-use crate::contact::normal::gap::solve::NextStep;
+use crate::contact::normal::gap::solve::{GridStart, NextStep};
 use crate::contact::normal::gap::surface::Window;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
@@ -61,12 +61,18 @@ impl GapTask {
             level: approach,
             least,
         };
+        let (reach, tolerance) = (&reach, resolution.tolerance);
         let start = (start.grid, start.pressed);
         let mut last: Option<(PressureGrid, PressureAnswer)> = None;
         let mut iterations = 0;
         for _ in 0..GRIDS_MAX {
             let from = last.as_ref().unwrap_or(&start);
-            let pressed = match self.pressure_on(&grid, Some(from), &reach, workspace, monitor) {
+            let pressed = match self.pressure_on(
+                &grid,
+                GridStart::new(from, reach, tolerance),
+                workspace,
+                monitor,
+            ) {
                 Ok(pressed) => pressed,
                 Err(NormalError::NoAnswer(_)) => return Ok(None),
                 Err(stopped) => return Err(stopped),
@@ -100,12 +106,16 @@ impl GapTask {
                 // The start was of another height, or of other profiles: a coarser grid of this gap tells.
                 let coarse = grid.coarser(REFINEMENT);
                 let found = (grid.clone(), pressed.clone());
-                let checked =
-                    match self.pressure_on(&coarse, Some(&found), &reach, workspace, monitor) {
-                        Ok(checked) => checked,
-                        Err(NormalError::NoAnswer(_)) => return Ok(None),
-                        Err(stopped) => return Err(stopped),
-                    };
+                let checked = match self.pressure_on(
+                    &coarse,
+                    GridStart::new(&found, reach, tolerance),
+                    workspace,
+                    monitor,
+                ) {
+                    Ok(checked) => checked,
+                    Err(NormalError::NoAnswer(_)) => return Ok(None),
+                    Err(stopped) => return Err(stopped),
+                };
                 iterations += checked.iterations;
                 if !settled(&(coarse, checked)) {
                     return Ok(None);

@@ -7,6 +7,7 @@
 
 use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::patch::Patch;
+use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::level_set::State;
 use crate::contact::normal::pressure_field::line::GridLine;
@@ -83,6 +84,7 @@ impl GridPressure {
             q,
             smooth: Vec::new(),
             runs: Vec::new(),
+            spans: Vec::new(),
             cells,
             pressure_max,
             shapes: Vec::new(),
@@ -109,6 +111,15 @@ impl GridPressure {
             single.then_some([first, last])
         };
         self.runs = self.q.chunks_exact(self.grid.x.len()).map(run).collect();
+        let span = |row: &[u8]| {
+            let first = row.iter().position(|label| *label != NOWHERE)?;
+            Some([first, row.iter().rposition(|label| *label != NOWHERE)?])
+        };
+        self.spans = self
+            .cells
+            .chunks_exact(self.grid.x.len())
+            .map(span)
+            .collect();
         for label in 0..self.shapes.len() {
             let (extent, area) = self.measure(label, &self.shapes[label]);
             let patch = &mut self.shapes[label].patch;
@@ -260,11 +271,15 @@ impl GridPressure {
         if rows[j] > y || rows[j + 1] < y || !shape.rows.contains(&j) {
             return Vec::new();
         }
+        let Some([first, last]) = self.near_row(j) else {
+            return Vec::new();
+        };
+        let columns = (*shape.columns.start()).max(first)..=(*shape.columns.end()).min(last);
         let t = (y - rows[j]) / (rows[j + 1] - rows[j]);
         let weights = weights(rows, j, y);
         let line = GridLine {
             axis: x,
-            intervals: shape.columns.clone(),
+            intervals: columns,
             whole: self.whole(label, j),
             value: |i| self.value_on_column(i, j, weights),
             inside: |i| self.q[j * x.len() + i] > 0.0 && self.q[(j + 1) * x.len() + i] > 0.0,
@@ -272,6 +287,15 @@ impl GridPressure {
             allowed: |i| self.allowed(label, i, j, t),
         };
         line.segments()
+    }
+
+    /// The columns of row j that may hold a part of a patch: next to a cell of one, or beside it ([`GridPressure::allowed`]).
+    fn near_row(&self, j: usize) -> Option<[usize; 2]> {
+        let near = self.spans[j - 1..=j + 1].iter().flatten();
+        let both = near
+            .copied()
+            .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        both.map(|[first, last]| [first - 1, last + 1])
     }
 
     /// The columns between which a patch has all samples of row j and the next one, where each of the two has one run of positive samples.

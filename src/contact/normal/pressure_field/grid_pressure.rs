@@ -15,6 +15,8 @@ pub struct GridPressure {
     pub(crate) smooth: Vec<bool>,
     /// The first and the last positive sample of every row that has one run of them; empty before edges are found.
     pub(crate) runs: Vec<Option<[usize; 2]>>,
+    /// The first and the last cell of every row that belongs to a patch; empty before edges are found.
+    pub(crate) spans: Vec<Option<[usize; 2]>>,
     /// The patch of every cell that has one of its samples as a corner.
     pub(crate) cells: Vec<u8>,
     /// Largest pressure in MPa.
