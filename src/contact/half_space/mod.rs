@@ -3,8 +3,8 @@
 pub mod elasticity;
 pub mod grid_coefficients;
 pub mod grid_operator;
-pub mod line_sums;
 pub mod kernels;
+pub mod line_sums;
 pub mod point_loads;
 #[cfg(test)]
 pub mod rectangle_stress;

@@ -9,9 +9,9 @@ use crate::contact::numerics::spline::Spline;
 
 /// Bounds of the spacing of the comparison in mm. The smaller one everywhere takes twice the time; it was not measured how the readings
 /// differ beyond the tests, and the class *damaged profile* of `docs/stability.md`.
-const STEP: [f64; 2] = [0.05, 0.1];
+const STEP: [f64; 2] = [0.05, 0.2];
 /// Places of the comparison from one point to the next, within these bounds. Chosen by judgement: a cubic between two points is seen.
-const PLACES: f64 = 5.0;
+const PLACES: f64 = 4.0;
 /// Distance in mm by which the comparison extends beyond twice the half width of the contact.
 const BEYOND: f64 = 10.0;
 /// Distance, in cut wavelengths, beyond which points do not affect a smoothed curve.

@@ -85,7 +85,7 @@ impl GridPressure {
     pub(crate) fn measure(&self, label: usize, shape: &PatchShape) -> ([f64; 4], f64) {
         let [y_min, y_max] = self.extent_across(shape, label);
         // The length of chords varies as a square root at both ends of the patch, so lines are closer there.
-        let lines = (32 + shape.rows.clone().count()).max(72);
+        let lines = (16 + shape.rows.clone().count()).max(48);
         let (middle, half) = (0.5 * (y_min + y_max), 0.5 * (y_max - y_min));
         let step = PI / lines as f64;
         let at = |n: f64| middle - half * (n * step).cos();
