@@ -19,7 +19,7 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 /// 0.0002 of μN in the median and 0.002 at most on the wheels of `cargo bench --bench calibrate profiles`, as with any other shift of the grids.
 pub(crate) const STEP: f64 = 0.04;
 /// Spacing of the points along the curves, in mm.
-const CURVE_STEP: f64 = 0.08;
+const CURVE_STEP: f64 = 0.16;
 /// Lines that the window of a gap is found from, evenly among those that overlap: its margins are larger than what lies between two.
 const WINDOW_LINES: usize = 40;
 /// The window of a gap is larger than the overlap by this fraction on either side.

@@ -143,13 +143,24 @@ impl StripMesh {
         operators: Arc<CaseOperators>,
     ) -> Result<StripMesh, SolveError> {
         let plan: MeshPlan = plan.into();
+        let fitted = fitted_chords(task.footprint, &plan)?;
+        Ok(StripMesh::of_chords(task, plan, &fitted, operators))
+    }
+
+    /// The same from the chords of the plan's strips ([`fitted_chords`]).
+    #[must_use]
+    pub(crate) fn of_chords(
+        task: &RollingTask,
+        plan: MeshPlan,
+        fitted: &[StripChord],
+        operators: Arc<CaseOperators>,
+    ) -> StripMesh {
         let Elasticity {
             shear_modulus,
             poisson_ratio,
             ..
         } = *task.elasticity;
         let (footprint, patches) = (task.footprint, task.footprint.patches());
-        let fitted = fitted_chords(footprint, &plan)?;
         let chords: Vec<Chord> = fitted.iter().map(|f| f.chord).collect();
         let grading = match plan.pole() {
             Some([x, _]) => Grading::about(x, plan.size.cells as usize),
@@ -162,9 +173,9 @@ impl StripMesh {
             mesh.load_y = fitted.iter().map(|f| f.load_y).collect();
         }
         let area = mesh.areas();
-        let pressure = cell_pressures(footprint, &fitted, &mesh, &grading, &area);
+        let pressure = cell_pressures(footprint, fitted, &mesh, &grading, &area);
         let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
-        let bound = bounds(task, &fitted, &mesh, &pressure, largest);
+        let bound = bounds(task, fitted, &mesh, &pressure, largest);
         // Pressures enter the equations through their bounds only, so that bounds decide the symmetry.
         let mirror = mesh.mirror_line().filter(|_| bounds_mirror(&mesh, &bound));
         let [x, y] = middle(&patches.iter().map(|p| p.extent).collect::<Vec<_>>());
@@ -185,7 +196,7 @@ impl StripMesh {
             let relative: Vec<f64> = pressure.iter().map(|p| p * unit).collect();
             pressure_slips(&normalised, task.elasticity.difference, &relative)
         });
-        Ok(StripMesh {
+        StripMesh {
             plan,
             mesh,
             pressure,
@@ -199,7 +210,7 @@ impl StripMesh {
             precision,
             mirrored: mirror.is_some(),
             operators,
-        })
+        }
     }
 
     /// The operator of the dimensionless mesh, from the store or computed.
@@ -305,8 +316,14 @@ fn bounds(
     bound
 }
 
-/// The strips of all patches, fitted to the region.
-fn fitted_chords(footprint: &Footprint, plan: &MeshPlan) -> Result<Vec<StripChord>, SolveError> {
+/// The strips of all patches, fitted to the region; they depend on the number of strips and on where these gather.
+///
+/// # Errors
+/// [`SolveError::Unmeshable`] if no strip meets a patch.
+pub(crate) fn fitted_chords(
+    footprint: &Footprint,
+    plan: &MeshPlan,
+) -> Result<Vec<StripChord>, SolveError> {
     let strips = plan.size.strips;
     let mut fitted = Vec::new();
     for (k, patch) in footprint.patches().iter().enumerate() {

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use crate::contact::error::SolveError;
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::operator_store::{CaseOperators, OperatorStore};
-use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::strip_chords::StripChord;
+use crate::contact::rolling::strip_mesh::{StripMesh, fitted_chords};
 use crate::contact::rolling::task::RollingTask;
 
 /// Levels that are kept from one motion to the next: a few paths of about four levels. Sweeps return to the levels of the last few
@@ -13,11 +14,19 @@ use crate::contact::rolling::task::RollingTask;
 /// creep-map`).
 pub const LEVELS_KEPT: usize = 32;
 
+/// Strips that are kept: those of a mesh and its companion, and of the meshes before.
+const STRIPS_KEPT: usize = 4;
+
+/// Number of strips, and where across the patch they gather, if anywhere.
+type StripsKey = (u32, Option<f64>);
+
 /// The levels of a case that exist; the least recently used are dropped between motions.
 #[derive(Debug)]
 pub struct Levels<'a> {
     task: &'a RollingTask<'a>,
     operators: Arc<CaseOperators>,
+    /// Strips of the meshes made last, with what they were made for: meshes that differ in the cells along them share them.
+    strips: Vec<(StripsKey, Arc<Vec<StripChord>>)>,
     /// With their numbers, which are never given twice, in the order of their last use.
     kept: Vec<(usize, Arc<StripMesh>)>,
     made: usize,
@@ -30,6 +39,7 @@ impl<'a> Levels<'a> {
         Levels {
             task,
             operators: CaseOperators::new(store),
+            strips: Vec::new(),
             kept: Vec::new(),
             made: 0,
         }
@@ -46,10 +56,24 @@ impl<'a> Levels<'a> {
             return Ok(self.kept[self.kept.len() - 1].0);
         }
         let operators = Arc::clone(&self.operators);
-        let level = StripMesh::with_operators(self.task, plan, operators)?;
+        let strips = self.strips(&plan)?;
+        let level = StripMesh::of_chords(self.task, plan, &strips, operators);
         self.kept.push((self.made, Arc::new(level)));
         self.made += 1;
         Ok(self.made - 1)
+    }
+
+    fn strips(&mut self, plan: &MeshPlan) -> Result<Arc<Vec<StripChord>>, SolveError> {
+        let key = (plan.size.strips, plan.pole().map(|pole| pole[1]));
+        if let Some((_, known)) = self.strips.iter().find(|(made, _)| *made == key) {
+            return Ok(Arc::clone(known));
+        }
+        let found = Arc::new(fitted_chords(self.task.footprint, plan)?);
+        if self.strips.len() == STRIPS_KEPT {
+            self.strips.remove(0);
+        }
+        self.strips.push((key, Arc::clone(&found)));
+        Ok(found)
     }
 
     /// A level by its number; it must have been used since the last [`Levels::trim`], or lie on the path.
