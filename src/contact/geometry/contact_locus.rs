@@ -19,9 +19,9 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 /// 0.0002 of μN in the median and 0.002 at most on the wheels of `cargo bench --bench calibrate profiles`, as with any other shift of the grids.
 pub(crate) const STEP: f64 = 0.04;
 /// Spacing of the points along the curves, in mm.
-const CURVE_STEP: f64 = 0.16;
-/// Lines that the window of a gap is found from, evenly among those that overlap: its margins are larger than what lies between two.
-const WINDOW_LINES: usize = 40;
+const CURVE_STEP: f64 = 0.08;
+/// Lines from either end of an overlap that the window of its gap is found from: its margins are larger than what lies between two.
+const WINDOW_LINES: usize = 20;
 /// The window of a gap is larger than the overlap by this fraction on either side.
 const MARGIN: f64 = 0.15;
 /// Length in mm by which it is larger on either side as well.
@@ -260,8 +260,10 @@ impl<'g> ContactLocus<'g> {
         let v_of = |line: &LocusPoint| plane.across(self.geometry.rail_at(line.rail).at)[0];
         let mut across = [f64::INFINITY, f64::NEG_INFINITY];
         let mut along = [0.0_f64; 2];
-        let few = lines.iter().step_by(lines.len().div_ceil(WINDOW_LINES));
-        for line in few.chain(lines.last()) {
+        // From both ends, so that a mirror image has the mirrored window.
+        let every = lines.len().div_ceil(WINDOW_LINES);
+        let from_ends = lines.iter().step_by(every);
+        for line in from_ends.chain(lines.iter().rev().step_by(every)) {
             let v = v_of(line);
             across = [across[0].min(v), across[1].max(v)];
             let overlap = (lowering - line.clearance).max(0.0);

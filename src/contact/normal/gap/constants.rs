@@ -5,12 +5,10 @@
 
 use crate::contact::normal::gap::grid::GridFineness;
 
-/// Cells of the first grid along either axis: enough to find the box of the contact; the result does not depend on it.
-pub(crate) const CELLS_FIRST: usize = 24;
-
 /// Fewest cells across the contact, and across every patch with the given share of the load, on the last grid: with 44 cells the error of
 /// the resultants is below 0.0007 in nine of ten gaps (see `REGION` of the rolling constants).
 pub(crate) const RESOLUTION: GridFineness = GridFineness {
+    first: 32,
     contact: 44.0,
     patch: 24.0,
     share_min: 0.02,
@@ -20,11 +18,20 @@ pub(crate) const RESOLUTION: GridFineness = GridFineness {
 
 /// The same for the search of a height, where forces within some tenths of a per cent are enough.
 pub(crate) const RESOLUTION_COARSE: GridFineness = GridFineness {
-    contact: 16.0,
+    first: 32,
+    contact: 22.0,
     patch: 12.0,
     share_min: 0.05,
     settles: false,
+    tolerance: 2e-4,
+};
+
+/// The same from the first of [`TARGETS_LOOSE`] on: the grid of the answer begins at what this one shows of the contact.
+pub(crate) const RESOLUTION_COARSE_LOOSE: GridFineness = GridFineness {
+    first: 24,
+    contact: 16.0,
     tolerance: 1e-3,
+    ..RESOLUTION_COARSE
 };
 
 /// Below this target of the resultants' error (relative to μN) grids are finer: the error of a normal problem falls with the

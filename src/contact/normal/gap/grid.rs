@@ -50,6 +50,8 @@ pub(crate) struct NextGrid {
 /// Numbers of cells that are wanted across the contact and its patches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GridFineness {
+    /// Cells of the first grid along either axis, which finds the box of the contact.
+    pub(crate) first: usize,
     /// Across everything in contact.
     pub(crate) contact: f64,
     /// Across the smallest patch that counts.

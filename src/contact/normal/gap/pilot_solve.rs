@@ -2,7 +2,7 @@
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Unmonitored;
-use crate::contact::normal::gap::constants::{CELLS_FIRST, LEVEL_BEYOND, NEAR, RESOLUTION};
+use crate::contact::normal::gap::constants::{LEVEL_BEYOND, NEAR, RESOLUTION};
 use crate::contact::normal::gap::grid::PressureGrid;
 use crate::contact::normal::gap::pilot::{GapPilot, PilotPatch};
 use crate::contact::normal::gap::search_box::reach_of_level;
@@ -27,7 +27,8 @@ impl GapTask {
         let mut workspace = GridWorkspace::default();
         let mut reach = self.reach();
         for _ in 0..BOXES_MAX {
-            let grid = PressureGrid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored());
+            let cells = [RESOLUTION.first; 2];
+            let grid = PressureGrid::new(reach.window, cells, self.gap.is_mirrored());
             let start = GridStart {
                 before: None,
                 reach: &reach,

@@ -4,7 +4,7 @@ use crate::contact::normal::gap::surface::{GapSurface, Window};
 use crate::contact::normal::hertz::NormalLoad;
 
 /// Points of a box along each axis when it is looked through.
-const POINTS: usize = 32;
+const POINTS: usize = 48;
 /// Most samples along one axis that are evaluated one by one; of more samples, only every second or third is.
 const SAMPLES_MAX: usize = 400;
 /// Most boxes that are tried until one is filled; each try shrinks a box that is too large at least by half.

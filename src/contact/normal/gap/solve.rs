@@ -11,8 +11,8 @@ use crate::contact::normal::gap::conjugate_gradients::{
     PressureAnswer, PressureTask, solve_pressure,
 };
 use crate::contact::normal::gap::constants::{
-    APPROACH_CHANGE, CELLS_FIRST, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, LOOSE_POWER, NEAR,
-    PRESSURE_CHANGE, REFINEMENT, RESOLUTION, RESOLUTION_COARSE, TARGET_POWER, TARGET_USUAL,
+    APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, LOOSE_POWER, NEAR, PRESSURE_CHANGE,
+    REFINEMENT, RESOLUTION, RESOLUTION_COARSE, RESOLUTION_COARSE_LOOSE, TARGET_POWER, TARGET_USUAL,
     TARGETS_LOOSE, TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
@@ -102,7 +102,7 @@ impl GapTask {
             return Err(NormalError::NoAnswer(no_touch(approach, reach.least)));
         }
         let first = |reach: &SearchBox| {
-            PressureGrid::new(reach.window, [CELLS_FIRST; 2], self.gap.is_mirrored())
+            PressureGrid::new(reach.window, [resolution.first; 2], self.gap.is_mirrored())
         };
         let mut grid = first(&reach);
         let mut solved: Option<(PressureGrid, PressureAnswer)> = None;
@@ -286,8 +286,12 @@ impl NextStep {
 impl GridFineness {
     /// The resolution for the search of a height, at a third of the cost: forces within some tenths of a per cent, edges within one cell, a
     /// twentieth of the contact. Roughness is not resolved.
-    pub(crate) fn coarse() -> GridFineness {
-        RESOLUTION_COARSE
+    pub(crate) fn coarse(target: f64) -> GridFineness {
+        if target < TARGETS_LOOSE[0] {
+            RESOLUTION_COARSE
+        } else {
+            RESOLUTION_COARSE_LOOSE
+        }
     }
 
     /// That for an answer: [`GapTask::solve_for`].

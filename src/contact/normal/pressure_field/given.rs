@@ -5,12 +5,15 @@
 //! reproduced exactly. The force of a patch is the sum of its samples times the areas they represent; the mesh scales the
 //! pressures on its strips to carry that force.
 
+use std::ops::RangeInclusive;
+
 use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::level_set::State;
 use crate::contact::normal::pressure_field::line::GridLine;
+use crate::contact::normal::pressure_field::patch_cells::PatchShape;
 use crate::contact::normal::pressure_field::sample_grid::{
     PADDING, PATCHES_MAX, SampleGrid, padded,
 };
@@ -271,10 +274,9 @@ impl GridPressure {
         if rows[j] > y || rows[j + 1] < y || !shape.rows.contains(&j) {
             return Vec::new();
         }
-        let Some([first, last]) = self.near_row(j) else {
+        let Some(columns) = self.near_row(shape, j) else {
             return Vec::new();
         };
-        let columns = (*shape.columns.start()).max(first)..=(*shape.columns.end()).min(last);
         let t = (y - rows[j]) / (rows[j + 1] - rows[j]);
         let weights = weights(rows, j, y);
         let line = GridLine {
@@ -289,13 +291,15 @@ impl GridPressure {
         line.segments()
     }
 
-    /// The columns of row j that may hold a part of a patch: next to a cell of one, or beside it ([`GridPressure::allowed`]).
-    fn near_row(&self, j: usize) -> Option<[usize; 2]> {
-        let near = self.spans[j - 1..=j + 1].iter().flatten();
-        let both = near
-            .copied()
-            .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-        both.map(|[first, last]| [first - 1, last + 1])
+    /// The columns of row j that may hold a part of a patch: those of its cells, and one beside them ([`GridPressure::allowed`]).
+    fn near_row(&self, shape: &PatchShape, j: usize) -> Option<RangeInclusive<usize>> {
+        let Some(near) = self.spans.get(j - 1..=j + 1) else {
+            return Some(shape.columns.clone());
+        };
+        let widened = |a: [usize; 2], b: [usize; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let [first, last] = near.iter().flatten().copied().reduce(widened)?;
+        let [from, to] = [*shape.columns.start(), *shape.columns.end()];
+        Some(from.max(first - 1)..=to.min(last + 1))
     }
 
     /// The columns between which a patch has all samples of row j and the next one, where each of the two has one run of positive samples.

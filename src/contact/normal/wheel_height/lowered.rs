@@ -165,7 +165,7 @@ impl WheelTask {
             seen: GapSeen::default(),
         };
         let resolution = match fineness.detail {
-            GapSampling::Coarse => GridFineness::coarse(),
+            GapSampling::Coarse => GridFineness::coarse(fineness.target),
             GapSampling::Fine => GridFineness {
                 settles: fineness.settles,
                 ..GridFineness::for_answer(fineness.target)

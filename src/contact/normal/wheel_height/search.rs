@@ -144,7 +144,8 @@ impl WheelTask {
         let mut force = target(friction_share);
         let tolerance = wanted.accuracy.tolerance();
         let exact = matches!(wanted.accuracy, Accuracy::For(_));
-        let starts_near = exact && before.is_some_and(|before| before.is_near(force, tolerance));
+        let starts_near =
+            exact && before.is_some_and(|before| before.is_near(force, wanted.accuracy));
         let mut fineness = Fineness::first(wanted, starts_near);
         // Other readings of the profiles only tell how far their answers lie apart.
         fineness.settles = start.lowering.is_none();
@@ -191,7 +192,7 @@ impl WheelTask {
                 return Ok(found.at_rest(HeightExit::closed(force / carried, tolerance), force));
             }
             lowering = if closed { found.lowering } else { next };
-            if closed || !fine && found.is_near(force, tolerance) {
+            if closed || !fine && found.is_near(force, wanted.accuracy) {
                 // Forces of coarse gaps are too inexact as ends of the bracket; their slope is exact enough.
                 fineness = fineness.finer();
                 bracket = bracket.opened(found.found[1]);

@@ -9,17 +9,13 @@ use crate::contact::normal::gap::start::GapStart;
 use crate::contact::normal::gap::tile::Tile;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::wheel_height::bracket::HeightExit;
+use crate::contact::normal::wheel_height::task::Accuracy;
 use crate::contact::remark::entry::RemarkEntry;
 
 /// The third that is left, as an error of the load.
 const CORRECTED: f64 = 1.0 / 3.0;
-/// Coarse gaps are replaced by fine ones when the force is missed by no more than this. 0.005 and 0.05 change
-/// forces by 0.3 % and pressures by 0.04 % at most on the wheels of `cargo bench --bench calibrate profiles`, with as many iterations.
-const NEAR: f64 = 0.02;
-/// The same as a multiple of the tolerance of the force: the next height of several patches misses the force by about a tenth of what this one
-/// does (`cargo bench --bench wheels -- rows 1000`).
-const NEAR_TOLERANCES: f64 = 8.0;
-/// The same with a single patch, whose force grows as Hertz's: the next height misses the force by the square of this.
+/// Coarse gaps of a single patch, whose force grows as Hertz's, are replaced by fine ones when the force is missed by no more than this: the next
+/// height misses it by the square of this.
 const NEAR_SINGLE: f64 = 0.1;
 
 /// Gaps of one contact at two heights differ by less than this in the inclination of their frames, in rad. Chosen by judgement: a start that
@@ -148,12 +144,12 @@ impl WheelContact {
         matches!(&self.patches[..], [gap] if gap.field.patches().len() == 1)
     }
 
-    /// Is the force near enough to go on with fine gaps, which are to carry it within a tolerance?
-    pub(crate) fn is_near(&self, target: f64, tolerance: f64) -> bool {
+    /// Is the force near enough to go on with fine gaps?
+    pub(crate) fn is_near(&self, target: f64, accuracy: Accuracy) -> bool {
         let near = if self.is_one_patch() {
             NEAR_SINGLE
         } else {
-            NEAR.max(NEAR_TOLERANCES * tolerance)
+            accuracy.near()
         };
         (self.found[0] / target - 1.0).abs() <= near
     }

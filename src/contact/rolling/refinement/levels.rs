@@ -14,11 +14,31 @@ use crate::contact::rolling::task::RollingTask;
 /// creep-map`).
 pub const LEVELS_KEPT: usize = 32;
 
-/// Strips that are kept: those of a mesh and its companion, and of the meshes before.
-const STRIPS_KEPT: usize = 4;
-
-/// Number of strips, and where across the patch they gather, if anywhere.
+/// What strips were made for: their number, and where across the patch they gather, if anywhere.
 type StripsKey = (u32, Option<f64>);
+
+/// The strips made last, and those before: a mesh and its companion of half the strips.
+#[derive(Debug, Default)]
+struct KeptStrips([Option<(StripsKey, Vec<StripChord>)>; 2]);
+
+impl KeptStrips {
+    /// The strips of a plan; they are made if they are not there.
+    fn of(&mut self, task: &RollingTask, plan: &MeshPlan) -> Result<&[StripChord], SolveError> {
+        let key = (plan.size.strips, plan.pole().map(|pole| pole[1]));
+        let is_known =
+            |kept: &Option<(StripsKey, _)>| matches!(kept, Some((made, _)) if *made == key);
+        match self.0.iter().position(is_known) {
+            Some(place) => self.0[..=place].rotate_right(1),
+            None => {
+                let found = fitted_chords(task.footprint, plan)?;
+                self.0.rotate_right(1);
+                self.0[0] = Some((key, found));
+            }
+        }
+        let first = self.0[0].as_ref();
+        Ok(first.map_or(&[], |(_, strips)| strips))
+    }
+}
 
 /// The levels of a case that exist; the least recently used are dropped between motions.
 #[derive(Debug)]
@@ -26,7 +46,7 @@ pub struct Levels<'a> {
     task: &'a RollingTask<'a>,
     operators: Arc<CaseOperators>,
     /// Strips of the meshes made last, with what they were made for: meshes that differ in the cells along them share them.
-    strips: Vec<(StripsKey, Arc<Vec<StripChord>>)>,
+    strips: KeptStrips,
     /// With their numbers, which are never given twice, in the order of their last use.
     kept: Vec<(usize, Arc<StripMesh>)>,
     made: usize,
@@ -39,7 +59,7 @@ impl<'a> Levels<'a> {
         Levels {
             task,
             operators: CaseOperators::new(store),
-            strips: Vec::new(),
+            strips: KeptStrips::default(),
             kept: Vec::new(),
             made: 0,
         }
@@ -56,24 +76,11 @@ impl<'a> Levels<'a> {
             return Ok(self.kept[self.kept.len() - 1].0);
         }
         let operators = Arc::clone(&self.operators);
-        let strips = self.strips(&plan)?;
-        let level = StripMesh::of_chords(self.task, plan, &strips, operators);
+        let strips = self.strips.of(self.task, &plan)?;
+        let level = StripMesh::of_chords(self.task, plan, strips, operators);
         self.kept.push((self.made, Arc::new(level)));
         self.made += 1;
         Ok(self.made - 1)
-    }
-
-    fn strips(&mut self, plan: &MeshPlan) -> Result<Arc<Vec<StripChord>>, SolveError> {
-        let key = (plan.size.strips, plan.pole().map(|pole| pole[1]));
-        if let Some((_, known)) = self.strips.iter().find(|(made, _)| *made == key) {
-            return Ok(Arc::clone(known));
-        }
-        let found = Arc::new(fitted_chords(self.task.footprint, plan)?);
-        if self.strips.len() == STRIPS_KEPT {
-            self.strips.remove(0);
-        }
-        self.strips.push((key, Arc::clone(&found)));
-        Ok(found)
     }
 
     /// A level by its number; it must have been used since the last [`Levels::trim`], or lie on the path.
