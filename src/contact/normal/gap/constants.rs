@@ -26,7 +26,11 @@ pub(crate) const RESOLUTION_COARSE: GridFineness = GridFineness {
     tolerance: 2e-4,
 };
 
-/// The same from the first of [`TARGETS_LOOSE`] on: the grid of the answer begins at what this one shows of the contact.
+/// From this target on heights are searched with [`RESOLUTION_COARSE_LOOSE`]. Below, forces of patches that share a wheel would differ by up to
+/// 1 % between a wheelset and its mirror image, because the grid of the answer begins at what this one shows of the contact.
+pub(crate) const COARSE_LOOSE_FROM: f64 = 0.01;
+
+/// The coarser one.
 pub(crate) const RESOLUTION_COARSE_LOOSE: GridFineness = GridFineness {
     first: 24,
     contact: 16.0,

@@ -11,9 +11,9 @@ use crate::contact::normal::gap::conjugate_gradients::{
     PressureAnswer, PressureTask, solve_pressure,
 };
 use crate::contact::normal::gap::constants::{
-    APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, LOOSE_POWER, NEAR, PRESSURE_CHANGE,
-    REFINEMENT, RESOLUTION, RESOLUTION_COARSE, RESOLUTION_COARSE_LOOSE, TARGET_POWER, TARGET_USUAL,
-    TARGETS_LOOSE, TOLERANCE_FIRST,
+    APPROACH_CHANGE, COARSE_LOOSE_FROM, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, LOOSE_POWER, NEAR,
+    PRESSURE_CHANGE, REFINEMENT, RESOLUTION, RESOLUTION_COARSE, RESOLUTION_COARSE_LOOSE,
+    TARGET_POWER, TARGET_USUAL, TARGETS_LOOSE, TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
 use crate::contact::normal::gap::search_box::{SearchBox, reach_of_level};
@@ -287,7 +287,7 @@ impl GridFineness {
     /// The resolution for the search of a height, at a third of the cost: forces within some tenths of a per cent, edges within one cell, a
     /// twentieth of the contact. Roughness is not resolved.
     pub(crate) fn coarse(target: f64) -> GridFineness {
-        if target < TARGETS_LOOSE[0] {
+        if target < COARSE_LOOSE_FROM {
             RESOLUTION_COARSE
         } else {
             RESOLUTION_COARSE_LOOSE
