@@ -197,12 +197,12 @@ impl<T: FftFloat> GridOperator<T> {
         for (k, pair) in pairs.chunks_exact(width).enumerate() {
             let pair = &pair[..lines.cells];
             lines.each(2 * k, |i, place| {
-                displacement[place] = up * pair[i].re.into()
+                displacement[place] = up * pair[i].re.into();
             });
             if 2 * k + 1 < lines.count {
                 let next = 2 * k + 1;
                 lines.each(next, |i, place| {
-                    displacement[place] = up * pair[i].im.into()
+                    displacement[place] = up * pair[i].im.into();
                 });
             }
         }
@@ -251,10 +251,12 @@ fn fill<T: FftFloat>(
     let zero = T::zero();
     let (own, padding) = pair.split_at_mut(lines.cells);
     lines.each(one, |i, place| {
-        own[i] = Complex::new(of(values[place]), zero)
+        own[i] = Complex::new(of(values[place]), zero);
     });
     if one + 1 < lines.count {
-        lines.each(one + 1, |i, place| own[i].im = of(values[place]));
+        lines.each(one + 1, |i, place| {
+            own[i].im = of(values[place]);
+        });
     }
     padding.fill(Complex::new(zero, zero));
 }

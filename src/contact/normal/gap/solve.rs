@@ -294,6 +294,14 @@ impl GridFineness {
         }
     }
 
+    /// The same without a comparison with another grid.
+    pub(crate) fn alone(self) -> GridFineness {
+        GridFineness {
+            settles: false,
+            ..self
+        }
+    }
+
     /// That for an answer: [`GapTask::solve_for`].
     pub(crate) fn for_answer(target: f64) -> GridFineness {
         RESOLUTION.for_target(target)

@@ -24,6 +24,15 @@ const BLOCKS: usize = 6;
 /// Part of the length of the grid beyond its sides within which the contact shows itself in the outermost cells. See [`BLOCKS`].
 const RING: f64 = 0.05;
 
+/// What a solution from a start is held to.
+#[derive(Clone, Copy)]
+struct Settling<'a> {
+    /// Deepest overlap of the undeformed bodies in mm.
+    depth: f64,
+    resolution: GridFineness,
+    reach: &'a SearchBox,
+}
+
 /// The load of a block of cells, and its place.
 struct BlockLoad {
     at: [f64; 2],
@@ -61,21 +70,16 @@ impl GapTask {
             level: approach,
             least,
         };
-        let (reach, tolerance) = (&reach, resolution.tolerance);
+        let reach = &reach;
         let start = (start.grid, start.pressed);
         let mut last: Option<(PressureGrid, PressureAnswer)> = None;
         let mut iterations = 0;
         for _ in 0..GRIDS_MAX {
             let from = last.as_ref().unwrap_or(&start);
-            let pressed = match self.pressure_on(
-                &grid,
-                GridStart::new(from, reach, tolerance),
-                workspace,
-                monitor,
-            ) {
-                Ok(pressed) => pressed,
-                Err(NormalError::NoAnswer(_)) => return Ok(None),
-                Err(stopped) => return Err(stopped),
+            let begun = GridStart::new(from, reach, resolution.tolerance);
+            let pressed = answered(self.pressure_on(&grid, begun, workspace, monitor))?;
+            let Some(pressed) = pressed else {
+                return Ok(None);
             };
             iterations += pressed.iterations;
             let short = grid.sides_in_contact(&pressed.pressure);
@@ -84,11 +88,7 @@ impl GapTask {
                 last = Some((std::mem::replace(&mut grid, larger), pressed));
                 continue;
             }
-            let alone = GridFineness {
-                settles: false,
-                ..resolution
-            };
-            match self.next_grid(&grid, &pressed, None, depth, alone) {
+            match self.next_grid(&grid, &pressed, None, depth, resolution.alone()) {
                 // A patch turned out smaller than at the start.
                 Ok(NextStep::PressureGrid(finer)) => {
                     last = Some((std::mem::replace(&mut grid, finer), pressed));
@@ -97,30 +97,18 @@ impl GapTask {
                 Ok(next) if next.is_settled() && !self.touches_beside(&grid, &pressed) => {}
                 _ => return Ok(None),
             }
-            let settled = |before: &(PressureGrid, PressureAnswer)| {
-                let next = self.next_grid(&grid, &pressed, Some(before), depth, resolution);
-                next.is_ok_and(|next| next.is_settled())
-            };
             let pressure_change = from.1.largest() / pressed.largest() - 1.0;
-            if resolution.settles && !settled(from) {
-                // The start was of another height, or of other profiles: a coarser grid of this gap tells.
-                let coarse = grid.coarser(REFINEMENT);
-                let found = (grid.clone(), pressed.clone());
-                let checked = match self.pressure_on(
-                    &coarse,
-                    GridStart::new(&found, reach, tolerance),
-                    workspace,
-                    monitor,
-                ) {
-                    Ok(checked) => checked,
-                    Err(NormalError::NoAnswer(_)) => return Ok(None),
-                    Err(stopped) => return Err(stopped),
-                };
-                iterations += checked.iterations;
-                if !settled(&(coarse, checked)) {
-                    return Ok(None);
-                }
-            }
+            let found = (grid, pressed);
+            let asked = Settling {
+                depth,
+                resolution,
+                reach,
+            };
+            let Some(more) = self.settles(&found, from, asked, workspace, monitor)? else {
+                return Ok(None);
+            };
+            iterations += more;
+            let (grid, pressed) = found;
             return Ok(Some(GapOutcome {
                 iterations,
                 exit: GridsExit::Settled,
@@ -130,6 +118,33 @@ impl GapTask {
             }));
         }
         Ok(None)
+    }
+
+    /// Does the solution on a grid agree with the start, or with a coarser grid of the same gap, where the start was of another height or of
+    /// other profiles? The iterations that took.
+    fn settles(
+        &self,
+        found: &(PressureGrid, PressureAnswer),
+        from: &(PressureGrid, PressureAnswer),
+        asked: Settling,
+        workspace: &mut GridWorkspace<f32>,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<u32>, NormalError> {
+        let (grid, pressed) = found;
+        let agrees = |before: &(PressureGrid, PressureAnswer)| {
+            let next = self.next_grid(grid, pressed, Some(before), asked.depth, asked.resolution);
+            next.is_ok_and(|next| next.is_settled())
+        };
+        if !asked.resolution.settles || agrees(from) {
+            return Ok(Some(0));
+        }
+        let coarse = grid.coarser(REFINEMENT);
+        let start = GridStart::new(found, asked.reach, asked.resolution.tolerance);
+        let checked = answered(self.pressure_on(&coarse, start, workspace, monitor))?;
+        Ok(checked.and_then(|checked| {
+            let iterations = checked.iterations;
+            agrees(&(coarse, checked)).then_some(iterations)
+        }))
     }
 
     /// The same from several grids, one per patch.
@@ -196,6 +211,17 @@ impl GapTask {
             let at = [x[k % x.len()], y[k / x.len()]];
             *gap < pressed.approach && outside(at) && gap + sunk(at) < pressed.approach
         })
+    }
+}
+
+/// A solution; that there is none is no error.
+fn answered(
+    pressed: Result<PressureAnswer, NormalError>,
+) -> Result<Option<PressureAnswer>, NormalError> {
+    match pressed {
+        Ok(pressed) => Ok(Some(pressed)),
+        Err(NormalError::NoAnswer(_)) => Ok(None),
+        Err(stopped) => Err(stopped),
     }
 }
 
