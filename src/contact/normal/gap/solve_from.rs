@@ -6,7 +6,7 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
-use crate::contact::normal::gap::constants::{NEAR, REFINEMENT};
+use crate::contact::normal::gap::constants::{NEAR, REFINEMENT, RESOLUTION};
 use crate::contact::normal::gap::grid::{GridFineness, PressureGrid, within};
 use crate::contact::normal::gap::search_box::SearchBox;
 use crate::contact::normal::gap::solve::{GridStart, NextStep};
@@ -137,6 +137,10 @@ impl GapTask {
         };
         if !asked.resolution.settles || agrees(from) {
             return Ok(Some(0));
+        }
+        // Peaks between the chords of a polygon are seen by finer grids only; loose targets do without.
+        if asked.resolution.tolerance <= RESOLUTION.tolerance {
+            return Ok(None);
         }
         let coarse = grid.coarser(REFINEMENT);
         let start = GridStart::new(found, asked.reach, asked.resolution.tolerance);
