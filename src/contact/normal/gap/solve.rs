@@ -285,7 +285,7 @@ impl NextStep {
 
 impl GridFineness {
     /// The resolution for the search of a height, at a third of the cost: forces within some tenths of a per cent, edges within one cell, a
-    /// twentieth of the contact. Roughness is not resolved.
+    /// twentieth of the contact. Roughness is not resolved. At loose targets it is coarser still.
     pub(crate) fn coarse(target: f64) -> GridFineness {
         if target < COARSE_LOOSE_FROM {
             RESOLUTION_COARSE

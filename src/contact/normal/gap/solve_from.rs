@@ -16,7 +16,7 @@ use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
 use crate::contact::normal::gap::tiles::merged;
 use crate::contact::normal::hertz::NormalLoad;
 
-/// Grids that are tried from a start; each is larger than the one before. Numeric safety.
+/// Grids that are tried from a start; each is larger or finer than the one before. Numeric safety.
 const GRIDS_MAX: usize = 4;
 /// Blocks of cells along either axis whose loads stand for the pressure far from it. 3 and 12, with 0.02 and 0.1 for `RING`, change no figure
 /// of `cargo bench --bench calibrate profiles`.
