@@ -95,12 +95,7 @@ impl GapTask {
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<GapOutcome, NormalError> {
-        let mut reach = self.reach();
-        if let NormalLoad::Approach(approach) = self.loading
-            && approach <= reach.least
-        {
-            return Err(NormalError::NoAnswer(no_touch(approach, reach.least)));
-        }
+        let mut reach = self.touching_reach()?;
         let first = |reach: &SearchBox| {
             PressureGrid::new(reach.window, [resolution.first; 2], self.gap.is_mirrored())
         };
@@ -160,6 +155,17 @@ impl GapTask {
             pressure_change,
             least: reach.least,
         })
+    }
+
+    /// The box of the contact, if the bodies touch.
+    fn touching_reach(&self) -> Result<SearchBox, NormalError> {
+        let reach = self.reach();
+        match self.loading {
+            NormalLoad::Approach(approach) if approach <= reach.least => {
+                Err(NormalError::NoAnswer(no_touch(approach, reach.least)))
+            }
+            _ => Ok(reach),
+        }
     }
 
     pub(crate) fn pressure_on(

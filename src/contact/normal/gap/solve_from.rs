@@ -97,25 +97,14 @@ impl GapTask {
                 Ok(next) if next.is_settled() && !self.touches_beside(&grid, &pressed) => {}
                 _ => return Ok(None),
             }
-            let pressure_change = from.1.largest() / pressed.largest() - 1.0;
             let found = (grid, pressed);
             let asked = Settling {
                 depth,
                 resolution,
                 reach,
             };
-            let Some(more) = self.settles(&found, from, asked, workspace, monitor)? else {
-                return Ok(None);
-            };
-            iterations += more;
-            let (grid, pressed) = found;
-            return Ok(Some(GapOutcome {
-                iterations,
-                exit: GridsExit::Settled,
-                pressure_change,
-                least,
-                tiles: vec![Tile { grid, pressed }],
-            }));
+            let more = self.settles(&found, from, asked, workspace, monitor)?;
+            return Ok(more.map(|more| settled_outcome(found, from, least, iterations + more)));
         }
         Ok(None)
     }
@@ -215,6 +204,22 @@ impl GapTask {
             let at = [x[k % x.len()], y[k / x.len()]];
             *gap < pressed.approach && outside(at) && gap + sunk(at) < pressed.approach
         })
+    }
+}
+
+/// What a grid that settled amounts to, with the change of pressure since its start.
+fn settled_outcome(
+    (grid, pressed): (PressureGrid, PressureAnswer),
+    (_, before): &(PressureGrid, PressureAnswer),
+    least: f64,
+    iterations: u32,
+) -> GapOutcome {
+    GapOutcome {
+        iterations,
+        exit: GridsExit::Settled,
+        pressure_change: before.largest() / pressed.largest() - 1.0,
+        least,
+        tiles: vec![Tile { grid, pressed }],
     }
 }
 

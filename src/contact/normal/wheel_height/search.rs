@@ -58,6 +58,17 @@ impl<'a> HeightStart<'a> {
         same_profiles.and_then(|rest| rest.carrying(force, tolerance))
     }
 
+    /// How fine the first height for a force in N is.
+    fn first_fineness(&self, wanted: NormalPass, force: f64) -> Fineness {
+        let exact = matches!(wanted.accuracy, Accuracy::For(_));
+        let is_near = |before: &WheelContact| before.is_near(force, wanted.accuracy);
+        Fineness {
+            // Other readings of the profiles only tell how far their answers lie apart.
+            settles: self.lowering.is_none(),
+            ..Fineness::first(wanted, exact && self.before.is_some_and(is_near))
+        }
+    }
+
     /// The lowering in mm that a search for a force in N begins with, if the start tells.
     fn first_lowering(&self, bracket: &mut Bracket, force: f64) -> Option<f64> {
         let of_before = |known: &WheelContact| {
@@ -144,11 +155,7 @@ impl WheelTask {
         let mut force = target(friction_share);
         let tolerance = wanted.accuracy.tolerance();
         let exact = matches!(wanted.accuracy, Accuracy::For(_));
-        let starts_near =
-            exact && before.is_some_and(|before| before.is_near(force, wanted.accuracy));
-        let mut fineness = Fineness::first(wanted, starts_near);
-        // Other readings of the profiles only tell how far their answers lie apart.
-        fineness.settles = start.lowering.is_none();
+        let mut fineness = start.first_fineness(wanted, force);
         let (mut bracket, mut last) = (Bracket::default(), None::<WheelContact>);
         let mut lowering = start
             .first_lowering(&mut bracket, force)
