@@ -1,6 +1,6 @@
 //! Rows of the operator between strips: corner sums of the closed forms over all cell edges, differenced.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use pulp::{Arch, NullaryFnOnce};
 
@@ -8,6 +8,9 @@ use crate::contact::mesh::observation::observe;
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd_ln::Float;
+
+/// Cells of a strip that are folded at once.
+const RUN: usize = 4;
 
 /// All cell edges of a mesh, as seen from the mid-line of one strip.
 pub(crate) struct CellEdges<T> {
@@ -21,7 +24,7 @@ pub(crate) struct CellEdges<T> {
     /// Per edge, at the point in work and at the one before: the three corner sums over the two y.
     now: [Vec<T>; 3],
     before: [Vec<T>; 3],
-    /// One row over all cells: xx, xy, yy.
+    /// One row: xx, xy, yy of every edge and the next one. Those from one strip to the next mean nothing.
     row: [Vec<T>; 3],
 }
 
@@ -33,7 +36,6 @@ impl<T: Float> CellEdges<T> {
             x.push(T::of(mesh.right[segment.cells.end - 1]));
         }
         let edges = || vec![T::ZERO; x.len()];
-        let cells = || vec![T::ZERO; mesh.cells()];
         CellEdges {
             q1: edges(),
             q2: edges(),
@@ -41,7 +43,7 @@ impl<T: Float> CellEdges<T> {
             ln_q2: edges(),
             now: [edges(), edges(), edges()],
             before: [edges(), edges(), edges()],
-            row: [cells(), cells(), cells()],
+            row: [edges(), edges(), edges()],
             x,
         }
     }
@@ -102,37 +104,27 @@ impl<T: Float> CellEdges<T> {
         }
     }
 
-    /// Turns the change of the corner sums since the point before into a row over all cells.
+    /// Turns the change of the corner sums since the point before into a row. All edges at once: the cells of a strip are too few for the
+    /// machine's lanes.
     #[inline(always)]
-    fn row(&mut self, mesh: &Mesh, nu: f64) {
+    fn row(&mut self, nu: f64) {
         use std::f64::consts::FRAC_1_PI;
         let (one, other) = (T::of(FRAC_1_PI), T::of(FRAC_1_PI * (1.0 - nu)));
         let cross = T::of(-FRAC_1_PI * nu);
-        let mut edge = 0;
-        for segment in &mesh.segments {
-            let cells = segment.cells.clone();
-            let n = cells.len();
-            let change = |k: usize| {
-                let (now, before) = (
-                    &self.now[k][edge..=edge + n],
-                    &self.before[k][edge..=edge + n],
-                );
-                move |i: usize| (now[i] - before[i]) - (now[i + 1] - before[i + 1])
-            };
-            let (a, b, r) = (change(0), change(1), change(2));
-            let [xx, xy, yy] = &mut self.row;
-            let (xx, xy, yy) = (
-                &mut xx[cells.clone()],
-                &mut xy[cells.clone()],
-                &mut yy[cells],
-            );
-            for i in 0..n {
-                let (a, b) = (a(i), b(i));
-                xx[i] = one * a + other * b;
-                xy[i] = cross * r(i);
-                yy[i] = one * b + other * a;
-            }
-            edge += n + 1;
+        let n = self.x.len() - 1;
+        let [now_a, now_b, now_r] = &self.now;
+        let [before_a, before_b, before_r] = &self.before;
+        let (now_a, now_b, now_r) = (&now_a[..=n], &now_b[..=n], &now_r[..=n]);
+        let (before_a, before_b, before_r) = (&before_a[..=n], &before_b[..=n], &before_r[..=n]);
+        let [xx, xy, yy] = &mut self.row;
+        let (xx, xy, yy) = (&mut xx[..n], &mut xy[..n], &mut yy[..n]);
+        for i in 0..n {
+            let a = (now_a[i] - before_a[i]) - (now_a[i + 1] - before_a[i + 1]);
+            let b = (now_b[i] - before_b[i]) - (now_b[i + 1] - before_b[i + 1]);
+            let r = (now_r[i] - before_r[i]) - (now_r[i + 1] - before_r[i + 1]);
+            xx[i] = one * a + other * b;
+            xy[i] = cross * r;
+            yy[i] = one * b + other * a;
         }
     }
 }
@@ -220,14 +212,18 @@ impl<T: Float> NullaryFnOnce for SegmentRows<'_, T> {
             // Neighbouring rows share a point, whose sums are computed once.
             std::mem::swap(&mut edges.now, &mut edges.before);
             edges.corner_sums(*point);
-            edges.row(mesh, nu);
+            edges.row(nu);
             for (k, values) in edges.row.iter().enumerate() {
                 if folded {
                     let (plus, minus) =
                         out[2 * k * stride..2 * (k + 1) * stride].split_at_mut(stride);
                     fold(mesh, values, plus, minus);
                 } else {
-                    out[k * stride..k * stride + values.len()].copy_from_slice(values);
+                    let out = &mut out[k * stride..(k + 1) * stride];
+                    for (number, segment) in mesh.segments.iter().enumerate() {
+                        let cells = segment.cells.clone();
+                        out[cells.clone()].copy_from_slice(&values[edges_of(cells, number)]);
+                    }
                 }
             }
         }
@@ -273,20 +269,42 @@ fn reverse_cells<T: Float>(from: &[T], to: &mut [T], negate: bool) {
     }
 }
 
+/// The first edges of the cells of a strip among all edges.
+#[inline(always)]
+fn edges_of(cells: Range<usize>, strip: usize) -> Range<usize> {
+    cells.start + strip..cells.end + strip
+}
+
 /// Adds and subtracts the value of the mirrored cell for the first half of the segments.
 #[inline(always)]
 fn fold<T: Float>(mesh: &Mesh, values: &[T], plus: &mut [T], minus: &mut [T]) {
     let m = mesh.segments.len();
-    for (here, there) in mesh.segments[..m / 2]
-        .iter()
-        .zip(mesh.segments.iter().rev())
-    {
-        let here = here.cells.clone();
-        let (own, image) = (&values[here.clone()], &values[there.cells.clone()]);
-        let (plus, minus) = (&mut plus[here.clone()], &mut minus[here]);
-        for i in 0..own.len() {
-            plus[i] = own[i] + image[i];
-            minus[i] = own[i] - image[i];
+    for (number, here) in mesh.segments[..m / 2].iter().enumerate() {
+        let there = m - 1 - number;
+        let own = &values[edges_of(here.cells.clone(), number)];
+        let image = &values[edges_of(mesh.segments[there].cells.clone(), there)];
+        let (plus, minus) = (
+            &mut plus[here.cells.clone()],
+            &mut minus[here.cells.clone()],
+        );
+        let n = own.len();
+        if n < RUN {
+            for i in 0..n {
+                plus[i] = own[i] + image[i];
+                minus[i] = own[i] - image[i];
+            }
+            continue;
+        }
+        // The last run ends with the strip, so that no cell is left over.
+        for start in (0..n).step_by(RUN) {
+            let start = start.min(n - RUN);
+            let (own, image) = (&own[start..start + RUN], &image[start..start + RUN]);
+            let plus = &mut plus[start..start + RUN];
+            let minus = &mut minus[start..start + RUN];
+            for i in 0..RUN {
+                plus[i] = own[i] + image[i];
+                minus[i] = own[i] - image[i];
+            }
         }
     }
 }
