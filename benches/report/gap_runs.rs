@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::gaps::{CLASSES, error, question};
-use crate::machine::median;
+use crate::machine::{lu_seconds, median};
 use crate::plot::{Plot, Series};
 use crate::questions::{number, problem, stored, timed};
 
@@ -24,8 +24,8 @@ pub fn section(lu: f64, pictures: &Path) -> String {
     for (name, _, start) in CLASSES {
         let of_class = |case: &&Value| case["id"].as_str().is_some_and(|id| id.starts_with(start));
         let cases: Vec<&Value> = cases.iter().filter(of_class).collect();
-        let ours = TARGETS.map(|target| run(&cases, &json!({ "target_error": target }), lu));
-        let fastsim = [run(&cases, &json!({ "method": "fastsim" }), lu)];
+        let ours = TARGETS.map(|target| run(&cases, &json!({ "target_error": target })));
+        let fastsim = [run(&cases, &json!({ "method": "fastsim" }))];
         let theirs: Vec<(f64, f64)> = (0..RUNS)
             .filter_map(|k| of_contact(&cases, k, lu))
             .collect();
@@ -64,7 +64,8 @@ pub fn section(lu: f64, pictures: &Path) -> String {
 }
 
 /// Median time in LU and median error.
-fn run(cases: &[&Value], solver: &Value, lu: f64) -> (f64, f64) {
+fn run(cases: &[&Value], solver: &Value) -> (f64, f64) {
+    let lu = lu_seconds();
     let (mut times, mut errors) = (Vec::new(), Vec::new());
     for case in cases {
         let mut question = question(case);

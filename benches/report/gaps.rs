@@ -14,7 +14,7 @@ use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
-use crate::machine::{median, quantile, seconds_of};
+use crate::machine::{lu_seconds, median, quantile, seconds_of};
 use crate::questions::{number, problem, stored, timed};
 
 const REPEATS: usize = 11;
@@ -43,24 +43,25 @@ pub const CLASSES: [(&str, &str, &str); 4] = [
     ),
 ];
 
-pub fn section(lu: f64) -> String {
+pub fn section() -> String {
     let mut text = "## Contacts from gaps\n\nAt the default target of 0.005, resultants only; both problems are in the time.\n\n".to_owned();
     let cases = [stored("gap_grids"), stored("gap_profiles")].concat();
     for (name, what, start) in CLASSES {
         let _ = writeln!(text, "### {name}\n\nGiven as {what}.\n");
         let of_class = |case: &&Value| case["id"].as_str().is_some_and(|id| id.starts_with(start));
-        text.push_str(&table(cases.iter().filter(of_class), lu));
+        text.push_str(&table(cases.iter().filter(of_class)));
     }
-    text + &wheels(lu)
+    text + &wheels()
 }
 
 /// One class against its reference.
-fn table<'a>(cases: impl Iterator<Item = &'a Value>, lu: f64) -> String {
+fn table<'a>(cases: impl Iterator<Item = &'a Value>) -> String {
     let mut text = "| case | LU | normal problem, LU | error of resultants | estimate | approach | area | largest pressure |\n\
                     |---|---|---|---|---|---|---|---|\n"
         .to_owned();
     let (mut whole, mut normal, mut errors) = (Vec::new(), Vec::new(), Vec::new());
     for case in cases {
+        let lu = lu_seconds();
         let checked = problem(&question(case));
         let (solution, seconds) = timed(&checked, REPEATS);
         let press = || {
@@ -194,7 +195,7 @@ fn across(formula: &Value, y: f64) -> f64 {
 const SHIFTS: [f64; 7] = [3.0, 1.0, 0.0, -1.0, -2.0, -4.0, -5.5];
 
 /// Wheel on rail by profiles. There are no converged results in the repository; the errors are the solver's estimates.
-fn wheels(lu: f64) -> String {
+fn wheels() -> String {
     let mut text = "### Wheel on rail by profiles\n\nS1002 on 60E1 as in `api/examples/wheel-rail.case.json`, by lateral shift of the wheelset, and the \
                     flange contact of `wheel-rail-flange.case.json`; 75 kN vertical, target 0.005. *Rest*: the wheel brought to rest once under a given \
                     normal share; the whole solve does this once roughly and once or twice exactly, because friction carries a part of the load.\n\n\
@@ -219,6 +220,7 @@ fn wheels(lu: f64) -> String {
     cases.push(("flange".to_owned(), example("wheel-rail-flange.case.json")));
     for (name, mut case) in cases {
         case["outputs"] = json!(["resultants"]);
+        let lu = lu_seconds();
         let checked = problem(&case);
         let (solution, seconds) = timed(&checked, REPEATS);
         let solution = solution.expect("an answer");

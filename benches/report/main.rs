@@ -44,18 +44,18 @@ fn main() {
     let mut text = HEAD.to_owned();
     let _ = writeln!(
         text,
-        "{:.2} ms here. It is timed anew for every section, because the machine does not keep its speed.\n",
+        "{:.2} ms here. It is timed again beside what it measures, because the machine does not keep its speed.\n",
         1e3 * lu_seconds()
     );
     let cases = questions::hertz_cases();
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("docs");
     let pictures = folder.join("accuracy-and-speed");
     std::fs::create_dir_all(&pictures).expect("a folder for the pictures");
-    text.push_str(&targets::section(&cases, lu_seconds()));
+    text.push_str(&targets::section(&cases));
     text.push_str(&meshes::section(&cases, lu_seconds(), &pictures));
-    text.push_str(&gaps::section(lu_seconds()));
+    text.push_str(&gaps::section());
     text.push_str(&gap_runs::section(lu_seconds(), &pictures));
-    text.push_str(&savings::section(lu_seconds()));
+    text.push_str(&savings::section());
     text.push_str(&scaling::section(lu_seconds(), &pictures));
     let path = folder.join("accuracy-and-speed.md");
     std::fs::write(&path, text).expect("the report can be written");

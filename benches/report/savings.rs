@@ -11,7 +11,7 @@ use railhead::contact::{solve, solve_with};
 use serde_json::{Value, json};
 
 use crate::allocations::during;
-use crate::machine::seconds_of;
+use crate::machine::{lu_seconds, seconds_of};
 use crate::questions::{problem, timed};
 
 const REPEATS: usize = 21;
@@ -20,7 +20,7 @@ allocations those of a worker of the service that has solved the case before.\n\
 | case | LU | products | allocations |\n|---|---|---|---|\n";
 const CASES_OF_A_SHAPE: u32 = 500;
 
-pub fn section(lu: f64) -> String {
+pub fn section() -> String {
     let resultants = json!(["resultants"]);
     let everything = json!(["resultants", "zones", "tractions", "pressure", "slip"]);
     let long = json!({ "creepage_x": 0.002 });
@@ -74,6 +74,7 @@ pub fn section(lu: f64) -> String {
         ),
         ("the same, all outputs", &spinning, &everything, 0.3),
     ] {
+        let lu = lu_seconds();
         let cost = cost(motion, outputs, friction);
         let _ = writeln!(
             text,
@@ -83,14 +84,15 @@ pub fn section(lu: f64) -> String {
             cost.allocations
         );
     }
-    text.push_str(&one_by_one(lu));
-    text.push_str(&creep_map(lu));
-    text.push_str(&one_shape(lu));
+    text.push_str(&one_by_one());
+    text.push_str(&creep_map());
+    text.push_str(&one_shape());
     text
 }
 
 /// The points of the creep curve as cases of their own.
-fn one_by_one(lu: f64) -> String {
+fn one_by_one() -> String {
+    let lu = lu_seconds();
     let resultants = json!(["resultants"]);
     let costs: Vec<Cost> = (0..51)
         .map(|k| json!({ "creepage_x": 0.0001 * f64::from(k) }))
@@ -105,7 +107,8 @@ fn one_by_one(lu: f64) -> String {
 }
 
 /// Both creepages over a grid, at one spin, in one job.
-fn creep_map(lu: f64) -> String {
+fn creep_map() -> String {
+    let lu = lu_seconds();
     let [along, across] = [40_u32, 25];
     let motion = json!({ "sweep": {
         "creepage_x": { "from": -0.004, "to": 0.004, "points": along },
@@ -123,7 +126,8 @@ fn creep_map(lu: f64) -> String {
 }
 
 /// Cases of one shape under many loads and motions, each on its own and with the influence kept.
-fn one_shape(lu: f64) -> String {
+fn one_shape() -> String {
+    let lu = lu_seconds();
     let problems: Vec<CheckedCase> = (0..CASES_OF_A_SHAPE)
         .map(|k| {
             let part = f64::from(k) / f64::from(CASES_OF_A_SHAPE);
