@@ -23,14 +23,17 @@ pub(crate) struct Product<'a, T> {
     pub(crate) out_y: &'a mut [f64],
 }
 
-/// The product for one width of numbers: four running sums per row.
+/// The product for one width of numbers: four running sums per row, and two rows at once, whose sums do not wait for each other.
 macro_rules! product {
     ($number:ty, $lanes:ident, $zero:ident, $multiply_add:ident, $add:ident, $sum:ident) => {
-        impl WithSimd for Product<'_, $number> {
-            type Output = ();
-
+        impl Product<'_, $number> {
+            /// The products with as many rows of the matrix as there are results.
             #[inline(always)]
-            fn with_simd<S: Simd>(self, simd: S) {
+            fn rows<S: Simd, const ROWS: usize>(
+                &self,
+                simd: S,
+                rows: &[$number],
+            ) -> [[f64; 2]; ROWS] {
                 let RowLayout {
                     blocks,
                     stride,
@@ -38,19 +41,48 @@ macro_rules! product {
                 } = self.layout;
                 let (tx, _) = S::$lanes(self.tx);
                 let ty = &S::$lanes(self.ty).0[..tx.len()];
-                let rows = self.matrix.chunks_exact(blocks * stride);
-                for (row, (out_x, out_y)) in rows.zip(self.out_x.iter_mut().zip(self.out_y)) {
-                    let [xx, a, b, yy] =
-                        roles.map(|k| &S::$lanes(&row[k * stride..(k + 1) * stride]).0[..tx.len()]);
-                    let [mut s0, mut s1, mut s2, mut s3] = [simd.$zero(0.0); 4];
-                    for i in 0..tx.len() {
-                        s0 = simd.$multiply_add(xx[i], tx[i], s0);
-                        s1 = simd.$multiply_add(a[i], ty[i], s1);
-                        s2 = simd.$multiply_add(b[i], tx[i], s2);
-                        s3 = simd.$multiply_add(yy[i], ty[i], s3);
+                let mut parts = [[tx; 4]; ROWS];
+                for (row, parts) in parts.iter_mut().enumerate() {
+                    for (part, role) in parts.iter_mut().zip(roles) {
+                        let start = (row * blocks + role) * stride;
+                        *part = &S::$lanes(&rows[start..start + stride]).0[..tx.len()];
                     }
-                    *out_x = f64::from(simd.$sum(simd.$add(s0, s1)));
-                    *out_y = f64::from(simd.$sum(simd.$add(s2, s3)));
+                }
+                let mut sums = [[simd.$zero(0.0); 4]; ROWS];
+                for i in 0..tx.len() {
+                    for (sums, [xx, a, b, yy]) in sums.iter_mut().zip(&parts) {
+                        sums[0] = simd.$multiply_add(xx[i], tx[i], sums[0]);
+                        sums[1] = simd.$multiply_add(a[i], ty[i], sums[1]);
+                        sums[2] = simd.$multiply_add(b[i], tx[i], sums[2]);
+                        sums[3] = simd.$multiply_add(yy[i], ty[i], sums[3]);
+                    }
+                }
+                let mut found = [[0.0; 2]; ROWS];
+                for (found, [s0, s1, s2, s3]) in found.iter_mut().zip(sums) {
+                    found[0] = f64::from(simd.$sum(simd.$add(s0, s1)));
+                    found[1] = f64::from(simd.$sum(simd.$add(s2, s3)));
+                }
+                found
+            }
+        }
+
+        impl WithSimd for Product<'_, $number> {
+            type Output = ();
+
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, simd: S) {
+                let length = self.layout.blocks * self.layout.stride;
+                let count = self.matrix.len() / length;
+                for k in (0..count / 2).map(|k| 2 * k) {
+                    let rows = &self.matrix[k * length..(k + 2) * length];
+                    let [first, second] = self.rows::<S, 2>(simd, rows);
+                    [self.out_x[k], self.out_y[k]] = first;
+                    [self.out_x[k + 1], self.out_y[k + 1]] = second;
+                }
+                if count % 2 == 1 {
+                    let k = count - 1;
+                    let [last] = self.rows::<S, 1>(simd, &self.matrix[k * length..count * length]);
+                    [self.out_x[k], self.out_y[k]] = last;
                 }
             }
         }
