@@ -153,3 +153,33 @@ fn a_pole_on_the_edge_of_two_strips_counts() {
         assert!(error <= estimate + 0.005, "{ratio}: {error} for {estimate}");
     }
 }
+
+#[test]
+fn tractions_add_up_to_the_resultants_where_nothing_tells_the_error() {
+    // So slender a patch that one of the two rules does not converge on it.
+    let case = json!({
+        "contact": { "type": "ellipse", "a_mm": 6.0, "b_mm": 0.2 },
+        "load": { "normal_force_n": 5000.0 },
+        "friction": { "coefficient": 0.3 },
+        "material": { "shear_modulus_mpa": 82000.0, "poisson_ratio": 0.5 },
+        "motion": { "creepage_x": 0.0, "creepage_y": 0.0, "spin_per_mm": -8.778406145583708e-4 },
+        "solver": { "target_error": 0.01 },
+        "outputs": ["resultants", "tractions"],
+    });
+    let (solution, fields) = solve(&case);
+    let (point, patch) = (&solution.patches[0].points[0], &fields.patches[0]);
+    let cells = patch.cells(0);
+    let traction = patch.points[0].traction_y_mpa.as_ref().unwrap();
+    let areas = cells.dx_mm.iter().zip(&cells.dy_mm);
+    let sum: f64 = traction
+        .iter()
+        .zip(areas)
+        .map(|(t, (x, y))| t * x * y)
+        .sum();
+    let estimate = point.error_estimate.map_or(0.0, |error| error.force_y_n);
+    let apart = (point.force_y_n - sum).abs();
+    assert!(
+        apart <= estimate + 1e-6 * 1500.0,
+        "{apart} N, {estimate} N estimated"
+    );
+}

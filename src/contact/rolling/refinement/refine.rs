@@ -399,6 +399,12 @@ pub(crate) fn extrapolate(
             .indicators
             .apart(task, &point.resultants, &point.summed);
         point.errors = solved.indicators.errors();
+        for (k, error) in point.errors.iter().take(point.summed.len()).enumerate() {
+            // Where nothing tells the error, nothing tells whether to go beyond the tractions.
+            if error.is_none() {
+                point.resultants[k] = point.summed[k];
+            }
+        }
     }
 }
 
