@@ -22,8 +22,8 @@ const NORMAL_TIMES: f64 = 10.0;
 #[must_use]
 pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
     let motions = case.problem.motions.len();
-    // The points of a history follow from each other.
-    if case.problem.history.is_some() {
+    // The points of a history follow from each other, and one motion is not cut.
+    if case.problem.history.is_some() || motions == 1 {
         return std::iter::once(0..motions).collect();
     }
     let SolveTime { whole, normal } = case.solve_time();

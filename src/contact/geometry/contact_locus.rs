@@ -9,6 +9,7 @@
 use std::sync::Arc;
 
 use crate::contact::geometry::envelope::envelope;
+use crate::contact::geometry::estimated_force::estimated_force;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::grouping::{Grouping, Overlap};
 use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
@@ -206,7 +207,7 @@ impl<'g> ContactLocus<'g> {
     /// the contact modulus.
     ///
     /// Every patch is taken for a circle of the area that half the lowering makes overlap, pressed by a sphere, as if
-    /// horizontal: `N = 4/3 E* √(A/π) δ`, exact for paraboloids.
+    /// horizontal: `N = 4/3 E* √(A/π) δ`, exact for paraboloids. Near ones act on each other.
     #[must_use]
     pub fn estimated_lowering(&self, force: f64) -> f64 {
         let (mut low, mut high) = (0.0_f64, LOWERING_FIRST);
@@ -215,13 +216,16 @@ impl<'g> ContactLocus<'g> {
             lines.iter().filter(inside).copied().collect()
         };
         let mut near = below(self.lines, high);
-        while estimated_force(&near, self.rolling_radius(), high) < force && high < LOWERING_MAX {
+        while estimated_force(&near, STEP, self.rolling_radius(), high) < force
+            && high < LOWERING_MAX
+        {
             (low, high) = (high, 2.0 * high);
             near = below(self.lines, high);
         }
         // The estimate jumps where one more line overlaps: the bracket is kept. It grows about as the power 3/2.
-        let power =
-            |lowering: f64| estimated_force(&near, self.rolling_radius(), lowering).powf(2.0 / 3.0);
+        let power = |lowering: f64| {
+            estimated_force(&near, STEP, self.rolling_radius(), lowering).powf(2.0 / 3.0)
+        };
         let wanted = force.powf(2.0 / 3.0);
         let mut known = [(low, power(low)), (high, power(high))];
         for _ in 0..SECANTS {
@@ -341,20 +345,6 @@ impl<'g> ContactLocus<'g> {
         }
         Ok(gap)
     }
-}
-
-/// Force over the contact modulus, in mm², that lines in the order of y carry at a lowering by [`ContactLocus::estimated_lowering`]. Lines
-/// that do not overlap may be missing.
-fn estimated_force(lines: &[LocusPoint], radius: f64, lowering: f64) -> f64 {
-    let inside = |line: &LocusPoint| line.clearance < 0.5 * lowering;
-    let runs = lines.chunk_by(|a, b| inside(a) == inside(b) && b.y - a.y < 1.5 * STEP);
-    let length =
-        |line: &LocusPoint| 2.0 * (2.0 * radius * (0.5 * lowering - line.clearance)).sqrt();
-    let carried = |run: &[LocusPoint]| {
-        let area: f64 = run.iter().map(|line| length(line) * STEP).sum();
-        4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * lowering
-    };
-    runs.filter(|run| inside(&run[0])).map(carried).sum()
 }
 
 /// The gap with its surfaces bent apart beyond the limits toward other gaps, `[lower, upper]` across in mm: what touches there

@@ -1,5 +1,9 @@
 //! Runs of lines that overlap, and which of them share a gap.
 
+/// Overlaps nearer to each other than this along the rail, in mm, share one gap, because they influence each other. CONTACT, too,
+/// separates patches that are 8 mm or 30° apart.
+pub(crate) const SHARED_GAP_DISTANCE: f64 = 8.0;
+
 /// Lines that overlap: the first and the last one, and what lies beyond either end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Overlap {

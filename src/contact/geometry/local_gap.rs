@@ -12,15 +12,40 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 pub enum GapSampling {
     /// Enough for the force at a height of the wheel, to some tenths of a per cent.
     Coarse,
+    /// Enough for the answer at a loose target, unless the profiles have so many points there that more samples are needed to see them all.
+    Loose,
     /// Enough for the answer.
     Fine,
 }
 
+/// From this target of the resultants' error, relative to μN, on gaps are sampled as [`GapSampling::Loose`]. On 1000 rows of
+/// `cargo bench --bench wheels -- rows` forces differ from those of fine samples by 0.00001 of μN in the median, 0.0013 in one of a hundred and
+/// 0.007 at most.
+const LOOSE_FROM: f64 = 0.01;
+
+/// Most points of one profile in a window that is sampled as [`GapSampling::Loose`]: two samples a point.
+const POINTS_LOOSE: usize = 40;
+
 impl GapSampling {
-    /// Samples along and across.
-    fn samples(self) -> [usize; 2] {
+    /// For an answer with a target of the resultants' error, relative to μN; infinite where there is none.
+    pub(crate) fn for_answer(target: f64) -> GapSampling {
+        if target.is_finite() && target >= LOOSE_FROM {
+            GapSampling::Loose
+        } else {
+            GapSampling::Fine
+        }
+    }
+
+    /// Is it enough for an answer?
+    pub(crate) fn is_for_answer(self) -> bool {
+        self != GapSampling::Coarse
+    }
+
+    /// Samples along and across a window over which the profiles have so many points.
+    fn samples(self, points: usize) -> [usize; 2] {
         match self {
-            GapSampling::Coarse => [9, 81],
+            GapSampling::Loose if points > POINTS_LOOSE => GapSampling::Fine.samples(points),
+            GapSampling::Coarse | GapSampling::Loose => [9, 81],
             GapSampling::Fine => [9, 161],
         }
     }
@@ -56,7 +81,7 @@ impl LocalGap {
         window: [[f64; 2]; 2],
         detail: GapSampling,
     ) -> Result<LocalGap, String> {
-        let [columns, rows] = detail.samples();
+        let [columns, rows] = detail.samples(points_within(geometry, &frame, window[1]));
         let [x, y] = [(window[0], columns), (window[1], rows)].map(|([low, high], count)| {
             // Measured from the middle, so that a symmetric window has symmetric coordinates.
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
@@ -65,12 +90,16 @@ impl LocalGap {
                 .map(|k| middle + half * at(k))
                 .collect::<Vec<f64>>()
         });
-        let (y, heights) = RailInFrame::new(geometry, &frame).heights(&y);
+        let rail = RailInFrame::new(geometry, &frame);
+        let (y, heights) = rail.heights(&y);
         if y.len() < rows / 2 {
-            return Err(format!(
-                "the patch at y = {:.2} mm on the rail bends too much for a plane of contact",
-                geometry.on_rail(frame.rail)[0]
-            ));
+            return Err(match rail.end_within(window[1]) {
+                Some(end) => geometry.cut_off([end, frame.wheel]),
+                None => format!(
+                    "the patch at y = {:.2} mm on the rail bends too much for a plane of contact",
+                    geometry.on_rail(frame.rail)[0]
+                ),
+            });
         }
         let (wheel, missed) = WheelInFrame::new(geometry, &frame, centre).heights(&x, &y);
         let gap = wheel
@@ -97,6 +126,17 @@ impl LocalGap {
             overlaps(&self.gap[0]) || overlaps(&self.gap[last_y]),
         ]
     }
+}
+
+/// Most points of one of the profiles about a frame's origin, as far as the farther end of a range across.
+fn points_within(geometry: &WheelRail, frame: &Frame, [low, high]: [f64; 2]) -> usize {
+    let reach = low.abs().max(high.abs());
+    let [rail, wheel] = geometry.profiles();
+    let points = [(rail, frame.rail), (wheel, frame.wheel)].map(|(profile, at)| {
+        let [first, last] = profile.points().numbers([at - reach, at + reach]);
+        last - first
+    });
+    points[0].max(points[1])
 }
 
 impl WheelRail {

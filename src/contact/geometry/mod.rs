@@ -4,6 +4,7 @@ pub mod conicity;
 pub mod contact_locus;
 pub mod crossing;
 pub mod envelope;
+mod estimated_force;
 pub mod formats;
 pub mod frame;
 pub mod grouping;

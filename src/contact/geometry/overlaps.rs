@@ -5,13 +5,10 @@
 //! holds for every height.
 
 use crate::contact::geometry::contact_locus::{ContactLocus, STEP};
-use crate::contact::geometry::grouping::{Grouping, Overlap};
+use crate::contact::geometry::grouping::{Grouping, Overlap, SHARED_GAP_DISTANCE};
 use crate::contact::geometry::locus_lines::LocusPoint;
 
-/// Overlaps nearer to each other than this along the rail, in mm, share one gap, because they influence each other. CONTACT, too,
-/// separates patches that are 8 mm or 30° apart.
-const SHARED_GAP_DISTANCE: f64 = 8.0;
-/// They do so if their mean inclinations differ by less than this, in rad.
+/// Overlaps nearer than [`SHARED_GAP_DISTANCE`] share a gap if their mean inclinations differ by less than this, in rad.
 const SHARED_GAP_ANGLE: f64 = 0.5;
 
 /// An overlap is cut where it is thinner than this fraction of the lobes on both sides. By Hertz's law two bodies touch where they
@@ -224,14 +221,6 @@ impl ContactLocus<'_> {
 
     fn cut_off(&self, line: usize) -> String {
         let line = self.lines[line];
-        let [rail, wheel] = [
-            self.geometry.on_rail(line.rail),
-            self.geometry.on_wheel(line.wheel),
-        ];
-        format!(
-            "the contact reaches the end of a profile, at y = {:.2} mm on the rail and {:.2} mm on the wheel; the true contact is \
-             cut off, longer profiles are needed",
-            rail[0], wheel[0]
-        )
+        self.geometry.cut_off([line.rail, line.wheel])
     }
 }

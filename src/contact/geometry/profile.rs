@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::contact::geometry::crossing;
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
+use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead};
 use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::geometry::profile_quality::{noise, shape};
 use crate::contact::numerics::spline::Spline;
@@ -63,6 +64,7 @@ pub struct Reading {
 pub struct Profile {
     curve: PlaneCurve,
     measured: Arc<MeasuredCurve>,
+    stretches: Arc<KnownStretches>,
     /// Remarks on what was found and changed when it was read.
     pub remarks: Vec<Remark>,
 }
@@ -146,6 +148,7 @@ impl Profile {
         Profile {
             curve: PlaneCurve::new(&part(0), &part(1)),
             measured: Arc::new(measured),
+            stretches: Arc::default(),
             remarks,
         }
     }
@@ -167,6 +170,22 @@ impl Profile {
             at: &self.measured.points,
             along: &self.measured.along,
         }
+    }
+
+    /// The points and the curve through them.
+    #[must_use]
+    pub fn read(&self) -> PointsRead<'_> {
+        PointsRead {
+            points: self.points(),
+            curve: &self.curve,
+            smoothing: self.smoothing(),
+        }
+    }
+
+    /// How the readings of its points differ, where that was asked for.
+    #[must_use]
+    pub fn stretches(&self) -> &KnownStretches {
+        &self.stretches
     }
 
     /// Median distance of neighbouring points in mm.

@@ -103,6 +103,12 @@ impl<'g> RailInFrame<'g> {
         found.into_iter().map(|[v, height]| (v, height)).unzip()
     }
 
+    /// The parameter of an end of the rail that lies over a range across and faces the plane, if there is one.
+    pub(crate) fn end_within(&self, [low, high]: [f64; 2]) -> Option<f64> {
+        let inside = |s: &f64| self.at(*s).is_some_and(|end| low < end.v && end.v < high);
+        self.geometry.ranges()[0].into_iter().find(inside)
+    }
+
     /// Height over the place `[u, v]` of the plane, and the parameter of the curve there.
     ///
     /// # Errors

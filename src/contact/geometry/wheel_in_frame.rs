@@ -49,6 +49,23 @@ impl WheelPoint {
             wheel: 2.0 * self.wheel - before.wheel,
         }
     }
+
+    /// The point in the air that stands for one that was not found from here.
+    fn opened(self) -> WheelPoint {
+        WheelPoint {
+            height: self.height + OPEN,
+            ..self
+        }
+    }
+
+    /// The next of a row that continues as the row beside it does between two points. Rows lie so close together that one step of
+    /// Newton's method is enough from there; from a straight line, two or three are needed.
+    fn as_between(self, from: WheelPoint, to: WheelPoint) -> WheelPoint {
+        WheelPoint {
+            height: self.height + (to.height - from.height),
+            wheel: self.wheel + (to.wheel - from.wheel),
+        }
+    }
 }
 
 impl<'g> WheelInFrame<'g> {
@@ -87,48 +104,58 @@ impl<'g> WheelInFrame<'g> {
         let mirrored = images && self.mirrored;
         let mut rows = vec![vec![f64::NAN; x.len()]; y.len()];
         let mut missed = Vec::new();
-        let mut found_or_open = |at: [f64; 2], start: WheelPoint| -> WheelPoint {
-            self.height(at[0], at[1], start).unwrap_or_else(|miss| {
-                if miss.exit == SurfaceExit::StepsUsedUp {
-                    missed.push(at);
-                }
-                WheelPoint {
-                    height: start.height + OPEN,
-                    wheel: start.wheel,
-                }
-            })
-        };
-        let mut fill = |j: usize, start: WheelPoint| -> WheelPoint {
-            let first = found_or_open([x[middle[0]], y[j]], start);
-            rows[j][middle[0]] = first.height;
-            let (right, left) = outward(middle[0], x.len());
-            let sides = [right, if mirrored { Vec::new() } else { left }];
-            for columns in sides {
-                let (mut before, mut guess) = (first, first);
-                for i in columns {
-                    let found = found_or_open([x[i], y[j]], guess);
-                    rows[j][i] = found.height;
-                    if mirrored {
-                        rows[j][x.len() - 1 - i] = found.height;
+        let mut found_or_open = |at: [f64; 2], start: WheelPoint| -> (WheelPoint, bool) {
+            match self.height(at[0], at[1], start) {
+                Ok(found) => (found, true),
+                Err(miss) => {
+                    if miss.exit == SurfaceExit::StepsUsedUp {
+                        missed.push(at);
                     }
-                    // The surface is continued in a straight line.
-                    (before, guess) = (found, found.beyond(before));
+                    (start.opened(), false)
                 }
             }
-            first
         };
-        let start = fill(
-            middle[1],
-            WheelPoint {
-                height: 0.0,
-                wheel: self.wheel,
-            },
-        );
+        let (right, left) = outward(middle[0], x.len());
+        let sides = [right, if mirrored { Vec::new() } else { left }];
+        // `row` holds what was found of the row before, then of this one.
+        let mut fill =
+            |j: usize, start: WheelPoint, row: &mut [Option<WheelPoint>]| -> WheelPoint {
+                let (first, is_found) = found_or_open([x[middle[0]], y[j]], start);
+                rows[j][middle[0]] = first.height;
+                let first_before =
+                    std::mem::replace(&mut row[middle[0]], is_found.then_some(first));
+                for columns in &sides {
+                    let (mut before, mut last) = (first, first);
+                    let mut from = first_before;
+                    for &i in columns {
+                        let to = row[i];
+                        let guess = match (from, to) {
+                            (Some(from), Some(to)) => last.as_between(from, to),
+                            _ => last.beyond(before),
+                        };
+                        let (found, is_found) = found_or_open([x[i], y[j]], guess);
+                        rows[j][i] = found.height;
+                        if mirrored {
+                            rows[j][x.len() - 1 - i] = found.height;
+                        }
+                        row[i] = is_found.then_some(found);
+                        (before, last, from) = (last, found, to);
+                    }
+                }
+                first
+            };
+        let mut first_row = vec![None; x.len()];
+        let start = WheelPoint {
+            height: 0.0,
+            wheel: self.wheel,
+        };
+        let start = fill(middle[1], start, &mut first_row);
         let (up, down) = outward(middle[1], y.len());
         for order in [up, down] {
             let (mut before, mut guess) = (start, start);
+            let mut row = first_row.clone();
             for j in order {
-                let found = fill(j, guess);
+                let found = fill(j, guess, &mut row);
                 (before, guess) = (found, found.beyond(before));
             }
         }

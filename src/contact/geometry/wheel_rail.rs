@@ -287,6 +287,16 @@ impl WheelRail {
         [y, -z]
     }
 
+    /// Why there is no answer where a contact reaches the end of a profile, at these parameters of rail and wheel.
+    pub(crate) fn cut_off(&self, [rail, wheel]: [f64; 2]) -> String {
+        format!(
+            "the contact reaches the end of a profile, at y = {:.2} mm on the rail and {:.2} mm on the wheel; the true contact is \
+             cut off, longer profiles are needed",
+            self.on_rail(rail)[0],
+            self.on_wheel(wheel)[0]
+        )
+    }
+
     /// Remarks on the two profiles.
     #[must_use]
     pub fn remarks(&self) -> Vec<RemarkEntry> {

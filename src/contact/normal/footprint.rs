@@ -40,8 +40,8 @@ pub struct NormalUncertainty {
 /// Cosines and sines of the mid-points of N equal parts of 0 … π.
 #[derive(Debug, Clone, Copy)]
 pub struct LineAngles<const N: usize> {
-    cosines: [f64; N],
-    sines: [f64; N],
+    pub(crate) cosines: [f64; N],
+    pub(crate) sines: [f64; N],
 }
 
 impl<const N: usize> LineAngles<N> {
@@ -178,7 +178,7 @@ impl Footprint {
         chords.clear();
         match &self.shape {
             FootprintShape::Hertz(ellipse) => ellipse.add_chords(strips, chords),
-            FootprintShape::Sampled(field) => chords.extend(field.chords(patch, strips)),
+            FootprintShape::Sampled(field) => field.add_chords(patch, strips, chords),
         }
     }
 

@@ -3,41 +3,56 @@
 /// Evaluations after which the bracket is no longer narrowed. Numeric safety: halvings alone narrow it to rounding in 55.
 const EVALUATIONS_MAX: usize = 60;
 /// Width of the bracket at the end relative to the one at the beginning: mirror images stay alike to 1e-9, and 1e-9 here was not enough for that.
-const CLOSE: f64 = 1e-12;
-/// How far from the place expected a value is asked for, relative to its distance, on either side in turn. Chosen by judgement; how much it
-/// matters was not measured.
+const CLOSE: f64 = 1e-11;
+/// How far from the first place expected a value is asked for, relative to its distance. It changes how many values are asked for, as the next
+/// three do.
 const ASIDE: f64 = 0.03;
-/// One step in so many halves the bracket, for ends that are not straight.
-const HALVED_EVERY: usize = 5;
+/// The same for later places, relative to how far they moved.
+const ASIDE_MOVED: f64 = 0.05;
+/// Where there is no value a little before the place expected, the next try is this many times farther from it.
+const FARTHER: f64 = 16.0;
+/// After so many steps that hardly narrow the bracket it is halved.
+const SLOW_STEPS: usize = 3;
 
 /// The last place on the way from `inside` to `outside` where there is a value; `value` has one inside, nothing beyond the end.
 ///
 /// Two values tell where a straight line through them ends; the bracket is closed by places a little before and a little beyond that.
 pub(crate) fn end([outside, inside]: [f64; 2], value: impl Fn(f64) -> Option<f64>) -> f64 {
+    let toward = (outside - inside).signum();
+    let close = CLOSE * (outside - inside).abs();
     let (mut outer, mut inner) = (outside, (inside, value(inside).unwrap_or(0.0)));
-    let mut before: Option<(f64, f64)> = None;
-    for step in 0..EVALUATIONS_MAX {
+    let mut expected: Option<f64> = None;
+    let (mut aside, mut beyond, mut slow) = (0.0_f64, false, 0);
+    for _ in 0..EVALUATIONS_MAX {
         let (at, left) = inner;
-        if (outer - at).abs() <= CLOSE * (outside - inside).abs() {
+        let width = (outer - at).abs();
+        if width <= close {
             break;
         }
-        let aside = if step % 2 == 0 {
-            1.0 - ASIDE
-        } else {
-            1.0 + ASIDE
-        };
-        let expected = before.map(|(place, more)| at + aside * left * (at - place) / (more - left));
         let (low, high) = (at.min(outer), at.max(outer));
+        let by = toward * if beyond { aside } else { -aside };
         let next = expected
-            .filter(|next| *next > low && *next < high && step % HALVED_EVERY + 1 < HALVED_EVERY)
-            .unwrap_or(0.5 * (low + high));
+            .map(|expected| expected + by)
+            .filter(|next| *next > low && *next < high && slow < SLOW_STEPS);
+        let next = next.unwrap_or(0.5 * (low + high));
         match value(next) {
             Some(found) => {
-                before = Some(inner);
-                inner = (next, found);
+                let end = next + found * (next - at) / (left - found);
+                aside = match expected {
+                    Some(last) => ASIDE_MOVED * (end - last).abs(),
+                    None => ASIDE * (end - next).abs(),
+                };
+                aside = aside.max(0.25 * close);
+                (inner, expected, beyond) = ((next, found), Some(end), !beyond);
             }
-            None => outer = next,
+            None => {
+                outer = next;
+                aside *= if beyond { 1.0 } else { FARTHER };
+                beyond = false;
+            }
         }
+        let halved = (outer - inner.0).abs() <= 0.5 * width;
+        slow = if halved { 0 } else { slow % SLOW_STEPS + 1 };
     }
     inner.0
 }
@@ -72,7 +87,7 @@ mod tests {
         ];
         for (k, value) in values.into_iter().enumerate() {
             for (end, count) in found(value) {
-                assert!((end - 1.3).abs() < 1e-11 && end <= 1.3, "{k}: {end}");
+                assert!((end - 1.3).abs() < 1e-10 && end <= 1.3, "{k}: {end}");
                 assert!(count <= 25, "{k}: {count}");
             }
         }

@@ -64,12 +64,11 @@ struct Under<'a> {
 
 impl<'a> Under<'a> {
     fn new(body: Body, profile: &'a Profile, contact: [f64; 2], modulus: f64) -> Under<'a> {
-        let (points, smoothing) = (profile.points(), profile.smoothing());
         Under {
             body,
             profile,
             contact,
-            found: under_contact(points, smoothing, contact, modulus),
+            found: under_contact(&profile.read(), profile.stretches(), contact, modulus),
         }
     }
 

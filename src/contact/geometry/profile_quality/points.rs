@@ -3,8 +3,7 @@
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
-use crate::contact::geometry::profile_quality::readings::{Roughness, roughness};
-use crate::contact::geometry::profile_quality::samples::Points;
+use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead, Roughness};
 
 /// Range of smoothing lengths that are advised, in mm. Shorter ones do not remove the noise of neighbouring points, longer ones distort
 /// gauge corners and flange roots (radii of 13 to 20 mm; 5 mm changes the largest pressure by 2 %, 10 mm by 27 % in one of ten cases).
@@ -42,15 +41,15 @@ pub struct UnderContact {
     pub step: Option<Step>,
 }
 
-/// Quality of the points of a body under the contact `[low, high]` (mm along the profile), smoothed by `smoothing` mm; the contact
-/// modulus is in MPa. The planner is for transforms.
+/// Quality of the points of a body under the contact `[low, high]` (mm along the profile); the contact modulus is in MPa.
 #[must_use]
 pub fn under_contact(
-    points: Points,
-    smoothing: f64,
+    reading: &PointsRead,
+    known: &KnownStretches,
     contact: [f64; 2],
     modulus: f64,
 ) -> UnderContact {
+    let points = reading.points;
     let [low, high] = contact;
     let half = 0.5 * (high - low);
     let last_chord = points.at.len() - 2;
@@ -75,7 +74,7 @@ pub fn under_contact(
         over_width: points.chord(widest) / (high - low),
         spacing,
         noise: noise::noise(points, around).or_else(|| noise::noise(points, whole)),
-        roughness: roughness(points, smoothing, contact, modulus),
+        roughness: known.about(reading, contact).roughness(contact, modulus),
         polygon: noise::polygon(points, around),
         outlier,
         step,

@@ -1,5 +1,7 @@
 //! Compares two readings of the same points: the spline in use with a smoother one, and with Akima's curve.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::flattening::flattening;
 use crate::contact::geometry::profile_quality::noise::{MEDIAN_OF_NORMAL, median};
@@ -32,62 +34,138 @@ pub struct Roughness {
     pub ambiguity: f64,
 }
 
-/// Roughness of a profile at the contact `middle ± half` (mm along the profile); the contact modulus is in MPa. The planner keeps what it has
-/// planned for the next contact.
-#[must_use]
-pub fn roughness(points: Points, smoothing: f64, contact: [f64; 2], modulus: f64) -> Roughness {
-    let [low, high] = contact;
+/// Length in mm to whose multiples stretches are cut: contacts that lie near each other share one. Chosen by judgement: contacts of one pair
+/// then need a dozen stretches.
+const STRETCH: f64 = 10.0;
+/// Most stretches that are kept for one profile.
+const STRETCHES_MAX: usize = 32;
+
+/// How the readings of a stretch of a profile differ, at places with equal distances.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretch {
+    /// The first place in mm along the profile.
+    first: f64,
+    /// Distance of the places in mm.
+    step: f64,
+    /// The waves between the smoothing in use and twice that, or 3 mm: the pressure that flattens them over the contact modulus.
+    waves: Vec<f64>,
+    /// The same of the difference between the spline in use and Akima's curve; empty with smoothing.
+    ambiguity: Vec<f64>,
+}
+
+/// The stretches of one profile that were asked for. They follow from the profile, so that two of them never make profiles differ.
+#[derive(Debug, Default)]
+pub struct KnownStretches(Mutex<Vec<([f64; 2], Arc<Stretch>)>>);
+
+impl PartialEq for KnownStretches {
+    fn eq(&self, _: &KnownStretches) -> bool {
+        true
+    }
+}
+
+impl KnownStretches {
+    /// The stretch about a contact on the profile with these points and this curve through them.
+    #[must_use]
+    pub fn about(&self, reading: &PointsRead, contact: [f64; 2]) -> Arc<Stretch> {
+        let window = stretch_about(reading.points, contact);
+        // A panic while it was held leaves the list as it is: only whole stretches are put there.
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, stretch)) = known.iter().find(|(of, _)| *of == window) {
+            return Arc::clone(stretch);
+        }
+        let stretch = Arc::new(Stretch::new(reading, window));
+        if known.len() == STRETCHES_MAX {
+            known.remove(0);
+        }
+        known.push((window, Arc::clone(&stretch)));
+        stretch
+    }
+}
+
+/// The points of a profile and the curve in use.
+#[derive(Debug, Clone, Copy)]
+pub struct PointsRead<'a> {
+    /// The points.
+    pub points: Points<'a>,
+    /// The curve through them, or past them where it is smoothed.
+    pub curve: &'a PlaneCurve,
+    /// Cut wavelength of its smoothing in mm; 0 for none.
+    pub smoothing: f64,
+}
+
+/// Both ends of the stretch that the roughness at a contact is taken from, in mm along the profile.
+fn stretch_about(points: Points, [low, high]: [f64; 2]) -> [f64; 2] {
     let half = 0.5 * (high - low);
     let last = points.along.len() - 1;
-    let window = [
-        (low - half - BEYOND).max(points.along[0]),
-        (high + half + BEYOND).min(points.along[last]),
-    ];
-    let reference = REFERENCE_MIN.max(2.0 * smoothing);
-    let part = points.within([
-        window[0] - SUPPORT * reference,
-        window[1] + SUPPORT * reference,
-    ]);
-    let spacing =
-        (part.along[part.along.len() - 1] - part.along[0]) / (part.along.len() - 1) as f64;
-    let step = (spacing / PLACES).clamp(STEP[0], STEP[1]);
-    let step = step.max((window[1] - window[0]) / SAMPLES_MAX as f64);
-    let count = ((window[1] - window[0]) / step).floor() as usize + 1;
-    let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
-    let used = spline(part, smoothing);
-    let used: Vec<CurvePoint> = places.iter().map(|s| used.at(*s)).collect();
-    let pressures = |other: &dyn Fn(f64) -> [f64; 2]| {
-        let heights: Vec<f64> = (used.iter().zip(&places))
-            .map(|(used, s)| above(used, other(*s)))
-            .collect();
-        flattening(&heights, step, modulus)
-    };
-    let over_contact = |pressures: &[f64]| {
-        let (mut sum, mut count) = (0.0, 0.0_f64);
-        for (_, pressure) in places
-            .iter()
-            .zip(pressures)
-            .filter(|(s, _)| (low..=high).contains(*s))
-        {
-            sum += pressure * pressure;
-            count += 1.0;
-        }
-        (sum / count.max(1.0)).sqrt()
-    };
-    let smoother = spline(part, reference);
-    let waves = pressures(&|s| smoother.at(s).at);
-    let mut sizes: Vec<f64> = waves.iter().map(|pressure| pressure.abs()).collect();
-    Roughness {
-        waviness: over_contact(&waves),
-        everywhere: median(&mut sizes) / MEDIAN_OF_NORMAL,
-        ambiguity: if smoothing > 0.0 {
-            0.0
+    [
+        (((low - half - BEYOND) / STRETCH).floor() * STRETCH).max(points.along[0]),
+        (((high + half + BEYOND) / STRETCH).ceil() * STRETCH).min(points.along[last]),
+    ]
+}
+
+impl Stretch {
+    /// The readings compared between two places in mm along the profile.
+    fn new(reading: &PointsRead, window: [f64; 2]) -> Stretch {
+        let PointsRead {
+            points,
+            curve,
+            smoothing,
+        } = *reading;
+        let reference = REFERENCE_MIN.max(2.0 * smoothing);
+        let part = points.within([
+            window[0] - SUPPORT * reference,
+            window[1] + SUPPORT * reference,
+        ]);
+        let spacing =
+            (part.along[part.along.len() - 1] - part.along[0]) / (part.along.len() - 1) as f64;
+        let step = (spacing / PLACES).clamp(STEP[0], STEP[1]);
+        let step = step.max((window[1] - window[0]) / SAMPLES_MAX as f64);
+        let count = ((window[1] - window[0]) / step).floor() as usize + 1;
+        let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
+        let used: Vec<CurvePoint> = places.iter().map(|s| curve.at(*s)).collect();
+        let pressures = |other: &dyn Fn(f64) -> [f64; 2]| {
+            let heights: Vec<f64> = (used.iter().zip(&places))
+                .map(|(used, s)| above(used, other(*s)))
+                .collect();
+            flattening(&heights, step, 1.0)
+        };
+        let smoother = spline(part, reference);
+        let waves = pressures(&|s| smoother.at(s).at);
+        let ambiguity = if smoothing > 0.0 {
+            Vec::new()
         } else {
             let values = [0, 1].map(|k| part.at.iter().map(|at| at[k]).collect::<Vec<_>>());
             let slopes = [0, 1].map(|k| akima_slopes(part.along, &values[k]));
-            let akima = |s| [0, 1].map(|k| value(part.along, &values[k], &slopes[k], s));
-            over_contact(&pressures(&akima))
-        },
+            pressures(&|s| [0, 1].map(|k| value(part.along, &values[k], &slopes[k], s)))
+        };
+        Stretch {
+            first: window[0],
+            step,
+            waves,
+            ambiguity,
+        }
+    }
+
+    /// Roughness at the contact `[low, high]` (mm along the profile); the contact modulus is in MPa.
+    #[must_use]
+    pub fn roughness(&self, [low, high]: [f64; 2], modulus: f64) -> Roughness {
+        let place = |k: usize| self.first + self.step * k as f64;
+        let over_contact = |pressures: &[f64]| {
+            let (mut sum, mut count) = (0.0, 0.0_f64);
+            for (k, pressure) in pressures.iter().enumerate() {
+                if (low..=high).contains(&place(k)) {
+                    sum += pressure * pressure;
+                    count += 1.0;
+                }
+            }
+            modulus * (sum / count.max(1.0)).sqrt()
+        };
+        let mut sizes: Vec<f64> = self.waves.iter().map(|pressure| pressure.abs()).collect();
+        Roughness {
+            waviness: over_contact(&self.waves),
+            everywhere: modulus * median(&mut sizes) / MEDIAN_OF_NORMAL,
+            ambiguity: over_contact(&self.ambiguity),
+        }
     }
 }
 
@@ -125,11 +203,18 @@ mod tests {
 
     fn of(smoothing: f64, height: impl Fn(f64) -> f64) -> Roughness {
         let (at, along) = crown(height);
-        let points = Points {
-            at: &at,
-            along: &along,
+        found(&at, &along, smoothing)
+    }
+
+    fn found(at: &[[f64; 2]], along: &[f64], smoothing: f64) -> Roughness {
+        let points = Points { at, along };
+        let reading = PointsRead {
+            points,
+            curve: &spline(points, smoothing),
+            smoothing,
         };
-        roughness(points, smoothing, CONTACT, MODULUS)
+        let stretch = KnownStretches::default().about(&reading, CONTACT);
+        stretch.roughness(CONTACT, MODULUS)
     }
 
     #[test]
@@ -179,11 +264,7 @@ mod tests {
         };
         let open = |step: usize, smoothing: f64| {
             let (at, along) = every(step);
-            let points = Points {
-                at: &at,
-                along: &along,
-            };
-            roughness(points, smoothing, CONTACT, MODULUS).ambiguity
+            found(&at, &along, smoothing).ambiguity
         };
         assert!(
             open(8, 0.0) > 3.0 * open(1, 0.0),

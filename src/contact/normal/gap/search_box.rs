@@ -3,7 +3,7 @@
 use crate::contact::normal::gap::surface::{GapSurface, Window};
 use crate::contact::normal::hertz::NormalLoad;
 
-/// Points of a box along each axis when it is looked through.
+/// Points of a box along each axis when it is looked through. With 24 a gap of a few bumps has a force that is 8 % off.
 const POINTS: usize = 48;
 /// Most samples along one axis that are evaluated one by one; of more samples, only every second or third is.
 const SAMPLES_MAX: usize = 400;

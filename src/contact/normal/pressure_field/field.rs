@@ -104,9 +104,15 @@ impl PressureField {
     /// that crosses a hollow or curved patch may have several, in order of x.
     #[must_use]
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
+        let mut chords = Vec::new();
+        self.add_chords(patch, strips, &mut chords);
+        chords
+    }
+
+    /// Adds them to others.
+    pub fn add_chords(&self, patch: usize, strips: &[(f64, f64)], chords: &mut Vec<Chord>) {
         let [grid, label] = self.places[patch];
-        let chords = self.grids[grid].chords(label, strips).into_iter();
-        chords.map(|chord| Chord { patch, ..chord }).collect()
+        self.grids[grid].add_chords(label, strips, patch, chords);
     }
 
     /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For

@@ -149,27 +149,32 @@ impl GridPressure {
             .collect()
     }
 
-    /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y. A strip that misses the patch has none; one
-    /// that crosses a hollow or curved patch may have several, in order of x.
-    #[must_use]
-    pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
-        let [x_min, x_max, ..] = self.shapes[patch].patch.extent;
-        let mut chords = Vec::new();
+    /// Adds the chords of one patch on the given strips, each `(y, dy)` with its mid-line at y; they get the number `patch`. A strip that misses
+    /// the patch has none; one that crosses a hollow or curved patch may have several, in order of x.
+    pub fn add_chords(
+        &self,
+        label: usize,
+        strips: &[(f64, f64)],
+        patch: usize,
+        chords: &mut Vec<Chord>,
+    ) {
+        let [x_min, x_max, ..] = self.shapes[label].patch.extent;
         for (strip, &(y, dy)) in strips.iter().enumerate() {
-            // Rough data may extend slightly farther between the lines from which the extent was measured.
-            let within = |(left, right): (f64, f64)| (left.max(x_min), right.min(x_max));
-            let segments = self.segments(patch, y).into_iter().map(within);
-            let segments = segments.filter(|(left, right)| right > left);
-            chords.extend(segments.map(|(left, right)| Chord {
-                patch,
-                strip,
-                y,
-                dy,
-                left,
-                right,
-            }));
+            self.each_segment(label, y, |left, right| {
+                // Rough data may extend slightly farther between the lines from which the extent was measured.
+                let (left, right) = (left.max(x_min), right.min(x_max));
+                if right > left {
+                    chords.push(Chord {
+                        patch,
+                        strip,
+                        y,
+                        dy,
+                        left,
+                        right,
+                    });
+                }
+            });
         }
-        chords
     }
 
     /// The interval of rows that holds the line of a chord, and the weights of the rows about it.
@@ -262,8 +267,8 @@ impl GridPressure {
         })
     }
 
-    /// The segments of the line at y that lie in a patch, from smaller to larger x.
-    pub(crate) fn segments(&self, label: usize, y: f64) -> Vec<(f64, f64)> {
+    /// Tells the segments of the line at y that lie in a patch, from smaller to larger x.
+    pub(crate) fn each_segment(&self, label: usize, y: f64, tell: impl FnMut(f64, f64)) {
         let (label, y) = match self.images.get(label) {
             Some(image) if y < 0.0 => (*image, -y),
             _ => (label, y),
@@ -272,10 +277,10 @@ impl GridPressure {
         let SampleGrid { x, y: rows } = &self.grid;
         let j = interval(rows, y);
         if rows[j] > y || rows[j + 1] < y || !shape.rows.contains(&j) {
-            return Vec::new();
+            return;
         }
         let Some(columns) = self.near_row(shape, j) else {
-            return Vec::new();
+            return;
         };
         let t = (y - rows[j]) / (rows[j + 1] - rows[j]);
         let weights = weights(rows, j, y);
@@ -288,7 +293,7 @@ impl GridPressure {
             smooth: |i| self.is_smooth(i, j),
             allowed: |i| self.allowed(label, i, j, t),
         };
-        line.segments()
+        line.each_segment(tell);
     }
 
     /// The columns of row j that may hold a part of a patch: those of its cells, and one beside them ([`GridPressure::allowed`]).

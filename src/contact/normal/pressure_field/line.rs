@@ -34,18 +34,14 @@ where
     S: Fn(usize) -> bool,
     A: Fn(usize) -> [f64; 2],
 {
-    /// The segments where the curve is positive, from smaller to larger coordinate.
-    pub(crate) fn segments(&self) -> Vec<(f64, f64)> {
-        let mut segments: Vec<(f64, f64)> = Vec::new();
+    /// Tells the segments where the curve is positive, from smaller to larger coordinate.
+    pub(crate) fn each_segment(&self, tell: impl FnMut(f64, f64)) {
+        let mut segments = JoinedSegments { last: None, tell };
         let mut known: Option<(usize, [f64; 4])> = None;
         let mut nodes = self.intervals.clone();
         while let Some(node) = nodes.next() {
             if let Some([first, last]) = self.whole.filter(|[first, _]| *first == node) {
-                let (low, high) = (self.axis[first], self.axis[last]);
-                match segments.last_mut() {
-                    Some(before) if before.1 == low => before.1 = high,
-                    _ => segments.push((low, high)),
-                }
+                segments.add(self.axis[first], self.axis[last]);
                 nodes = last..=*self.intervals.end();
                 continue;
             }
@@ -63,14 +59,7 @@ where
                 }
             };
             let (from, to) = (part(from, low), part(to, high));
-            let mut tell = |left: f64, right: f64| {
-                let (left, right) = (left.max(from), right.min(to));
-                match segments.last_mut() {
-                    _ if left >= right => {}
-                    Some(last) if last.1 == left => last.1 = right,
-                    _ => segments.push((left, right)),
-                }
-            };
+            let mut tell = |left: f64, right: f64| segments.add(left.max(from), right.min(to));
             // Between two positive nodes the contact is whole: a gap there is not in the data.
             if (self.inside)(node) && (self.inside)(node + 1) {
                 tell(low, high);
@@ -89,7 +78,7 @@ where
                 self.positive_parts(node, values, tell);
             }
         }
-        segments
+        segments.end();
     }
 
     /// Tells where the curve is positive between a node and the next one, part by part; `values` are those of the nodes around.
@@ -110,6 +99,34 @@ where
         }
         if let Some(start) = start {
             tell(start, high);
+        }
+    }
+}
+
+/// Segments told one after the other, those that meet as one.
+struct JoinedSegments<T> {
+    last: Option<(f64, f64)>,
+    tell: T,
+}
+
+impl<T: FnMut(f64, f64)> JoinedSegments<T> {
+    fn add(&mut self, left: f64, right: f64) {
+        if left >= right {
+            return;
+        }
+        match &mut self.last {
+            Some(last) if last.1 == left => last.1 = right,
+            last => {
+                if let Some((from, to)) = last.replace((left, right)) {
+                    (self.tell)(from, to);
+                }
+            }
+        }
+    }
+
+    fn end(mut self) {
+        if let Some((from, to)) = self.last {
+            (self.tell)(from, to);
         }
     }
 }

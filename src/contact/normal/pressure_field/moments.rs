@@ -6,40 +6,45 @@ impl GridPressure {
     /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean position weighted with the pressure.
     #[must_use]
     pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
-        let width = self.grid.x.len();
-        let share = |axis: &[f64], k: usize| 0.5 * (axis[k + 1] - axis[k - 1]);
         let (mut weight, mut sum) = (0.0, [0.0; 2]);
-        for (k, q) in self.q.iter().enumerate().filter(|(_, q)| **q > 0.0) {
-            let [i, j] = [k % width, k / width];
-            // Values continued outside the contact are not positive, so a positive one is a sample and not in the padding.
-            if patch.is_some_and(|patch| usize::from(self.cells[k]) != patch) {
-                continue;
-            }
-            let own = q.sqrt() * share(&self.grid.x, i) * share(&self.grid.y, j);
+        self.each_load(patch, |[x, y], own| {
             weight += own;
-            sum = [sum[0] + own * self.grid.x[i], sum[1] + own * self.grid.y[j]];
-        }
+            sum = [sum[0] + own * x, sum[1] + own * y];
+        });
         sum.map(|sum| sum / weight)
     }
 
     /// Mean square distances `[along, across]` in mm² from the load centre of one patch, weighted with the pressure.
     #[must_use]
     pub fn load_spread(&self, patch: usize) -> [f64; 2] {
-        let centre = self.load_centre(Some(patch));
-        let width = self.grid.x.len();
-        let share = |axis: &[f64], k: usize| 0.5 * (axis[k + 1] - axis[k - 1]);
+        let [x0, y0] = self.load_centre(Some(patch));
         let (mut weight, mut sum) = (0.0, [0.0; 2]);
-        for (k, q) in self.q.iter().enumerate() {
-            if *q <= 0.0 || usize::from(self.cells[k]) != patch {
-                continue;
-            }
-            let [i, j] = [k % width, k / width];
-            let own = q.sqrt() * share(&self.grid.x, i) * share(&self.grid.y, j);
-            let from = [self.grid.x[i] - centre[0], self.grid.y[j] - centre[1]];
+        self.each_load(Some(patch), |[x, y], own| {
             weight += own;
-            sum = [0, 1].map(|axis| sum[axis] + own * from[axis] * from[axis]);
-        }
+            sum = [
+                sum[0] + own * (x - x0) * (x - x0),
+                sum[1] + own * (y - y0) * (y - y0),
+            ];
+        });
         sum.map(|sum| sum / weight)
+    }
+
+    /// Tells place and load of every sample of one patch, or of all of them; loads are relative to the largest pressure in MPa, times mm².
+    fn each_load(&self, patch: Option<usize>, mut tell: impl FnMut([f64; 2], f64)) {
+        let share = |axis: &[f64], k: usize| 0.5 * (axis[k + 1] - axis[k - 1]);
+        let (x, y) = (&self.grid.x, &self.grid.y);
+        let rows = self
+            .q
+            .chunks_exact(x.len())
+            .zip(self.cells.chunks_exact(x.len()));
+        for (j, (row, cells)) in rows.enumerate() {
+            for (i, (q, cell)) in row.iter().zip(cells).enumerate() {
+                // Values continued outside the contact are not positive, so a positive one is a sample and not in the padding.
+                if *q > 0.0 && patch.is_none_or(|patch| usize::from(*cell) == patch) {
+                    tell([x[i], y[j]], q.sqrt() * share(x, i) * share(y, j));
+                }
+            }
+        }
     }
 
     /// The same pressure with coordinates relative to another origin, in mm.
@@ -85,6 +90,7 @@ impl GridPressure {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::mesh::chord::Chord;
 
     fn two_bumps() -> GridPressure {
         let x: Vec<f64> = (-20..=20).map(|k| 0.2 * f64::from(k)).collect();
@@ -103,6 +109,12 @@ mod tests {
             })
             .collect();
         GridPressure::new(&x, &y, &rows).unwrap().0
+    }
+
+    fn chord_at(field: &GridPressure, y: f64) -> Chord {
+        let mut chords = Vec::new();
+        field.add_chords(0, &[(y, 0.1)], 0, &mut chords);
+        chords[0]
     }
 
     #[test]
@@ -140,8 +152,7 @@ mod tests {
             assert!((after.extent[3] - before.extent[3] - 5.0).abs() < 1e-12);
             assert_eq!(after.area, before.area);
         }
-        let chord = |field: &GridPressure, y: f64| field.chords(0, &[(y, 0.1)])[0];
-        let (here, there) = (chord(&field, -4.2), chord(&moved, 0.8));
+        let (here, there) = (chord_at(&field, -4.2), chord_at(&moved, 0.8));
         assert!((here.left - there.left - 0.3).abs() < 1e-12);
     }
 
@@ -157,7 +168,7 @@ mod tests {
         }
         // The pressures on the cells carry just that force: a line's load times its width grows with the third power.
         let load = |field: &GridPressure, y: f64| {
-            let chord = field.chords(0, &[(y, 0.1)])[0];
+            let chord = chord_at(field, y);
             let length = chord.right - chord.left;
             (
                 length,

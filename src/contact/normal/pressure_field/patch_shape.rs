@@ -89,13 +89,7 @@ impl GridPressure {
         let (middle, half) = (0.5 * (y_min + y_max), 0.5 * (y_max - y_min));
         let step = PI / lines as f64;
         let at = |n: f64| middle - half * (n * step).cos();
-        let ends = |y: f64| {
-            let segments = self.segments(label, y);
-            let length: f64 = segments.iter().map(|(left, right)| right - left).sum();
-            let left = segments.first().map_or(f64::INFINITY, |first| first.0);
-            let right = segments.last().map_or(f64::NEG_INFINITY, |last| last.1);
-            (left, right, length)
-        };
+        let ends = |y: f64| self.ends(label, y);
         let mut reach = FarthestLines::NONE;
         let mut area = 0.0;
         for n in 0..lines {
@@ -151,6 +145,15 @@ impl GridPressure {
         ([x_min, x_max, y_min, y_max], area.sum())
     }
 
+    /// Left and right end of a patch on the line at y, and the length of its segments there; infinite ends and 0 if it has none.
+    fn ends(&self, label: usize, y: f64) -> (f64, f64, f64) {
+        let mut found = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+        self.each_segment(label, y, |left, right| {
+            found = (found.0.min(left), right, found.2 + (right - left));
+        });
+        found
+    }
+
     /// First and last y of lines that meet the patch.
     fn extent_across(&self, shape: &PatchShape, label: usize) -> [f64; 2] {
         let y = &self.grid.y;
@@ -164,9 +167,8 @@ impl GridPressure {
     /// linearly to 0.
     fn end_across(&self, label: usize, bracket: [f64; 2]) -> f64 {
         vanishing::end(bracket, |y| {
-            let segments = self.segments(label, y);
-            let ends = segments.first().zip(segments.last());
-            ends.map(|((left, _), (_, right))| (right - left) * (right - left))
+            let (left, right, _) = self.ends(label, y);
+            (right > left).then(|| (right - left) * (right - left))
         })
     }
 

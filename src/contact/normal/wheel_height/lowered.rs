@@ -47,7 +47,7 @@ impl Fineness {
     /// The same with fine gaps and edges.
     pub(crate) fn finer(self) -> Fineness {
         Fineness {
-            detail: GapSampling::Fine,
+            detail: GapSampling::for_answer(self.target),
             edges: Edges::Found,
             ..self
         }
@@ -59,7 +59,7 @@ impl Fineness {
             Accuracy::For(target) => target,
         };
         Fineness {
-            detail: GapSampling::Fine,
+            detail: GapSampling::for_answer(target),
             target,
             edges: Edges::Found,
             settles: true,
@@ -166,7 +166,7 @@ impl WheelTask {
         };
         let resolution = match fineness.detail {
             GapSampling::Coarse => GridFineness::coarse(fineness.target),
-            GapSampling::Fine => GridFineness {
+            GapSampling::Loose | GapSampling::Fine => GridFineness {
                 settles: fineness.settles,
                 ..GridFineness::for_answer(fineness.target)
             },
@@ -182,7 +182,7 @@ impl WheelTask {
         let centre = centre - (approach - depth) / gap.frame.angle.cos();
         let mut remarks = found.remarks;
         remarks.extend(missed_beside(gap, &found.field));
-        if fineness.detail == GapSampling::Fine {
+        if fineness.detail.is_for_answer() {
             let cut = cut_patches(&self.geometry, gap, &found.field);
             remarks.extend(cut.map_err(|miss| NormalError::NoAnswer(miss.to_string()))?);
         }
@@ -190,7 +190,7 @@ impl WheelTask {
             let place = self.geometry.moved(&gap.frame, to, centre);
             place.map_err(|miss| NormalError::NoAnswer(miss.to_string()))
         };
-        if fineness.detail == GapSampling::Fine {
+        if fineness.detail.is_for_answer() {
             for patch in 0..found.field.patches().len() {
                 moved(found.field.load_centre(Some(patch)))?;
             }

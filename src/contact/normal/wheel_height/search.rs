@@ -6,7 +6,6 @@
 //! and solved coarsely.
 
 use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::local_gap::GapSampling;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
@@ -175,7 +174,7 @@ impl WheelTask {
             };
             let [carried, slope] = found.found;
             let known = bracket.slope;
-            let fine = fineness.detail == GapSampling::Fine;
+            let fine = fineness.detail.is_for_answer();
             if let Some(share) = forecast.filter(|_| !fine).and_then(|told| told(&found)) {
                 friction_share = share;
                 force = target(share);
@@ -222,7 +221,7 @@ impl WheelTask {
         monitor: &dyn Monitor,
     ) -> Result<WheelContact, NormalError> {
         match self.lowered(search, lowering, fineness, near, workspace, monitor) {
-            Err(NormalError::NoAnswer(_)) if fineness.detail == GapSampling::Coarse => {
+            Err(NormalError::NoAnswer(_)) if !fineness.detail.is_for_answer() => {
                 let fine = fineness.finer();
                 self.lowered(search, lowering, fine, near, workspace, monitor)
             }

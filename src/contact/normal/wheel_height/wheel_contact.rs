@@ -7,6 +7,7 @@ use crate::contact::geometry::local_gap::LocalGap;
 use crate::contact::normal::gap::answer::NormalWork;
 use crate::contact::normal::gap::start::GapStart;
 use crate::contact::normal::gap::tile::Tile;
+use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::wheel_height::bracket::HeightExit;
 use crate::contact::normal::wheel_height::task::Accuracy;
@@ -17,6 +18,9 @@ const CORRECTED: f64 = 1.0 / 3.0;
 /// Coarse gaps of a single patch, whose force grows as Hertz's, are replaced by fine ones when the force is missed by no more than this: the next
 /// height misses it by the square of this.
 const NEAR_SINGLE: f64 = 0.1;
+
+/// Rounds of Gauss and Seidel for the stiffness of several patches; three tell two patches to a thousandth.
+const STIFFNESS_ROUNDS: usize = 3;
 
 /// Gaps of one contact at two heights differ by less than this in the inclination of their frames, in rad. Chosen by judgement: a start that
 /// does not suit is found out.
@@ -85,11 +89,55 @@ impl GapContact {
         patches.iter().map(|patch| patch.normal_force).sum()
     }
 
-    /// Force per mm of approach of flat punches of the same areas (exact for circles), divided by `2 E*`.
+    /// Force per mm of approach of flat punches of the same areas (exact for one circle), divided by `2 E*`.
     pub(crate) fn stiffness(&self) -> f64 {
         let patches = self.field.patches();
-        patches.iter().map(|patch| (patch.area / PI).sqrt()).sum()
+        let punch = |(k, patch): (usize, &Patch)| Punch {
+            radius: (patch.area / PI).sqrt(),
+            at: self.field.load_centre(Some(k)),
+        };
+        let mut punches: Vec<Punch> = patches.iter().enumerate().map(punch).collect();
+        // The order decides what few rounds leave; so a mirror image has the same.
+        punches.sort_by(|a, b| b.radius.total_cmp(&a.radius));
+        stiffness(&punches)
     }
+}
+
+/// A flat circular punch, in mm.
+#[derive(Debug, Clone, Copy)]
+struct Punch {
+    radius: f64,
+    at: [f64; 2],
+}
+
+impl Punch {
+    /// How far another punch is away; never nearer than side by side, since patches are no circles.
+    fn apart(&self, other: &Punch) -> f64 {
+        let [x, y] = [0, 1].map(|axis| self.at[axis] - other.at[axis]);
+        x.hypot(y).max(self.radius + other.radius)
+    }
+}
+
+/// Force per mm of approach of punches pressed together, divided by `2 E*`. One alone carries `2 E* a` per mm, and lets the surface at the distance r
+/// sink by the force over `π E* r` (Boussinesq 1885).
+fn stiffness(punches: &[Punch]) -> f64 {
+    let mut forces: Vec<f64> = punches.iter().map(|punch| punch.radius).collect();
+    let rounds = if punches.len() > 1 {
+        STIFFNESS_ROUNDS
+    } else {
+        0
+    };
+    for _ in 0..rounds {
+        for (k, punch) in punches.iter().enumerate() {
+            let others = punches.iter().zip(&forces).enumerate();
+            let sunk: f64 = others
+                .filter(|(other, _)| *other != k)
+                .map(|(_, (other, force))| 2.0 / PI * force / punch.apart(other))
+                .sum();
+            forces[k] = punch.radius * (1.0 - sunk);
+        }
+    }
+    forces.iter().sum()
 }
 
 impl WheelContact {
@@ -171,5 +219,23 @@ impl WheelContact {
     pub fn vertical_force(&self) -> f64 {
         let part = |gap: &GapContact| gap.normal_force() * gap.frame.angle.cos();
         self.patches.iter().map(part).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_equal_punches_are_as_stiff_as_their_compliances_tell() {
+        let (radius, apart) = (4.0, 15.0);
+        let punch = |x: f64| Punch {
+            radius,
+            at: [x, 0.0],
+        };
+        assert_eq!(stiffness(&[punch(0.0)]), radius);
+        let found = stiffness(&[punch(0.0), punch(apart)]);
+        let expected = 2.0 * radius / (1.0 + 2.0 / PI * radius / apart);
+        assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
     }
 }

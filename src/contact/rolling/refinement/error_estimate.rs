@@ -92,11 +92,11 @@ impl Indicators {
         let patches = task.footprint.patches();
         let none = vec![0.0; patches.len() + 1];
         let all = |value| Indicators::Known(vec![value; patches.len() + 1]);
-        let slides = answer.slips.iter().all(|slips| *slips);
-        let sums = finer.filter(|_| slides).map_or_else(
-            || none.clone(),
-            |finer| sum_errors(task, patches, [level, finer], motion),
-        );
+        let sums = if turns_sliding(task, motion, answer) {
+            sum_errors(task, patches, level, finer, motion)
+        } else {
+            none.clone()
+        };
         match answer.exit {
             LevelExit::NoMotion | LevelExit::NoFriction => return all(Some(0.0)),
             LevelExit::RigidSlip => {
@@ -375,21 +375,35 @@ fn change(
     change
 }
 
+/// Does everything slip under spin? In full slip without spin all tractions point the same way, and cells of any size add up to the load.
+pub(crate) fn turns_sliding(task: &RollingTask, motion: &Motion, answer: &LevelAnswer) -> bool {
+    let turns = motion.spin_per_mm != 0.0 && !task.friction.is_frictionless();
+    turns && answer.slips.iter().all(|slips| *slips)
+}
+
 /// Errors of the sums over cells, which both rules share: where everything slips along the rigid slip there is no other error. They are
-/// estimated by the change to a level of four times as many cells.
+/// estimated by the change to a level of four times as many cells if there is one, otherwise by integrals of the pressures.
 fn sum_errors(
     task: &RollingTask,
     patches: &[Patch],
-    levels: [&StripMesh; 2],
+    level: &StripMesh,
+    finer: Option<&StripMesh>,
     motion: &Motion,
 ) -> Vec<f64> {
-    let [here, finer] = levels.map(|level| -> Vec<Resultants> {
+    let on = |level: &StripMesh| -> Vec<Resultants> {
         let traction = full_slip::along_rigid_slip(level, &level.scale.motion(motion));
         (0..patches.len())
             .map(|p| Resultants::of_patch(level, &traction, p))
             .collect()
-    });
-    let mut errors = distances(task, patches, &here, &finer);
-    errors.iter_mut().for_each(|e| *e *= 4.0 / 3.0);
+    };
+    let integral = |p: usize| {
+        full_slip::sum_along_rigid_slip(task.footprint, p, motion, task.friction.largest())
+    };
+    let (exact, left) = match finer {
+        Some(finer) => (on(finer), 4.0 / 3.0),
+        None => ((0..patches.len()).map(integral).collect(), 1.0),
+    };
+    let mut errors = distances(task, patches, &on(level), &exact);
+    errors.iter_mut().for_each(|e| *e *= left);
     errors
 }

@@ -288,16 +288,16 @@ pub(crate) fn before<'a>(
     })
 }
 
-/// A level of four times as many cells for the error of sums over cells, where the pressure jumps or where everything slips under spin.
-/// In full slip without spin all tractions point the same way, and cells of any size add up to the load.
+/// A level of four times as many cells for the error of sums over cells: where the pressure jumps, and where everything slips under spin unless
+/// an integral of the pressures serves.
 fn finer_for_sums(
     task: &RollingTask,
     level: &StripMesh,
     motion: &Motion,
     answer: &LevelAnswer,
 ) -> Option<StripMesh> {
-    let turns = motion.spin_per_mm != 0.0 && !task.friction.is_frictionless();
-    let slides = turns && answer.slips.iter().all(|slips| *slips);
+    let is_smooth = task.footprint.surprise().is_none() && task.friction.across().is_none();
+    let slides = !is_smooth && error_estimate::turns_sliding(task, motion, answer);
     if !slides && !error_estimate::jumps(task) {
         return None;
     }
