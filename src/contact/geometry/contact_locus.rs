@@ -14,7 +14,7 @@ use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::grouping::{Grouping, Overlap};
 use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
 use crate::contact::geometry::locus_lines::{Inclination, LocusLines, LocusPoint};
-use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::geometry::wheel_rail::{WheelCircle, WheelRail};
 
 /// Spacing of the search across the track, in mm. It decides where frames and windows lie, not what the gap is in them: with 0.02 mm forces differ by
 /// 0.00003 of μN in the median and 0.0012 at most at a target of 0.002, on 200 of the rows of `cargo bench --bench wheels -- rows`, as with any other
@@ -72,11 +72,16 @@ pub(crate) fn rail_points(
 
 /// Places the wheel above the rail and finds the height of first touch.
 fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
-    let [rail, wheel] = geometry.parameters(CURVE_STEP);
-    let edge = || envelope(&rail_points(geometry, rail), STEP);
-    let rail = geometry.rail_edge.get_or_make(edge);
+    let rail = geometry.rail_edge.get_or_make(|| {
+        let [rail, _] = geometry.parameters(CURVE_STEP);
+        envelope(&rail_points(geometry, rail), STEP)
+    });
+    let circles = geometry.circles.get_or_make(|| {
+        let [_, wheel] = geometry.parameters(CURVE_STEP);
+        wheel.into_iter().map(|s| geometry.circle(s)).collect()
+    });
     let beside = [rail.first, rail.first + rail.points.len() as i64].map(|k| k as f64 * STEP);
-    let wheel = wheel_points(geometry, &wheel, beside);
+    let wheel = wheel_points(geometry, circles, beside);
     if wheel.iter().all(Option::is_none) {
         return Err(nothing_above());
     }
@@ -120,19 +125,22 @@ fn nothing_above() -> String {
     "no part of the wheel lies above the rail; check gauge, flange-back distance and position, lateral shift".to_owned()
 }
 
-/// Lowest points `[y, −z, s]` of the wheel in mm at these parameters, for an [`envelope`] between `first` and `last` in y: far beside that
-/// there are none.
+/// Lowest points `[y, −z, s]` of circles of the wheel in mm, for an [`envelope`] between `first` and `last` in y: far beside that there are
+/// none.
 fn wheel_points(
     geometry: &WheelRail,
-    parameters: &[f64],
+    circles: &[WheelCircle],
     [first, last]: [f64; 2],
 ) -> Vec<Option<[f64; 3]>> {
-    let point = |s: f64| geometry.lowest(s).map(|[_, y, z]| [y, -z, s]);
-    let mut points = Vec::with_capacity(parameters.len());
-    for part in parameters.chunks(LEFT_OUT) {
-        let ends = [part[0], part[part.len() - 1]];
+    let point = |circle: &WheelCircle| {
+        let found = geometry.lowest_of(circle);
+        found.map(|[_, y, z]| [y, -z, circle.s])
+    };
+    let mut points = Vec::with_capacity(circles.len());
+    for part in circles.chunks(LEFT_OUT) {
+        let ends = [&part[0], &part[part.len() - 1]];
         // Yaw turns circles into ellipses, whose lowest points move a little faster along y than the parameter does.
-        let margin = 2.0 * (ends[1] - ends[0] + CURVE_STEP);
+        let margin = 2.0 * (ends[1].s - ends[0].s + CURVE_STEP);
         let beside = match ends.map(point) {
             [Some([from, ..]), Some([to, ..])] => {
                 from.max(to) < first - margin || from.min(to) > last + margin
@@ -142,7 +150,7 @@ fn wheel_points(
         if beside {
             points.extend(part.iter().map(|_| None));
         } else {
-            points.extend(part.iter().map(|s| point(*s)));
+            points.extend(part.iter().map(point));
         }
     }
     points

@@ -18,10 +18,15 @@ pub(crate) fn envelope(curve: &[Option<[f64; 3]>], step: f64) -> Envelope {
     let last = y().fold(f64::NEG_INFINITY, f64::max).floor() as i64;
     let mut points: Vec<Option<[f64; 2]>> =
         vec![None; usize::try_from(last - first + 1).unwrap_or(0)];
+    let mut bend_before: Option<[f64; 2]> = None;
     for (n, pair) in curve.windows(2).enumerate() {
         let [Some(from), Some(to)] = pair else {
+            bend_before = None;
             continue;
         };
+        let after = curve.get(n + 2).copied().flatten();
+        let bend_after = after.and_then(|after| bend([*from, *to, after]));
+        let bends = [std::mem::replace(&mut bend_before, bend_after), bend_after];
         let (low, high) = (from[0].min(to[0]) / step, from[0].max(to[0]) / step);
         // Casts cut toward zero, which costs less than a call that rounds.
         let (lowest, highest) = (low as i64, high as i64);
@@ -31,12 +36,6 @@ pub(crate) fn envelope(curve: &[Option<[f64; 3]>], step: f64) -> Envelope {
             continue;
         }
         let span = to[0] - from[0];
-        let around = [n.checked_sub(1), Some(n + 2)]
-            .map(|k| k.and_then(|k| curve.get(k).copied().flatten()));
-        let bends = [
-            around[0].and_then(|before| bend([before, *from, *to])),
-            around[1].and_then(|after| bend([*from, *to, after])),
-        ];
         // Where the two bends differ in sign the curve has a corner or hardly bends, and is taken to be straight.
         let bends = [0, 1].map(|part| match bends {
             [Some(a), Some(b)] if a[part] * b[part] > 0.0 => 0.5 * (a[part] + b[part]),

@@ -72,6 +72,8 @@ pub struct WheelRail {
     axes: AxleAxes,
     /// The rail's upper edge, which is the same for every place of the wheelset over it.
     pub(crate) rail_edge: Arc<Once<Envelope>>,
+    /// Circles of the wheel, which are the same for every place of the wheelset.
+    pub(crate) circles: Arc<Once<Vec<WheelCircle>>>,
     /// Rail and wheel line by line, or why there are no lines.
     pub(crate) locus: Once<Arc<Result<LocusLines, String>>>,
 }
@@ -119,6 +121,19 @@ pub struct Meridian {
     pub radius_slope: f64,
 }
 
+/// A circle of the wheel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct WheelCircle {
+    /// Parameter of the profile.
+    pub(crate) s: f64,
+    /// Distance from the centre along the axle, in mm.
+    along: f64,
+    /// Radius in mm.
+    radius: f64,
+    /// Change of the radius along the axle.
+    widening: f64,
+}
+
 impl WheelRail {
     /// Places the rail by its gauge point and its top, the wheel by the wheelset.
     ///
@@ -163,6 +178,7 @@ impl WheelRail {
             wheel,
             axes,
             rail_edge: Arc::default(),
+            circles: Arc::default(),
             locus: Once::default(),
         }
     }
@@ -247,20 +263,39 @@ impl WheelRail {
         }
     }
 
+    /// The circle of the wheel at a parameter of its profile.
+    pub(crate) fn circle(&self, s: f64) -> WheelCircle {
+        let meridian = self.meridian(s);
+        WheelCircle {
+            s,
+            along: meridian.along,
+            radius: meridian.radius,
+            widening: meridian.radius_slope / meridian.along_slope,
+        }
+    }
+
     /// The point of a wheel circle where the surface's normal has no part along x, relative to the wheel's centre but
     /// shifted sideways with it: where the circle meets a rail that is straight along x. None where the yaw hides it.
     #[must_use]
     pub fn lowest(&self, s: f64) -> Option<[f64; 3]> {
-        let circle = self.meridian(s);
-        let sin = circle.radius_slope * self.axes.axle[0] / (circle.along_slope * self.axes.across);
+        self.lowest_of(&self.circle(s))
+    }
+
+    /// The same of a circle.
+    pub(crate) fn lowest_of(&self, circle: &WheelCircle) -> Option<[f64; 3]> {
+        let AxleAxes {
+            axle,
+            across,
+            forward,
+            down,
+        } = &self.axes;
+        let sin = circle.widening * (axle[0] / across);
         if sin.is_nan() || sin.abs() >= 1.0 {
             return None;
         }
         let cos = (1.0 - sin * sin).sqrt();
-        let mut point = [0, 1, 2].map(|k| {
-            circle.along * self.axes.axle[k]
-                + circle.radius * (cos * self.axes.down[k] + sin * self.axes.forward[k])
-        });
+        let mut point = [0, 1, 2]
+            .map(|k| circle.along * axle[k] + circle.radius * (cos * down[k] + sin * forward[k]));
         point[1] += self.placement.lateral_shift;
         Some(point)
     }
