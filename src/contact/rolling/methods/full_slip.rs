@@ -55,13 +55,13 @@ fn along(level: &StripMesh, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
 }
 
 /// Lines across a patch, and points along each of them, of [`sum_along_rigid_slip`].
-const POINTS: usize = 16;
+pub(crate) const POINTS: usize = 16;
 
 /// Forces and moment of one patch if every point slips along the rigid slip of a motion in mm, with the same coefficient of friction everywhere;
 /// the moment is about the origin of the case.
 ///
-/// Lines and points lie in the middle of equal angles (see [`Footprint::mean_of_line`]), where pressures are so smooth that cells of any usual
-/// mesh are less exact. With the pole of the rotation inside, the direction jumps there, and this is about as exact as `16 · 16` cells.
+/// Lines and points lie in the middle of equal angles (see [`Footprint::mean_of_line`]), as whose function pressures are smooth. With the pole of
+/// the rotation inside, the direction jumps there, and this is about as exact as `16 · 16` cells.
 #[must_use]
 pub fn sum_along_rigid_slip(
     footprint: &Footprint,

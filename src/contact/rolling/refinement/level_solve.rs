@@ -289,7 +289,7 @@ pub(crate) fn before<'a>(
 }
 
 /// A level of four times as many cells for the error of sums over cells: where the pressure jumps, and where everything slips under spin unless
-/// an integral of the pressures serves.
+/// an integral of the pressures is as exact.
 fn finer_for_sums(
     task: &RollingTask,
     level: &StripMesh,
@@ -297,7 +297,9 @@ fn finer_for_sums(
     answer: &LevelAnswer,
 ) -> Option<StripMesh> {
     let is_smooth = task.footprint.surprise().is_none() && task.friction.across().is_none();
-    let slides = !is_smooth && error_estimate::turns_sliding(task, motion, answer);
+    let patches = task.footprint.patches().len();
+    let by_integral = is_smooth && 4 * level.mesh.cells() <= patches * full_slip::POINTS.pow(2);
+    let slides = !by_integral && error_estimate::turns_sliding(task, motion, answer);
     if !slides && !error_estimate::jumps(task) {
         return None;
     }
