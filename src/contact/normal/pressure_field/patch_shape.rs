@@ -168,7 +168,7 @@ impl GridPressure {
     fn end_across(&self, label: usize, bracket: [f64; 2]) -> f64 {
         vanishing::end(bracket, |y| {
             let (left, right, _) = self.ends(label, y);
-            (right > left).then(|| (right - left) * (right - left))
+            (right > left).then_some((right - left) * (right - left))
         })
     }
 
