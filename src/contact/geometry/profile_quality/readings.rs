@@ -42,7 +42,7 @@ const STRETCHES_MAX: usize = 32;
 
 /// How the readings of a stretch of a profile differ, at places with equal distances.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stretch {
+pub struct ProfileStretch {
     /// The first place in mm along the profile.
     first: f64,
     /// Distance of the places in mm.
@@ -55,7 +55,7 @@ pub struct Stretch {
 
 /// The stretches of one profile that were asked for. They follow from the profile, so that two of them never make profiles differ.
 #[derive(Debug, Default)]
-pub struct KnownStretches(Mutex<Vec<([f64; 2], Arc<Stretch>)>>);
+pub struct KnownStretches(Mutex<Vec<([f64; 2], Arc<ProfileStretch>)>>);
 
 impl PartialEq for KnownStretches {
     fn eq(&self, _: &KnownStretches) -> bool {
@@ -66,14 +66,14 @@ impl PartialEq for KnownStretches {
 impl KnownStretches {
     /// The stretch about a contact on the profile with these points and this curve through them.
     #[must_use]
-    pub fn about(&self, reading: &PointsRead, contact: [f64; 2]) -> Arc<Stretch> {
+    pub fn about(&self, reading: &PointsRead, contact: [f64; 2]) -> Arc<ProfileStretch> {
         let window = stretch_about(reading.points, contact);
         // A panic while it was held leaves the list as it is: only whole stretches are put there.
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, stretch)) = known.iter().find(|(of, _)| *of == window) {
             return Arc::clone(stretch);
         }
-        let stretch = Arc::new(Stretch::new(reading, window));
+        let stretch = Arc::new(ProfileStretch::new(reading, window));
         if known.len() == STRETCHES_MAX {
             known.remove(0);
         }
@@ -103,9 +103,9 @@ fn stretch_about(points: Points, [low, high]: [f64; 2]) -> [f64; 2] {
     ]
 }
 
-impl Stretch {
+impl ProfileStretch {
     /// The readings compared between two places in mm along the profile.
-    fn new(reading: &PointsRead, window: [f64; 2]) -> Stretch {
+    fn new(reading: &PointsRead, window: [f64; 2]) -> ProfileStretch {
         let PointsRead {
             points,
             curve,
@@ -138,7 +138,7 @@ impl Stretch {
             let slopes = [0, 1].map(|k| akima_slopes(part.along, &values[k]));
             pressures(&|s| [0, 1].map(|k| value(part.along, &values[k], &slopes[k], s)))
         };
-        Stretch {
+        ProfileStretch {
             first: window[0],
             step,
             waves,
