@@ -2,7 +2,7 @@
 
 use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::footprint::{Footprint, LineAngles};
-use crate::contact::numerics::quadrature::RULES;
+use crate::contact::numerics::quadrature::FOUR_POINTS;
 
 /// A strip's chord and the line of the region it was made from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,9 +75,7 @@ pub fn chords(footprint: &Footprint, patch: usize, strips: &[(f64, f64)]) -> Vec
     let share = 0.5 / (1.0 + 0.5 * (longest / width).powi(2));
     let mut across = StripBuffer::new();
     let fit = |line: &Chord| {
-        let outermost = line.strip == 0 || line.strip + 1 == strips.len();
-        let rule = RULES[usize::from(outermost)];
-        let strip = alone(line).then(|| StripLoad::of(footprint, line, rule, &mut across));
+        let strip = alone(line).then(|| StripLoad::of(footprint, line, &mut across));
         let mean = strip.and_then(|strip| strip.length);
         let length = line.right - line.left;
         let half = 0.5 * ((1.0 - share) * length + share * mean.unwrap_or(length));
@@ -128,16 +126,14 @@ struct StripLoad {
 }
 
 impl StripLoad {
-    /// The strip about a line, from lines at the points of a rule of quadrature. Two are enough unless the patch ends inside: loads over width
-    /// change about as a parabola.
+    /// The strip about a line.
     fn of(
         footprint: &Footprint,
         line: &Chord,
-        rule: &[(f64, f64)],
         StripBuffer { across, angles }: &mut StripBuffer,
     ) -> StripLoad {
         let (mut length, mut load, mut moment) = (Some(0.0), 0.0, 0.0);
-        for (place, weight) in rule {
+        for (place, weight) in FOUR_POINTS {
             let y = line.y + 0.5 * line.dy * place;
             footprint.chords_into(line.patch, &[(y, line.dy)], across);
             if across.len() > 1 {
