@@ -37,7 +37,7 @@ pub struct Roughness {
 /// Length in mm to whose multiples stretches are cut: contacts that lie near each other share one. Chosen by judgement: contacts of one pair
 /// then need a dozen stretches.
 const STRETCH: f64 = 10.0;
-/// Most stretches that are kept for one profile.
+/// Most stretches that are kept for one profile. Keeps the memory small; it changes times, no answer.
 const STRETCHES_MAX: usize = 32;
 
 /// How the readings of a stretch of a profile differ, at places with equal distances.
