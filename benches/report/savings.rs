@@ -11,10 +11,13 @@ use railhead::contact::{solve, solve_with};
 use serde_json::{Value, json};
 
 use crate::allocations::during;
-use crate::machine::{lu_seconds, seconds_of};
-use crate::questions::{problem, timed};
+use crate::machine::{lu_seconds, median, seconds_of};
+use crate::questions::{hertz, hertz_cases, problem, timed};
 
 const REPEATS: usize = 21;
+/// Of one of the references beside the creep curve, and how often both are timed.
+const REPEATS_EACH: usize = 3;
+const TURNS: usize = 9;
 const HEAD: &str = "## What skipping saves\n\nWheel on rail (radii 460 and 300 mm, 100 kN, μ 0.3), target 0.005. Times are those of solves on their own, \
 allocations those of a worker of the service that has solved the case before.\n\n\
 | case | LU | products | allocations |\n|---|---|---|---|\n";
@@ -85,6 +88,7 @@ pub fn section() -> String {
         );
     }
     text.push_str(&one_by_one());
+    text.push_str(&beside_the_median(&curve));
     text.push_str(&creep_map());
     text.push_str(&one_shape());
     text
@@ -103,6 +107,26 @@ fn one_by_one() -> String {
         costs.iter().map(|c| c.seconds).sum::<f64>() / lu,
         costs.iter().map(|c| c.products).sum::<u32>(),
         costs.iter().map(|c| c.allocations).sum::<u64>()
+    )
+}
+
+/// The creep curve in solves of the reference cases, in turns.
+fn beside_the_median(curve: &Value) -> String {
+    let outputs = json!(["resultants"]);
+    let curve = problem(&question(curve, &outputs, 0.3, 100_000.0));
+    let solver = json!({ "target_error": 0.005 });
+    let cases: Vec<CheckedCase> = hertz_cases()
+        .iter()
+        .map(|case| hertz(case, &solver, &outputs))
+        .collect();
+    let ratios = (0..TURNS).map(|_| {
+        let (_, whole) = timed(&curve, REPEATS);
+        let each = cases.iter().map(|case| timed(case, REPEATS_EACH).1);
+        whole / median(each.collect())
+    });
+    format!(
+        "The creep curve takes as long as {:.1} solves of the Hertz references at the same target, in the median of them, solved in turns.\n\n",
+        median(ratios.collect())
     )
 }
 

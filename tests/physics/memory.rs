@@ -123,7 +123,8 @@ fn the_cost_counts_the_operators_that_a_case_leaves_in_the_store() {
         // Solved on the first mesh alone, which the table of creep forces finds good enough.
         (ellipse(&target, &creep), 8.0),
         (ellipse(&target, &all), 6.0),
-        (creep_map(9, 0.005), 2.5),
+        // Some rows go on with one mesh that the table finds good enough, where each motion could want one about its own pole.
+        (creep_map(9, 0.005), 6.0),
     ];
     for (case, factor) in cases {
         for bytes in [0, 4 << 20, 128 << 20] {

@@ -90,6 +90,37 @@ fn a_sweep_takes_fewer_products_than_its_motions_alone() {
     }
 }
 
+/// A curve crosses the mesh on which it begins and comes back: the table tells where a finer one is needed and where no more.
+#[test]
+fn a_curve_changes_its_mesh_where_the_table_says_so_without_any_companion() {
+    let motions: Vec<Value> = (1..51)
+        .map(|k| json!({ "creepage_x": 1e-4 * f64::from(k) }))
+        .collect();
+    let (curve, _) = solve(&case(&json!(motions), 0.005));
+    let (finer, _) = solve(&case(&json!(motions), 0.0005));
+    let points = &curve.patches[0].points;
+    let cells = |k: usize| {
+        let mesh = points[k].solver.mesh.expect("a mesh");
+        mesh.strips * mesh.cells
+    };
+    let most = (0..points.len()).map(cells).max().expect("motions");
+    assert!(cells(0) < most && cells(points.len() - 1) < most, "{most}");
+    for (k, point) in points.iter().enumerate() {
+        let skipped = &point.solver.skipped;
+        assert!(
+            skipped.iter().any(|text| text.contains("table")),
+            "motion {k}: {skipped:?}"
+        );
+        let (here, there) = (&curve.total[k], &finer.total[k]);
+        let [estimate, truth] =
+            [here, there].map(|total| total.error_estimate.expect("an estimate").force_x_n);
+        let off = (here.force_x_n - there.force_x_n).abs();
+        assert!(off <= estimate + truth, "motion {k}: {off} of {estimate}");
+    }
+    let products: u32 = points.iter().map(|point| point.solver.products).sum();
+    assert!(products < 320, "{products}");
+}
+
 /// Motions of a curve whose error follows from their neighbours.
 fn borrowed(solution: &Solution) -> Vec<usize> {
     let points = solution.patches[0].points.iter().enumerate();

@@ -18,7 +18,8 @@ pub struct Gmres {
     columns: Vec<f64>,
     rotations: Vec<(f64, f64)>,
     rhs: Vec<f64>,
-    direction: Vec<f64>,
+    /// `P⁻¹ V`, so that the solution needs no application of its own.
+    directions: Vec<Vec<f64>>,
     product: Vec<f64>,
     residual: Vec<f64>,
     weights: Vec<f64>,
@@ -94,7 +95,6 @@ impl Gmres {
         if norm_b == 0.0 {
             return Ok(report);
         }
-        self.direction.resize(b.len(), 0.0);
         self.product.resize(b.len(), 0.0);
         let mut residual = std::mem::take(&mut self.residual);
         residual.clear();
@@ -147,11 +147,16 @@ impl Gmres {
             if let ControlFlow::Break(stop) = system.tick() {
                 return Err(stop);
             }
-            self.direction.copy_from_slice(&self.basis[k]);
+            if self.directions.len() <= k {
+                self.directions.push(Vec::new());
+            }
+            let direction = &mut self.directions[k];
+            direction.clear();
+            direction.extend_from_slice(&self.basis[k]);
             // Preconditioned from the right: the residual that is minimised is that of the system itself, so that the
             // tolerance means the same with any preconditioner.
-            system.precondition(&mut self.direction);
-            system.product(&self.direction, &mut self.product);
+            system.precondition(direction);
+            system.product(direction, &mut self.product);
             report.products += 1;
             let breakdown = self.orthogonalise(k);
             k += 1;
@@ -160,7 +165,7 @@ impl Gmres {
                 break;
             }
         }
-        self.add_solution(k, system, x);
+        self.add_solution(k, x);
         Ok(self.rhs[k].abs())
     }
 
@@ -216,7 +221,7 @@ impl Gmres {
     }
 
     /// `x ← x + P⁻¹ V y` with `y` from the triangular system.
-    fn add_solution(&mut self, k: usize, system: &mut dyn LinearSystem, x: &mut [f64]) {
+    fn add_solution(&mut self, k: usize, x: &mut [f64]) {
         let y = &mut self.weights;
         y.clear();
         y.extend_from_slice(&self.rhs[..k]);
@@ -228,17 +233,11 @@ impl Gmres {
             let pivot = self.columns[column_start(i) + i];
             y[i] = if pivot == 0.0 { 0.0 } else { y[i] / pivot };
         }
-        self.direction.fill(0.0);
-        // The basis may still hold vectors of a longer cycle; the weights end the sum.
-        for (weight, basis) in self.weights.iter().zip(&self.basis) {
-            for (d, b) in self.direction.iter_mut().zip(basis) {
-                *d += weight * b;
+        // There may still be directions of a longer cycle; the weights end the sum.
+        for (weight, direction) in self.weights.iter().zip(&self.directions) {
+            for (to, d) in x.iter_mut().zip(direction) {
+                *to += weight * d;
             }
-        }
-        // The preconditioner is linear, so that one application to the sum is enough.
-        system.precondition(&mut self.direction);
-        for (to, d) in x.iter_mut().zip(&self.direction) {
-            *to += d;
         }
     }
 }

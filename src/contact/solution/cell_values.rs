@@ -1,6 +1,7 @@
 //! Values per cell as the client reads them: with units, and only those requested.
 
 use crate::contact::case::words::solver::Output;
+use crate::contact::numerics::length::length;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::motion_answer::SolvedFields;
@@ -65,6 +66,6 @@ pub(crate) fn point_fields(
 /// Largest tangential traction in the cells of a patch, in MPa.
 pub(crate) fn traction_max(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64 {
     let [x, y] = &fields.tangential.traction;
-    let lengths = level.patch_cells(patch).map(|i| x[i].hypot(y[i]));
+    let lengths = level.patch_cells(patch).map(|i| length(x[i], y[i]));
     lengths.fold(0.0, f64::max) * level.scale.traction
 }

@@ -24,6 +24,9 @@ const SHARE_BENT: f64 = 0.3;
 /// See [`SHARE_BENT`].
 const SHARE_BENT_TARGET: f64 = 0.2;
 
+/// Largest number of motions from one comparison to the next. Chosen by judgement; how much it matters was not measured.
+const STRIDE_MAX: usize = 16;
+
 /// Changes of the resultants of every patch: to the three-point rule, to half the strips, to half the cells.
 type Changes = [Vec<Resultants>; 3];
 
@@ -234,4 +237,27 @@ pub fn apart(answer: &LevelAnswer) -> [Vec<f64>; 2] {
         let pairs = second[k].iter().zip(&answer.traction[k]);
         pairs.map(|(second, first)| second - first).collect()
     })
+}
+
+/// How many motions to go on to the next that is compared, `stride` after the last one, where they are `each` apart.
+pub(super) fn next_stride(
+    task: &RollingTask,
+    lenders: &[Lender],
+    stride: usize,
+    each: f64,
+    target: f64,
+) -> usize {
+    let [a, b, c] = lenders else {
+        return 1;
+    };
+    let each = if each > 0.0 { each } else { c.place - b.place };
+    let mut stride = (2 * stride).min(STRIDE_MAX);
+    while stride > 1 {
+        let off = bent(task, [a, b, c], each * stride as f64);
+        if is_straight(&off, [b, c], target) {
+            break;
+        }
+        stride /= 2;
+    }
+    stride
 }

@@ -184,7 +184,7 @@ pub(crate) fn to_target(
             let number = state.levels.level(plan)?;
             let level = state.levels.get(number);
             let motion = level.scale.motion(&asked.motion);
-            state.sweep.follows(number, &level, &motion)
+            state.sweep.follows(number, &motion)
         }
         None => false,
     };

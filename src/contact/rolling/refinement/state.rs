@@ -64,6 +64,23 @@ impl<'a> RefinementState<'a> {
         true
     }
 
+    /// Carries the tractions of the last motions on a level to another one: of all, or of all but the newest.
+    pub(crate) fn carry_steps(&mut self, numbers: [usize; 2], all: bool) {
+        let [from, to] = numbers.map(|number| self.levels.get(number));
+        let steps = self.sweep.trapezoids(numbers[0]);
+        let count = if all {
+            steps.len()
+        } else {
+            steps.len().saturating_sub(1)
+        };
+        for (motion, traction) in steps.iter().take(count) {
+            let motion = to.scale.motion(&from.scale.creepages(motion));
+            let nested = nested_tractions(&from, traction, &to);
+            let sweep = &mut self.sweep;
+            sweep.remember_rules(numbers[1], motion, nested.clone(), nested);
+        }
+    }
+
     /// The ellipses that stand for the patches.
     pub fn ellipses(&self) -> &[LoadEllipse] {
         let footprint = self.task.footprint;

@@ -1,36 +1,33 @@
 //! Stretches of a sweep: nearby motions on a line that the same mesh serves. Some of them are compared with the companion meshes; those in
 //! between are solved with one rule only and borrow the result of the comparison from their neighbours.
 
+use std::ops::ControlFlow;
+
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
-use crate::contact::rolling::answer::{LevelFailure, Work};
+use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::mesh_plan::Regime;
-use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
-use crate::contact::rolling::methods::boundary_element::task::FEW_STEPS;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::error_estimate::Indicators;
-use crate::contact::rolling::refinement::lender::{Lender, apart, bent, borrow, is_straight};
+use crate::contact::rolling::refinement::finer_by_table;
+use crate::contact::rolling::refinement::lender::{Lender, apart, borrow, next_stride};
 use crate::contact::rolling::refinement::level_solve::{
-    JudgedAnswer, MotionTask, SolvedLevel, add_three_point, answer_on, indicators_on, level_task,
+    JudgedAnswer, MotionTask, SolvedLevel, add_three_point, indicators_on,
 };
-use crate::contact::rolling::refinement::refine;
-use crate::contact::rolling::refinement::refine::ComparedAnswer;
+use crate::contact::rolling::refinement::refine::{self, ComparedAnswer};
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::refinement::sweep_line::SweepLine;
+use crate::contact::rolling::refinement::swept_level::{self, LevelStart};
+use crate::contact::rolling::refinement::trials::Trials;
 use crate::contact::rolling::refinement::waiting::{Compared, Waiting};
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::task::RollingTask;
 
-/// Largest number of motions from one comparison to the next. Chosen by judgement; how much it matters was not measured.
-const STRIDE_MAX: usize = 16;
-/// The same at the beginning of a stretch: motions are solved ahead, the last one is compared, and then others between, until what they lend is exact
+/// Number of motions from one comparison to the next at the beginning of a stretch: motions are solved ahead, the last one is compared, and then others between, until what they lend is exact
 /// enough. With 1 a map of 1000 motions at fixed spin takes 20 % more products, and the sweeps of `cargo bench --bench calibrate -- sweeps` 0 to 13 %
 /// more, but for curves of the fit half at 0.02, which take 11 % fewer; 4 lies between. As many estimates hold.
 const STRIDE_FIRST: usize = 8;
-/// Largest number of motions that are solved in the usual way after a failed start, before another start is tried. Of 80 rays and curves of
-/// `benches/calibrate` at 0.005 the slowest takes 6 % more products than without borrowing, 14 % without a pause.
-const PAUSE_MAX: usize = 16;
 
 /// The stretch that the last motions of a sweep belong to.
 #[derive(Debug, Default)]
@@ -53,10 +50,9 @@ pub struct Stretch {
     stride: usize,
     /// Work that led to no answer.
     lost: Work,
-    /// Number of motions in a row whose start failed.
-    vain: u32,
-    /// Motions to solve in the usual way before a start is tried again.
-    pause: usize,
+    trials: Trials,
+    /// The table told nothing on the finer mesh either.
+    finer_in_vain: bool,
 }
 
 impl Stretch {
@@ -74,17 +70,20 @@ impl Stretch {
     ) -> Result<Vec<MotionAnswer>, SolveError> {
         let place = self.place(state, &asked.motion);
         let mut begun = None;
-        if place.is_some() && self.may_try() {
+        if place.is_some() && self.trials.may_try() {
             begun = self.begin(task, state, asked, monitor)?;
-            self.tried(begun.is_some());
+            self.trials.tried(begun.is_some());
         }
         if let Some((place, solved)) = place.zip(begun) {
             self.last = Some(place);
-            if self.waiting.is_empty() && solved.indicators.is_by_table() {
-                return self
-                    .settled(task, state, solved, asked, target, monitor)
-                    .map(|point| vec![point]);
-            }
+            let solved = match self.by_table(task, state, asked, solved, target, monitor)? {
+                ControlFlow::Break(told) => {
+                    let point = self.settled(task, state, told, asked, target, monitor)?;
+                    self.follow(state)?;
+                    return Ok(vec![point]);
+                }
+                ControlFlow::Continue(solved) => solved,
+            };
             self.waiting.push(Waiting {
                 asked,
                 place,
@@ -103,23 +102,6 @@ impl Stretch {
         self.begin_anew(state, asked, &found, target);
         done.push(found.answer.point.into());
         Ok(done)
-    }
-
-    /// May a start be tried, and not only after a pause?
-    fn may_try(&mut self) -> bool {
-        let paused = self.pause > 0;
-        self.pause = self.pause.saturating_sub(1);
-        !paused
-    }
-
-    /// Takes note of a start that was tried; after every one that fails the pause is twice as long.
-    fn tried(&mut self, successful: bool) {
-        if successful {
-            self.vain = 0;
-        } else {
-            self.pause = (1 << self.vain.min(8)).min(PAUSE_MAX);
-            self.vain += 1;
-        }
     }
 
     /// Is nothing left to be settled?
@@ -165,28 +147,21 @@ impl Stretch {
         asked: MotionTask,
         monitor: &dyn Monitor,
     ) -> Result<Option<JudgedAnswer>, SolveError> {
-        let began = monitor.elapsed();
         let level = state.levels.used(self.level);
         let motion = level.scale.motion(&asked.motion);
-        let start = state.sweep.start(self.level, &level, &motion);
-        let Some(start) = start.and_then(|start| start.trapezoid) else {
+        let sweep = &state.sweep;
+        let Some(traction) = sweep.start_of_one_rule(self.level, &level, &motion) else {
             return Ok(None);
         };
-        let of_level = level_task(task, &level, &motion, asked.index);
-        let workspace = &mut state.workspace;
-        let found =
-            boundary_element::trapezoid_of_motion(of_level, &start, FEW_STEPS, workspace, monitor);
-        let tangential = match found {
-            Ok((Some(tangential), _)) => tangential,
-            Ok((None, work)) | Err(LevelFailure::NotConverged { work, .. }) => {
-                self.lost.add(work);
-                return Ok(None);
-            }
-            Err(LevelFailure::Stopped(stop)) => return Err(stop.into()),
+        let start = LevelStart {
+            level: self.level,
+            traction,
+            apart: &self.apart,
         };
-        let sweep = &mut state.sweep;
-        sweep.remember_alone(self.level, motion, &tangential.traction, &self.apart);
-        let mut solved = answer_on(task, state, self.level, asked, tangential, None);
+        let found = swept_level::solve(task, state, asked, &start, &mut self.lost, monitor)?;
+        let Some(solved) = found else {
+            return Ok(None);
+        };
         let serves = match solved.indicators {
             Indicators::ByTable { .. } => true,
             Indicators::Known(_) => false,
@@ -199,7 +174,6 @@ impl Stretch {
             self.lost.add(solved.point.work);
             return Ok(None);
         }
-        solved.point.seconds = (monitor.elapsed() - began).as_secs_f64();
         Ok(Some(solved))
     }
 
@@ -215,8 +189,7 @@ impl Stretch {
         *self = Stretch {
             stride: STRIDE_FIRST,
             lost: self.lost,
-            vain: self.vain,
-            pause: self.pause,
+            trials: self.trials,
             ..Stretch::default()
         };
         let point = &found.answer.point;
@@ -230,6 +203,56 @@ impl Stretch {
             self.apart = apart(&point.tangential);
             self.lenders.extend(lender);
         }
+    }
+
+    /// The answer of a motion if the table tells that its error meets the target, here or on a finer mesh, with which the stretch goes on.
+    fn by_table(
+        &mut self,
+        task: &RollingTask,
+        state: &mut RefinementState,
+        asked: MotionTask,
+        solved: JudgedAnswer,
+        target: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<ControlFlow<JudgedAnswer, JudgedAnswer>, SolveError> {
+        if !self.waiting.is_empty() {
+            return Ok(ControlFlow::Continue(solved));
+        }
+        if solved.indicators.is_by_table() {
+            return Ok(ControlFlow::Break(solved));
+        }
+        if self.finer_in_vain {
+            return Ok(ControlFlow::Continue(solved));
+        }
+        let lost = &mut self.lost;
+        let finer = finer_by_table::solve(task, state, asked, &solved, target, lost, monitor)?;
+        let Some(finer) = finer else {
+            self.finer_in_vain = true;
+            return Ok(ControlFlow::Continue(solved));
+        };
+        self.go_on_with(state, finer.point.level);
+        Ok(ControlFlow::Break(finer))
+    }
+
+    /// Goes on with the mesh that the next motion is to begin on, if it is another one.
+    fn follow(&mut self, state: &mut RefinementState) -> Result<(), SolveError> {
+        let here = state.levels.get(self.level).plan;
+        if let Some(next) = state.sweep.begin.filter(|next| *next != here) {
+            let number = state.levels.level(next)?;
+            state.carry_steps([self.level, number], true);
+            self.go_on_with(state, number);
+        }
+        Ok(())
+    }
+
+    /// Goes on with another mesh, on which nothing was compared.
+    fn go_on_with(&mut self, state: &RefinementState, number: usize) {
+        let cells = state.levels.get(number).mesh.cells();
+        self.level = number;
+        self.apart = [0, 1].map(|_| vec![0.0; cells]);
+        self.lenders.clear();
+        self.stride = STRIDE_FIRST;
+        self.finer_in_vain = false;
     }
 
     /// Compares the last motion that waits, and as many of the others as it takes; all others borrow.
@@ -259,7 +282,7 @@ impl Stretch {
         }
         lenders.drain(..lenders.len().saturating_sub(3));
         self.lenders = lenders;
-        self.stride = self.next_stride(task, each, target);
+        self.stride = next_stride(task, &self.lenders, self.stride, each, target);
         Ok(done)
     }
 
@@ -299,23 +322,6 @@ impl Stretch {
             }
         }
         Ok(found.answer.point.into())
-    }
-
-    /// How many motions to go on to the next that is compared, where they are `each` apart.
-    fn next_stride(&self, task: &RollingTask, each: f64, target: f64) -> usize {
-        let [a, b, c] = &self.lenders[..] else {
-            return 1;
-        };
-        let each = if each > 0.0 { each } else { c.place - b.place };
-        let mut stride = (2 * self.stride).min(STRIDE_MAX);
-        while stride > 1 {
-            let off = bent(task, [a, b, c], each * stride as f64);
-            if is_straight(&off, [b, c], target) {
-                break;
-            }
-            stride /= 2;
-        }
-        stride
     }
 
     /// Solves a motion that waits with the other rule and on the companions.

@@ -8,7 +8,7 @@ use crate::contact::rolling::refinement::interpolate;
 use crate::contact::rolling::start::Start;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
-/// A start is extrapolated only for motions on the line through the last two; the distance from it may be this fraction of the step.
+/// A start is extrapolated only for motions on the line through the last two, or through the last one from rest; the distance from it may be this fraction of the step.
 /// Numeric safety, not tuned.
 const STRAIGHT: f64 = 1e-6;
 /// Longest step that is extrapolated, in steps between the last two motions: equal steps with some room. 1.1 and 2.5 are alike on sweeps
@@ -120,6 +120,14 @@ impl SweepState {
         push(&mut self.steps, step);
     }
 
+    /// Motions and tractions that are remembered on a level, the newest last.
+    pub(crate) fn trapezoids(&self, number: usize) -> Vec<(Motion, [Vec<f64>; 2])> {
+        let steps = self.steps.iter().filter(|step| step.level == number);
+        steps
+            .map(|step| (step.motion, step.trapezoid.clone()))
+            .collect()
+    }
+
     /// Forgets a level.
     pub fn forget(&mut self, number: usize) {
         self.steps.retain(|step| step.level != number);
@@ -172,14 +180,31 @@ impl SweepState {
     /// the motions that began lines of the sweep.
     #[must_use]
     pub fn start(&self, number: usize, level: &StripMesh, motion: &Motion) -> Option<Start> {
-        start_from(&self.steps, number, level, motion)
-            .or_else(|| start_from(&self.heads, number, level, motion))
+        let way = Way::of(&self.steps, number, motion)
+            .or_else(|| Way::of(&self.heads, number, motion))?;
+        Some(Start {
+            three_point: way.traction(|step| &step.three_point, &level.bound),
+            trapezoid: Some(way.traction(|step| &step.trapezoid, &level.bound)),
+        })
+    }
+
+    /// The same of the trapezoid rule alone.
+    #[must_use]
+    pub(crate) fn start_of_one_rule(
+        &self,
+        number: usize,
+        level: &StripMesh,
+        motion: &Motion,
+    ) -> Option<[Vec<f64>; 2]> {
+        let way = Way::of(&self.steps, number, motion)
+            .or_else(|| Way::of(&self.heads, number, motion))?;
+        Some(way.traction(|step| &step.trapezoid, &level.bound))
     }
 
     /// Does a motion follow from the last ones on a level?
     #[must_use]
-    pub fn follows(&self, number: usize, level: &StripMesh, motion: &Motion) -> bool {
-        start_from(&self.steps, number, level, motion).is_some()
+    pub fn follows(&self, number: usize, motion: &Motion) -> bool {
+        Way::of(&self.steps, number, motion).is_some()
     }
 
     /// Remembers the last answer on a level as one that began a line, and where the next such motion may begin.
@@ -202,38 +227,51 @@ fn push(steps: &mut Vec<Remembered>, step: Remembered) {
     steps.push(step);
 }
 
-/// See [`SweepState::start`].
-fn start_from(
-    steps: &[Remembered],
-    number: usize,
-    level: &StripMesh,
-    motion: &Motion,
-) -> Option<Start> {
-    let mut steps = steps.iter().rev().filter(|s| s.level == number);
-    let last = steps.next()?;
-    let to_go = difference(motion, &last.motion);
-    let Some((before, along)) = steps.next().and_then(|before| {
-        let step = difference(&last.motion, &before.motion);
-        let along = on_line(to_go, step)?;
-        (along > 0.0 && along <= STEP_MAX).then_some((before, along))
-    }) else {
-        return is_near(motion, &last.motion).then(|| Start {
-            three_point: last.three_point.clone(),
-            trapezoid: Some(last.trapezoid.clone()),
+/// How the start of a motion follows from the last ones on its level: the last tractions times a number, or beyond those before.
+struct Way<'a> {
+    last: &'a Remembered,
+    times: f64,
+    /// And how many of the last step to go on.
+    before: Option<(&'a Remembered, f64)>,
+}
+
+impl<'a> Way<'a> {
+    fn of(steps: &'a [Remembered], number: usize, motion: &Motion) -> Option<Way<'a>> {
+        let mut steps = steps.iter().rev().filter(|s| s.level == number);
+        let last = steps.next()?;
+        let to_go = difference(motion, &last.motion);
+        let before = steps.next().and_then(|before| {
+            let step = difference(&last.motion, &before.motion);
+            let along = on_line(to_go, step)?;
+            (along > 0.0 && along <= STEP_MAX).then_some((before, along))
         });
-    };
-    let beyond = |of: fn(&Remembered) -> &[Vec<f64>; 2]| {
+        let times = match before {
+            Some(_) => 1.0,
+            None => from_rest(motion, &last.motion)
+                .or_else(|| is_near(motion, &last.motion).then_some(1.0))?,
+        };
+        Some(Way {
+            last,
+            times,
+            before,
+        })
+    }
+
+    /// The tractions of a rule, within their discs.
+    fn traction(&self, rule: fn(&Remembered) -> &[Vec<f64>; 2], bound: &[f64]) -> [Vec<f64>; 2] {
         let mut values = [0, 1].map(|k| -> Vec<f64> {
-            let pairs = of(last)[k].iter().zip(&of(before)[k]);
-            pairs.map(|(h, p)| h + along * (h - p)).collect()
+            let last = &rule(self.last)[k];
+            match self.before {
+                None => last.iter().map(|t| self.times * t).collect(),
+                Some((before, along)) => {
+                    let pairs = last.iter().zip(&rule(before)[k]);
+                    pairs.map(|(t, before)| t + along * (t - before)).collect()
+                }
+            }
         });
-        shrink(&mut values, &level.bound);
+        shrink(&mut values, bound);
         values
-    };
-    Some(Start {
-        three_point: beyond(|step| &step.three_point),
-        trapezoid: Some(beyond(|step| &step.trapezoid)),
-    })
+    }
 }
 
 /// How many of a step a way is, if both lie on one line.
@@ -241,6 +279,14 @@ fn on_line(way: [f64; 3], step: [f64; 3]) -> Option<f64> {
     let along = dot(way, step) / dot(step, step);
     let aside = [0, 1, 2].map(|k| way[k] - along * step[k]);
     (dot(aside, aside).sqrt() <= STRAIGHT * dot(way, way).sqrt()).then_some(along)
+}
+
+/// How many times the last motion this one is, if both lie on a line from rest and are not far apart: tractions that stick grow in proportion.
+fn from_rest(motion: &Motion, last: &Motion) -> Option<f64> {
+    let along = on_line(components(motion), components(last))?;
+    (1.0 / (1.0 + STEP_MAX)..=1.0 + STEP_MAX)
+        .contains(&along)
+        .then_some(along)
 }
 
 /// Is a motion so near the last one that what was found there serves it?

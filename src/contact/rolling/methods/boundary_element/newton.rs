@@ -173,7 +173,9 @@ impl<'a> Newton<'a> {
             before.copy_from_slice(t);
             self.linearise(law, t, rhs, workspace, &mut report);
             let NewtonWorkspace { blocks, linear, .. } = &mut *workspace;
-            blocks.factor(&self.own, self.equations, linear);
+            // Where a start is near. Iterations from far, which may cycle, get blocks that leave nothing out.
+            let by_axes = law.steps_max <= FREE_STEPS;
+            blocks.factor(&self.own, self.equations, linear, by_axes);
             let inner = inner_tolerance(report.residual, last, law.tolerance);
             self.linear_step(rhs, inner, step, workspace, monitor, &mut report)?;
             last = report.residual;
