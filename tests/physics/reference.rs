@@ -254,3 +254,14 @@ pub fn assert_none(what: &str, failures: &[String]) {
         failures.join("\n")
     );
 }
+
+/// What the cells of the first patch carry together in motion `k`, in N: the sums of tractions times areas, along x and along y.
+pub fn force_of_cells(fields: &Fields, k: usize) -> [f64; 2] {
+    let patch = &fields.patches[0];
+    let (cells, values) = (patch.cells(k), &patch.points[k]);
+    [&values.traction_x_mpa, &values.traction_y_mpa].map(|traction| {
+        let areas = cells.dx_mm.iter().zip(&cells.dy_mm);
+        let pairs = traction.as_ref().expect("tractions").iter().zip(areas);
+        pairs.map(|(t, (dx, dy))| t * dx * dy).sum()
+    })
+}

@@ -14,7 +14,7 @@ use railhead::contact::solution::words::fields::Fields;
 use railhead::contact::solve_slice;
 use serde_json::{Value, json};
 
-use crate::reference::{solve, solve_without_table};
+use crate::reference::{force_of_cells, solve, solve_without_table};
 
 fn case(motion: &Value, target: f64) -> Value {
     json!({
@@ -255,14 +255,7 @@ fn the_default_outputs_of_a_sweep_with_spin_meet_their_target() {
     assert!(patch.meshes.len() > 1, "motions have meshes of their own");
     for (k, point) in solution.patches[0].points.iter().enumerate() {
         assert_eq!(point.target_met, Some(true), "motion {k}");
-        let (cells, values) = (patch.cells(k), &patch.points[k]);
-        let traction = values.traction_x_mpa.as_ref().expect("tractions");
-        let areas = cells.dx_mm.iter().zip(&cells.dy_mm);
-        let sum: f64 = traction
-            .iter()
-            .zip(areas)
-            .map(|(t, (dx, dy))| t * dx * dy)
-            .sum();
+        let [sum, _] = force_of_cells(&fields, k);
         let estimate = point.error_estimate.expect("an estimate").force_x_n;
         assert!(
             (sum - point.force_x_n).abs() <= estimate,

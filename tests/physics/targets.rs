@@ -3,7 +3,7 @@
 use railhead::contact::remark::figure::Figure;
 use serde_json::json;
 
-use crate::reference::{HERTZ_CLASSES, ReferenceCase, cases, median, solve};
+use crate::reference::{HERTZ_CLASSES, ReferenceCase, cases, force_of_cells, median, solve};
 
 /// True and estimated error relative to μN, and the cells of the finest mesh, for one case and target.
 struct Outcome {
@@ -167,15 +167,8 @@ fn tractions_add_up_to_the_resultants_where_nothing_tells_the_error() {
         "outputs": ["resultants", "tractions"],
     });
     let (solution, fields) = solve(&case);
-    let (point, patch) = (&solution.patches[0].points[0], &fields.patches[0]);
-    let cells = patch.cells(0);
-    let traction = patch.points[0].traction_y_mpa.as_ref().unwrap();
-    let areas = cells.dx_mm.iter().zip(&cells.dy_mm);
-    let sum: f64 = traction
-        .iter()
-        .zip(areas)
-        .map(|(t, (x, y))| t * x * y)
-        .sum();
+    let point = &solution.patches[0].points[0];
+    let [_, sum] = force_of_cells(&fields, 0);
     let estimate = point.error_estimate.map_or(0.0, |error| error.force_y_n);
     let apart = (point.force_y_n - sum).abs();
     assert!(
