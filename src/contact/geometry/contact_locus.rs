@@ -45,7 +45,7 @@ const LOWERING_FIRST: f64 = 0.032;
 /// Steps by which a lowering is estimated within its bracket, which the first steps narrow to about a hundredth. It changes times, no answer.
 const SECANTS: usize = 6;
 /// Clearance in mm below which the inclination of a line is kept: more than usual loads lower a wheel. It changes times, no answer.
-const NEAR: f64 = 0.3;
+const NEAR: f64 = 0.12;
 
 /// Rail and wheel above each other, line by line along x.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,6 +54,8 @@ pub struct ContactLocus<'g> {
     pub(crate) lines: &'g [LocusPoint],
     /// Which lines share a gap, if that is decided for all heights.
     pub(crate) grouping: Option<Grouping>,
+    /// A force over the contact modulus in mm², and the lowering in mm that was estimated for it before.
+    pub(crate) estimated: Option<[f64; 2]>,
     /// Height of the wheel's centre in mm at which the bodies just touch.
     pub touch: f64,
 }
@@ -177,6 +179,7 @@ impl<'g> ContactLocus<'g> {
             geometry,
             lines: &found.lines,
             grouping: None,
+            estimated: None,
             touch: found.touch,
         })
     }
@@ -218,6 +221,9 @@ impl<'g> ContactLocus<'g> {
     /// horizontal: `N = 4/3 E* √(A/π) δ`, exact for paraboloids. Near ones act on each other.
     #[must_use]
     pub fn estimated_lowering(&self, force: f64) -> f64 {
+        if let Some([_, known]) = self.estimated.filter(|[of, _]| *of == force) {
+            return known;
+        }
         let (mut low, mut high) = (0.0_f64, LOWERING_FIRST);
         let below = |lines: &[LocusPoint], lowering: f64| -> Vec<LocusPoint> {
             let inside = |line: &&LocusPoint| line.clearance < 0.5 * lowering;

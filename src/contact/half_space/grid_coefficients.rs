@@ -64,9 +64,10 @@ impl NullaryFnOnce for Corners<'_> {
 
 /// The coefficients and their mirror images for negative i, row by row.
 pub(crate) fn lines(nx: usize, coefficients: &[f64]) -> Vec<f64> {
-    let both = |row: &[f64]| -> Vec<f64> {
-        let images = row[1..].iter().rev().copied();
-        images.chain(row.iter().copied()).collect()
-    };
-    coefficients.chunks_exact(nx).flat_map(both).collect()
+    let mut lines = Vec::with_capacity(coefficients.len() / nx * (2 * nx - 1));
+    for row in coefficients.chunks_exact(nx) {
+        lines.extend(row[1..].iter().rev());
+        lines.extend_from_slice(row);
+    }
+    lines
 }

@@ -195,16 +195,7 @@ impl<T: FftFloat> GridOperator<T> {
         Arch::new().dispatch(self.sums.of_pairs(pairs, first..last + 1, spectra));
         self.plans.backward.process_with_scratch(pairs, scratch);
         for (k, pair) in pairs.chunks_exact(width).enumerate() {
-            let pair = &pair[..lines.cells];
-            lines.each(2 * k, |i, place| {
-                displacement[place] = up * pair[i].re.into();
-            });
-            if 2 * k + 1 < lines.count {
-                let next = 2 * k + 1;
-                lines.each(next, |i, place| {
-                    displacement[place] = up * pair[i].im.into();
-                });
-            }
+            spread(&pair[..lines.cells], 2 * k, lines, up, displacement);
         }
     }
 
@@ -250,15 +241,44 @@ fn fill<T: FftFloat>(
 ) {
     let zero = T::zero();
     let (own, padding) = pair.split_at_mut(lines.cells);
-    lines.each(one, |i, place| {
-        own[i] = Complex::new(of(values[place]), zero);
-    });
-    if one + 1 < lines.count {
-        lines.each(one + 1, |i, place| {
-            own[i].im = of(values[place]);
+    if one + 1 == lines.count {
+        lines.each(one, |i, place| {
+            own[i] = Complex::new(of(values[place]), zero);
         });
+    } else if lines.along == 1 {
+        let (re, im) = values[one * lines.between..].split_at(lines.cells);
+        for ((cell, re), im) in own.iter_mut().zip(re).zip(im) {
+            *cell = Complex::new(of(*re), of(*im));
+        }
+    } else {
+        for (cell, row) in own.iter_mut().zip(values.chunks_exact(lines.along)) {
+            *cell = Complex::new(of(row[one]), of(row[one + 1]));
+        }
     }
     padding.fill(Complex::new(zero, zero));
+}
+
+/// What [`fill`] does, the other way, and times a factor.
+fn spread<T: FftFloat>(
+    pair: &[Complex<T>],
+    one: usize,
+    lines: GridLines,
+    factor: f64,
+    values: &mut [f64],
+) {
+    let of = |part: T| factor * part.into();
+    if one + 1 == lines.count {
+        lines.each(one, |i, place| values[place] = of(pair[i].re));
+    } else if lines.along == 1 {
+        let (re, im) = values[one * lines.between..].split_at_mut(lines.cells);
+        for ((cell, re), im) in pair.iter().zip(re).zip(im) {
+            (*re, *im) = (of(cell.re), of(cell.im));
+        }
+    } else {
+        for (cell, row) in pair.iter().zip(values.chunks_exact_mut(lines.along)) {
+            (row[one], row[one + 1]) = (of(cell.re), of(cell.im));
+        }
+    }
 }
 
 /// See [`GridOperator::add`]; compiled for the instruction set of this machine.

@@ -5,7 +5,9 @@ use crate::contact::numerics::cubic::{Cubic, interval};
 /// Value of the curve with these values and slopes at the nodes of an ascending axis, at least 2; beyond its ends that of the
 /// outermost cubics.
 pub(crate) fn value(axis: &[f64], values: &[f64], slopes: &[f64], at: f64) -> f64 {
-    value_at(axis, values, slopes, &Place::new(axis, at))
+    let Place { node, share } = Place::new(axis, at);
+    let ends = |of: &[f64]| [of[node], of[node + 1]];
+    Cubic::with_slopes(axis, node, ends(values), ends(slopes)).value(share)
 }
 
 /// A place on an axis, found once for the curves of many rows.
@@ -14,7 +16,7 @@ pub(crate) struct Place {
     /// The node at the start of its interval.
     pub(crate) node: usize,
     /// How far along the interval it lies: 0 at its start, 1 at its end.
-    share: f64,
+    pub(crate) share: f64,
 }
 
 impl Place {
@@ -26,21 +28,6 @@ impl Place {
             share: (at - axis[node]) / (axis[node + 1] - axis[node]),
         }
     }
-
-    /// The same on the axis without its first nodes, of which there are `fewer`.
-    pub(crate) fn on_part(self, fewer: usize) -> Place {
-        Place {
-            node: self.node - fewer,
-            ..self
-        }
-    }
-}
-
-/// The same as [`value`] at a place.
-pub(crate) fn value_at(axis: &[f64], values: &[f64], slopes: &[f64], place: &Place) -> f64 {
-    let i = place.node;
-    let ends = |of: &[f64]| [of[i], of[i + 1]];
-    Cubic::with_slopes(axis, i, ends(values), ends(slopes)).value(place.share)
 }
 
 /// Values at any places of the curve that has no extreme between its nodes (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat.
@@ -121,47 +108,76 @@ pub(crate) const SLOPE_REACH: usize = 2;
 /// adjoining chords' slopes, 0 where these differ in sign (the limiter of van Leer 1974), which keeps the curve from overshooting
 /// the values. At the ends the parabola of the adjacent node is used. A slope inside depends on [`SLOPE_REACH`] values on either side.
 pub(crate) fn limited_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
-    /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
-    const SLOPE_LIMIT: f64 = 8.0;
-    let n = axis.len();
-    let rises: Vec<f64> = (1..n)
-        .map(|k| (values[k] - values[k - 1]) / (axis[k] - axis[k - 1]))
-        .collect();
-    if n == 2 {
-        return vec![rises[0]; 2];
-    }
-    let bend = |k: usize| 2.0 * (rises[k] - rises[k - 1]) / (axis[k + 1] - axis[k - 1]);
-    let bends: Vec<f64> = (0..n).map(|k| bend(k.clamp(1, n - 2))).collect();
-    let allowed = |k: usize| {
-        SLOPE_LIMIT
-            * bends[k.saturating_sub(1)]
-                .abs()
-                .min(bends[(k + 1).min(n - 1)].abs())
-    };
-    // Share of the parabola in a slope.
-    let trust = |k: usize| {
-        let (bend, allowed) = (bends[k].abs(), allowed(k));
-        if bend <= allowed { 1.0 } else { allowed / bend }
-    };
-    let slope = |k: usize| {
-        let (before, after) = (rises[k - 1], rises[k]);
-        let widths = [axis[k] - axis[k - 1], axis[k + 1] - axis[k]];
-        let parabola = (before * widths[1] + after * widths[0]) / (widths[0] + widths[1]);
-        let trust = trust(k);
-        if trust == 1.0 {
-            return parabola;
+    let mut slopes = LimitedSlopes::default();
+    slopes.find(axis, values);
+    slopes.slopes
+}
+
+/// [`limited_slopes`] of one curve after the other, with room that is kept.
+#[derive(Debug, Default)]
+pub(crate) struct LimitedSlopes {
+    rises: Vec<f64>,
+    bends: Vec<f64>,
+    /// Those of the last curve.
+    pub(crate) slopes: Vec<f64>,
+}
+
+impl LimitedSlopes {
+    /// Finds the slopes of a curve.
+    pub(crate) fn find(&mut self, axis: &[f64], values: &[f64]) {
+        /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
+        const SLOPE_LIMIT: f64 = 8.0;
+        let n = axis.len();
+        let LimitedSlopes {
+            rises,
+            bends,
+            slopes,
+        } = self;
+        rises.clear();
+        rises.extend((1..n).map(|k| (values[k] - values[k - 1]) / (axis[k] - axis[k - 1])));
+        slopes.clear();
+        slopes.resize(n, rises[0]);
+        if n == 2 {
+            return;
         }
-        let steepness = before.abs() + after.abs();
-        let mean = (before * after.abs() + after * before.abs()) / steepness;
-        trust * parabola + (1.0 - trust) * mean
-    };
-    let mut slopes: Vec<f64> = vec![0.0; n];
-    for (k, value) in slopes.iter_mut().enumerate().take(n - 1).skip(1) {
-        *value = slope(k);
+        // The outermost two have those of their neighbours.
+        bends.clear();
+        bends.push(0.0);
+        bends.extend(
+            (1..n - 1).map(|k| 2.0 * (rises[k] - rises[k - 1]) / (axis[k + 1] - axis[k - 1])),
+        );
+        bends.push(bends[n - 2]);
+        bends[0] = bends[1];
+        let allowed = |k: usize| {
+            SLOPE_LIMIT
+                * bends[k.saturating_sub(1)]
+                    .abs()
+                    .min(bends[(k + 1).min(n - 1)].abs())
+        };
+        // Share of the parabola in a slope.
+        let trust = |k: usize| {
+            let (bend, allowed) = (bends[k].abs(), allowed(k));
+            if bend <= allowed { 1.0 } else { allowed / bend }
+        };
+        let slope = |k: usize| {
+            let (before, after) = (rises[k - 1], rises[k]);
+            let widths = [axis[k] - axis[k - 1], axis[k + 1] - axis[k]];
+            let parabola = (before * widths[1] + after * widths[0]) / (widths[0] + widths[1]);
+            let trust = trust(k);
+            if trust == 1.0 {
+                return parabola;
+            }
+            let steepness = before.abs() + after.abs();
+            let mean = (before * after.abs() + after * before.abs()) / steepness;
+            trust * parabola + (1.0 - trust) * mean
+        };
+        for (k, value) in slopes.iter_mut().enumerate().take(n - 1).skip(1) {
+            *value = slope(k);
+        }
+        slopes[0] = rises[0] - 0.5 * trust(1) * bends[1] * (axis[1] - axis[0]);
+        slopes[n - 1] =
+            rises[n - 2] + 0.5 * trust(n - 2) * bends[n - 2] * (axis[n - 1] - axis[n - 2]);
     }
-    slopes[0] = rises[0] - 0.5 * trust(1) * bends[1] * (axis[1] - axis[0]);
-    slopes[n - 1] = rises[n - 2] + 0.5 * trust(n - 2) * bends[n - 2] * (axis[n - 1] - axis[n - 2]);
-    slopes
 }
 
 /// Slopes that favour the straighter side, so that the curve stays close to the chords where a spline overshoots (H. Akima, Journal of

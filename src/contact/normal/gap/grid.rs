@@ -228,12 +228,13 @@ impl PressureGrid {
     pub(crate) fn sides_in_contact(&self, pressure: &[f64]) -> Vec<GridSide> {
         let [nx, ny] = self.cells;
         let touches = |side: &GridSide| {
-            let last = if side.upper {
-                self.cells[side.axis] - 1
+            let [count, stride, across] = if side.axis == 0 {
+                [ny, nx, 1]
             } else {
-                0
+                [nx, 1, nx]
             };
-            (0..nx * ny).any(|k| pressure[k] > 0.0 && [k % nx, k / nx][side.axis] == last)
+            let last = (self.cells[side.axis] - 1) * usize::from(side.upper) * across;
+            (0..count).any(|k| pressure[last + k * stride] > 0.0)
         };
         let all = [(0, false), (0, true), (1, false), (1, true)];
         let sides = all.map(|(axis, upper)| GridSide { axis, upper });
@@ -270,18 +271,20 @@ impl PressureGrid {
         resolution: GridFineness,
         limits: Window,
     ) -> NextGrid {
-        let width = self.cells[0];
-        let cell = |k: usize| [k % width, k / width];
         let mut whole = Extent::default();
-        for k in (0..pressed.pressure.len()).filter(|k| pressed.distance[*k] < near) {
-            whole.add(cell(k));
+        for (j, row) in pressed.distance.chunks_exact(self.cells[0]).enumerate() {
+            let is_near = |distance: &f64| *distance < near;
+            if let Some(first) = row.iter().position(is_near) {
+                whole.add([first, j]);
+                whole.add([row.iter().rposition(is_near).unwrap_or(first), j]);
+            }
         }
         let mut contact = Extent::default();
         let total: f64 = pressed.pressure.iter().sum();
         let mut steps = [f64::INFINITY; 2];
         for patch in self.patches(&pressed.pressure) {
             let extent = self.extent(&patch);
-            patch.iter().for_each(|k| contact.add(cell(*k)));
+            contact.join(extent);
             let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
             if load >= resolution.share_min * total {
                 for (k, step) in steps.iter_mut().enumerate() {
@@ -325,10 +328,16 @@ impl PressureGrid {
         })
     }
 
+    /// The range of some cells, which ascend.
     fn extent(&self, cells: &[usize]) -> Extent {
+        let width = self.cells[0];
         let mut extent = Extent::default();
+        let (mut j, mut first) = (0, 0);
         for k in cells {
-            extent.add([k % self.cells[0], k / self.cells[0]]);
+            while *k >= first + width {
+                (j, first) = (j + 1, first + width);
+            }
+            extent.add([k - first, j]);
         }
         extent
     }
@@ -353,6 +362,12 @@ impl Extent {
     fn add(&mut self, cell: [usize; 2]) {
         for (range, i) in self.0.iter_mut().zip(cell) {
             *range = [range[0].min(i), range[1].max(i)];
+        }
+    }
+
+    fn join(&mut self, other: Extent) {
+        for (range, [first, last]) in self.0.iter_mut().zip(other.0) {
+            *range = [range[0].min(first), range[1].max(last)];
         }
     }
 

@@ -1,7 +1,7 @@
 //! The gap between the undeformed bodies: samples, and a smooth surface through them.
 
-use crate::contact::numerics::cubic::{Cubic, interval};
-use crate::contact::numerics::hermite::{self, Place, SLOPE_REACH};
+use crate::contact::numerics::cubic::Cubic;
+use crate::contact::numerics::hermite::{self, LimitedSlopes, Place, SLOPE_REACH};
 
 /// Distance of the undeformed surfaces in mm, both bodies together, over the contact plane.
 #[derive(Debug, Clone, PartialEq)]
@@ -227,10 +227,13 @@ impl GapCurve {
 impl SampledSurface {
     fn new(x: &[f64], y: &[f64], samples: &[Vec<f64>]) -> SampledSurface {
         let mut slopes = vec![0.0; x.len() * y.len()];
+        let (mut column, mut across) = (Vec::new(), LimitedSlopes::default());
         for i in 0..x.len() {
-            let column: Vec<f64> = samples.iter().map(|row| row[i]).collect();
-            for (j, slope) in hermite::limited_slopes(y, &column).into_iter().enumerate() {
-                slopes[j * x.len() + i] = slope;
+            column.clear();
+            column.extend(samples.iter().map(|row| row[i]));
+            across.find(y, &column);
+            for (j, slope) in across.slopes.iter().enumerate() {
+                slopes[j * x.len() + i] = *slope;
             }
         }
         SampledSurface {
@@ -251,20 +254,28 @@ impl SampledSurface {
         let to = (last.unwrap_or(1) + SLOPE_REACH).min(width - 1);
         let columns = &self.x[from..=to];
         let mut out = Vec::with_capacity(x.len() * y.len());
+        let (mut line, mut cubics) = (Vec::new(), Vec::new());
+        let mut along = LimitedSlopes::default();
         for y in y {
-            let j = interval(&self.y, *y);
+            let Place { node: j, share } = Place::new(&self.y, *y);
             let (here, next) = (j * width, (j + 1) * width);
-            let line: Vec<f64> = (from..=to)
-                .map(|i| {
-                    let values = [here, next].map(|row| self.values[row + i]);
-                    let slopes = [here, next].map(|row| self.slopes[row + i]);
-                    Cubic::with_slopes(&self.y, j, values, slopes).at(*y)
-                })
-                .collect();
-            let slopes = hermite::limited_slopes(columns, &line);
-            let value =
-                |place: &Place| hermite::value_at(columns, &line, &slopes, &place.on_part(from));
-            out.extend(places.iter().map(value));
+            line.clear();
+            line.extend((from..=to).map(|i| {
+                let values = [here, next].map(|row| self.values[row + i]);
+                let slopes = [here, next].map(|row| self.slopes[row + i]);
+                Cubic::with_slopes(&self.y, j, values, slopes).value(share)
+            }));
+            along.find(columns, &line);
+            cubics.clear();
+            cubics.extend((1..columns.len()).map(|i| {
+                let ends = |of: &[f64]| [of[i - 1], of[i]];
+                Cubic::with_slopes(columns, i - 1, ends(&line), ends(&along.slopes))
+            }));
+            out.extend(
+                places
+                    .iter()
+                    .map(|place| cubics[place.node - from].value(place.share)),
+            );
         }
         out
     }

@@ -96,6 +96,7 @@ impl GridPressure {
             surprise: 0.0,
         };
         field.shapes = field.shapes_from_samples(&samples, count);
+        field.find_loads();
         field.images = field.find_images(&samples);
         Ok((field, samples))
     }

@@ -40,11 +40,17 @@ pub(crate) fn extend(grid: &SampleGrid, q: &mut [f64]) -> Vec<State> {
         .enumerate()
         .filter_map(|(k, near)| (near && states[k] == State::Unknown).then_some(k))
         .collect();
+    let nx = grid.x.len();
     // A sample three away along both axes is reached after six steps.
     for pass in 0..2 * RINGS {
+        let is_known = |k: usize| states.get(k).is_some_and(|state| *state != State::Unknown);
+        let reached = |k: usize| {
+            let beside = [k.wrapping_sub(1), k + 1, k.wrapping_sub(nx), k + nx];
+            beside.into_iter().any(is_known)
+        };
         let found: Vec<_> = missing
             .iter()
-            .map(|k| continued(grid, q, &states, *k, pass == 0))
+            .map(|k| reached(*k).then(|| continued(grid, q, &states, *k, pass == 0))?)
             .collect();
         let mut left = Vec::new();
         for (k, found) in missing.into_iter().zip(found) {

@@ -1,17 +1,44 @@
 //! The load centre of a pressure, and the same pressure moved or corrected.
 
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
+use crate::contact::normal::pressure_field::patch_cells::SampledLoad;
 
 impl GridPressure {
     /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean position weighted with the pressure.
     #[must_use]
     pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
+        if let Some(patch) = patch {
+            return self.shapes[patch].load.centre;
+        }
+        if let [shape] = &self.shapes[..] {
+            return shape.load.centre;
+        }
         let (mut weight, mut sum) = (0.0, [0.0; 2]);
-        self.each_load(patch, |[x, y], own| {
+        for SampledLoad {
+            weight: own,
+            centre: [x, y],
+        } in self.shapes.iter().map(|shape| shape.load)
+        {
             weight += own;
             sum = [sum[0] + own * x, sum[1] + own * y];
-        });
+        }
         sum.map(|sum| sum / weight)
+    }
+
+    /// Finds the loads of all patches, before their edges are placed.
+    pub(crate) fn find_loads(&mut self) {
+        let mut loads = vec![SampledLoad::default(); self.shapes.len()];
+        self.each_load(|patch, [x, y], own| {
+            let SampledLoad { weight, centre } = &mut loads[patch];
+            *weight += own;
+            *centre = [centre[0] + own * x, centre[1] + own * y];
+        });
+        for (shape, SampledLoad { weight, centre }) in self.shapes.iter_mut().zip(loads) {
+            shape.load = SampledLoad {
+                weight,
+                centre: centre.map(|sum| sum / weight),
+            };
+        }
     }
 
     /// Mean square distances `[along, across]` in mm² from the load centre of one patch, weighted with the pressure.
@@ -19,18 +46,20 @@ impl GridPressure {
     pub fn load_spread(&self, patch: usize) -> [f64; 2] {
         let [x0, y0] = self.load_centre(Some(patch));
         let (mut weight, mut sum) = (0.0, [0.0; 2]);
-        self.each_load(Some(patch), |[x, y], own| {
-            weight += own;
-            sum = [
-                sum[0] + own * (x - x0) * (x - x0),
-                sum[1] + own * (y - y0) * (y - y0),
-            ];
+        self.each_load(|at, [x, y], own| {
+            if at == patch {
+                weight += own;
+                sum = [
+                    sum[0] + own * (x - x0) * (x - x0),
+                    sum[1] + own * (y - y0) * (y - y0),
+                ];
+            }
         });
         sum.map(|sum| sum / weight)
     }
 
-    /// Tells place and load of every sample of one patch, or of all of them; loads are relative to the largest pressure in MPa, times mm².
-    fn each_load(&self, patch: Option<usize>, mut tell: impl FnMut([f64; 2], f64)) {
+    /// Tells patch, place and load of every sample; loads are relative to the largest pressure in MPa, times mm².
+    fn each_load(&self, mut tell: impl FnMut(usize, [f64; 2], f64)) {
         let share = |axis: &[f64], k: usize| 0.5 * (axis[k + 1] - axis[k - 1]);
         let (x, y) = (&self.grid.x, &self.grid.y);
         let rows = self
@@ -40,8 +69,9 @@ impl GridPressure {
         for (j, (row, cells)) in rows.enumerate() {
             for (i, (q, cell)) in row.iter().zip(cells).enumerate() {
                 // Values continued outside the contact are not positive, so a positive one is a sample and not in the padding.
-                if *q > 0.0 && patch.is_none_or(|patch| usize::from(*cell) == patch) {
-                    tell([x[i], y[j]], q.sqrt() * share(x, i) * share(y, j));
+                if *q > 0.0 {
+                    let load = q.sqrt() * share(x, i) * share(y, j);
+                    tell(usize::from(*cell), [x[i], y[j]], load);
                 }
             }
         }
@@ -60,6 +90,8 @@ impl GridPressure {
                 y_min - origin[1],
                 y_max - origin[1],
             ];
+            let [x, y] = shape.load.centre;
+            shape.load.centre = [x - origin[0], y - origin[1]];
         }
         if origin[1] != 0.0 {
             self.images.clear();
@@ -82,6 +114,9 @@ impl GridPressure {
             patch.area *= root * root;
             patch.extent = patch.extent.map(|at| root * at);
             patch.approach = patch.approach.map(|before| before + approach);
+            let SampledLoad { weight, centre } = &mut shape.load;
+            *weight *= root * root;
+            *centre = centre.map(|at| root * at);
         }
         self
     }

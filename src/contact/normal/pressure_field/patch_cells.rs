@@ -11,4 +11,13 @@ pub(crate) struct PatchShape {
     pub(crate) columns: RangeInclusive<usize>,
     pub(crate) rows: RangeInclusive<usize>,
     pub(crate) segments_per_strip: f64,
+    pub(crate) load: SampledLoad,
+}
+
+/// The load of some samples: the sum of their pressures relative to the largest one, times the areas they represent in mm², and their mean position
+/// `[x, y]` in mm, weighted so.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct SampledLoad {
+    pub(crate) weight: f64,
+    pub(crate) centre: [f64; 2],
 }

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal::pressure_field::patch_cells::PatchShape;
+use crate::contact::normal::pressure_field::patch_cells::{PatchShape, SampledLoad};
 use crate::contact::normal::pressure_field::sample_grid::{PADDING, SampleGrid};
 use crate::contact::numerics::maximum::maximum;
 use crate::contact::numerics::vanishing;
@@ -76,6 +76,7 @@ impl GridPressure {
                     columns: i0 - 2..=i1 + 1,
                     rows: j0 - 2..=j1 + 1,
                     segments_per_strip: f64::from(runs[label]) / (j1 - j0 + 1) as f64,
+                    load: SampledLoad::default(),
                 }
             })
             .collect()

@@ -93,10 +93,13 @@ impl WheelTask {
     /// # Errors
     /// As [`ContactLocus::new`].
     pub fn search(&self) -> Result<ContactLocus<'_>, String> {
-        let search = ContactLocus::new(&self.geometry)?;
+        let mut search = ContactLocus::new(&self.geometry)?;
         let expected = match self.loading {
             WheelLoad::Vertical(force) | WheelLoad::Normal(force) => {
-                search.estimated_lowering(force / self.contact_modulus)
+                let force = force / self.contact_modulus;
+                let lowering = search.estimated_lowering(force);
+                search.estimated = Some([force, lowering]);
+                lowering
             }
             WheelLoad::Lowering(lowering) => lowering,
         };

@@ -5,6 +5,7 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::mesh_plan::Regime;
+use crate::contact::rolling::refinement::constants::MARGIN;
 use crate::contact::rolling::refinement::level_solve::{JudgedAnswer, MotionTask};
 use crate::contact::rolling::refinement::mesh_policy::HalfDoublings;
 use crate::contact::rolling::refinement::refine::regime_of;
@@ -40,7 +41,9 @@ pub(super) fn solve(
         found => found,
     };
     let none = HalfDoublings::NONE;
-    let (plan, _) = state.policy.next(cells, none, excess, regime, false);
+    let (plan, _) = state
+        .policy
+        .next(cells, none, MARGIN * excess, regime, false);
     let number = state.levels.level(plan)?;
     let level = state.levels.get(number);
     state.carry_steps([coarse.point.level, number], false);

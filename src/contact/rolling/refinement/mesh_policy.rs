@@ -6,7 +6,7 @@ use crate::contact::method::Method;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
 use crate::contact::rolling::methods::fastsim;
-use crate::contact::rolling::refinement::constants::{MARGIN, SLACK, SLACK_POLE};
+use crate::contact::rolling::refinement::constants::{SLACK, SLACK_POLE};
 use crate::contact::rolling::resolution::Resolution;
 
 /// Cells of the first mesh of a patch that is not slender. On the first 160 ellipses of `cargo bench --bench calibrate ellipse` at the
@@ -148,7 +148,7 @@ impl MeshPolicy {
         self.plan(cells.round() as u32, regime)
     }
 
-    /// The mesh after one of so many cells whose error is `excess` times the target: errors fall about as 1/N. Motions of a sweep take
+    /// The mesh after one of so many cells that is to have `excess` times as many at least, rounded to half-doublings. Motions of a sweep take
     /// coarse steps, so that they share their meshes; a motion alone may take small ones.
     ///
     /// A mesh has not quite the cells that were `planned`, because strips are even in number and may miss a patch. The next plan is finer
@@ -164,7 +164,7 @@ impl MeshPolicy {
     ) -> (MeshPlan, HalfDoublings) {
         let here = self.half_doublings(cells);
         let least = if alone { 1 } else { 2 };
-        let step = ((2.0 * (MARGIN * excess).log2()).ceil() as i32).clamp(least, STEP_MAX);
+        let step = ((2.0 * excess.log2()).ceil() as i32).clamp(least, STEP_MAX);
         let finer = (here + step).max(planned.0.saturating_add(1));
         let finer = finer.min(self.largest());
         (self.at(finer, regime), HalfDoublings(finer))

@@ -8,7 +8,7 @@ use crate::contact::rolling::answer::{LevelExit, Work};
 use crate::contact::rolling::mesh_plan::{MeshPlan, Regime};
 use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion_answer::MotionAnswer;
-use crate::contact::rolling::refinement::companion_answer::CompanionAnswer;
+use crate::contact::rolling::refinement::companion_answer::{self, CompanionAnswer};
 use crate::contact::rolling::refinement::companions::Companion;
 use crate::contact::rolling::refinement::constants::{
     CELLS_FINE, CELLS_SHOWN, EXTRAPOLATED, FINE_TARGET, MARGIN, SHOWN_TARGET,
@@ -251,6 +251,7 @@ pub(crate) fn refined(
 ) -> Result<ComparedAnswer, SolveError> {
     let mut planned = HalfDoublings::NONE;
     loop {
+        let margin = companion_answer::margin(task, &found.companions);
         let solved = found.answer;
         let cells = state.levels.get(solved.point.level).mesh.cells();
         let larger = state.policy.is_refinable(cells, planned);
@@ -264,7 +265,7 @@ pub(crate) fn refined(
             break;
         }
         let excess = solved.point.error().map_or(1.0, |error| error / target);
-        let excess = excess.max(shown as f64 / (MARGIN * cells as f64));
+        let excess = (margin * excess).max(shown as f64 / cells as f64);
         let regime = regime_of(state, asked, &solved.point);
         let plan;
         (plan, planned) = state
