@@ -83,6 +83,8 @@ test('rolling that changes is written in the form, and its forces stand over the
 }));
 
 test('a wheel on a rail moves across and rolls through a history in the form', () => onPage('', async (page) => {
+  // Before that the first example may still come and take the place of what is written.
+  await sound(page);
   await page.locator('.code textarea').fill(JSON.stringify({ ...example('wheel-rail-flange'), load: { normal_force_n: 75_000 } }));
   await page.getByLabel('Lateral velocity').fill('-40');
   assert.equal((await json(page)).motion.wheelset.lateral_velocity_mm_per_s, -40);
