@@ -44,7 +44,8 @@ const LOWERING_MAX: f64 = 16.0;
 const LOWERING_FIRST: f64 = 0.032;
 /// Steps by which a lowering is estimated within its bracket, which the first steps narrow to about a hundredth. It changes times, no answer.
 const SECANTS: usize = 6;
-/// Clearance in mm below which the inclination of a line is kept: more than usual loads lower a wheel. It changes times, no answer.
+/// Clearance in mm below which the inclination of a line is found beforehand, about as far as usual loads lower a wheel; farther ones are found where
+/// they are asked for. It changes times, no answer.
 const NEAR: f64 = 0.12;
 
 /// Rail and wheel above each other, line by line along x.

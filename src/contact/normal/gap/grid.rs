@@ -233,8 +233,8 @@ impl PressureGrid {
             } else {
                 [nx, 1, nx]
             };
-            let last = (self.cells[side.axis] - 1) * usize::from(side.upper) * across;
-            (0..count).any(|k| pressure[last + k * stride] > 0.0)
+            let first = (self.cells[side.axis] - 1) * usize::from(side.upper) * across;
+            (0..count).any(|k| pressure[first + k * stride] > 0.0)
         };
         let all = [(0, false), (0, true), (1, false), (1, true)];
         let sides = all.map(|(axis, upper)| GridSide { axis, upper });
