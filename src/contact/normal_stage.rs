@@ -5,6 +5,7 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::gap::answer::{NormalError, NormalWork};
+use crate::contact::normal::gap::grid::GridFineness;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::problem::checked_case::CheckedCase;
@@ -45,7 +46,8 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprin
         NormalTask::Gap(task) => {
             let began = monitor.elapsed();
             let workspace = &mut GridWorkspace::default();
-            let mut found = solve_gap(case, task, 0.0, workspace, monitor)?;
+            let fineness = GridFineness::for_answer(case.run.target());
+            let mut found = solve_gap(case, task, fineness, 0.0, workspace, monitor)?;
             found.coupling_error = first_order_error;
             found.report = found.report.map(|report| NormalReport {
                 seconds: (monitor.elapsed() - began).as_secs_f64(),
@@ -59,19 +61,20 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprin
     }
 }
 
-/// Patches and pressures of a gap, whose load may be off by a part `load_error`, checked against the memory allowed; coupling error
-/// and time are left 0.
+/// Patches and pressures of a gap on grids as fine as told, whose load may be off by a part `load_error`, checked against the memory allowed;
+/// coupling error and time are left 0.
 ///
 /// # Errors
 /// As [`solve`].
 pub(crate) fn solve_gap(
     case: &CheckedCase,
     task: &GapTask,
+    fineness: GridFineness,
     load_error: f64,
     workspace: &mut GridWorkspace<f32>,
     monitor: &dyn Monitor,
 ) -> Result<SolvedFootprint, SolveError> {
-    let found = task.solve_for(case.run.target(), workspace, monitor)?;
+    let found = task.solve_as(fineness, workspace, monitor)?;
     let solved = SolvedFootprint {
         footprint: Footprint::computed(found.field, load_error),
         report: Some(found.report.with_time(0.0)),

@@ -13,6 +13,7 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::half_space::unlike_bodies::opening;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
+use crate::contact::normal::gap::grid::GridFineness;
 use crate::contact::normal::gap::seen::GapSeen;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
@@ -21,6 +22,7 @@ use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal_stage;
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::history;
@@ -115,6 +117,12 @@ impl UnlikeGap {
         let began = watch.elapsed();
         let rough = rough(case);
         let target = case.run.resolution.target_or_usual();
+        let mut fineness = GridFineness::for_answer(case.run.target());
+        if case.problem.history.is_some() {
+            // Peaks that only finer grids see are those of the coarse cells of the tractions; whether the gap itself is rough was found out
+            // without tractions.
+            fineness = fineness.alone();
+        }
         let workspace = &mut GridWorkspace::default();
         let mut found: Option<SolvedFootprint> = None;
         let mut before = None;
@@ -132,6 +140,7 @@ impl UnlikeGap {
             found = Some(normal_stage::solve_gap(
                 case,
                 &task,
+                fineness,
                 self.load_error,
                 workspace,
                 watch,
@@ -152,6 +161,10 @@ impl UnlikeGap {
         if left > PART_OF_TARGET * target {
             let remark = rounds_used_up(left, PART_OF_TARGET * target);
             solved.remarks.push(remark.into());
+        }
+        let rough = RemarkEntry::from(Remark::GapRough {});
+        if self.without.remarks.contains(&rough) {
+            solved.remarks.push(rough);
         }
         let mut seconds = (watch.elapsed() - began).as_secs_f64();
         if neighbour.is_none() {

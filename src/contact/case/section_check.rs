@@ -9,7 +9,7 @@ use crate::contact::case::wheel_task::profile;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
-use crate::contact::geometry::profile_quality::shape::{LikelyBody, looks_like};
+use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::problem::profile_points;
 use crate::contact::solution::words::profile_quality::SectionQuality;
 
@@ -39,7 +39,7 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
     };
     let read = [Body::Rail, Body::Wheel].map(|body| (body, profile(body, &section)));
     let (body, profile) = match read {
-        [(_, Ok(rail)), (_, Ok(wheel))] => match looks_like(rail.points().at) {
+        [(_, Ok(rail)), (_, Ok(wheel))] => match rail.looks_like() {
             Some(LikelyBody::Wheel) => (Body::Wheel, wheel),
             _ => (Body::Rail, rail),
         },

@@ -9,8 +9,10 @@ use crate::contact::geometry::crossing;
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead};
 use crate::contact::geometry::profile_quality::samples::Points;
+use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::geometry::profile_quality::{noise, shape};
 use crate::contact::numerics::spline::Spline;
+use crate::contact::once::Once;
 use crate::contact::remark::list::Remark;
 
 /// Length of the whole curve in mm that a profile may have; anything else is in another unit.
@@ -80,6 +82,7 @@ struct MeasuredCurve {
     smoothing: f64,
     /// Step of which the given coordinates are multiples, in mm.
     rounding: Option<f64>,
+    likely: Once<Option<LikelyBody>>,
 }
 
 impl Profile {
@@ -136,6 +139,7 @@ impl Profile {
             along,
             smoothing: reading.smoothing,
             rounding,
+            likely: Once::default(),
         };
         Ok(Profile::of(measured, remarks))
     }
@@ -161,6 +165,15 @@ impl Profile {
             ..(*self.measured).clone()
         };
         Profile::of(measured, self.remarks.clone())
+    }
+
+    /// The body that its points resemble.
+    pub(crate) fn looks_like(&self) -> Option<LikelyBody> {
+        let points = &self.measured.points;
+        *self
+            .measured
+            .likely
+            .get_or_make(|| shape::looks_like(points))
     }
 
     /// The points the curve was made from, z up, by increasing parameter of the curve.

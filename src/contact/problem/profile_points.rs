@@ -3,7 +3,7 @@
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::points::{Grain, advised_smoothing};
-use crate::contact::geometry::profile_quality::shape::{LikelyBody, looks_like};
+use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
@@ -91,5 +91,5 @@ pub fn misplaced(profile: &Profile, body: Body) -> Option<RemarkEntry> {
         profile: body.name(),
         like,
     };
-    (looks_like(profile.points().at) == Some(looks)).then(|| remark.at_pointer(pointer))
+    (profile.looks_like() == Some(looks)).then(|| remark.at_pointer(pointer))
 }

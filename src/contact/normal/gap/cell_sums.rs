@@ -21,9 +21,11 @@ pub(crate) struct Distances<'a> {
     pub(crate) weights: &'a CellWeights,
 }
 
-/// Subtracts the approach from the distances; the answer is their largest violation and the weighted sum of their squares in the contact.
+/// Subtracts the approach from the distances; the answer is their largest violation, and in the contact the weighted sums of their squares and of
+/// their products with what the last direction displaced.
 pub(crate) struct Parting<'a> {
     pub(crate) distance: &'a mut [f64],
+    pub(crate) displacement: &'a [f64],
     pub(crate) pressure: &'a [f64],
     pub(crate) weights: &'a CellWeights,
     pub(crate) approach: f64,
@@ -98,16 +100,21 @@ impl WithSimd for Distances<'_> {
 }
 
 impl WithSimd for Parting<'_> {
-    type Output = [f64; 2];
+    type Output = [f64; 3];
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> [f64; 2] {
+    fn with_simd<S: Simd>(self, simd: S) -> [f64; 3] {
         let zero = simd.splat_f64s(0.0);
         let approach = simd.splat_f64s(self.approach);
-        let (mut violation, mut square) = (zero, zero);
+        let (mut violation, mut square, mut along) = (zero, zero, zero);
         let (g, _) = S::as_mut_simd_f64s(self.distance);
-        let [p, area, yielding] = [self.pressure, &self.weights.area, &self.weights.yielding]
-            .map(|values| &S::as_simd_f64s(values).0[..g.len()]);
+        let [r, p, area, yielding] = [
+            self.displacement,
+            self.pressure,
+            &self.weights.area,
+            &self.weights.yielding,
+        ]
+        .map(|values| &S::as_simd_f64s(values).0[..g.len()]);
         for k in 0..g.len() {
             let here = simd.sub_f64s(g[k], approach);
             g[k] = here;
@@ -115,12 +122,14 @@ impl WithSimd for Parting<'_> {
             let [apart, over] = [simd.abs_f64s(here), simd.neg_f64s(here)];
             violation = simd.max_f64s(violation, simd.select_f64s(inside, apart, over));
             let own = simd.select_f64s(inside, here, zero);
-            let weight = simd.mul_f64s(area[k], yielding[k]);
-            square = simd.mul_add_e_f64s(weight, simd.mul_f64s(own, own), square);
+            let weighted = simd.mul_f64s(simd.mul_f64s(area[k], yielding[k]), own);
+            square = simd.mul_add_e_f64s(weighted, own, square);
+            along = simd.mul_add_e_f64s(weighted, r[k], along);
         }
         [
             simd.reduce_max_f64s(violation),
             simd.reduce_sum_f64s(square),
+            simd.reduce_sum_f64s(along),
         ]
     }
 }

@@ -122,14 +122,14 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
     let mut work = PressureIterate::new(gap, start, influence.weights(n));
     work.scale_to(loading, cell);
     influence.apply(&work.p[..n], &mut work.u[..n], workspace);
-    let (mut follow, mut last) = (false, 1.0);
+    let mut below = f64::INFINITY;
     let mut least_residual = f64::INFINITY;
     for iterations in 0..ITERATIONS_MAX {
         if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
             return Err(PressureFailure::Stopped(stop));
         }
         let approach = work.distances(loading);
-        let [violation, square] = work.part_from(approach);
+        let [violation, square, along] = work.part_from(approach);
         if !square.is_finite() {
             break;
         }
@@ -146,10 +146,10 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
                 residual,
             });
         }
-        let factor = if follow { square / last } else { 0.0 };
-        last = square;
-        let step = work.step_after(factor, n, influence, loading, workspace);
-        follow = work.advance(step);
+        let factor = (-along / below).max(0.0);
+        let step;
+        [step, below] = work.step_after(factor, n, influence, loading, workspace);
+        work.advance(step);
         if work.changes.len() <= I::CHANGES_MAX {
             for (u, r) in work.u.iter_mut().zip(&work.r) {
                 *u -= step * r;
@@ -232,10 +232,12 @@ impl PressureIterate {
         }
     }
 
-    /// Subtracts the approach from the distances; returns their largest violation and the sum of their squares in the contact.
-    fn part_from(&mut self, approach: f64) -> [f64; 2] {
+    /// Subtracts the approach from the distances; returns their largest violation and the sums of their squares and of their products with the
+    /// displacement of the last direction, in the contact.
+    fn part_from(&mut self, approach: f64) -> [f64; 3] {
         cell_sums::run(Parting {
             distance: &mut self.g,
+            displacement: &self.r,
             pressure: &self.p,
             weights: &self.weights,
             approach,
@@ -262,7 +264,7 @@ impl PressureIterate {
         influence: &I,
         loading: NormalLoad,
         workspace: &mut I::Workspace,
-    ) -> f64 {
+    ) -> [f64; 2] {
         for factor in [factor, 0.0] {
             self.direct(factor);
             influence.apply(&self.t[..n], &mut self.r[..n], workspace);
@@ -274,11 +276,11 @@ impl PressureIterate {
             }
         }
         // A single cell under a force leaves nothing to minimise; a step by its own stiffness lets other cells in.
-        1.0 / influence.own()
+        [1.0 / influence.own(), f64::INFINITY]
     }
 
     /// Length of the step that leaves no distance along the direction, if the direction lowers the energy.
-    fn step(&self, loading: NormalLoad) -> Option<f64> {
+    fn step(&self, loading: NormalLoad) -> Option<[f64; 2]> {
         let [above, product, along, sum, count] = cell_sums::run(StepSums {
             distance: &self.g,
             direction: &self.t,
@@ -290,7 +292,7 @@ impl PressureIterate {
             NormalLoad::Force(_) => product - sum / count * along,
             NormalLoad::Approach(_) => product,
         };
-        (below > 0.0 && above > 0.0).then(|| above / below)
+        (below > 0.0 && above > 0.0).then(|| [above / below, below])
     }
 
     /// Takes the step, and records the cells whose pressure had to be changed otherwise. Returns whether the next direction may be

@@ -12,8 +12,8 @@ use crate::contact::normal::gap::conjugate_gradients::{
 };
 use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, COARSE_LOOSE_FROM, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, LOOSE_POWER, NEAR,
-    PRESSURE_CHANGE, REFINEMENT, RESOLUTION, RESOLUTION_COARSE, RESOLUTION_COARSE_LOOSE,
-    TARGET_POWER, TARGET_USUAL, TARGETS_LOOSE, TOLERANCE_FIRST,
+    OTHER_READING, PRESSURE_CHANGE, REFINEMENT, RESOLUTION, RESOLUTION_COARSE,
+    RESOLUTION_COARSE_LOOSE, TARGET_POWER, TARGET_USUAL, TARGETS_LOOSE, TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
 use crate::contact::normal::gap::search_box::{SearchBox, reach_of_level};
@@ -62,7 +62,19 @@ impl GapTask {
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
-        let resolution = RESOLUTION.for_target(target);
+        self.solve_as(GridFineness::for_answer(target), workspace, monitor)
+    }
+
+    /// The same with grids as fine as told.
+    ///
+    /// # Errors
+    /// As [`Self::solve_for`].
+    pub(crate) fn solve_as(
+        &self,
+        resolution: GridFineness,
+        workspace: &mut GridWorkspace<f32>,
+        monitor: &dyn Monitor,
+    ) -> Result<NormalAnswer, NormalError> {
         let found = self.solve_near(Vec::new(), resolution, workspace, monitor)?;
         self.found(found, Edges::Found)
     }
@@ -305,6 +317,14 @@ impl GridFineness {
         GridFineness {
             settles: false,
             ..self
+        }
+    }
+
+    /// The same where only the difference between two readings of the profiles counts.
+    pub(crate) fn of_other_reading(self) -> GridFineness {
+        GridFineness {
+            tolerance: OTHER_READING * self.tolerance,
+            ..self.alone()
         }
     }
 

@@ -29,9 +29,9 @@ const CELLS_MAX: usize = 36_000;
 /// Cells along either axis of a grid whose patch is hardly known yet, at least and at most. Chosen by judgement; how much it matters was not
 /// measured.
 const CELLS_FIRST: [f64; 2] = [24.0, 56.0];
-/// Violation of the contact conditions relative to the deepest overlap. Small patches yield less than large ones: a quarter of
-/// what serves for one grid. Chosen by judgement; how much it matters was not measured.
-const TOLERANCE: f64 = 5e-5;
+/// Allowed violation of the contact conditions over what serves for one grid: small patches yield less than large ones. Chosen by judgement; how
+/// much it matters was not measured.
+const TOLERANCE_SHARE: f64 = 0.25;
 /// A patch with less than this fraction of the load needs fewer cells. Chosen by judgement; how much it matters was not measured.
 const SHARE_LARGE: f64 = 0.25;
 /// Cells across such a patch over those across a large one. On 22 gaps with a patch of radius 1 to 60 mm beside one of 300 mm (1 to 60 kN
@@ -83,7 +83,8 @@ impl GapTask {
         monitor: &dyn Monitor,
     ) -> Result<GapOutcome, NormalError> {
         for _ in 0..GRIDS_MAX {
-            let tiles = self.press_tiles(grids, &found.tiles, workspace, monitor)?;
+            let tolerance = TOLERANCE_SHARE * resolution.tolerance;
+            let tiles = self.press_tiles(grids, &found.tiles, tolerance, workspace, monitor)?;
             let before = std::mem::replace(&mut found.tiles, tiles);
             found.iterations += found.tiles[0].pressed.iterations;
             let peak = |tiles: &[Tile]| tiles.iter().map(Tile::largest).fold(0.0, f64::max);
@@ -129,6 +130,7 @@ impl GapTask {
         &self,
         grids: Vec<PressureGrid>,
         before: &[Tile],
+        tolerance: f64,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<Vec<Tile>, NormalError> {
@@ -143,7 +145,7 @@ impl GapTask {
             gap: &gap,
             cell: grids[0].step[0] * grids[0].step[1],
             loading: self.loading,
-            tolerance: TOLERANCE,
+            tolerance,
         };
         let pressed = solve_pressure(&task, &influence, start, workspace, monitor)?;
         let parts = grids.into_iter().zip(influence.ranges);

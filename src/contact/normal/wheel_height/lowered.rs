@@ -53,6 +53,15 @@ impl Fineness {
         }
     }
 
+    fn of_grids(self) -> GridFineness {
+        let whole = GridFineness::for_answer(self.target);
+        match self.detail {
+            GapSampling::Coarse => GridFineness::coarse(self.target),
+            GapSampling::Loose | GapSampling::Fine if self.settles => whole,
+            GapSampling::Loose | GapSampling::Fine => whole.of_other_reading(),
+        }
+    }
+
     pub(crate) fn fine(wanted: NormalPass) -> Fineness {
         let target = match wanted.accuracy {
             Accuracy::About(_) => f64::INFINITY,
@@ -164,13 +173,7 @@ impl WheelTask {
             contact_modulus: self.contact_modulus,
             seen: GapSeen::default(),
         };
-        let resolution = match fineness.detail {
-            GapSampling::Coarse => GridFineness::coarse(fineness.target),
-            GapSampling::Loose | GapSampling::Fine => GridFineness {
-                settles: fineness.settles,
-                ..GridFineness::for_answer(fineness.target)
-            },
-        };
+        let resolution = fineness.of_grids();
         let found = contact.solve_near(start, resolution, workspace, monitor)?;
         let found = contact.found(found, fineness.edges)?;
         let reached = found
