@@ -51,7 +51,7 @@ pub(crate) struct StepSums<'a> {
 }
 
 /// Takes a step along a direction in all pressures. Those that are not in contact, or leave it, become 0, or what their overlap gives; `off` is
-/// the difference from the full step. The answer is whether no cell came into contact.
+/// the difference from the full step.
 pub(crate) struct Advance<'a> {
     pub(crate) pressure: &'a mut [f64],
     pub(crate) off: &'a mut [f64],
@@ -187,13 +187,12 @@ impl WithSimd for StepSums<'_> {
 }
 
 impl WithSimd for Advance<'_> {
-    type Output = bool;
+    type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> bool {
+    fn with_simd<S: Simd>(self, simd: S) {
         let zero = simd.splat_f64s(0.0);
         let back = simd.splat_f64s(-self.step);
-        let mut deepest = zero;
         let (p, _) = S::as_mut_simd_f64s(self.pressure);
         let off = &mut S::as_mut_simd_f64s(self.off).0[..p.len()];
         let [t, g, yielding] = [self.direction, self.distance, &self.weights.yielding]
@@ -209,9 +208,7 @@ impl WithSimd for Advance<'_> {
             let next = simd.select_f64s(stays, stepped, other);
             p[k] = next;
             off[k] = simd.sub_f64s(next, stepped);
-            deepest = simd.min_f64s(deepest, simd.select_f64s(stays, zero, overlap));
         }
-        simd.reduce_min_f64s(deepest) >= 0.0
     }
 }
 

@@ -146,6 +146,7 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
                 residual,
             });
         }
+        // Conjugate to the last direction, whichever cells came into contact or left it since; 0 before the first step.
         let factor = (-along / below).max(0.0);
         let step;
         [step, below] = work.step_after(factor, n, influence, loading, workspace);
@@ -254,7 +255,7 @@ impl PressureIterate {
         });
     }
 
-    /// Chooses the direction and what it displaces; returns the length of the step along it.
+    /// Chooses the direction and what it displaces; returns the length of the step along it, and what the direction displaces times itself.
     ///
     /// Cells that left the contact turn the conjugate direction. If it no longer lowers the energy, steepest descent takes its place.
     fn step_after<I: PressureInfluence>(
@@ -279,7 +280,7 @@ impl PressureIterate {
         [1.0 / influence.own(), f64::INFINITY]
     }
 
-    /// Length of the step that leaves no distance along the direction, if the direction lowers the energy.
+    /// Length of the step that leaves no distance along the direction, and the product of the direction with what it displaces, if the direction lowers the energy.
     fn step(&self, loading: NormalLoad) -> Option<[f64; 2]> {
         let [above, product, along, sum, count] = cell_sums::run(StepSums {
             distance: &self.g,
@@ -295,10 +296,9 @@ impl PressureIterate {
         (below > 0.0 && above > 0.0).then(|| [above / below, below])
     }
 
-    /// Takes the step, and records the cells whose pressure had to be changed otherwise. Returns whether the next direction may be
-    /// conjugate to this one: no cell came into contact.
-    fn advance(&mut self, step: f64) -> bool {
-        let follow = cell_sums::run(Advance {
+    /// Takes the step, and records the cells whose pressure had to be changed otherwise.
+    fn advance(&mut self, step: f64) {
+        cell_sums::run(Advance {
             pressure: &mut self.p,
             off: &mut self.off,
             direction: &self.t,
@@ -316,7 +316,6 @@ impl PressureIterate {
             self.changes
                 .extend(changed.map(|(k, off)| (block * LANES + k, *off)));
         }
-        follow
     }
 }
 

@@ -31,7 +31,7 @@ pub(crate) const RESOLUTION_COARSE: GridFineness = GridFineness {
 pub(crate) const COARSE_LOOSE_FROM: f64 = 0.01;
 
 /// [`RESOLUTION_COARSE`] for loose targets, at which forces of rows differ by 0.0002 of μN in the median and 0.005 at most from those with the
-/// finer one (`cargo bench --bench wheels -- rows`; with 12 cells across a patch). 12 in place of 8 cells across a patch take 11 % more
+/// finer one (`cargo bench --bench wheels -- rows`; with 12 cells across a patch). 12 in place of 8 cells across a patch take 12 % more
 /// instructions where there are two.
 pub(crate) const RESOLUTION_COARSE_LOOSE: GridFineness = GridFineness {
     first: 24,
@@ -84,5 +84,6 @@ pub(crate) const LEVEL_BEYOND: f64 = 0.2;
 pub(crate) const NEAR: f64 = 0.03;
 
 /// Violation of the contact conditions over that of an answer where another reading of the profiles is solved, whose difference from the first
-/// one tells their uncertainty. With 1 two patches take 6 % more instructions.
+/// one tells their uncertainty. With 1 two patches take 7 % more
+/// instructions; what else it changes was not measured apart.
 pub(crate) const OTHER_READING: f64 = 3.0;
