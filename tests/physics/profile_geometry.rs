@@ -262,3 +262,24 @@ fn a_larger_clearance_of_the_wheel_makes_the_overlap_smaller_by_as_much() {
         "{low} {high} {expected}"
     );
 }
+
+/// Readings of a pair are kept for all places of the wheelset; those asked for long ago are made again.
+#[test]
+fn a_reading_that_was_kept_is_that_of_a_pair_made_anew_wherever_the_wheelset_is() {
+    let pair = || {
+        let [rail, wheel] = generated();
+        WheelRail::new(rail, wheel, placement()).unwrap()
+    };
+    let kept = pair();
+    for round in 0..3 {
+        let [shift, yaw, roll] = [1.5, 4e-3, 1e-4].map(|most| f64::from(round) * most);
+        for smoothing in [2.0, 3.0, 0.0, 5.0, 8.0, 4.0] {
+            let smoothing = [smoothing, 0.5 * smoothing];
+            let found = kept.posed(shift, yaw, roll).smoothed(smoothing);
+            let anew = pair().smoothed(smoothing).posed(shift, yaw, roll);
+            assert_eq!(found, anew);
+            let touch = |pair: &WheelRail| ContactLocus::new(pair).unwrap().touch;
+            assert_eq!(touch(&found), touch(&anew));
+        }
+    }
+}

@@ -160,8 +160,13 @@ fn left_and_right_are_mirror_images_in_every_number() {
         "contact",
         json!({ "side": "left" }),
     );
-    let (right, _) = solve(&moving(&right, 0.001, 0.0005, 2e-4));
-    let (left, _) = solve(&moving(&left, 0.001, -0.0005, -2e-4));
+    // With a target, rounding may decide which of two meshes is fine enough.
+    let solved = |case: &Value, y: f64, spin: f64| {
+        let mut case = moving(case, 0.001, y, spin);
+        case["solver"] = json!({ "mesh": { "strips": 14, "cells": 19 } });
+        solve(&case).0
+    };
+    let (right, left) = (solved(&right, 0.0005, 2e-4), solved(&left, -0.0005, -2e-4));
     assert_eq!(right.patches.len(), left.patches.len());
     let close = |a: f64, b: f64, scale: f64| assert!((a - b).abs() < 1e-3 * scale, "{a} {b}");
     for (a, b) in right.patches.iter().zip(left.patches.iter().rev()) {

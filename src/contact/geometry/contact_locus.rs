@@ -13,8 +13,9 @@ use crate::contact::geometry::estimated_force::estimated_force;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::grouping::{Grouping, Overlap};
 use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
-use crate::contact::geometry::locus_lines::{Inclination, LocusLines, LocusPoint};
+use crate::contact::geometry::locus_lines::{Inclination, LocusLines, LocusPoint, RailEdge};
 use crate::contact::geometry::wheel_rail::{WheelCircle, WheelRail};
+use crate::contact::once::Once;
 
 /// Spacing of the search across the track, in mm. It decides where frames and windows lie, not what the gap is in them: with 0.02 mm forces differ by
 /// 0.00003 of μN in the median and 0.0012 at most at a target of 0.002, on 200 of the rows of `cargo bench --bench wheels -- rows`, as with any other
@@ -40,18 +41,18 @@ const WIDENINGS_MAX: usize = 5;
 const SLOPE_BEYOND_CUT: f64 = 0.5;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
-/// Lowering in mm under a light load; the estimate for heavier ones doubles it until it carries them. It changes times, no answer.
+/// Lowering in mm under a light load, where the estimate for others begins. It changes times, no answer.
 const LOWERING_FIRST: f64 = 0.032;
-/// Steps by which a lowering is estimated within its bracket, which the first steps narrow to about a hundredth. It changes times, no answer.
-const SECANTS: usize = 6;
-/// Clearance in mm below which the inclination of a line is found beforehand, about as far as usual loads lower a wheel; farther ones are found where
-/// they are asked for. It changes times, no answer.
-const NEAR: f64 = 0.12;
+/// Lowerings that are tried for an estimate at most, and part of the force to the power 2/3 that ends it: where one patch carries the force, two or
+/// three tries do. It changes times, no answer.
+const LOWERINGS_TRIED: usize = 10;
+const ESTIMATED: f64 = 2e-3;
 
 /// Rail and wheel above each other, line by line along x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactLocus<'g> {
     pub(crate) geometry: &'g WheelRail,
+    pub(crate) rail: &'g RailEdge,
     pub(crate) lines: &'g [LocusPoint],
     /// Which lines share a gap, if that is decided for all heights.
     pub(crate) grouping: Option<Grouping>,
@@ -73,12 +74,21 @@ pub(crate) fn rail_points(
     parameters.into_iter().map(point).collect()
 }
 
+/// The rail's upper edge.
+fn edge_of(geometry: &WheelRail) -> &RailEdge {
+    geometry.rail_edge.get_or_make(|| {
+        let [rail, _] = geometry.parameters(CURVE_STEP);
+        let edge = envelope(&rail_points(geometry, rail), STEP);
+        RailEdge {
+            inclinations: vec![Once::default(); edge.points.len()],
+            edge,
+        }
+    })
+}
+
 /// Places the wheel above the rail and finds the height of first touch.
 fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
-    let rail = geometry.rail_edge.get_or_make(|| {
-        let [rail, _] = geometry.parameters(CURVE_STEP);
-        envelope(&rail_points(geometry, rail), STEP)
-    });
+    let rail = &edge_of(geometry).edge;
     let circles = geometry.circles.get_or_make(|| {
         let [_, wheel] = geometry.parameters(CURVE_STEP);
         wheel.into_iter().map(|s| geometry.circle(s)).collect()
@@ -93,8 +103,9 @@ fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
     let last = (rail.first + rail.points.len() as i64).min(wheel.first + wheel.points.len() as i64);
     let mut lines = Vec::with_capacity(usize::try_from(last - first).unwrap_or(0));
     for k in first..last {
+        let of_rail = (k - rail.first) as usize;
         let (below, above) = (
-            rail.points[(k - rail.first) as usize],
+            rail.points[of_rail],
             wheel.points[(k - wheel.first) as usize],
         );
         if let (Some([z, rail]), Some([depth, wheel])) = (below, above) {
@@ -103,7 +114,7 @@ fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
                 clearance: -depth - z,
                 rail,
                 wheel,
-                inclination: None,
+                of_rail,
             });
         }
     }
@@ -114,9 +125,6 @@ fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
     let least = clearances.fold(f64::INFINITY, f64::min);
     for line in &mut lines {
         line.clearance -= least;
-        if line.clearance < NEAR {
-            line.inclination = Some(inclination(geometry, line.rail));
-        }
     }
     Ok(LocusLines {
         lines,
@@ -178,6 +186,7 @@ impl<'g> ContactLocus<'g> {
         let found = found.as_ref().as_ref().map_err(String::clone)?;
         Ok(ContactLocus {
             geometry,
+            rail: edge_of(geometry),
             lines: &found.lines,
             grouping: None,
             estimated: None,
@@ -225,37 +234,49 @@ impl<'g> ContactLocus<'g> {
         if let Some([_, known]) = self.estimated.filter(|[of, _]| *of == force) {
             return known;
         }
-        let (mut low, mut high) = (0.0_f64, LOWERING_FIRST);
-        let below = |lines: &[LocusPoint], lowering: f64| -> Vec<LocusPoint> {
+        let below = |lowering: f64| -> Vec<LocusPoint> {
             let inside = |line: &&LocusPoint| line.clearance < 0.5 * lowering;
-            lines.iter().filter(inside).copied().collect()
+            self.lines.iter().filter(inside).copied().collect()
         };
-        let mut near = below(self.lines, high);
-        while estimated_force(&near, STEP, self.rolling_radius(), high) < force
-            && high < LOWERING_MAX
-        {
-            (low, high) = (high, 2.0 * high);
-            near = below(self.lines, high);
-        }
-        // The estimate jumps where one more line overlaps: the bracket is kept. It grows about as the power 3/2.
-        let power = |lowering: f64| {
+        let mut deepest = 4.0 * LOWERING_FIRST;
+        let mut near = below(deepest);
+        // Grows about in proportion to the lowering.
+        let mut power = |lowering: f64| {
+            if lowering > deepest {
+                deepest = 1.5 * lowering;
+                near = below(deepest);
+            }
             estimated_force(&near, STEP, self.rolling_radius(), lowering).powf(2.0 / 3.0)
         };
         let wanted = force.powf(2.0 / 3.0);
-        let mut known = [(low, power(low)), (high, power(high))];
-        for _ in 0..SECANTS {
-            let [(low, under), (high, over)] = known;
-            let secant = low + (high - low) * (wanted - under) / (over - under);
-            let margin = 0.02 * (high - low);
-            let next = secant.clamp(low + margin, high - margin);
+        // The estimate jumps where one more line overlaps: the bracket is kept.
+        let (mut low, mut high) = ([0.0_f64; 2], None::<[f64; 2]>);
+        let mut lowering = LOWERING_FIRST;
+        for _ in 0..LOWERINGS_TRIED {
+            let found = power(lowering);
+            if (found / wanted - 1.0).abs() < ESTIMATED {
+                break;
+            }
+            if found < wanted {
+                low = [lowering, found];
+            } else {
+                high = Some([lowering, found]);
+            }
+            let next = match high {
+                None if low[0] >= LOWERING_MAX => break,
+                None => (low[0] * wanted / low[1]).min(LOWERING_MAX),
+                Some(high) => {
+                    let width = high[0] - low[0];
+                    let secant = low[0] + width * (wanted - low[1]) / (high[1] - low[1]);
+                    secant.clamp(low[0] + 0.02 * width, high[0] - 0.02 * width)
+                }
+            };
             if !next.is_finite() {
                 break;
             }
-            let found = (next, power(next));
-            known[usize::from(found.1 >= wanted)] = found;
+            lowering = next;
         }
-        let [(low, _), (high, _)] = known;
-        0.5 * (low + high)
+        lowering
     }
 
     fn rolling_radius(&self) -> f64 {
@@ -298,8 +319,7 @@ impl<'g> ContactLocus<'g> {
 
     /// The inclination of the rail's surface on a line.
     pub(crate) fn inclination(&self, line: &LocusPoint) -> Inclination {
-        line.inclination
-            .unwrap_or_else(|| inclination(self.geometry, line.rail))
+        *self.rail.inclinations[line.of_rail].get_or_make(|| inclination(self.geometry, line.rail))
     }
 
     fn gap(

@@ -1,7 +1,7 @@
 //! The upper edge of a plane curve over equally spaced places.
 
 /// Upper edge of a curve on the lines `k step`: height and parameter.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Envelope {
     /// Distance of the lines in mm.
     pub(crate) step: f64,

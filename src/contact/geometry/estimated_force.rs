@@ -93,7 +93,7 @@ mod tests {
                 clearance: heights.fold(f64::INFINITY, f64::min),
                 rail: y,
                 wheel: y,
-                inclination: None,
+                of_rail: 0,
             }
         };
         let lines: Vec<LocusPoint> = (-4000..=4000).map(line).collect();

@@ -5,12 +5,21 @@ use crate::contact::numerics::spline::Spline;
 /// A curve `[y, z]` in mm over a parameter in mm, twice continuously differentiable, straight beyond its ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlaneCurve {
-    knots: Vec<f64>,
-    /// Of every interval the coefficients `[y, z]` by powers of the distance from its first knot.
-    cubics: Vec<[[f64; 2]; 4]>,
+    /// First and last parameter.
+    range: [f64; 2],
+    intervals: Vec<CurveInterval>,
     /// For equal cells of the parameter the interval in which each begins, so that a place is found without a search.
     cells: Vec<u32>,
     cells_per_mm: f64,
+}
+
+/// The curve between two knots.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct CurveInterval {
+    /// Both knots in mm.
+    ends: [f64; 2],
+    /// The coefficients `[y, z]` by powers of the distance from the first knot.
+    cubic: [[f64; 2]; 4],
 }
 
 /// The curve at one place: position in mm and derivatives to the parameter.
@@ -44,14 +53,15 @@ impl PlaneCurve {
     /// The curve of two splines with the same knots.
     #[must_use]
     pub fn new(y: &Spline, z: &Spline) -> PlaneCurve {
-        let knots = y.knots().to_vec();
+        let knots = y.knots();
         let intervals = knots.len() - 1;
-        let cubics = (0..intervals)
-            .map(|i| {
-                let (y, z) = (y.cubic(i), z.cubic(i));
-                [0, 1, 2, 3].map(|power| [y[power], z[power]])
-            })
-            .collect();
+        let between = |i: usize| {
+            let (y, z) = (y.cubic(i), z.cubic(i));
+            CurveInterval {
+                ends: [knots[i], knots[i + 1]],
+                cubic: [0, 1, 2, 3].map(|power| [y[power], z[power]]),
+            }
+        };
         // Two cells an interval: on evenly spaced knots hardly any place is more than one interval beyond that of its cell.
         let count = 2 * intervals;
         let length = knots[intervals] - knots[0];
@@ -63,15 +73,15 @@ impl PlaneCurve {
         PlaneCurve {
             cells: (0..count).map(begins).collect(),
             cells_per_mm: count as f64 / length,
-            cubics,
-            knots,
+            intervals: (0..intervals).map(between).collect(),
+            range: [knots[0], knots[intervals]],
         }
     }
 
     /// First and last parameter.
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
-        [self.knots[0], self.knots[self.knots.len() - 1]]
+        self.range
     }
 
     /// The curve at a parameter; beyond the ends the tangent there.
@@ -80,9 +90,9 @@ impl PlaneCurve {
     pub fn at(&self, s: f64) -> CurvePoint {
         let [first, last] = self.range();
         let inside = s.clamp(first, last);
-        let i = self.interval(inside);
-        let d = inside - self.knots[i];
-        let [c0, c1, c2, c3] = self.cubics[i];
+        let CurveInterval { ends, cubic } = self.interval(inside);
+        let d = inside - ends[0];
+        let [c0, c1, c2, c3] = cubic;
         let mut point = CurvePoint {
             at: [0, 1].map(|k| c0[k] + d * (c1[k] + d * (c2[k] + d * c3[k]))),
             slope: [0, 1].map(|k| c1[k] + d * (2.0 * c2[k] + 3.0 * d * c3[k])),
@@ -97,17 +107,17 @@ impl PlaneCurve {
 
     /// The interval of knots that a place within the range lies in.
     #[inline]
-    fn interval(&self, s: f64) -> usize {
-        let cell = ((s - self.knots[0]) * self.cells_per_mm) as usize;
+    fn interval(&self, s: f64) -> &CurveInterval {
+        let cell = ((s - self.range[0]) * self.cells_per_mm) as usize;
         let mut i = self.cells[cell.min(self.cells.len() - 1)] as usize;
         // Rounding may have put the place into the cell after its own.
-        while i > 0 && self.knots[i] > s {
+        while i > 0 && self.intervals[i].ends[0] > s {
             i -= 1;
         }
-        while i + 1 < self.cubics.len() && self.knots[i + 1] <= s {
+        while i + 1 < self.intervals.len() && self.intervals[i].ends[1] <= s {
             i += 1;
         }
-        i
+        &self.intervals[i]
     }
 
     /// The curve turned by an angle in rad from y to z about the origin, then moved by `[y, z]`, and mirrored in y where `sign` is −1.
@@ -120,8 +130,12 @@ impl PlaneCurve {
             let powers = [[y + by[0], z + by[1]], turned(c1), turned(c2), turned(c3)];
             powers.map(|[y, z]| [sign * y, z])
         };
+        let interval = |interval: &CurveInterval| CurveInterval {
+            cubic: placed(interval.cubic),
+            ..*interval
+        };
         PlaneCurve {
-            cubics: self.cubics.iter().copied().map(placed).collect(),
+            intervals: self.intervals.iter().map(interval).collect(),
             ..self.clone()
         }
     }

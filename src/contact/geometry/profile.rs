@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::contact::geometry::crossing;
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead};
-use crate::contact::geometry::profile_quality::samples::Points;
+use crate::contact::geometry::profile_quality::samples::{KnownPoints, Points};
 use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::geometry::profile_quality::{noise, shape};
 use crate::contact::numerics::spline::Spline;
@@ -83,6 +83,7 @@ struct MeasuredCurve {
     /// Step of which the given coordinates are multiples, in mm.
     rounding: Option<f64>,
     likely: Once<Option<LikelyBody>>,
+    known: KnownPoints,
 }
 
 impl Profile {
@@ -135,6 +136,7 @@ impl Profile {
             along.push(along[along.len() - 1] + distance(pair[0], pair[1]));
         }
         let measured = MeasuredCurve {
+            known: KnownPoints::new(points.len()),
             points,
             along,
             smoothing: reading.smoothing,
@@ -182,6 +184,7 @@ impl Profile {
         Points {
             at: &self.measured.points,
             along: &self.measured.along,
+            known: Some(&self.measured.known),
         }
     }
 

@@ -6,10 +6,9 @@
 //! radius `r − z` at the distance `d/2 − p + y` from the centre along the axle, with the flange-back distance d and the
 //! flange-back position p. Conventions of the Manchester contact benchmark (Shackleton and Iwnicki 2008).
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::contact::geometry::envelope::Envelope;
-use crate::contact::geometry::locus_lines::LocusLines;
+use crate::contact::geometry::locus_lines::{LocusLines, RailEdge};
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile::Profile;
 use crate::contact::once::Once;
@@ -70,10 +69,12 @@ pub struct WheelRail {
     rail: Arc<PlaneCurve>,
     wheel: Arc<Profile>,
     axes: AxleAxes,
-    /// The rail's upper edge, which is the same for every place of the wheelset over it.
-    pub(crate) rail_edge: Arc<Once<Envelope>>,
+    /// The rail's upper edge.
+    pub(crate) rail_edge: Arc<Once<RailEdge>>,
     /// Circles of the wheel, which are the same for every place of the wheelset.
     pub(crate) circles: Arc<Once<Vec<WheelCircle>>>,
+    /// The same pair with other smoothings, somewhere over the rail, which are the same for every place of the wheelset too.
+    readings: Arc<OtherReadings>,
     /// Rail and wheel line by line, or why there are no lines.
     pub(crate) locus: Once<Arc<Result<LocusLines, String>>>,
 }
@@ -105,6 +106,37 @@ impl AxleAxes {
             ],
             down: [0.0, axle[2] / across, -axle[1] / across],
         }
+    }
+}
+
+/// Most readings of a pair that are kept. Keeps the memory small; it changes times, no answer.
+const READINGS_MAX: usize = 4;
+
+/// Pairs with other smoothings of rail and wheel in mm, the one asked for last at the end. They follow from the pair, so that two of them never make
+/// pairs differ.
+#[derive(Debug, Default)]
+struct OtherReadings(Mutex<Vec<([f64; 2], WheelRail)>>);
+
+impl PartialEq for OtherReadings {
+    fn eq(&self, _: &OtherReadings) -> bool {
+        true
+    }
+}
+
+impl OtherReadings {
+    fn find_or_make(&self, smoothing: [f64; 2], make: impl FnOnce() -> WheelRail) -> WheelRail {
+        // A panic while it was held leaves the list as it is: only whole pairs are put there.
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match kept.iter().position(|(of, _)| *of == smoothing) {
+            Some(place) => kept[place..].rotate_left(1),
+            None => {
+                if kept.len() == READINGS_MAX {
+                    kept.remove(0);
+                }
+                kept.push((smoothing, make()));
+            }
+        }
+        kept[kept.len() - 1].1.clone()
     }
 }
 
@@ -179,6 +211,7 @@ impl WheelRail {
             axes,
             rail_edge: Arc::default(),
             circles: Arc::default(),
+            readings: Arc::default(),
             locus: Once::default(),
         }
     }
@@ -218,11 +251,19 @@ impl WheelRail {
     /// The same with other smoothings of rail and wheel, in mm.
     #[must_use]
     pub fn smoothed(&self, smoothing: [f64; 2]) -> WheelRail {
-        let rail = self.rail_given.smoothed(smoothing[0]);
-        let wheel = Arc::new(self.wheel.smoothed(smoothing[1]));
-        let placement = self.placement;
-        // What a wheel's profile may reach was checked; a smoothed one reaches hardly farther.
-        WheelRail::placed(rail, wheel, placement)
+        let Placement {
+            lateral_shift,
+            yaw,
+            roll,
+            ..
+        } = self.placement;
+        let reading = self.readings.find_or_make(smoothing, || {
+            let rail = self.rail_given.smoothed(smoothing[0]);
+            let wheel = Arc::new(self.wheel.smoothed(smoothing[1]));
+            // What a wheel's profile may reach was checked; a smoothed one reaches hardly farther.
+            WheelRail::placed(rail, wheel, self.placement)
+        });
+        reading.posed(lateral_shift, yaw, roll)
     }
 
     /// Unit vector along the axle, to the left.

@@ -44,6 +44,7 @@ impl Cubic {
     }
 
     /// The curve between nodes `i` and `i + 1` of the axis with the given values and slopes at them.
+    #[cfg(test)]
     pub(crate) fn with_slopes(axis: &[f64], i: usize, values: [f64; 2], slopes: [f64; 2]) -> Cubic {
         let length = axis[i + 1] - axis[i];
         let rise = values[1] - values[0];
@@ -64,6 +65,14 @@ impl Cubic {
     /// Value at x.
     pub(crate) fn at(&self, x: f64) -> f64 {
         self.value((x - self.start) / self.length)
+    }
+
+    /// Is it surely positive nowhere? Its values are means, with weights that are not negative, of those at both ends and of two that their
+    /// tangents tell.
+    pub(crate) fn is_never_positive(&self) -> bool {
+        let [c0, c1, c2, c3] = self.coefficients;
+        let before_end = self.end - (c1 + 2.0 * c2 + 3.0 * c3) / 3.0;
+        c0 <= 0.0 && self.end <= 0.0 && c0 + c1 / 3.0 <= 0.0 && before_end <= 0.0
     }
 
     /// Points where the sign changes from or to positive, from smaller to larger x, each with the sign after it
@@ -92,6 +101,11 @@ impl Cubic {
     /// The turning points that divide 0..=1 into monotone pieces, in order; one outside is replaced by the nearer end.
     fn turning_points(&self) -> [f64; 2] {
         let [_, c1, c2, c3] = self.coefficients;
+        // The slope is a mean of these with weights that are not negative.
+        let slopes = [c1, c1 + c2, c1 + 2.0 * c2 + 3.0 * c3];
+        if slopes.iter().all(|slope| *slope >= 0.0) || slopes.iter().all(|slope| *slope <= 0.0) {
+            return [0.0, 1.0];
+        }
         let discriminant = c2 * c2 - 3.0 * c1 * c3;
         if discriminant <= 0.0 {
             return [0.0, 1.0];
@@ -203,6 +217,38 @@ mod tests {
         assert_eq!(cubic(1, parabola).sign_changes().count(), 0);
         assert_eq!(cubic(3, |x| x - 0.75).sign_changes().count(), 1);
         assert_eq!(cubic(3, |_| 0.0).sign_changes().count(), 0);
+    }
+
+    #[test]
+    fn a_curve_said_to_be_positive_nowhere_is_not_and_turning_points_divide_every_curve() {
+        let ends = [-1.0, -0.3, -0.01, 0.2];
+        let steep = [-3.0, -0.4, 0.0, 0.02, 2.0];
+        let mut never = 0;
+        for (start, end) in ends.iter().flat_map(|a| ends.map(|b| (*a, b))) {
+            for (leaving, arriving) in steep.iter().flat_map(|a| steep.map(|b| (*a, b))) {
+                let cubic = Cubic::with_slopes(&[0.0, 1.0], 0, [start, end], [leaving, arriving]);
+                let values: Vec<f64> = (0..=1000)
+                    .map(|k| cubic.value(1e-3 * f64::from(k)))
+                    .collect();
+                if cubic.is_never_positive() {
+                    never += 1;
+                    assert!(values.iter().all(|value| *value <= 0.0), "{cubic:?}");
+                }
+                let [first, second] = cubic.turning_points();
+                let place = |s: f64| (1e3 * s).round() as usize;
+                for (from, to) in [
+                    (0, place(first)),
+                    (place(first), place(second)),
+                    (place(second), 1000),
+                ] {
+                    let steps = || values[from..=to].windows(2).map(|pair| pair[1] - pair[0]);
+                    // A turning point lies between two of the samples.
+                    let against = |sign: f64| steps().filter(|step| sign * step < 0.0).count();
+                    assert!(against(1.0).min(against(-1.0)) <= 2, "{cubic:?}");
+                }
+            }
+        }
+        assert!(never > 100, "{never}");
     }
 
     #[test]

@@ -45,15 +45,19 @@ pub(crate) fn groups(
         }
         above = first..runs.len();
     }
+    let mut sizes = vec![0; runs.len()];
+    for (k, run) in runs.iter().enumerate() {
+        sizes[root(&runs, k)] += run.to - run.from;
+    }
     let mut places = vec![usize::MAX; runs.len()];
     let mut groups: Vec<Vec<usize>> = Vec::new();
-    for k in 0..runs.len() {
+    for (k, run) in runs.iter().enumerate() {
         let root = root(&runs, k);
         if places[root] == usize::MAX {
             places[root] = groups.len();
-            groups.push(Vec::new());
+            groups.push(Vec::with_capacity(sizes[root]));
         }
-        groups[places[root]].extend(runs[k].from..runs[k].to);
+        groups[places[root]].extend(run.from..run.to);
     }
     groups
 }

@@ -1,13 +1,11 @@
 //! Curves through samples: a cubic in every interval, with slopes at the nodes that the functions here choose by different rules.
 
-use crate::contact::numerics::cubic::{Cubic, interval};
+use crate::contact::numerics::cubic::interval;
 
 /// Value of the curve with these values and slopes at the nodes of an ascending axis, at least 2; beyond its ends that of the
 /// outermost cubics.
 pub(crate) fn value(axis: &[f64], values: &[f64], slopes: &[f64], at: f64) -> f64 {
-    let Place { node, share } = Place::new(axis, at);
-    let ends = |of: &[f64]| [of[node], of[node + 1]];
-    Cubic::with_slopes(axis, node, ends(values), ends(slopes)).value(share)
+    Place::new(axis, at).value(values, slopes)
 }
 
 /// A place on an axis, found once for the curves of many rows.
@@ -15,18 +13,35 @@ pub(crate) fn value(axis: &[f64], values: &[f64], slopes: &[f64], at: f64) -> f6
 pub(crate) struct Place {
     /// The node at the start of its interval.
     pub(crate) node: usize,
-    /// How far along the interval it lies: 0 at its start, 1 at its end.
-    pub(crate) share: f64,
+    /// Weights of the values at both ends of the interval in the curve's value.
+    pub(crate) values: [f64; 2],
+    /// Weights of the slopes there.
+    pub(crate) slopes: [f64; 2],
 }
 
 impl Place {
     /// A place on an ascending axis of at least 2 nodes; beyond the ends it is counted from the outermost intervals.
     pub(crate) fn new(axis: &[f64], at: f64) -> Place {
         let node = interval(axis, at);
+        let length = axis[node + 1] - axis[node];
+        let share = (at - axis[node]) / length;
+        let rest = 1.0 - share;
+        let end = share * share * (3.0 - 2.0 * share);
         Place {
             node,
-            share: (at - axis[node]) / (axis[node + 1] - axis[node]),
+            values: [1.0 - end, end],
+            slopes: [length * share * rest * rest, -length * share * share * rest],
         }
+    }
+
+    /// Value of the curve with these values and slopes at the nodes.
+    pub(crate) fn value(&self, values: &[f64], slopes: &[f64]) -> f64 {
+        let [start, end] = self.values;
+        let [leaving, arriving] = self.slopes;
+        let next = self.node + 1;
+        start * values[self.node]
+            + end * values[next]
+            + (leaving * slopes[self.node] + arriving * slopes[next])
     }
 }
 
@@ -108,75 +123,94 @@ pub(crate) const SLOPE_REACH: usize = 2;
 /// adjoining chords' slopes, 0 where these differ in sign (the limiter of van Leer 1974), which keeps the curve from overshooting
 /// the values. At the ends the parabola of the adjacent node is used. A slope inside depends on [`SLOPE_REACH`] values on either side.
 pub(crate) fn limited_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
-    let mut slopes = LimitedSlopes::default();
-    slopes.find(axis, values);
+    let mut slopes = LimitedSlopes::new(axis);
+    slopes.find(values);
     slopes.slopes
 }
 
-/// [`limited_slopes`] of one curve after the other, with room that is kept.
-#[derive(Debug, Default)]
+/// [`limited_slopes`] of one curve after the other over the same axis.
+#[derive(Debug)]
 pub(crate) struct LimitedSlopes {
+    /// One over the distance from every node to the next.
+    per_width: Vec<f64>,
+    /// Of every node but the outermost, two over the distance from the one before it to the one after it.
+    bend: Vec<f64>,
+    /// The weights of the chords before and after such a node in the slope of its parabola.
+    weights: Vec<[f64; 2]>,
     rises: Vec<f64>,
+    /// Second derivatives of the parabolas; the outermost two have those of their neighbours.
     bends: Vec<f64>,
     /// Those of the last curve.
     pub(crate) slopes: Vec<f64>,
 }
 
 impl LimitedSlopes {
+    /// For curves over an ascending axis of at least 2 nodes.
+    pub(crate) fn new(axis: &[f64]) -> LimitedSlopes {
+        let around = || {
+            axis.windows(3)
+                .map(|at| ([at[2] - at[1], at[1] - at[0]], at[2] - at[0]))
+        };
+        LimitedSlopes {
+            per_width: axis.windows(2).map(|at| 1.0 / (at[1] - at[0])).collect(),
+            bend: around().map(|(_, both)| 2.0 / both).collect(),
+            weights: around()
+                .map(|(parts, both)| parts.map(|part| part / both))
+                .collect(),
+            rises: Vec::with_capacity(axis.len()),
+            bends: Vec::with_capacity(axis.len()),
+            slopes: Vec::with_capacity(axis.len()),
+        }
+    }
+
     /// Finds the slopes of a curve.
-    pub(crate) fn find(&mut self, axis: &[f64], values: &[f64]) {
-        /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
-        const SLOPE_LIMIT: f64 = 8.0;
-        let n = axis.len();
-        let LimitedSlopes {
-            rises,
-            bends,
-            slopes,
-        } = self;
-        rises.clear();
-        rises.extend((1..n).map(|k| (values[k] - values[k - 1]) / (axis[k] - axis[k - 1])));
-        slopes.clear();
-        slopes.resize(n, rises[0]);
+    pub(crate) fn find(&mut self, values: &[f64]) {
+        let n = values.len();
+        self.rises.clear();
+        let chords = values.windows(2).zip(&self.per_width);
+        self.rises
+            .extend(chords.map(|(ends, per_width)| (ends[1] - ends[0]) * per_width));
+        self.slopes.clear();
         if n == 2 {
+            self.slopes.resize(n, self.rises[0]);
             return;
         }
-        // The outermost two have those of their neighbours.
-        bends.clear();
-        bends.push(0.0);
-        bends.extend(
-            (1..n - 1).map(|k| 2.0 * (rises[k] - rises[k - 1]) / (axis[k + 1] - axis[k - 1])),
-        );
-        bends.push(bends[n - 2]);
-        bends[0] = bends[1];
-        let allowed = |k: usize| {
-            SLOPE_LIMIT
-                * bends[k.saturating_sub(1)]
-                    .abs()
-                    .min(bends[(k + 1).min(n - 1)].abs())
-        };
-        // Share of the parabola in a slope.
-        let trust = |k: usize| {
-            let (bend, allowed) = (bends[k].abs(), allowed(k));
-            if bend <= allowed { 1.0 } else { allowed / bend }
-        };
-        let slope = |k: usize| {
-            let (before, after) = (rises[k - 1], rises[k]);
-            let widths = [axis[k] - axis[k - 1], axis[k + 1] - axis[k]];
-            let parabola = (before * widths[1] + after * widths[0]) / (widths[0] + widths[1]);
-            let trust = trust(k);
-            if trust == 1.0 {
-                return parabola;
+        let pairs = || self.rises.windows(2);
+        self.bends.clear();
+        self.bends.push(0.0);
+        let bends = pairs().zip(&self.bend);
+        self.bends
+            .extend(bends.map(|(rise, per)| (rise[1] - rise[0]) * per));
+        self.bends.push(self.bends[n - 2]);
+        self.bends[0] = self.bends[1];
+        self.slopes.push(0.0);
+        let parabolas = pairs().zip(&self.weights);
+        self.slopes
+            .extend(parabolas.map(|(rise, [before, after])| before * rise[0] + after * rise[1]));
+        for k in 1..n - 1 {
+            let trust = self.trust(k);
+            if trust < 1.0 {
+                let (before, after) = (self.rises[k - 1], self.rises[k]);
+                let steepness = before.abs() + after.abs();
+                let mean = (before * after.abs() + after * before.abs()) / steepness;
+                self.slopes[k] = trust * self.slopes[k] + (1.0 - trust) * mean;
             }
-            let steepness = before.abs() + after.abs();
-            let mean = (before * after.abs() + after * before.abs()) / steepness;
-            trust * parabola + (1.0 - trust) * mean
-        };
-        for (k, value) in slopes.iter_mut().enumerate().take(n - 1).skip(1) {
-            *value = slope(k);
         }
-        slopes[0] = rises[0] - 0.5 * trust(1) * bends[1] * (axis[1] - axis[0]);
-        slopes[n - 1] =
-            rises[n - 2] + 0.5 * trust(n - 2) * bends[n - 2] * (axis[n - 1] - axis[n - 2]);
+        let end = |node: usize, chord: usize| {
+            0.5 * self.trust(node) * self.bends[node] / self.per_width[chord]
+        };
+        let (first, last) = (end(1, 0), end(n - 2, n - 2));
+        self.slopes[0] = self.rises[0] - first;
+        self.slopes.push(self.rises[n - 2] + last);
+    }
+
+    /// Share of the parabola in the slope at a node that is not the first or last.
+    fn trust(&self, k: usize) -> f64 {
+        /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
+        const SLOPE_LIMIT: f64 = 8.0;
+        let bend = self.bends[k].abs();
+        let allowed = SLOPE_LIMIT * self.bends[k - 1].abs().min(self.bends[k + 1].abs());
+        if bend <= allowed { 1.0 } else { allowed / bend }
     }
 }
 

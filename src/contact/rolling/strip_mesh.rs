@@ -143,7 +143,7 @@ impl StripMesh {
         operators: Arc<CaseOperators>,
     ) -> Result<StripMesh, SolveError> {
         let plan: MeshPlan = plan.into();
-        let fitted = fitted_chords(task.footprint, &plan)?;
+        let fitted = fitted_chords(task.footprint, &plan, &[])?;
         Ok(StripMesh::of_chords(task, plan, &fitted, operators))
     }
 
@@ -316,13 +316,15 @@ fn bounds(
     bound
 }
 
-/// The strips of all patches, fitted to the region; they depend on the number of strips and on where these gather.
+/// The strips of all patches, fitted to the region; they depend on the number of strips and on where these gather. `halves` are those of a plan of
+/// twice as many, gathered in the same place, or empty.
 ///
 /// # Errors
 /// [`SolveError::Unmeshable`] if no strip meets a patch.
 pub(crate) fn fitted_chords(
     footprint: &Footprint,
     plan: &MeshPlan,
+    halves: &[StripChord],
 ) -> Result<Vec<StripChord>, SolveError> {
     let strips = plan.size.strips;
     let mut fitted = Vec::new();
@@ -332,7 +334,7 @@ pub(crate) fn fitted_chords(
             Some([_, y]) => strips_about(y, low, high, strips as usize),
             None => equal_strips(low, high, strips as usize),
         };
-        let chords = strip_chords::chords(footprint, k, &edges);
+        let chords = strip_chords::chords(footprint, k, &edges, halves);
         if chords.is_empty() {
             return Err(SolveError::Unmeshable { patch: k, strips });
         }

@@ -80,8 +80,9 @@ pub struct Step {
 pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
     let (mut fine, mut coarse) = (Vec::new(), Vec::new());
     let mut length = 0.0;
-    for window in points.at[range[0]..range[1]].windows(NOISE_CHORDS + 1) {
-        let Some((span, difference)) = fourth_difference(window) else {
+    for k in range[0]..range[1].saturating_sub(NOISE_CHORDS) {
+        let found = || window_at(points, k).and_then(fourth_difference);
+        let Some((span, difference)) = points.known(k, |known| &known.difference, found) else {
             continue;
         };
         if span <= NOISE_SPAN_MAX {
@@ -105,16 +106,15 @@ pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
 }
 
 /// Length of the chord over five points in mm, and the size of their normalised fourth divided difference in mm.
-fn fourth_difference(window: &[[f64; 2]]) -> Option<(f64, f64)> {
+fn fourth_difference(window: &[[f64; 2]; NOISE_CHORDS + 1]) -> Option<(f64, f64)> {
     let local = in_chord(window);
     let span = local[NOISE_CHORDS][0] - local[0][0];
-    let weight = |i: usize| -> f64 {
+    let weights: [f64; NOISE_CHORDS + 1] = std::array::from_fn(|i| {
         let others = (0..=NOISE_CHORDS).filter(|j| *j != i);
         1.0 / others
             .map(|j| (local[i][0] - local[j][0]) / span)
             .product::<f64>()
-    };
-    let weights: Vec<f64> = (0..=NOISE_CHORDS).map(weight).collect();
+    });
     let length = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
     let sum: f64 = weights.iter().zip(&local).map(|(w, at)| w * at[1]).sum();
     let difference = (sum / length).abs();
@@ -134,7 +134,8 @@ pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<S
         (range[1] + ODD_WINDOW).min(points.at.len()),
     ];
     let off: Vec<f64> = (around[0]..around[1])
-        .map(|k| off_neighbours(points, k).unwrap_or(0.0))
+        .map(|k| points.known(k, |known| &known.off, || off_neighbours(points, k)))
+        .map(Option::unwrap_or_default)
         .collect();
     let size = |j: usize| off[j].abs();
     let (mut outlier, mut step): (Option<Outlier>, Option<Step>) = (None, None);
@@ -188,13 +189,12 @@ fn spacing_around(points: Points, k: usize) -> f64 {
 
 /// Height in mm of a point above the least-squares cubic of its six neighbours.
 fn off_neighbours(points: Points, k: usize) -> Option<f64> {
-    let window = points.at.get(k.checked_sub(3)?..k + 4)?;
-    let local = in_chord(window);
+    let local = in_chord(window_at::<7>(points, k.checked_sub(3)?)?);
     if local[6][0] - local[0][0] > ODD_SPAN_MAX {
         return None;
     }
-    let others: Vec<[f64; 2]> = (0..7).filter(|j| *j != 3).map(|j| local[j]).collect();
-    Some(local[3][1] - fitted::<4>(&others, local[3][0])?)
+    let others = [0, 1, 2, 4, 5, 6].map(|j| local[j]);
+    Some(local[3][1] - fitted::<4, 6>(others, local[3][0])?)
 }
 
 /// Length in mm of the chords if the points of a range lie on a polygon, that is, were interpolated linearly between fewer points. Such
@@ -205,15 +205,15 @@ pub fn polygon(points: Points, range: [usize; 2]) -> Option<f64> {
     if window.len() < POLYGON_POINTS_MIN {
         return None;
     }
-    let turns: Vec<f64> = window
-        .windows(3)
-        .map(|at| {
-            let [a, b] = [[0, 1], [1, 2]].map(|[i, j]| {
-                let [y, z] = [0, 1].map(|part| at[j][part] - at[i][part]);
-                z.atan2(y)
-            });
-            (b - a).abs()
-        })
+    let turn = |at: &[[f64; 2]]| {
+        let [a, b] = [[0, 1], [1, 2]].map(|[i, j]| {
+            let [y, z] = [0, 1].map(|part| at[j][part] - at[i][part]);
+            z.atan2(y)
+        });
+        (b - a).abs()
+    };
+    let turns: Vec<f64> = (window.windows(3).enumerate())
+        .map(|(k, at)| points.known(range[0] + k, |known| &known.turn, || turn(at)))
         .collect();
     let total: f64 = turns.iter().sum();
     let mut sorted = turns.clone();
@@ -253,35 +253,36 @@ pub fn rounding(given: &[[f64; 2]]) -> Option<f64> {
         .map(|places| 1.0 / places)
 }
 
+/// So many points from one on, if there are as many.
+fn window_at<const N: usize>(points: Points<'_>, first: usize) -> Option<&[[f64; 2]; N]> {
+    points.at.get(first..)?.first_chunk()
+}
+
 /// The points in axes along and perpendicular to the chord from the first to the last of them.
-fn in_chord(window: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let (from, to) = (window[0], window[window.len() - 1]);
+fn in_chord<const N: usize>(window: &[[f64; 2]; N]) -> [[f64; 2]; N] {
+    let (from, to) = (window[0], window[N - 1]);
     let chord = [to[0] - from[0], to[1] - from[1]];
     let length = chord[0].hypot(chord[1]).max(f64::MIN_POSITIVE);
     let axis = chord.map(|part| part / length);
-    let turned = |at: &[f64; 2]| {
+    window.map(|at| {
         let [y, z] = [at[0] - from[0], at[1] - from[1]];
         [axis[0] * y + axis[1] * z, axis[0] * z - axis[1] * y]
-    };
-    window.iter().map(turned).collect()
+    })
 }
 
 /// Value at `t` of the least-squares polynomial with `N` coefficients through points `[t, h]`.
-fn fitted<const N: usize>(points: &[[f64; 2]], t: f64) -> Option<f64> {
+fn fitted<const N: usize, const POINTS: usize>(points: [[f64; 2]; POINTS], t: f64) -> Option<f64> {
     let scale = points
         .iter()
         .map(|at| (at[0] - t).abs())
         .fold(0.0, f64::max);
-    let rows: Vec<([f64; N], f64)> = points
-        .iter()
-        .map(|at| {
-            let mut powers = [1.0; N];
-            for k in 1..N {
-                powers[k] = powers[k - 1] * (at[0] - t) / scale;
-            }
-            (powers, at[1])
-        })
-        .collect();
+    let rows = points.map(|at| {
+        let mut powers = [1.0; N];
+        for k in 1..N {
+            powers[k] = powers[k - 1] * (at[0] - t) / scale;
+        }
+        (powers, at[1])
+    });
     first_coefficient(&rows)
 }
 
@@ -298,6 +299,7 @@ pub fn median(values: &mut [f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::geometry::profile_quality::samples::KnownPoints;
 
     fn chords(at: &[[f64; 2]]) -> Vec<f64> {
         let mut along = vec![0.0];
@@ -308,9 +310,28 @@ mod tests {
         along
     }
 
-    fn with<T>(at: &[[f64; 2]], of: impl Fn(Points, [usize; 2]) -> T) -> T {
+    /// What `of` finds, the same whether what points tell is kept or not.
+    fn with<T: PartialEq + std::fmt::Debug>(
+        at: &[[f64; 2]],
+        of: impl Fn(Points, [usize; 2]) -> T,
+    ) -> T {
         let along = chords(at);
-        of(Points { at, along: &along }, [0, at.len()])
+        let points = Points {
+            at,
+            along: &along,
+            known: None,
+        };
+        let found = of(points, [0, at.len()]);
+        let known = KnownPoints::new(at.len());
+        let kept = Points {
+            known: Some(&known),
+            ..points
+        };
+        // In a part first, so that some of it is known then.
+        let part = [at.len() / 4, at.len() / 2];
+        assert_eq!(of(kept, part), of(points, part));
+        assert_eq!(of(kept, [0, at.len()]), found);
+        found
     }
 
     /// Points of a circle of 80 mm every 0.3 mm.

@@ -51,6 +51,8 @@ pub struct ProfileStretch {
     waves: Vec<f64>,
     /// The same of the difference between the spline in use and Akima's curve; empty with smoothing.
     ambiguity: Vec<f64>,
+    /// Deviation of the waves, from their median.
+    everywhere: f64,
 }
 
 /// The stretches of one profile that were asked for. They follow from the profile, so that two of them never make profiles differ.
@@ -138,11 +140,13 @@ impl ProfileStretch {
             let slopes = [0, 1].map(|k| akima_slopes(part.along, &values[k]));
             pressures(&|s| [0, 1].map(|k| value(part.along, &values[k], &slopes[k], s)))
         };
+        let mut sizes: Vec<f64> = waves.iter().map(|pressure| pressure.abs()).collect();
         ProfileStretch {
             first: window[0],
             step,
             waves,
             ambiguity,
+            everywhere: median(&mut sizes) / MEDIAN_OF_NORMAL,
         }
     }
 
@@ -160,10 +164,9 @@ impl ProfileStretch {
             }
             modulus * (sum / count.max(1.0)).sqrt()
         };
-        let mut sizes: Vec<f64> = self.waves.iter().map(|pressure| pressure.abs()).collect();
         Roughness {
             waviness: over_contact(&self.waves),
-            everywhere: modulus * median(&mut sizes) / MEDIAN_OF_NORMAL,
+            everywhere: modulus * self.everywhere,
             ambiguity: over_contact(&self.ambiguity),
         }
     }
@@ -207,7 +210,11 @@ mod tests {
     }
 
     fn found(at: &[[f64; 2]], along: &[f64], smoothing: f64) -> Roughness {
-        let points = Points { at, along };
+        let points = Points {
+            at,
+            along,
+            known: None,
+        };
         let reading = PointsRead {
             points,
             curve: &spline(points, smoothing),

@@ -155,6 +155,7 @@ mod tests {
         let tip = flange_tip(Points {
             at: &points,
             along: &along,
+            known: None,
         });
         let [from, to] = tip.expect("a flange");
         // 28 exp(−(d/15)²) = 26 at d = 15 √ln(28/26).

@@ -1,6 +1,5 @@
 //! The gap between the undeformed bodies: samples, and a smooth surface through them.
 
-use crate::contact::numerics::cubic::Cubic;
 use crate::contact::numerics::hermite::{self, LimitedSlopes, Place, SLOPE_REACH};
 
 /// Distance of the undeformed surfaces in mm, both bodies together, over the contact plane.
@@ -227,11 +226,11 @@ impl GapCurve {
 impl SampledSurface {
     fn new(x: &[f64], y: &[f64], samples: &[Vec<f64>]) -> SampledSurface {
         let mut slopes = vec![0.0; x.len() * y.len()];
-        let (mut column, mut across) = (Vec::new(), LimitedSlopes::default());
+        let (mut column, mut across) = (Vec::new(), LimitedSlopes::new(y));
         for i in 0..x.len() {
             column.clear();
             column.extend(samples.iter().map(|row| row[i]));
-            across.find(y, &column);
+            across.find(&column);
             for (j, slope) in across.slopes.iter().enumerate() {
                 slopes[j * x.len() + i] = *slope;
             }
@@ -246,36 +245,32 @@ impl SampledSurface {
 
     fn on(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         let width = self.x.len();
-        let places: Vec<Place> = x.iter().map(|x| Place::new(&self.x, *x)).collect();
+        let mut places: Vec<Place> = x.iter().map(|x| Place::new(&self.x, *x)).collect();
         // Only these columns decide on the values.
         let first = places.iter().map(|place| place.node).min();
         let last = places.iter().map(|place| place.node + 1).max();
         let from = first.unwrap_or(0).saturating_sub(SLOPE_REACH);
         let to = (last.unwrap_or(1) + SLOPE_REACH).min(width - 1);
-        let columns = &self.x[from..=to];
+        places.iter_mut().for_each(|place| place.node -= from);
+        let columns = to - from + 1;
         let mut out = Vec::with_capacity(x.len() * y.len());
-        let (mut line, mut cubics) = (Vec::new(), Vec::new());
-        let mut along = LimitedSlopes::default();
+        let mut line = Vec::with_capacity(columns);
+        let mut along = LimitedSlopes::new(&self.x[from..=to]);
         for y in y {
-            let Place { node: j, share } = Place::new(&self.y, *y);
-            let (here, next) = (j * width, (j + 1) * width);
+            let across = Place::new(&self.y, *y);
+            let ends = [across.node, across.node + 1].map(|j| {
+                let row = j * width + from..j * width + to + 1;
+                (&self.values[row.clone()], &self.slopes[row])
+            });
+            let [(start, leaving), (end, arriving)] = ends;
             line.clear();
-            line.extend((from..=to).map(|i| {
-                let values = [here, next].map(|row| self.values[row + i]);
-                let slopes = [here, next].map(|row| self.slopes[row + i]);
-                Cubic::with_slopes(&self.y, j, values, slopes).value(share)
+            line.extend((0..columns).map(|i| {
+                across.values[0] * start[i]
+                    + across.values[1] * end[i]
+                    + (across.slopes[0] * leaving[i] + across.slopes[1] * arriving[i])
             }));
-            along.find(columns, &line);
-            cubics.clear();
-            cubics.extend((1..columns.len()).map(|i| {
-                let ends = |of: &[f64]| [of[i - 1], of[i]];
-                Cubic::with_slopes(columns, i - 1, ends(&line), ends(&along.slopes))
-            }));
-            out.extend(
-                places
-                    .iter()
-                    .map(|place| cubics[place.node - from].value(place.share)),
-            );
+            along.find(&line);
+            out.extend(places.iter().map(|place| place.value(&line, &along.slopes)));
         }
         out
     }

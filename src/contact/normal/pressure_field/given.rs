@@ -27,6 +27,26 @@ use crate::contact::remark::list::Remark;
 /// pressure for Hertz's pressure.
 const INTERVALS_MANY: f64 = 24.0;
 
+/// The samples of the four rows about a line along x.
+struct RowsAbout<'a> {
+    weights: [f64; 4],
+    q: [&'a [f64]; 4],
+    /// Of the two beside the line.
+    smooth: [&'a [bool]; 2],
+}
+
+impl RowsAbout<'_> {
+    /// Value on a column.
+    fn value(&self, column: usize) -> f64 {
+        let q = self.q.map(|row| row[column]);
+        let [a, b, c, d] = self.weights;
+        let value = a * q[0] + b * q[1] + c * q[2] + d * q[3];
+        let smooth = self.smooth[0][column] && self.smooth[1][column];
+        let [low, high] = line::bounds(q[1], q[2], smooth);
+        value.clamp(low, high)
+    }
+}
+
 impl GridPressure {
     /// Finds the patches of a pressure; `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
     ///
@@ -178,15 +198,26 @@ impl GridPressure {
         }
     }
 
-    /// The interval of rows that holds the line of a chord, and the weights of the rows about it.
-    fn row_weights(&self, chord: &Chord) -> (usize, [f64; 4]) {
+    /// The rows about the line of a chord.
+    fn rows_about(&self, chord: &Chord) -> RowsAbout<'_> {
         let y = if self.images.is_empty() {
             chord.y
         } else {
             chord.y.abs()
         };
         let j = self.row_interval(y);
-        (j, weights(&self.grid.y, j, y))
+        self.rows_at(j, weights(&self.grid.y, j, y))
+    }
+
+    /// The rows about a line between the rows j and j + 1.
+    fn rows_at(&self, j: usize, weights: [f64; 4]) -> RowsAbout<'_> {
+        let nx = self.grid.x.len();
+        let row = |j: usize| j * nx..(j + 1) * nx;
+        RowsAbout {
+            weights,
+            q: [j - 1, j, j + 1, j + 2].map(|j| &self.q[row(j)]),
+            smooth: [j, j + 1].map(|j| &self.smooth[row(j)]),
+        }
     }
 
     /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For
@@ -202,9 +233,9 @@ impl GridPressure {
             return 0.0;
         }
         let x = &self.grid.x;
-        let (j, weights) = self.row_weights(chord);
+        let rows = self.rows_about(chord);
         let (first, last) = (self.column_interval(low), self.column_interval(high));
-        let value = |i: usize| self.value_on_column(i, j, weights);
+        let value = |i: usize| rows.value(i);
         let mut values: [f64; 4] = std::array::from_fn(|k| value(first - 1 + k));
         if x0 == x1 {
             let cubic = line::cubic(x, first, values);
@@ -246,8 +277,8 @@ impl GridPressure {
     #[must_use]
     pub fn pressures<const N: usize>(&self, chord: &Chord, places: [f64; N]) -> [f64; N] {
         let x = &self.grid.x;
-        let (j, weights) = self.row_weights(chord);
-        let value = |column: usize| self.value_on_column(column, j, weights);
+        let rows = self.rows_about(chord);
+        let value = |column: usize| rows.value(column);
         let last = x.len() - 3;
         let mut i = self.column_interval(places[0].max(chord.left));
         let mut values: [f64; 4] = std::array::from_fn(|k| value(i - 1 + k));
@@ -284,13 +315,13 @@ impl GridPressure {
             return;
         };
         let t = (y - rows[j]) / (rows[j + 1] - rows[j]);
-        let weights = weights(rows, j, y);
+        let about = self.rows_at(j, weights(rows, j, y));
         let line = GridLine {
             axis: x,
             intervals: columns,
             whole: self.whole(label, j),
-            value: |i| self.value_on_column(i, j, weights),
-            inside: |i| self.q[j * x.len() + i] > 0.0 && self.q[(j + 1) * x.len() + i] > 0.0,
+            value: |i| about.value(i),
+            inside: |i| about.q[1][i] > 0.0 && about.q[2][i] > 0.0,
             smooth: |i| self.is_smooth(i, j),
             allowed: |i| self.allowed(label, i, j, t),
         };
@@ -351,21 +382,6 @@ impl GridPressure {
         [k, k + 1, k + nx, k + nx + 1]
             .iter()
             .all(|k| self.smooth[*k])
-    }
-
-    /// Value on column i between the rows j and j + 1.
-    fn value_on_column(&self, i: usize, j: usize, weights: [f64; 4]) -> f64 {
-        let nx = self.grid.x.len();
-        let k = j * nx + i;
-        let nodes = [k - nx, k, k + nx, k + 2 * nx];
-        let value: f64 = weights
-            .iter()
-            .zip(nodes)
-            .map(|(weight, k)| weight * self.q[k])
-            .sum();
-        let smooth = self.smooth[k] && self.smooth[k + nx];
-        let [low, high] = line::bounds(self.q[k], self.q[k + nx], smooth);
-        value.clamp(low, high)
     }
 
     fn row_interval(&self, y: f64) -> usize {

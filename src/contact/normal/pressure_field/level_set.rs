@@ -41,6 +41,7 @@ pub(crate) fn extend(grid: &SampleGrid, q: &mut [f64]) -> Vec<State> {
         .filter_map(|(k, near)| (near && states[k] == State::Unknown).then_some(k))
         .collect();
     let nx = grid.x.len();
+    let weights = [&grid.x, &grid.y].map(|axis| parabola_weights(axis));
     // A sample three away along both axes is reached after six steps.
     for pass in 0..2 * RINGS {
         let is_known = |k: usize| states.get(k).is_some_and(|state| *state != State::Unknown);
@@ -50,7 +51,7 @@ pub(crate) fn extend(grid: &SampleGrid, q: &mut [f64]) -> Vec<State> {
         };
         let found: Vec<_> = missing
             .iter()
-            .map(|k| reached(*k).then(|| continued(grid, q, &states, *k, pass == 0))?)
+            .map(|k| reached(*k).then(|| continued(grid, &weights, q, &states, *k, pass == 0))?)
             .collect();
         let mut left = Vec::new();
         for (k, found) in missing.into_iter().zip(found) {
@@ -92,24 +93,47 @@ fn widened(marked: &[bool], stride: usize) -> Vec<bool> {
     out
 }
 
+/// Weights of the three samples before and after a place of an axis in the value of their parabola there.
+type ParabolaWeights = [[f64; 3]; 2];
+
+/// Those of every place of an axis that has as many samples on that side; elsewhere 0.
+fn parabola_weights(axis: &[f64]) -> Vec<ParabolaWeights> {
+    let of = |at: usize, nodes: [Option<usize>; 3]| {
+        let nodes = nodes.map(|node| axis.get(node?).copied());
+        match nodes {
+            [Some(a), Some(b), Some(c)] => lagrange::weights(&[a, b, c], axis[at]),
+            _ => [0.0; 3],
+        }
+    };
+    let both = |at: usize| {
+        [
+            of(at, [1, 2, 3].map(|k| at.checked_sub(k))),
+            of(at, [1, 2, 3].map(|k| Some(at + k))),
+        ]
+    };
+    (0..axis.len()).map(both).collect()
+}
+
 /// Value of the unknown sample `k` from the most reliable extrapolations along the axes, if there are any. Their harmonic mean
 /// is used, so that the steep edge of a heavily loaded patch does not shift that of a lightly loaded one beside it.
 fn continued(
     grid: &SampleGrid,
+    weights: &[Vec<ParabolaWeights>; 2],
     q: &[f64],
     states: &[State],
     k: usize,
     first_pass: bool,
 ) -> Option<(f64, State)> {
     let nx = grid.x.len();
+    let (i, j) = (k % nx, k / nx);
     let directions = [
-        (&grid.x, k % nx, 1, -1),
-        (&grid.x, k % nx, 1, 1),
-        (&grid.y, k / nx, nx as isize, -1),
-        (&grid.y, k / nx, nx as isize, 1),
+        (&grid.x, i, 1, -1, weights[0][i][0]),
+        (&grid.x, i, 1, 1, weights[0][i][1]),
+        (&grid.y, j, nx as isize, -1, weights[1][j][0]),
+        (&grid.y, j, nx as isize, 1, weights[1][j][1]),
     ];
     let (mut best, mut inverse_sum, mut count, mut state) = (0, 0.0, 0.0, State::Smooth);
-    for (axis, at, stride, sign) in directions {
+    for (axis, at, stride, sign, parabola) in directions {
         // Up to three known samples in this direction, nearest first, as (coordinate, value).
         let mut known = [(0.0, 0.0); 3];
         let mut order = 0;
@@ -132,12 +156,19 @@ fn continued(
         if order > best {
             (best, inverse_sum, count, state) = (order, 0.0, 0.0, State::Smooth);
         }
+        let by_curve = match known {
+            [(_, a), (_, b), (_, c)] if order == 3 => {
+                let [wa, wb, wc] = parabola;
+                wa * a + wb * b + wc * c
+            }
+            _ => lagrange::value(&known[..order], axis[at]),
+        };
         let known = &known[..order];
         let nearest = states[k.wrapping_add_signed(sign * stride)];
         let (value, how) = match nearest {
             State::Step => (known[0].1, State::Step),
-            _ if first_pass => edge_value(axis[at], known),
-            _ => outward_value(axis[at], known),
+            _ if first_pass => edge_value(axis[at], known, by_curve),
+            _ => outward_value(known, by_curve),
         };
         // An extrapolated value of 0 has to remain 0 in the mean.
         inverse_sum += 1.0 / value.min(-1e-300);
@@ -147,19 +178,18 @@ fn continued(
     (best > 0).then_some((count / inverse_sum, state))
 }
 
-/// Value of the first sample outside, from one to three samples inside, and how it is known.
+/// Value of the first sample outside, from one to three samples inside and the value of the curve through them there, and how it is known.
 ///
 /// The value is never positive, so the edge lies between the last sample inside and the first outside. Where the
 /// pressure jumps (the extrapolation is well above 0) the edge is put half-way; between the two cases the rule changes
 /// smoothly.
-fn edge_value(at: f64, inside: &[(f64, f64)]) -> (f64, State) {
+fn edge_value(at: f64, inside: &[(f64, f64)], value: f64) -> (f64, State) {
     const EDGE_AT_SAMPLE: f64 = 0.25;
     const JUMP: f64 = 0.75;
     let last = inside[0].1;
     if inside.len() == 1 {
         return (-last, State::Step);
     }
-    let value = lagrange::value(inside, at);
     if value <= 0.0 {
         return (
             value,
@@ -178,9 +208,8 @@ fn edge_value(at: f64, inside: &[(f64, f64)]) -> (f64, State) {
     (-last * jump.min(1.0), State::Step)
 }
 
-/// Value of a sample farther out, from one to three known ones; values never increase outward.
-fn outward_value(at: f64, known: &[(f64, f64)]) -> (f64, State) {
-    let value = lagrange::value(known, at);
+/// Value of a sample farther out, from one to three known ones and the value of the curve through them there; values never increase outward.
+fn outward_value(known: &[(f64, f64)], value: f64) -> (f64, State) {
     let smooth = known.len() == 3 && value <= known[0].1;
     (
         value.min(known[0].1),
@@ -218,6 +247,8 @@ mod tests {
 
     #[test]
     fn the_edge_stays_between_inside_and_outside() {
+        let edge_value =
+            |at: f64, inside: &[(f64, f64)]| edge_value(at, inside, lagrange::value(inside, at));
         let last = 0.5;
         for next in [0.0, 0.2, 0.5, 0.6, 1.0, 5.0] {
             let (value, _) = edge_value(2.0, &[(1.0, last), (0.0, next)]);

@@ -89,8 +89,12 @@ where
             tell(low, high);
             return;
         }
+        let cubic = Cubic::between(self.axis, node, values);
+        if cubic.is_never_positive() {
+            return;
+        }
         let mut start = (here > 0.0).then_some(low);
-        for (at, positive) in Cubic::between(self.axis, node, values).sign_changes() {
+        for (at, positive) in cubic.sign_changes() {
             if positive {
                 start = Some(at);
             } else if let Some(start) = start.take() {

@@ -54,16 +54,37 @@ fn along(level: &StripMesh, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
     })
 }
 
-/// Lines across a patch, and points along each of them, of [`sum_along_rigid_slip`]. Chosen by judgement: it serves meshes of a quarter as many cells.
-pub(crate) const POINTS: usize = 16;
+/// Lines across a patch, and points along each of them, of [`sum_along_rigid_slip`]. Chosen by judgement: they serve meshes of a quarter as many cells.
+const POINTS: [usize; 2] = [16, 32];
+
+/// Most cells of a patch whose sums [`sum_along_rigid_slip`] tells the errors of.
+pub(crate) const CELLS_MAX: usize = POINTS[1] * POINTS[1] / 4;
 
 /// Forces and moment of one patch if every point slips along the rigid slip of a motion in mm, with the same coefficient of friction everywhere;
 /// the moment is about the origin of the case.
 ///
 /// Lines and points lie in the middle of equal angles (see [`Footprint::mean_of_line`]), as whose function pressures are smooth. With the pole of
-/// the rotation inside, the direction jumps there, and this is about as exact as `16 · 16` cells.
+/// the rotation inside, the direction jumps there, and this is about as exact as four times as many `cells`, of which there are at most
+/// [`CELLS_MAX`].
 #[must_use]
 pub fn sum_along_rigid_slip(
+    footprint: &Footprint,
+    patch: usize,
+    motion: &Motion,
+    coefficient: f64,
+    cells: usize,
+) -> Resultants {
+    let [few, many] = POINTS;
+    if 4 * cells <= few * few {
+        sum_at::<{ POINTS[0] }>(footprint, patch, motion, coefficient)
+    } else {
+        debug_assert!(4 * cells <= many * many);
+        sum_at::<{ POINTS[1] }>(footprint, patch, motion, coefficient)
+    }
+}
+
+/// The same from N lines and N points on each of them.
+fn sum_at<const N: usize>(
     footprint: &Footprint,
     patch: usize,
     motion: &Motion,
@@ -74,7 +95,7 @@ pub fn sum_along_rigid_slip(
         normal_force,
         ..
     } = footprint.patches()[patch];
-    let angles = LineAngles::<POINTS>::new();
+    let angles = LineAngles::<N>::new();
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let (mut chords, mut load, mut sum) = (Vec::new(), 0.0, Resultants::default());
     for (cos, width) in angles.cosines.iter().zip(&angles.sines) {
@@ -192,7 +213,11 @@ mod tests {
     const LOAD: f64 = 1000.0;
     const FRICTION: f64 = 0.3;
 
-    fn sum(semi_axes: [f64; 2], [creepage_x, creepage_y, spin_per_mm]: [f64; 3]) -> Resultants {
+    /// By few points and by many.
+    fn sums(
+        semi_axes: [f64; 2],
+        [creepage_x, creepage_y, spin_per_mm]: [f64; 3],
+    ) -> [Resultants; 2] {
         let [a, b] = semi_axes;
         let ellipse = Ellipse::of_semi_axes(a, b, NormalLoad::Force(LOAD), 1e5);
         let motion = Motion {
@@ -200,32 +225,37 @@ mod tests {
             creepage_y,
             spin_per_mm,
         };
-        sum_along_rigid_slip(&Footprint::hertz(ellipse), 0, &motion, FRICTION)
+        let footprint = Footprint::hertz(ellipse);
+        let sum = |cells| sum_along_rigid_slip(&footprint, 0, &motion, FRICTION, cells);
+        [1, CELLS_MAX].map(sum)
     }
 
     #[test]
     fn without_spin_the_whole_bound_points_along_the_creepage() {
-        let found = sum([5.0, 3.0], [0.003, 0.004, 0.0]);
-        assert!((found.force_x / (0.6 * FRICTION * LOAD) - 1.0).abs() < 1e-9);
-        assert!((found.force_y / (0.8 * FRICTION * LOAD) - 1.0).abs() < 1e-9);
+        for found in sums([5.0, 3.0], [0.003, 0.004, 0.0]) {
+            assert!((found.force_x / (0.6 * FRICTION * LOAD) - 1.0).abs() < 1e-9);
+            assert!((found.force_y / (0.8 * FRICTION * LOAD) - 1.0).abs() < 1e-9);
+        }
     }
 
     /// The mean distance from the centre under Hertz's pressure on a circle is `3 π a / 16`.
     #[test]
     fn spin_about_the_centre_of_a_circle_leaves_a_moment_alone() {
-        let found = sum([4.0, 4.0], [0.0, 0.0, 1e-3]);
-        let moment = FRICTION * LOAD * 3.0 * std::f64::consts::PI * 4.0 / 16.0;
-        assert!((found.moment_z / moment - 1.0).abs() < 1e-3, "{found:?}");
-        assert!(found.force_x.hypot(found.force_y) < 1e-9 * FRICTION * LOAD);
+        for found in sums([4.0, 4.0], [0.0, 0.0, 1e-3]) {
+            let moment = FRICTION * LOAD * 3.0 * std::f64::consts::PI * 4.0 / 16.0;
+            assert!((found.moment_z / moment - 1.0).abs() < 1e-3, "{found:?}");
+            assert!(found.force_x.hypot(found.force_y) < 1e-9 * FRICTION * LOAD);
+        }
     }
 
     /// To the second order in the distance of the pole the transverse force falls by half the mean square of y over that distance.
     #[test]
     fn a_far_pole_turns_tractions_by_what_the_place_tells() {
         let (b, pole) = (3.0, 60.0);
-        let found = sum([b, b], [1e-3 * pole, 0.0, 1e-3]);
-        let spread = 0.5 * (b * b / 5.0) / (pole * pole);
-        let expected = FRICTION * LOAD * (1.0 - spread);
-        assert!((found.force_x / expected - 1.0).abs() < 1e-5, "{found:?}");
+        for found in sums([b, b], [1e-3 * pole, 0.0, 1e-3]) {
+            let spread = 0.5 * (b * b / 5.0) / (pole * pole);
+            let expected = FRICTION * LOAD * (1.0 - spread);
+            assert!((found.force_x / expected - 1.0).abs() < 1e-5, "{found:?}");
+        }
     }
 }

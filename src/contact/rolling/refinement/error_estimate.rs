@@ -410,8 +410,10 @@ fn sum_errors(
             .map(|p| Resultants::of_patch(level, &traction, p))
             .collect()
     };
+    let cells = level.mesh.cells() / patches.len();
     let integral = |p: usize| {
-        full_slip::sum_along_rigid_slip(task.footprint, p, motion, task.friction.largest())
+        let coefficient = task.friction.largest();
+        full_slip::sum_along_rigid_slip(task.footprint, p, motion, coefficient, cells)
     };
     let (exact, left) = match finer {
         Some(finer) => (on(finer), 4.0 / 3.0),

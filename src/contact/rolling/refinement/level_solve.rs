@@ -298,7 +298,7 @@ fn finer_for_sums(
 ) -> Option<StripMesh> {
     let is_smooth = task.footprint.surprise().is_none() && task.friction.across().is_none();
     let patches = task.footprint.patches().len();
-    let by_integral = is_smooth && 4 * level.mesh.cells() <= patches * full_slip::POINTS.pow(2);
+    let by_integral = is_smooth && level.mesh.cells() <= patches * full_slip::CELLS_MAX;
     let slides = !by_integral && error_estimate::turns_sliding(task, motion, answer);
     if !slides && !error_estimate::jumps(task) {
         return None;

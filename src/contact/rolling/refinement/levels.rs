@@ -30,7 +30,12 @@ impl KeptStrips {
         match self.0.iter().position(is_known) {
             Some(place) => self.0[..=place].rotate_right(1),
             None => {
-                let found = fitted_chords(task.footprint, plan)?;
+                let (strips, pole) = key;
+                let halved = (2 * strips, pole);
+                let mut kept = self.0.iter().flatten();
+                let halves = kept.find(|(made, _)| *made == halved);
+                let halves = halves.map_or(&[][..], |(_, strips)| strips);
+                let found = fitted_chords(task.footprint, plan, halves)?;
                 self.0.rotate_right(1);
                 self.0[0] = Some((key, found));
             }
