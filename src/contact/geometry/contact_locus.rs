@@ -41,10 +41,10 @@ const WIDENINGS_MAX: usize = 5;
 const SLOPE_BEYOND_CUT: f64 = 0.5;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
-/// Lowering in mm under a light load, where the estimate for others begins. It changes times, no answer.
+/// Lowering in mm under a light load, where the estimate for others begins.
 const LOWERING_FIRST: f64 = 0.032;
 /// Lowerings that are tried for an estimate at most, and part of the force to the power 2/3 that ends it: where one patch carries the force, two or
-/// three tries do. It changes times, no answer.
+/// three tries do. Like the one before they decide which height is tried first.
 const LOWERINGS_TRIED: usize = 10;
 const ESTIMATED: f64 = 2e-3;
 
