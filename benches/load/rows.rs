@@ -16,7 +16,7 @@ use crate::service::Service;
 const EVALUATED: usize = 500_000;
 /// Rows of a run by the table, and of one by the fast solver.
 const BY_TABLE: usize = 1_000_000;
-const BY_SOLVER: usize = 10_000;
+const BY_SOLVER: usize = 100_000;
 
 const NAMES: [&str; 7] = [
     "normal_force_n",

@@ -12,11 +12,11 @@ use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::mesh::size::MeshSize;
-use crate::contact::mesh::strips::Segment;
 use crate::contact::method::{Method, TractionBound};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::patch::Patch;
+use crate::contact::numerics::length::length;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::methods::full_slip;
@@ -74,18 +74,48 @@ pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAns
         remarks: Vec::new(),
     };
     let mut bound = level.bound.clone();
-    for (p, patch) in task.footprint.patches().iter().enumerate() {
+    for (p, brush) in brushes(task, level, motion).enumerate() {
         if parabolic {
             make_parabolic(level, p, &mut bound);
         }
-        let ellipse = EquivalentEllipse::like(level, p, patch);
-        let brush = SimplifiedTheory::new(&ellipse, task.elasticity.poisson_ratio, motion);
-        let segments = &level.normalised.segments;
-        for segment in segments.iter().filter(|s| s.chord.patch == p) {
-            brush.sweep(level, segment, &bound, &mut answer);
-        }
+        brush.sweep_patch(level, p, &bound, |i, traction, slip| {
+            answer.traction[0][i] = traction[0];
+            answer.traction[1][i] = traction[1];
+            if let Some(slip) = slip {
+                answer.slips[i] = true;
+                answer.slip[0][i] = slip[0];
+                answer.slip[1][i] = slip[1];
+            }
+        });
     }
     answer
+}
+
+/// The tractions of [`solve`] alone, with the elliptic bound.
+#[must_use]
+pub fn tractions(task: &RollingTask, level: &StripMesh, motion: &Motion) -> [Vec<f64>; 2] {
+    let cells = level.mesh.cells();
+    let mut found = [vec![0.0; cells], vec![0.0; cells]];
+    for (p, brush) in brushes(task, level, motion).enumerate() {
+        brush.sweep_patch(level, p, &level.bound, |i, traction, _| {
+            found[0][i] = traction[0];
+            found[1][i] = traction[1];
+        });
+    }
+    found
+}
+
+/// The theory of every patch.
+fn brushes<'a>(
+    task: &'a RollingTask,
+    level: &'a StripMesh,
+    motion: &'a Motion,
+) -> impl Iterator<Item = SimplifiedTheory> + 'a {
+    let patches = task.footprint.patches().iter().enumerate();
+    patches.map(move |(p, patch)| {
+        let ellipse = EquivalentEllipse::like(level, p, patch);
+        SimplifiedTheory::new(&ellipse, task.elasticity.poisson_ratio, motion)
+    })
 }
 
 /// The mesh of an ellipse for many ellipses and motions: that of the circle, since all ellipses are its images. The chords of meshes made
@@ -171,11 +201,11 @@ impl EllipseMesh {
                     traction[0] + step * across,
                     traction[1] + step * (brush.growth[1] + brush.turning * halfway),
                 ];
-                let length = (traction[0] * traction[0] + traction[1] * traction[1]).sqrt();
+                let size = length(traction[0], traction[1]);
                 let area = self.level.area[i];
                 whole += area;
-                if length > self.bound[i] {
-                    let share = self.bound[i] / length;
+                if size > self.bound[i] {
+                    let share = self.bound[i] / size;
                     traction = traction.map(|t| share * t);
                 } else {
                     stick += area;
@@ -275,33 +305,40 @@ impl SimplifiedTheory {
         }
     }
 
-    /// One pass along a segment, from its leading edge to its trailing one.
-    fn sweep(&self, level: &StripMesh, segment: &Segment, bound: &[f64], answer: &mut LevelAnswer) {
-        let mut ahead = segment.chord.right;
-        let mut traction = [0.0; 2];
-        let across = self.growth[0] - self.turning * (segment.chord.y - self.centre[1]);
-        for i in segment.cells.clone().rev() {
-            let here = level.normalised.node[i];
-            let step = ahead - here;
-            // The rigid slip is linear along the strip: its value halfway makes the step exact.
-            let halfway = 0.5 * (ahead + here) - self.centre[0];
-            let trial = [
-                traction[0] + step * across,
-                traction[1] + step * (self.growth[1] + self.turning * halfway),
-            ];
-            let length = trial[0].hypot(trial[1]);
-            traction = trial;
-            if length > bound[i] {
-                let share = bound[i] / length;
-                traction = trial.map(|t| share * t);
-                answer.slips[i] = true;
-                let back = self.flexibility * (1.0 - share) / step;
-                answer.slip[0][i] = back * trial[0];
-                answer.slip[1][i] = back * trial[1];
+    /// One pass along each segment of a patch, from its leading edge to its trailing one; `take` is given cell, traction, and slip where it slips.
+    fn sweep_patch(
+        &self,
+        level: &StripMesh,
+        patch: usize,
+        bound: &[f64],
+        mut take: impl FnMut(usize, [f64; 2], Option<[f64; 2]>),
+    ) {
+        let segments = &level.normalised.segments;
+        for segment in segments.iter().filter(|s| s.chord.patch == patch) {
+            let mut ahead = segment.chord.right;
+            let mut traction = [0.0; 2];
+            let across = self.growth[0] - self.turning * (segment.chord.y - self.centre[1]);
+            for i in segment.cells.clone().rev() {
+                let here = level.normalised.node[i];
+                let step = ahead - here;
+                // The rigid slip is linear along the strip: its value halfway makes the step exact.
+                let halfway = 0.5 * (ahead + here) - self.centre[0];
+                let trial = [
+                    traction[0] + step * across,
+                    traction[1] + step * (self.growth[1] + self.turning * halfway),
+                ];
+                let size = length(trial[0], trial[1]);
+                traction = trial;
+                let mut slip = None;
+                if size > bound[i] {
+                    let share = bound[i] / size;
+                    traction = trial.map(|t| share * t);
+                    let back = self.flexibility * (1.0 - share) / step;
+                    slip = Some(trial.map(|t| back * t));
+                }
+                take(i, traction, slip);
+                ahead = here;
             }
-            answer.traction[0][i] = traction[0];
-            answer.traction[1][i] = traction[1];
-            ahead = here;
         }
     }
 }

@@ -20,7 +20,7 @@ use crate::contact::rolling::refinement::estimate_context::{CoarserLevel, Estima
 use crate::contact::rolling::refinement::one_rule;
 use crate::contact::rolling::refinement::slender::slender;
 use crate::contact::rolling::refinement::state::RefinementState;
-use crate::contact::rolling::refinement::warm_start::from_coarser;
+use crate::contact::rolling::refinement::warm_start::{from_coarser, simplified};
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::start::Start;
@@ -383,5 +383,6 @@ fn run_method(
         return Ok(fastsim::solve(task, level, &motion));
     }
     let of_level = level_task(task, level, &motion, asked.index);
+    let start = start.or_else(|| simplified(task, of_level));
     boundary_element::solve(of_level, start.as_ref(), workspace, monitor)
 }
