@@ -1,6 +1,6 @@
 //! Dimensionless creepages solved with the boundary-element method.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use railhead::contact;
@@ -83,8 +83,11 @@ pub fn solve(
 
 /// The folder of what takes long to compute.
 pub fn folder() -> PathBuf {
-    let folder = std::env::var("RAILHEAD_TABLE_FOLDER").unwrap_or_else(|_| "target/table".into());
-    let folder = PathBuf::from(folder);
+    // A bench runs in the folder of its own crate.
+    let folder = std::env::var_os("RAILHEAD_TABLE_FOLDER").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/table"),
+        PathBuf::from,
+    );
     std::fs::create_dir_all(&folder).expect("a folder");
     folder
 }

@@ -12,9 +12,12 @@ use railhead::contact::rolling::methods::boundary_element::task::{
     LevelTask, NewtonTask, STEPS_MAX,
 };
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use railhead::contact::rolling::methods::fastsim;
 use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
+use railhead::contact::rolling::start::Start;
 use railhead::contact::rolling::strip_mesh::StripMesh;
+use railhead::contact::rolling::task::RollingTask;
 use railhead::contact::solution::words::answer::PointSolution;
 
 use crate::reference::{Ellipse, solve};
@@ -29,6 +32,13 @@ fn answered(contact: &Ellipse) -> PointSolution {
 /// Largest difference between the door's tractions and those of a plain Newton solve of the trapezoid rule over the
 /// whole mesh in double precision, relative to the friction bound.
 fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
+    on_level(contact, |_, asked| {
+        distance_on(contact.poisson_ratio, asked)
+    })
+}
+
+/// What `work` finds of a contact on a mesh of these strips and cells.
+fn on_level<T>(contact: &Ellipse, work: impl FnOnce(&RollingTask, LevelTask) -> T) -> T {
     let case = contact.case(STRIPS, CELLS);
     let checked = contact::check(&case, &Limits::default()).expect("a valid case");
     let size = contact::mesh::size::MeshSize {
@@ -38,9 +48,9 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
     let footprint = normal_stage::solve(&checked, &Unmonitored)
         .expect("a contact")
         .footprint;
-    let level = StripMesh::new(&checked.rolling_task(&footprint), size).expect("a mesh");
+    let task = checked.rolling_task(&footprint);
+    let level = StripMesh::new(&task, size).expect("a mesh");
     let motion = level.scale.motion(&checked.problem.motions[0]);
-    let mut workspace = NewtonWorkspace::default();
     let asked = LevelTask {
         level: &level,
         motion: &motion,
@@ -48,10 +58,15 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
         passage: None,
         tolerance: 1e-9,
     };
+    work(&task, asked)
+}
+
+fn distance_on(nu: f64, asked: LevelTask) -> f64 {
+    let LevelTask { level, motion, .. } = asked;
+    let mut workspace = NewtonWorkspace::default();
     let shortened = boundary_element::solve(asked, None, &mut workspace, &Unmonitored);
     let shortened = shortened.expect("a solution");
 
-    let nu = checked.problem.elasticity.poisson_ratio;
     let whole = StripOperator::new(
         &level.normalised,
         nu,
@@ -69,7 +84,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
             values
         };
         let (rigid, bound, area) = (
-            equations.rigid(&motion),
+            equations.rigid(motion),
             resized(&level.bound),
             resized(&level.area),
         );
@@ -157,6 +172,48 @@ fn overwhelming_slip_needs_no_influence_and_does_not_move_the_answer() {
         let distance = distance_to_plain_newton(&contact);
         assert!(distance < 1e-6, "a/b {a_over_b}: {distance:e}");
     }
+}
+
+#[test]
+fn a_start_from_the_simplified_theory_saves_products_and_does_not_move_the_answer() {
+    let (mut from_zero, mut from_simplified) = (0, 0);
+    for ratio in [0.2, 0.7, 1.5, 5.0] {
+        for [x, y, spin] in [
+            [0.1, 0.0, 0.0],
+            [0.5, 0.0, 0.0],
+            [0.0, 0.9, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.3, 0.2, 0.8],
+            [0.9, -0.7, -2.0],
+        ] {
+            let contact = Ellipse::steel(ratio, 0.28).normalised(x, y, spin);
+            on_level(&contact, |task, asked| {
+                let simplified = Start {
+                    three_point: fastsim::tractions(task, asked.level, asked.motion),
+                    trapezoid: None,
+                };
+                let mut workspace = NewtonWorkspace::default();
+                let mut of = |start| {
+                    boundary_element::solve(asked, start, &mut workspace, &Unmonitored)
+                        .expect("a solution")
+                };
+                let [zero, near] = [of(None), of(Some(&simplified))];
+                from_zero += zero.work.products;
+                from_simplified += near.work.products;
+                let pairs = zero
+                    .traction
+                    .iter()
+                    .flatten()
+                    .zip(near.traction.iter().flatten());
+                let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(apart < 1e-6, "{ratio} {x} {y} {spin}: {apart:e}");
+            });
+        }
+    }
+    assert!(
+        10 * from_simplified < 9 * from_zero,
+        "{from_simplified} products, {from_zero} from zero tractions"
+    );
 }
 
 #[test]
