@@ -140,12 +140,65 @@ fn newton_and_gmres_allocate_nothing_in_a_workspace_that_has_served_before() {
 }
 
 #[test]
+fn blocks_kept_from_the_motion_before_move_no_answer_and_are_forgotten_by_the_next_case() {
+    let kept_some = std::cell::Cell::new(false);
+    with_equations(0.005, |equations, [bound, area]| {
+        let newton = Newton::new(equations);
+        let solve = |workspace: &mut NewtonWorkspace, steps_max, start: &[f64], creepage_x| {
+            let rigid = equations.rigid(&Motion {
+                creepage_x,
+                creepage_y: 0.2,
+                spin_per_mm: 0.3,
+            });
+            let law = NewtonTask {
+                rigid: &rigid,
+                bound,
+                fall: None,
+                area,
+                scale: 1.0,
+                tolerance: 1e-7,
+                steps_max,
+            };
+            let mut t = start.to_vec();
+            let report = newton.solve(&law, &mut t, workspace, &Unmonitored);
+            let report = report.expect("never stopped");
+            assert!(report.exit.converged(), "{:?}: {report:?}", equations.rule);
+            t
+        };
+        let zero = vec![0.0; 2 * equations.padded()];
+        let mut served = NewtonWorkspace::default();
+        let first = solve(&mut served, STEPS_MAX, &zero, 0.50);
+        // So few steps that starts count as near.
+        let near =
+            |workspace: &mut NewtonWorkspace, creepage_x| solve(workspace, 8, &first, creepage_x);
+        near(&mut served, 0.505);
+        let kept = near(&mut served, 0.51);
+        let fresh = near(&mut NewtonWorkspace::default(), 0.51);
+        let pairs = kept.iter().zip(&fresh);
+        let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-5, "{:?}: {apart:e}", equations.rule);
+        kept_some.set(kept_some.get() || apart > 0.0);
+        served.give_back();
+        let mut of_next = NewtonWorkspace::of_thread();
+        assert_eq!(near(&mut of_next, 0.51), fresh);
+    });
+    assert!(kept_some.get(), "no block was kept");
+}
+
+#[test]
 fn a_small_solve_allocates_a_bounded_number_of_times() {
     let motion = json!({ "creepage_x": 0.001, "creepage_y": 0.0005, "spin_per_mm": 0.0003 });
     let count = |solver: &Value| {
         let checked = case(solver, &motion);
         during(|| solve(&checked, &Unmonitored))
     };
+    // What the process makes once is made by another thread, whose allocations are not counted.
+    std::thread::scope(|scope| {
+        scope
+            .spawn(|| count(&json!({ "target_error": 0.02 })))
+            .join()
+    })
+    .expect("an answer");
     let on_mesh = count(&json!({ "mesh": { "strips": 8, "cells": 8 } }));
     let to_target = count(&json!({ "target_error": 0.005 }));
     println!("{on_mesh} allocations on one mesh, {to_target} to the target");

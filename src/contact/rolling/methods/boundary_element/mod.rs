@@ -8,5 +8,6 @@ mod newton_system;
 pub mod preconditioner;
 mod rule_sequence;
 pub mod solve;
+mod strip_blocks;
 pub mod task;
 pub mod workspace;

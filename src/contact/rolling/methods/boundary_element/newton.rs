@@ -174,8 +174,8 @@ impl<'a> Newton<'a> {
             self.linearise(law, t, rhs, workspace, &mut report);
             let NewtonWorkspace { blocks, linear, .. } = &mut *workspace;
             // Where a start is near. Iterations from far, which may cycle, get blocks that leave nothing out.
-            let by_axes = law.steps_max <= FREE_STEPS;
-            blocks.factor(&self.own, self.equations, linear, by_axes);
+            let near = law.steps_max <= FREE_STEPS;
+            blocks.factor(&self.own, self.equations, linear, near);
             let inner = inner_tolerance(report.residual, last, law.tolerance);
             self.linear_step(rhs, inner, step, workspace, monitor, &mut report)?;
             last = report.residual;

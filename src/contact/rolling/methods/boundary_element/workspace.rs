@@ -40,7 +40,8 @@ impl NewtonWorkspace {
     }
 
     /// Leaves the workspace to the next solve of this thread, unless it is large.
-    pub fn give_back(self) {
+    pub fn give_back(mut self) {
+        self.blocks.forget();
         if self.slip.capacity() <= KEPT_LENGTH {
             LAST.set(Some(self));
         }
