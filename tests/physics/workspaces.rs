@@ -80,6 +80,19 @@ fn with_equations(precision_target: f64, work: impl Fn(&SlipEquations, [&[f64]; 
     }
 }
 
+/// The friction law with these rigid slips, bounds and areas, to a residual of 1e-7 in so many steps.
+fn law<'a>(rigid: &'a [f64], [bound, area]: [&'a [f64]; 2], steps_max: u32) -> NewtonTask<'a> {
+    NewtonTask {
+        rigid,
+        bound,
+        fall: None,
+        area,
+        scale: 1.0,
+        tolerance: 1e-7,
+        steps_max,
+    }
+}
+
 #[test]
 fn a_product_allocates_nothing_after_the_first() {
     // Single and double precision.
@@ -115,15 +128,7 @@ fn newton_and_gmres_allocate_nothing_in_a_workspace_that_has_served_before() {
                 creepage_y: 0.4,
                 spin_per_mm: spin,
             });
-            let law = NewtonTask {
-                rigid: &rigid,
-                bound,
-                fall: None,
-                area,
-                scale: 1.0,
-                tolerance: 1e-6,
-                steps_max: STEPS_MAX,
-            };
+            let law = law(&rigid, [bound, area], STEPS_MAX);
             let mut solve = || {
                 t.fill(0.0);
                 let report = newton.solve(&law, &mut t, &mut workspace, &Unmonitored);
@@ -150,15 +155,7 @@ fn blocks_kept_from_the_motion_before_move_no_answer_and_are_forgotten_by_the_ne
                 creepage_y: 0.2,
                 spin_per_mm: 0.3,
             });
-            let law = NewtonTask {
-                rigid: &rigid,
-                bound,
-                fall: None,
-                area,
-                scale: 1.0,
-                tolerance: 1e-7,
-                steps_max,
-            };
+            let law = law(&rigid, [bound, area], steps_max);
             let mut t = start.to_vec();
             let report = newton.solve(&law, &mut t, workspace, &Unmonitored);
             let report = report.expect("never stopped");

@@ -53,7 +53,8 @@ impl Linearisation {
         self.stiffness[cell].max(0.0)
     }
 
-    /// Do these cells of a segment have nearly the same rows in another one? `own` are the segment's blocks.
+    /// Do these cells of a segment have nearly the same rows in another one: the same zones, and tangents and diagonals no farther apart than
+    /// `change_max`? `xx` and `yy` are the segment's own blocks.
     pub(crate) fn is_like(
         &self,
         other: &Linearisation,
