@@ -1,6 +1,8 @@
 //! Sweeps of near motions, which share what judges them: is the estimate of each as right as that of a motion alone, and what does a motion
 //! cost?
 
+use std::f64::consts::TAU;
+
 use cpu_time::ThreadTime;
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
@@ -34,9 +36,11 @@ enum Form {
     Map,
     /// Motions about one, in no order.
     Cloud,
+    /// Motions as a simulation steps through them: each component swings with its own frequency, to both sides.
+    Steps,
 }
 
-const FORMS: [Form; 4] = [Form::Ray, Form::Curve, Form::Map, Form::Cloud];
+const FORMS: [Form; 5] = [Form::Ray, Form::Curve, Form::Map, Form::Cloud, Form::Steps];
 
 /// The motions of a sweep up to the given creepages and spin.
 fn motions(form: Form, end: [f64; 3], random: &mut Random) -> Vec<[f64; 3]> {
@@ -71,6 +75,14 @@ fn motions(form: Form, end: [f64; 3], random: &mut Random) -> Vec<[f64; 3]> {
         Form::Cloud => (0..count)
             .map(|_| end.map(|v| v * random.between(0.9, 1.1)))
             .collect(),
+        Form::Steps => {
+            let step = random.decades(0.02, 0.4);
+            let swings = end.map(|v| (v, random.between(0.3, 1.0), random.between(0.0, TAU)));
+            let at = |k: usize| {
+                swings.map(|(v, rate, phase)| v * (rate * step * k as f64 + phase).sin())
+            };
+            (0..count).map(at).collect()
+        }
     }
 }
 

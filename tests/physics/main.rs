@@ -45,6 +45,7 @@ mod liu_hsu_newton;
 mod maintenance;
 mod many_rows;
 mod memory;
+mod near_rows;
 mod paper_figures;
 #[path = "../../benches/calibrate/patches.rs"]
 mod patches;

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::evaluate::many::{ManyTask, solve_many};
-use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus, NUMBER_NAMES};
+use railhead::contact::evaluate::many::solve_many;
+use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
+use railhead::contact::evaluate::many_task::{ManyTask, RowSolver, RowStarts};
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;
@@ -16,7 +17,7 @@ use serde_json::{Value, json};
 use crate::gap_samples::steel;
 use crate::profile_cases::generated;
 
-fn case(method: &str) -> Value {
+pub fn case(method: &str) -> Value {
     let contact = json!({ "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 });
     let load = json!({ "normal_force_n": 8e4 });
     let mut case = steel(contact, load, [1e-3, -5e-4, 2e-4]);
@@ -25,7 +26,7 @@ fn case(method: &str) -> Value {
     case
 }
 
-fn numbers(pointer: &str, values: &[f64]) -> VariedColumn {
+pub fn numbers(pointer: &str, values: &[f64]) -> VariedColumn {
     VariedColumn {
         pointer: pointer.to_owned(),
         values: Values::Numbers(values.to_vec()),
@@ -33,28 +34,47 @@ fn numbers(pointer: &str, values: &[f64]) -> VariedColumn {
 }
 
 fn solved(case: &Value, columns: &[VariedColumn]) -> ManyAnswer {
+    solved_from(case, columns, RowStarts::Own)
+}
+
+pub fn solved_from(case: &Value, columns: &[VariedColumn], starts: RowStarts) -> ManyAnswer {
     let operators = Arc::new(OperatorStore::default());
+    solved_by(case, columns, starts, &|checked, monitor| {
+        contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)
+    })
+}
+
+pub fn solved_by(
+    case: &Value,
+    columns: &[VariedColumn],
+    starts: RowStarts,
+    solve: &RowSolver,
+) -> ManyAnswer {
     let task = ManyTask {
         case,
         columns,
         profiles: &BTreeMap::new(),
         limits: &Limits::default(),
         time_limit: Duration::from_secs(60),
+        starts,
     };
-    let solve = |checked: &contact::problem::checked_case::CheckedCase,
-                 monitor: &dyn contact::monitor::Monitor| {
-        contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)
-    };
-    solve_many(&task, &solve, &Unmonitored).expect("nobody stops it")
+    solve_many(&task, solve, &Unmonitored).expect("nobody stops it")
 }
 
 /// The numbers of a row as bits, in which equal means the same answer.
-fn bits(answer: &ManyAnswer, row: usize) -> Vec<u64> {
+pub fn bits(answer: &ManyAnswer, row: usize) -> Vec<u64> {
     answer
         .numbers
         .iter()
         .map(|column| column[row].to_bits())
         .collect()
+}
+
+/// A column of an answer.
+pub fn column<'a>(answer: &'a ManyAnswer, name: &str) -> &'a [f64] {
+    let names = answer.columns.names();
+    let place = names.iter().position(|known| *known == name);
+    &answer.numbers[place.expect("a column")]
 }
 
 fn columns() -> Vec<VariedColumn> {
@@ -124,13 +144,7 @@ fn auto_takes_the_table_where_its_bound_meets_the_target_and_solves_the_rest() {
     assert_eq!(by_table(&exact), 0);
     assert!(exact.status.iter().all(|status| status.has_answer()));
     let limit = 0.3 * 8e4;
-    let error = |name: &str| {
-        let column = NUMBER_NAMES
-            .iter()
-            .position(|known| *known == name)
-            .expect("a column");
-        (answer.numbers[column][0] - exact.numbers[column][0]).abs()
-    };
+    let error = |name: &str| (column(&answer, name)[0] - column(&exact, name)[0]).abs();
     assert!(error("force_x_n").max(error("force_y_n")) < 0.008 * limit);
 }
 

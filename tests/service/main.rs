@@ -71,6 +71,7 @@ mod result_places;
 mod results;
 mod retention;
 mod run_forms;
+mod run_starts;
 mod runs;
 mod schema;
 mod schemathesis;

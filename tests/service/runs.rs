@@ -53,7 +53,7 @@ async fn services() -> Vec<Server> {
     services
 }
 
-async fn submit(server: &Server, body: &Value) -> String {
+pub async fn submit(server: &Server, body: &Value) -> String {
     let answer = server.post("/v1/runs", body).await;
     assert_eq!(answer.status, 202, "{}", answer.text);
     answer.header("location").expect("a location").to_owned()
@@ -82,7 +82,7 @@ fn assert_faults(answer: &Answer, word: &str) {
     );
 }
 
-fn lines(answer: &Answer) -> Vec<Value> {
+pub fn lines(answer: &Answer) -> Vec<Value> {
     let lines = answer.text.lines();
     lines
         .map(|line| serde_json::from_str(line).expect("JSON"))

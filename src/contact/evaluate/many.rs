@@ -1,49 +1,25 @@
 //! Solves many rows: one case with columns of values in place of some of its members.
 //!
-//! A row's answer depends on its own case alone, to the last bit: not on the rows beside it, on their order or number, or on the machine's
-//! load. So nothing is started from another row. What rows share are operators of patches of one shape, and profiles that were read, which
-//! are equal whoever computed them; rows of one shape therefore follow each other.
+//! Unless [`RowStarts::Neighbours`] says otherwise, a row's answer depends on its own case alone, to the last bit: not on the rows beside it,
+//! on their order or number, or on the machine's load. So nothing is started from another row. What rows share are operators of patches of one
+//! shape, and profiles that were read, which are equal whoever computed them; rows of one shape therefore follow each other.
 
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
-use std::ops::ControlFlow;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Duration;
-
-use serde_json::Value;
 
 use crate::contact;
 use crate::contact::case::known_pair::KnownPair;
-use crate::contact::case::limits::Limits;
 use crate::contact::case::solve_time::TABLE_SECONDS;
-use crate::contact::case::words::solver::{MethodName, Output};
-use crate::contact::error::{CaseError, Fault, SolveError};
+use crate::contact::case::words::solver::MethodName;
+use crate::contact::error::SolveError;
 use crate::contact::evaluate::answer::{RowStatus, RowsAnswer};
 use crate::contact::evaluate::column::Column;
-use crate::contact::evaluate::many_answer::{ManyAnswer, ManyStatus, RowNumbers};
+use crate::contact::evaluate::many_answer::{ManyAnswer, ManyStatus, NumberColumns, RowNumbers};
+use crate::contact::evaluate::many_task::{ManyTask, RowSolver, RowStarts};
+use crate::contact::evaluate::row_solver::RowsInWork;
 use crate::contact::evaluate::rows::Rows;
-use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
-use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::evaluate::varied::{Values, VariedColumn};
+use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::solution::words::answer::Solution;
-
-/// Solves a checked case of one motion.
-pub type RowSolver<'a> = dyn Fn(&CheckedCase, &dyn Monitor) -> Result<Solution, SolveError> + 'a;
-
-/// Rows to solve.
-#[derive(Debug, Clone, Copy)]
-pub struct ManyTask<'a> {
-    /// A good case of one motion, such as that of the first of all rows.
-    pub case: &'a Value,
-    /// What differs from it, at least one column; all of the same length.
-    pub columns: &'a [VariedColumn],
-    /// Cross-sections that rows name, by their names.
-    pub profiles: &'a BTreeMap<String, Value>,
-    /// What a row may use.
-    pub limits: &'a Limits,
-    /// Longest time for one row; a shorter one of the case counts.
-    pub time_limit: Duration,
-}
 
 /// Solves rows: numbers of Hertz contacts by `table` and `fastsim`, or by `auto` where the table's bound meets the target, are evaluated
 /// without meshes; every other row is checked and solved as a case of its own.
@@ -55,42 +31,25 @@ pub fn solve_many(
     solve: &RowSolver,
     monitor: &dyn Monitor,
 ) -> Result<ManyAnswer, SolveError> {
-    let rows = task.columns.first().map_or(1, |column| column.values.len());
     let checked = contact::check(task.case, task.limits).ok();
-    let gradients = checked
-        .as_ref()
-        .is_some_and(|checked| checked.run.wants(Output::Gradients));
-    let mut answer = ManyAnswer::new(rows, gradients);
-    let mut open: Vec<usize> = (0..rows).collect();
+    let columns = checked.as_ref().map(NumberColumns::of).unwrap_or_default();
+    let mut answer = ManyAnswer::new(task.rows(), columns);
+    let mut open: Vec<usize> = (0..task.rows()).collect();
     if let Some((evaluable, method)) = checked.and_then(|checked| evaluable(task, &checked)) {
         let (evaluated, patches) = evaluable.evaluate_with_patches();
         open.retain(|row| !take(&mut answer, *row, method, &evaluated, patches[*row]));
     }
-    open.sort_by(|a, b| near(task.columns, *a, *b));
-    let known = KnownPair::default();
-    for (done, row) in open.iter().enumerate() {
-        let watch = RowMonitor {
-            inner: monitor,
-            begun: monitor.elapsed(),
-            before: done as f64 / open.len() as f64,
-            own: 1.0 / open.len() as f64,
-        };
-        if watch.tick(0.0).is_break() {
-            return Err(SolveError::Cancelled);
-        }
-        match solve_row(task, &known, solve, *row, &watch) {
-            Ok(solution) => answer.set_solution(*row, &solution),
-            Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
-            Err(RowEnd::Status(status)) => answer.status[*row] = status,
-        }
+    if task.starts == RowStarts::Own {
+        open.sort_by(|a, b| near(task.columns, *a, *b));
     }
+    RowsInWork::new(task, solve, monitor, &mut answer).solve(&open)?;
     Ok(answer)
 }
 
 /// How long the rows of a task take, in s on one core of the machine the figures were taken on; rough, and the same for the same rows.
 #[must_use]
 pub fn expected_seconds(task: &ManyTask) -> f64 {
-    let rows = task.columns.first().map_or(1, |column| column.values.len());
+    let rows = task.rows();
     let Ok(checked) = contact::check(task.case, task.limits) else {
         return rows as f64 * REFUSED_SECONDS;
     };
@@ -99,7 +58,7 @@ pub fn expected_seconds(task: &ManyTask) -> f64 {
         let step = rows.div_ceil(SAMPLED).max(1);
         let sampled: Vec<f64> = (0..rows)
             .step_by(step)
-            .map(|row| match row_checked(task, &known, row) {
+            .map(|row| match task.checked(&known, row) {
                 Ok(checked) => checked.cost().seconds,
                 Err(_) => REFUSED_SECONDS,
             })
@@ -122,12 +81,6 @@ const SAMPLED: usize = 16;
 const FASTSIM_SECONDS: f64 = 3e-5;
 /// Time of a row that is refused, in s; not measured, it only keeps chunks of faulty rows from being endless.
 const REFUSED_SECONDS: f64 = 1e-4;
-
-/// Why a row has no solution.
-enum RowEnd {
-    Stopped,
-    Status(ManyStatus),
-}
 
 /// The rows as [`Rows`], if they are of that kind, and whether the method was left to the service.
 fn evaluable(task: &ManyTask, checked: &CheckedCase) -> Option<(Rows, MethodName)> {
@@ -195,31 +148,6 @@ fn take(
     true
 }
 
-fn row_checked(task: &ManyTask, known: &KnownPair, row: usize) -> Result<CheckedCase, CaseError> {
-    let case = case_of_row(task.case, task.columns, task.profiles, row)
-        .map_err(|(pointer, reason)| CaseError(vec![Fault::new(pointer, reason)]))?;
-    contact::check_with(known, &case, task.limits)
-}
-
-fn solve_row(
-    task: &ManyTask,
-    known: &KnownPair,
-    solve: &RowSolver,
-    row: usize,
-    watch: &RowMonitor,
-) -> Result<Solution, RowEnd> {
-    let refused = |_| RowEnd::Status(ManyStatus::Refused);
-    let mut checked = row_checked(task, known, row).map_err(refused)?;
-    let own = checked.run.time_limit;
-    checked.run.time_limit = Some(own.map_or(task.time_limit, |own| own.min(task.time_limit)));
-    let solved = catch_unwind(AssertUnwindSafe(|| solve(&checked, watch)));
-    match solved {
-        Ok(Ok(solution)) => Ok(solution),
-        Ok(Err(error)) => Err(ManyStatus::of(&error).map_or(RowEnd::Stopped, RowEnd::Status)),
-        Err(_) => Err(RowEnd::Status(ManyStatus::SolverFailed)),
-    }
-}
-
 /// Orders rows so that equal shapes, and then near motions, follow each other.
 fn near(columns: &[VariedColumn], a: usize, b: usize) -> Ordering {
     let of_motion = |column: &VariedColumn| column.pointer.starts_with("/motion");
@@ -230,22 +158,4 @@ fn near(columns: &[VariedColumn], a: usize, b: usize) -> Ordering {
         .map(|column| column.values.compare(a, b))
         .find(|order| order.is_ne())
         .unwrap_or_else(|| a.cmp(&b))
-}
-
-/// The monitor of one row.
-struct RowMonitor<'a> {
-    inner: &'a dyn Monitor,
-    begun: Duration,
-    before: f64,
-    own: f64,
-}
-
-impl Monitor for RowMonitor<'_> {
-    fn tick(&self, progress: f64) -> ControlFlow<Stop> {
-        self.inner.tick(self.before + self.own * progress)
-    }
-
-    fn elapsed(&self) -> Duration {
-        self.inner.elapsed().saturating_sub(self.begun)
-    }
 }

@@ -55,6 +55,15 @@ pub struct MotionPart {
     pub all: usize,
 }
 
+/// The one motion of a question.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RowMotion {
+    pub(crate) motion: Motion,
+    pub(crate) forces: PrescribedForces,
+    /// Rolling speed in mm/s.
+    pub(crate) speed: Option<f64>,
+}
+
 /// Proof that a problem went through the checks. `tests/tidy` allows it, and literals of [`Problem`], in `case/` and here only.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Checked(());
@@ -76,6 +85,42 @@ impl Problem {
             speeds: chosen.iter().map(|k| self.speeds[*k]).collect(),
             ..self.clone()
         }
+    }
+
+    /// The same question about these motions, none of which follows from another.
+    #[must_use]
+    pub(crate) fn of_rows(&self, rows: impl Iterator<Item = RowMotion>) -> Problem {
+        let rows: Vec<RowMotion> = rows.collect();
+        let part = MotionPart {
+            before: 0,
+            all: rows.len(),
+        };
+        Problem {
+            part,
+            motions: rows.iter().map(|row| row.motion).collect(),
+            forces: rows.iter().map(|row| row.forces).collect(),
+            speeds: rows.iter().map(|row| row.speed).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// The motion, if the question has one alone that is not found in the balance of a wheel or wheelset.
+    pub(crate) fn row_motion(&self) -> Option<RowMotion> {
+        let (&[motion], &[forces], &[speed]) = (&*self.motions, &*self.forces, &*self.speeds)
+        else {
+            return None;
+        };
+        let by_balance = match self.task {
+            NormalTask::Hertz(_) | NormalTask::Given(_) | NormalTask::Gap(_) => false,
+            NormalTask::Wheel(_) => self.wheelset.is_some() || self.pull().is_some(),
+            NormalTask::Wheelset(_) => true,
+        };
+        let row = RowMotion {
+            motion,
+            forces,
+            speed,
+        };
+        (self.history.is_none() && !by_balance).then_some(row)
     }
 
     /// The same question about a wheelset that moves in this way.

@@ -8,8 +8,9 @@ use tokio::runtime::Handle;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::many::{ManyTask, expected_seconds};
-use crate::contact::evaluate::many_answer::number_names;
+use crate::contact::evaluate::many::expected_seconds;
+use crate::contact::evaluate::many_answer::NumberColumns;
+use crate::contact::evaluate::many_task::{ManyTask, RowStarts};
 use crate::contact::evaluate::request_faults::{column_pointer, of_first_row, of_values};
 use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use crate::contact::problem::checked_case::CheckedCase;
@@ -64,6 +65,8 @@ pub struct RunOptions {
     pub name: Option<String>,
     /// Labels of the client.
     pub labels: BTreeMap<String, String>,
+    /// Where rows start that are solved on a mesh.
+    pub starts: RowStarts,
     /// Priority and deadline.
     pub submit: SubmitOptions,
     /// The client's idempotency key.
@@ -128,7 +131,7 @@ impl Jobs {
         draft: RunDraft,
         options: RunOptions,
     ) -> Result<(Run, bool), JobsError> {
-        let finished = tokio::task::spawn_blocking(move || draft.finish());
+        let finished = tokio::task::spawn_blocking(move || draft.finish(options.starts));
         let mut upload = finished
             .await
             .map_err(|error| JobsError::Damaged(error.to_string()))??;
@@ -189,7 +192,7 @@ impl RunDraft {
     }
 
     /// Everything is there.
-    fn finish(mut self) -> Result<BatchUpload, JobsError> {
+    fn finish(mut self, starts: RowStarts) -> Result<BatchUpload, JobsError> {
         if self.rows == 0 {
             let fault = Fault::new("/columns", "0 rows given; at least one is needed");
             return Err(CaseError(vec![fault]).into());
@@ -197,6 +200,7 @@ impl RunDraft {
         self.cut(true)?;
         if let Some(Begun { mut head, .. }) = self.begun {
             head.rows = self.rows;
+            head.from_neighbours = starts == RowStarts::Neighbours;
             head.profiles = self.profiles.into_iter().collect();
             self.upload.set_template(head.to_bytes());
         }
@@ -277,6 +281,7 @@ impl RunDraft {
             profiles: &profiles,
             limits: &options.limits,
             time_limit: options.time_limit,
+            starts: RowStarts::Own,
         };
         let row_seconds = expected_seconds(&task) / rows as f64;
         let wanted = CHUNK_SECONDS / row_seconds;
@@ -286,7 +291,7 @@ impl RunDraft {
             reason = "a clamped number"
         )]
         let chunk_rows = wanted.clamp(CHUNK_ROWS_MIN as f64, CHUNK_ROWS_MAX as f64) as u32;
-        let names = number_names(checked.run.wants(Output::Gradients));
+        let names = NumberColumns::of(&checked).names();
         let mut head = RunHead::new(
             case,
             self.columns.clone(),
@@ -400,7 +405,7 @@ fn faults_of_columns(columns: &[RunColumn]) -> Vec<Fault> {
             faults.push(Fault::new(column_pointer(&column.name), detail));
         }
         let own = ["row", "status", "method"];
-        let answered = number_names(true);
+        let answered = NumberColumns::all().names();
         if column.pointer.is_none()
             && (own.contains(&&*column.name) || answered.contains(&&*column.name))
         {

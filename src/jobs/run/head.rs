@@ -6,6 +6,7 @@ use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::contact::evaluate::many_task::RowStarts;
 use crate::contact::evaluate::varied::Values;
 use crate::jobs::codec::table::{TableColumn, TableKind};
 use crate::jobs::error::JobsError;
@@ -59,6 +60,9 @@ pub struct RunHead {
     pub profiles: BTreeMap<String, Value>,
     /// The method asked for.
     pub method: String,
+    /// Rows start from rows that are like them.
+    #[serde(default)]
+    pub from_neighbours: bool,
     /// Number of rows.
     pub rows: u64,
     /// Rows of each chunk but the last.
@@ -76,8 +80,18 @@ impl RunHead {
             numbers,
             profiles: BTreeMap::new(),
             method,
+            from_neighbours: false,
             rows: 0,
             chunk_rows: 0,
+        }
+    }
+
+    /// Where rows start that are solved on a mesh.
+    #[must_use]
+    pub fn starts(&self) -> RowStarts {
+        match self.from_neighbours {
+            true => RowStarts::Neighbours,
+            false => RowStarts::Own,
         }
     }
 

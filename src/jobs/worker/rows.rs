@@ -6,8 +6,9 @@ use bytes::Bytes;
 use serde_json::json;
 
 use crate::contact::error::SolveError;
-use crate::contact::evaluate::many::{ManyTask, solve_many};
+use crate::contact::evaluate::many::solve_many;
 use crate::contact::evaluate::many_answer::ManyAnswer;
+use crate::contact::evaluate::many_task::ManyTask;
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::words::answer::Solution;
@@ -45,6 +46,7 @@ pub(crate) fn solve_chunk(
         profiles: &head.profiles,
         limits,
         time_limit: shared.options.time_limit,
+        starts: head.starts(),
     };
     control.begin(Duration::ZERO);
     let solve = |checked: &CheckedCase, monitor: &dyn Monitor| solve_case(shared, checked, monitor);

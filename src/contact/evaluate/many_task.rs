@@ -1,0 +1,66 @@
+//! What many rows are, and what one of them asks.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::contact;
+use crate::contact::case::known_pair::KnownPair;
+use crate::contact::case::limits::Limits;
+use crate::contact::error::{CaseError, Fault, SolveError};
+use crate::contact::evaluate::varied::{VariedColumn, case_of_row};
+use crate::contact::monitor::Monitor;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::solution::words::answer::Solution;
+
+/// Solves a checked case.
+pub type RowSolver<'a> = dyn Fn(&CheckedCase, &dyn Monitor) -> Result<Solution, SolveError> + 'a;
+
+/// Where the iteration of a row starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum RowStarts {
+    /// From its own case alone. The answer to a row is that of its case, to the last bit, whatever other rows there are.
+    #[default]
+    Own,
+    /// From rows that ask the same but for their motions, or that are similar. The answer to a row depends on the other rows of its task, within
+    /// its estimated error; the same task gives the same answers.
+    Neighbours,
+}
+
+/// Rows to solve.
+#[derive(Debug, Clone, Copy)]
+pub struct ManyTask<'a> {
+    /// A good case of one motion, such as that of the first of all rows.
+    pub case: &'a Value,
+    /// What differs from it, at least one column; all of the same length.
+    pub columns: &'a [VariedColumn],
+    /// Cross-sections that rows name, by their names.
+    pub profiles: &'a BTreeMap<String, Value>,
+    /// What a row may use.
+    pub limits: &'a Limits,
+    /// Longest time for one row; a shorter one of the case counts.
+    pub time_limit: Duration,
+    /// Where rows that are solved on a mesh start.
+    pub starts: RowStarts,
+}
+
+impl ManyTask<'_> {
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.columns.first().map_or(1, |column| column.values.len())
+    }
+
+    /// The checked case of a row.
+    ///
+    /// # Errors
+    /// Its faults.
+    pub(crate) fn checked(&self, known: &KnownPair, row: usize) -> Result<CheckedCase, CaseError> {
+        let case = case_of_row(self.case, self.columns, self.profiles, row)
+            .map_err(|(pointer, reason)| CaseError(vec![Fault::new(pointer, reason)]))?;
+        let mut checked = contact::check_with(known, &case, self.limits)?;
+        let own = checked.run.time_limit;
+        checked.run.time_limit = Some(own.map_or(self.time_limit, |own| own.min(self.time_limit)));
+        Ok(checked)
+    }
+}

@@ -1,0 +1,174 @@
+//! Solves rows on meshes, each by itself or as a motion of a case that it shares with rows like it.
+
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+use crate::contact::case::known_pair::KnownPair;
+use crate::contact::error::SolveError;
+use crate::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
+use crate::contact::evaluate::many_task::{ManyTask, RowSolver, RowStarts};
+use crate::contact::evaluate::near_rows::{Group, OpenGroups};
+use crate::contact::method::Method;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::solution::words::answer::Solution;
+
+/// Rows that are being solved.
+pub(crate) struct RowsInWork<'a> {
+    pub(crate) task: &'a ManyTask<'a>,
+    pub(crate) solve: &'a RowSolver<'a>,
+    pub(crate) monitor: &'a dyn Monitor,
+    /// Where their answers go.
+    pub(crate) answer: &'a mut ManyAnswer,
+    known: KnownPair,
+    /// Rows that are over, and all.
+    done: usize,
+    all: usize,
+}
+
+/// Why a case has no solution.
+enum RowEnd {
+    Stopped,
+    Status(ManyStatus),
+}
+
+impl<'a> RowsInWork<'a> {
+    /// Rows of a task, before the first.
+    pub(crate) fn new(
+        task: &'a ManyTask<'a>,
+        solve: &'a RowSolver<'a>,
+        monitor: &'a dyn Monitor,
+        answer: &'a mut ManyAnswer,
+    ) -> RowsInWork<'a> {
+        RowsInWork {
+            task,
+            solve,
+            monitor,
+            answer,
+            known: KnownPair::default(),
+            done: 0,
+            all: 0,
+        }
+    }
+
+    /// Solves rows.
+    ///
+    /// # Errors
+    /// [`SolveError::Cancelled`]: the monitor stopped the work.
+    pub(crate) fn solve(mut self, rows: &[usize]) -> Result<(), SolveError> {
+        self.all = rows.len();
+        let mut groups = OpenGroups::default();
+        for row in rows {
+            if self.watch(1).tick(0.0).is_break() {
+                return Err(SolveError::Cancelled);
+            }
+            let Ok(checked) = self.task.checked(&self.known, *row) else {
+                self.end(*row, ManyStatus::Refused);
+                continue;
+            };
+            let motion = checked.problem.row_motion();
+            let together = self.task.starts == RowStarts::Neighbours
+                && checked.run.method == Method::BoundaryElement
+                && !checked.problem.is_coupled(&checked.run);
+            match motion.filter(|_| together) {
+                None => self.alone(*row, &checked)?,
+                Some(motion) => {
+                    if let Some(group) = groups.add(*row, checked, motion) {
+                        self.together(&group)?;
+                    }
+                }
+            }
+        }
+        for group in groups.close() {
+            self.together(&group)?;
+        }
+        Ok(())
+    }
+
+    /// Solves the rows of a group, each started from the one before. Where they have no answer as one case, each is solved by itself.
+    fn together(&mut self, group: &Group) -> Result<(), SolveError> {
+        if let [only] = &*group.members {
+            return self.alone(only.row, &group.head);
+        }
+        for (case, members) in group.parts() {
+            match self.solved(&case, members.len()) {
+                Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
+                Ok(solution) => {
+                    for (motion, member) in members.iter().enumerate() {
+                        let of_row = |columns: &_, numbers: &mut [f64]| {
+                            member.likeness.numbers(columns, numbers);
+                        };
+                        let answered = (&solution, motion);
+                        self.answer.set_solution(member.row, answered, of_row);
+                    }
+                    self.done += members.len();
+                }
+                Err(RowEnd::Status(_)) => {
+                    for member in members {
+                        match self.task.checked(&self.known, member.row) {
+                            Ok(checked) => self.alone(member.row, &checked)?,
+                            Err(_) => self.end(member.row, ManyStatus::Refused),
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn alone(&mut self, row: usize, checked: &CheckedCase) -> Result<(), SolveError> {
+        match self.solved(checked, 1) {
+            Ok(solution) => {
+                self.answer.set_solution(row, (&solution, 0), |_, _| ());
+                self.done += 1;
+            }
+            Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
+            Err(RowEnd::Status(status)) => self.end(row, status),
+        }
+        Ok(())
+    }
+
+    fn end(&mut self, row: usize, status: ManyStatus) {
+        self.answer.status[row] = status;
+        self.done += 1;
+    }
+
+    fn solved(&self, checked: &CheckedCase, rows: usize) -> Result<Solution, RowEnd> {
+        let watch = self.watch(rows);
+        let solved = catch_unwind(AssertUnwindSafe(|| (self.solve)(checked, &watch)));
+        match solved {
+            Ok(Ok(solution)) => Ok(solution),
+            Ok(Err(error)) => Err(ManyStatus::of(&error).map_or(RowEnd::Stopped, RowEnd::Status)),
+            Err(_) => Err(RowEnd::Status(ManyStatus::SolverFailed)),
+        }
+    }
+
+    /// The monitor of the next rows.
+    fn watch(&self, rows: usize) -> RowMonitor<'a> {
+        RowMonitor {
+            inner: self.monitor,
+            begun: self.monitor.elapsed(),
+            before: self.done as f64 / self.all as f64,
+            own: rows as f64 / self.all as f64,
+        }
+    }
+}
+
+/// The monitor of some of the rows.
+struct RowMonitor<'a> {
+    inner: &'a dyn Monitor,
+    begun: Duration,
+    before: f64,
+    own: f64,
+}
+
+impl Monitor for RowMonitor<'_> {
+    fn tick(&self, progress: f64) -> ControlFlow<Stop> {
+        self.inner.tick(self.before + self.own * progress)
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.inner.elapsed().saturating_sub(self.begun)
+    }
+}
