@@ -10,9 +10,9 @@ use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::evaluate::answer::{RowStatus, RowsAnswer};
 use railhead::contact::evaluate::column::Column;
-use railhead::contact::evaluate::many::solve_many;
+use railhead::contact::evaluate::many::solve::solve_many;
+use railhead::contact::evaluate::many::task::{ManyTask, RowStarts};
 use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
-use railhead::contact::evaluate::many_task::{ManyTask, RowStarts};
 use railhead::contact::evaluate::rows::Rows;
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::{Monitor, Unmonitored};
@@ -26,6 +26,7 @@ use crate::random::Random;
 const TABLE: [usize; 2] = [40, 50];
 const EVALUATE: [usize; 2] = [60, 400];
 const RUNS: [usize; 2] = [24, 12];
+const NEAR: [usize; 2] = [40, 60];
 /// One row of the table in so many is solved as well.
 const SOLVED_EVERY: usize = 20;
 /// A second answer to the same question differs by no more, relative to μN: what the last bits of its numbers make of it.
@@ -150,7 +151,8 @@ pub fn table(seed: u64) -> String {
         "## The table, rows at once, many rows\n\nEllipses a/b 0.12 to 8, ν 0 to ½, loads, friction, creepages and spin over decades, with none of a motion's parts in some. *Laws*: \
          finite numbers, forces within μN and their bound, friction takes power, the reversed motion has the reversed answer; a row by the table \
          equals its case solved alone, and rows of a run equal their cases to the last bit, whatever stands beside them, faulty rows included. *Bound held*: \
-         the difference from `boundary_element` is at most the bound and the solver's own estimate.\n\n\
+         the difference from `boundary_element` is at most the bound and the solver's own estimate; of runs whose rows start from their neighbours, the \
+         difference from the row by itself is at most both estimates.\n\n\
          | rows | tried | answered | solved as well | bound held | largest difference over it | broken |\n|---|---|---|---|---|---|---|\n",
     );
     let mut troubles = String::new();
@@ -158,6 +160,7 @@ pub fn table(seed: u64) -> String {
         ("table", by_table as fn(u64) -> Class),
         ("evaluate", evaluated),
         ("runs", runs),
+        ("runs from neighbours", near),
     ] {
         let class = catch_unwind(AssertUnwindSafe(|| work(seed))).unwrap_or_else(|_| Class {
             broken: vec!["crashes".to_owned()],
@@ -331,7 +334,7 @@ fn runs(seed: u64) -> Class {
         let faulty = 1 + random.below(RUNS[1] - 1);
         draw.columns[1].values[faulty] = [-1.0, 0.0, 1e9][random.below(3)];
         class.rows += RUNS[1];
-        let all = solved(&draw.template, &draw.varied());
+        let all = solved(&draw.template, &draw.varied(), RowStarts::Own);
         let backward: Vec<VariedColumn> = (draw.varied().into_iter())
             .map(|mut column| {
                 if let Values::Numbers(numbers) = &mut column.values {
@@ -340,7 +343,7 @@ fn runs(seed: u64) -> Class {
                 column
             })
             .collect();
-        let reversed = solved(&draw.template, &backward);
+        let reversed = solved(&draw.template, &backward, RowStarts::Own);
         for row in 0..RUNS[1] {
             let has = all.status[row].has_answer();
             class.answered += usize::from(has);
@@ -369,7 +372,44 @@ fn runs(seed: u64) -> Class {
     class
 }
 
-fn solved(template: &Value, columns: &[VariedColumn]) -> ManyAnswer {
+/// Runs on similar ellipses whose rows start from each other, beside the same rows by themselves.
+fn near(seed: u64) -> Class {
+    let mut class = Class::default();
+    let mut random = Random(seed ^ 0x4EA2);
+    for number in 0..NEAR[0] {
+        let mut draw = Draw::new(&mut random, "boundary_element", NEAR[1]);
+        draw.template["solver"]["target_error"] = json!([0.02, 0.005][number % 2]);
+        draw.columns
+            .retain(|column| column.pointer != "/contact/a_mm");
+        class.rows += NEAR[1];
+        let from = |starts| solved(&draw.template, &draw.varied(), starts);
+        let [own, near] = [RowStarts::Own, RowStarts::Neighbours].map(from);
+        if near != from(RowStarts::Neighbours) {
+            let why = format!("the same rows have two answers: {}", draw.template);
+            class.broken.push(why);
+        }
+        for row in 0..NEAR[1] {
+            let numbers = |answer: &ManyAnswer| [1, 2, 4].map(|k| answer.numbers[k][row]);
+            let [[x, y, estimate], of_own] = [&near, &own].map(numbers);
+            let answered = near.status[row].has_answer();
+            class.answered += usize::from(answered);
+            let beyond = x.hypot(y) > draw.limit(row) + 1.5 * estimate;
+            if answered != own.status[row].has_answer() || answered && beyond {
+                let why = format!("{:?}, [{x}, {y}] N: {}", near.status[row], draw.case(row));
+                class.broken.push(why);
+            } else if answered {
+                let difference = (x - of_own[0]).abs().max((y - of_own[1]).abs());
+                let allowed = estimate + of_own[2];
+                class.solved += 1;
+                class.held += usize::from(difference <= allowed);
+                class.worst = class.worst.max(difference / allowed);
+            }
+        }
+    }
+    class
+}
+
+fn solved(template: &Value, columns: &[VariedColumn], starts: RowStarts) -> ManyAnswer {
     let operators = Arc::new(OperatorStore::default());
     let task = ManyTask {
         case: template,
@@ -377,6 +417,7 @@ fn solved(template: &Value, columns: &[VariedColumn]) -> ManyAnswer {
         profiles: &BTreeMap::new(),
         limits: &Limits::default(),
         time_limit: Duration::from_secs(60),
+        starts,
     };
     let solve = |checked: &CheckedCase, monitor: &dyn Monitor| {
         contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::evaluate::many::solve_many;
+use railhead::contact::evaluate::many::solve::solve_many;
+use railhead::contact::evaluate::many::task::{ManyTask, RowSolver, RowStarts};
 use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
-use railhead::contact::evaluate::many_task::{ManyTask, RowSolver, RowStarts};
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;

@@ -1,8 +1,8 @@
 //! Rows that start from rows like them: their answers are those of their cases alone, within what either is off by, for less work.
 
 use railhead::contact;
+use railhead::contact::evaluate::many::task::RowStarts;
 use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
-use railhead::contact::evaluate::many_task::RowStarts;
 use railhead::contact::evaluate::varied::VariedColumn;
 use serde_json::{Value, json};
 

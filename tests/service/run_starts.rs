@@ -69,7 +69,9 @@ async fn rows_with_prescribed_forces_tell_the_creepages_that_were_found() {
         case["motion"]["creepage_x"] = body["columns"]["/motion/creepage_x"][at].clone();
         case["motion"]["creepage_y"] = number("creepage_y").into();
         let solved = server.solve(&case).await;
-        let force = solved["result"]["total"][0]["force_y_n"].as_f64().expect("a force");
+        let force = solved["result"]["total"][0]["force_y_n"]
+            .as_f64()
+            .expect("a force");
         assert!(
             (force - asked).abs() < 0.02 * 0.3 * 8e4,
             "{force} N, {asked} N asked for"

@@ -3,14 +3,10 @@
 
 pub mod answer;
 pub mod column;
-mod likeness;
 pub mod many;
 pub mod many_answer;
-pub mod many_task;
-mod near_rows;
 pub mod placing;
 pub mod request_faults;
-mod row_solver;
 pub mod rows;
 mod rows_checks;
 pub mod sections;

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::evaluate::many_task::RowStarts;
+use crate::contact::evaluate::many::task::RowStarts;
 use crate::http::dto::job::rfc3339;
 use crate::jobs::codec::table::TableKind;
 use crate::jobs::model::job::State as JobState;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::evaluate::many_task::RowStarts;
+use crate::contact::evaluate::many::task::RowStarts;
 use crate::http::dto::run::{RunAnswer, RunRequest, starts_from_name};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::RunId;

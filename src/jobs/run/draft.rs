@@ -8,9 +8,9 @@ use tokio::runtime::Handle;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::many::expected_seconds;
+use crate::contact::evaluate::many::solve::expected_seconds;
+use crate::contact::evaluate::many::task::{ManyTask, RowStarts};
 use crate::contact::evaluate::many_answer::NumberColumns;
-use crate::contact::evaluate::many_task::{ManyTask, RowStarts};
 use crate::contact::evaluate::request_faults::{column_pointer, of_first_row, of_values};
 use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use crate::contact::problem::checked_case::CheckedCase;

@@ -6,7 +6,7 @@ use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::contact::evaluate::many_task::RowStarts;
+use crate::contact::evaluate::many::task::RowStarts;
 use crate::contact::evaluate::varied::Values;
 use crate::jobs::codec::table::{TableColumn, TableKind};
 use crate::jobs::error::JobsError;

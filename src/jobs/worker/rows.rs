@@ -6,9 +6,9 @@ use bytes::Bytes;
 use serde_json::json;
 
 use crate::contact::error::SolveError;
-use crate::contact::evaluate::many::solve_many;
+use crate::contact::evaluate::many::solve::solve_many;
+use crate::contact::evaluate::many::task::ManyTask;
 use crate::contact::evaluate::many_answer::ManyAnswer;
-use crate::contact::evaluate::many_task::ManyTask;
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::words::answer::Solution;

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::contact::evaluate::likeness::Likeness;
+use crate::contact::evaluate::many::likeness::Likeness;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::RowMotion;
 
@@ -104,7 +104,7 @@ fn chained(members: &[Member]) -> Vec<Member> {
     let places = places(members);
     let mut left: Vec<usize> = (1..members.len()).collect();
     let mut order = vec![0];
-    let mut straight: Option<Place> = None;
+    let mut straight: Option<ChainPlace> = None;
     while !left.is_empty() {
         let last = places[order[order.len() - 1]];
         let nearest = left
@@ -131,10 +131,10 @@ fn chained(members: &[Member]) -> Vec<Member> {
 }
 
 /// Creepages, spin and prescribed forces of a row, each in parts of its range over the rows.
-type Place = [f64; 5];
+type ChainPlace = [f64; 5];
 
-fn places(members: &[Member]) -> Vec<Place> {
-    let mut places: Vec<Place> = members
+fn places(members: &[Member]) -> Vec<ChainPlace> {
+    let mut places: Vec<ChainPlace> = members
         .iter()
         .map(|Member { motion, .. }| {
             let [force_x, force_y] = motion.forces.map(Option::unwrap_or_default);
@@ -155,6 +155,6 @@ fn places(members: &[Member]) -> Vec<Place> {
 }
 
 /// The square of the distance.
-fn distance(a: &Place, b: &Place) -> f64 {
+fn distance(a: &ChainPlace, b: &ChainPlace) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }

@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use crate::contact::case::known_pair::KnownPair;
 use crate::contact::error::SolveError;
+use crate::contact::evaluate::many::near_rows::{Group, OpenGroups};
+use crate::contact::evaluate::many::task::{ManyTask, RowSolver, RowStarts};
 use crate::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
-use crate::contact::evaluate::many_task::{ManyTask, RowSolver, RowStarts};
-use crate::contact::evaluate::near_rows::{Group, OpenGroups};
 use crate::contact::method::Method;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::problem::checked_case::CheckedCase;
@@ -86,7 +86,8 @@ impl<'a> RowsInWork<'a> {
         Ok(())
     }
 
-    /// Solves the rows of a group, each started from the one before. Where they have no answer as one case, each is solved by itself.
+    /// Solves the rows of a group, each started from the one before. Those that miss the target are solved by themselves as well, and so are all
+    /// where they have no answer as one case.
     fn together(&mut self, group: &Group) -> Result<(), SolveError> {
         if let [only] = &*group.members {
             return self.alone(only.row, &group.head);
@@ -101,18 +102,35 @@ impl<'a> RowsInWork<'a> {
                         };
                         let answered = (&solution, motion);
                         self.answer.set_solution(member.row, answered, of_row);
+                        self.done += 1;
+                        if self.answer.status[member.row] == ManyStatus::TargetMissed {
+                            self.again(member.row)?;
+                        }
                     }
-                    self.done += members.len();
                 }
                 Err(RowEnd::Status(_)) => {
                     for member in members {
-                        match self.task.checked(&self.known, member.row) {
-                            Ok(checked) => self.alone(member.row, &checked)?,
-                            Err(_) => self.end(member.row, ManyStatus::Refused),
+                        // A row of a group has no faults.
+                        if let Ok(checked) = self.task.checked(&self.known, member.row) {
+                            self.alone(member.row, &checked)?;
                         }
                     }
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Solves a row by itself, where it chooses its own meshes, after it missed the target in its group.
+    fn again(&mut self, row: usize) -> Result<(), SolveError> {
+        let Ok(checked) = self.task.checked(&self.known, row) else {
+            return Ok(());
+        };
+        match self.solved(&checked, 1) {
+            Ok(solution) => self.answer.set_solution(row, (&solution, 0), |_, _| ()),
+            Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
+            // It keeps the answer of its group.
+            Err(RowEnd::Status(_)) => {}
         }
         Ok(())
     }
@@ -165,7 +183,8 @@ struct RowMonitor<'a> {
 
 impl Monitor for RowMonitor<'_> {
     fn tick(&self, progress: f64) -> ControlFlow<Stop> {
-        self.inner.tick(self.before + self.own * progress)
+        self.inner
+            .tick((self.before + self.own * progress).min(1.0))
     }
 
     fn elapsed(&self) -> Duration {
