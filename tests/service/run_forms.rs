@@ -127,3 +127,83 @@ async fn more_rows_or_bytes_than_allowed_are_refused() {
         "template",
     );
 }
+
+/// A table as a simulation writes it, and the same rows in the words of this service.
+#[tokio::test]
+async fn a_table_of_a_simulation_is_read_with_its_units() {
+    let server = Server::start().await;
+    let mut case = template("table");
+    case["load"]["normal_force_n"] = json!(1e5);
+    let job = server.submit(&case).await;
+    let template = job.rsplit('/').next().expect("an id");
+    let tables = [
+        (
+            "",
+            "normal_force_n,creepage_x,spin_per_mm,time\n5e4,1e-3,4e-4,0.1\n6e4,-2e-3,-3e-4,0.2\n",
+        ),
+        (
+            "",
+            "Normal force;longitudinal creepage;spin;time\n[kN];[%];[1/m];[s]\n50;0,1;0,4;0,1\n60;-0,2;-0,3;0,2\n",
+        ),
+        (
+            "&column=Fz:normal_force%20%5BkN%5D&column=nu.x:creepage_x&column=phi:spin%20%5B1/m%5D",
+            "Fz\tnu.x\tphi\ttime\n50\t0.001\t0.4\t0.1\n60\t-0.002\t-0.3\t0.2\n",
+        ),
+    ];
+    let mut answers = Vec::new();
+    for (query, table) in tables {
+        let path = format!("/v1/runs?template={template}{query}");
+        let send = |request: reqwest::RequestBuilder| {
+            request.header("content-type", "text/csv").body(table)
+        };
+        let sent = server.send(Method::POST, &path, send).await;
+        assert_eq!(sent.status, 202, "{}", sent.text);
+        assert_eq!(sent.json["columns"][0]["pointer"], "/load/normal_force_n");
+        let factor = if query.is_empty() && table.starts_with("normal") {
+            1.0
+        } else {
+            1e3
+        };
+        assert_eq!(sent.json["columns"][0]["factor"], factor);
+        let run = sent.header("location").expect("a location").to_owned();
+        assert_eq!(ended(&server, &run).await["rows_without_answer"], 0);
+        let results = format!("{run}/results?format=ndjson&columns=time,force_x_n,normal_force_n");
+        answers.push(crate::runs::lines(&server.get(&results).await));
+    }
+    for other in &answers[1..] {
+        for (row, same) in answers[0].iter().zip(other) {
+            assert_eq!(row["time"], same["time"]);
+            let [force, other] = [row, same].map(|row| row["force_x_n"].as_f64().expect("a force"));
+            assert!((force / other - 1.0).abs() < 1e-12, "{row} {same}");
+        }
+    }
+    for (query, table, words) in [
+        (
+            "",
+            "normal_force_n,spin\n5e4,0.4\n",
+            ["`spin`", "has no unit"],
+        ),
+        (
+            "",
+            "normal_force_n,yaw [grad]\n5e4,0.4\n",
+            ["`yaw [grad]`", "mrad"],
+        ),
+        (
+            "&column=Q:creepage_x",
+            "normal_force_n,q\n5e4,0.4\n",
+            ["`Q`", "no title"],
+        ),
+    ] {
+        let path = format!("/v1/runs?template={template}{query}");
+        let send = |request: reqwest::RequestBuilder| {
+            request.header("content-type", "text/csv").body(table)
+        };
+        let refused = server.send(Method::POST, &path, send).await;
+        assert_problem(&refused, 422, "faulty-table", words[0]);
+        assert!(
+            words.iter().all(|word| refused.text.contains(word)),
+            "{}",
+            refused.text
+        );
+    }
+}

@@ -135,6 +135,8 @@ pub(crate) struct SentColumn {
     name: String,
     /// The place in the case that it varies; null if it is carried along to the answers.
     pointer: Option<String>,
+    /// What its numbers are multiplied by, from the unit of the column to that of the case.
+    factor: f64,
 }
 
 /// A column of the answers.
@@ -189,6 +191,7 @@ impl From<Run> for RunAnswer {
         let sent = |column: &RunColumn| SentColumn {
             name: column.name.clone(),
             pointer: column.pointer.clone(),
+            factor: column.factor,
         };
         let own = format!("/v1/runs/{}", chunks.id);
         let links = ["results", "manifest", "totals", "cancel", "events"];

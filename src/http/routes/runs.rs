@@ -15,6 +15,7 @@ use crate::http::extract::ids::RunId;
 use crate::http::extract::labels::{name, new_label};
 use crate::http::extract::query::{Parameters, Repeated, count, id, query, reader};
 use crate::http::extract::run_rows::body::{form, read_run};
+use crate::http::extract::run_rows::titles::{NamedColumns, named_column};
 use crate::http::extract::submit_options::SubmitQuery;
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
@@ -48,6 +49,10 @@ query! {
         /// With a table, and needed there: the job whose case is the template
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
+        /// What a column is whose title does not say it, as `TITLE:NAME`; may be repeated. The name is a JSON pointer, a short name or a name with a
+        /// unit, such as `Q:vertical_force [kN]`; without a name the column is carried along to the answers
+        #[param(max_items = 100, example = json!(["Q:vertical_force [kN]"]))]
+        column: Vec<(String, String)> as Vec<String> = Repeated(reader("`TITLE:NAME`", named_column));
         /// Where rows that are solved on a mesh start: `own`, each from its own case alone, also when left out; `neighbours`, from rows that ask
         /// the same but for their motions, or that are similar, which takes less time where motions are near each other
         #[param(pattern = "^(own|neighbours)$", example = "neighbours")]
@@ -107,7 +112,8 @@ pub(crate) async fn submit(
         idempotency_key,
     };
     let form = form(&jobs, request.headers(), run.template).await?;
-    let draft = read_run(&jobs, &memory, &options, form, request).await?;
+    let read = (form, NamedColumns(run.column.unwrap_or_default()));
+    let draft = read_run(&jobs, &memory, &options, read, request).await?;
     let (run, replayed) = jobs.submit_run(draft, options_of_run).await?;
     let location = [(header::LOCATION, format!("/v1/runs/{}", run.chunks.id))];
     let run = Json(RunAnswer::from(run));

@@ -122,6 +122,7 @@ mod tests {
     #[test]
     fn a_chunk_comes_back_as_it_was_and_a_broken_one_is_refused() {
         let column = |text| RunColumn {
+            factor: 1.0,
             name: "c".to_owned(),
             pointer: None,
             text,

@@ -178,9 +178,12 @@ impl RunDraft {
         if self.rows > self.rows_max {
             return Err(JobsError::TooManyRows(self.rows_max));
         }
-        for (held, more) in self.held.iter_mut().zip(columns) {
+        let factors = self.columns.iter().map(|column| column.factor);
+        for ((held, more), factor) in self.held.iter_mut().zip(columns).zip(factors) {
             match (held, more) {
-                (Values::Numbers(held), Values::Numbers(more)) => held.extend(more),
+                (Values::Numbers(held), Values::Numbers(more)) => {
+                    held.extend(more.into_iter().map(|number| factor * number));
+                }
                 (Values::Texts(held), Values::Texts(more)) => held.extend(more),
                 _ => unreachable!("kinds were compared"),
             }

@@ -15,14 +15,22 @@ use crate::jobs::error::JobsError;
 const FORM: u32 = 1;
 
 /// A column of the rows of a run.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunColumn {
     /// As the client names it, and as it is answered.
     pub name: String,
     /// The place in the case that it stands for; a column without one is carried along to the answers.
     pub pointer: Option<String>,
+    /// What makes a number that was sent one of the case, in its unit.
+    #[serde(default = "unchanged")]
+    pub factor: f64,
     /// It holds texts; otherwise numbers.
     pub text: bool,
+}
+
+/// The factor of a column in the unit of the case.
+fn unchanged() -> f64 {
+    1.0
 }
 
 impl RunColumn {

@@ -14,8 +14,8 @@ use crate::http::extract::arriving::Arriving;
 use crate::http::extract::json::{essence, read_json};
 use crate::http::extract::npz::{read_arrays, too_large};
 use crate::http::extract::rows::{declared_bytes, read_body, read_json_columns};
-use crate::http::extract::run_rows::text::{CsvRows, JsonRows, faulty};
-use crate::http::extract::run_rows::titles::column;
+use crate::http::extract::run_rows::text::{CsvRows, JsonRows};
+use crate::http::extract::run_rows::titles::{NamedColumns, faulty};
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
@@ -102,13 +102,13 @@ pub async fn read_run(
     jobs: &Jobs,
     memory: &Memory,
     options: &HttpOptions,
-    (form, template): (RowsForm, Option<Value>),
+    ((form, template), named): ((RowsForm, Option<Value>), NamedColumns),
     request: Request<Body>,
 ) -> Result<RunDraft, ApiError> {
     let rows_max = options.run_max_rows;
     let jobs = jobs.clone();
     let Some(template) = template else {
-        return from_json(jobs, memory, options, request).await;
+        return from_json(jobs, memory, options, named, request).await;
     };
     let file = spool(&jobs, options, request).await?;
     let bytes_max = options.evaluate_max_bytes;
@@ -126,7 +126,7 @@ pub async fn read_run(
         let draft = |columns| jobs.draft_run(template.clone(), columns, rows_max);
         match form {
             RowsForm::Ndjson => {
-                let mut rows = JsonRows::new(BufReader::new(file))?;
+                let mut rows = JsonRows::new(BufReader::new(file), &named)?;
                 let mut draft = draft(rows.columns.clone())?;
                 while let Some(values) = rows.next()? {
                     draft.push(values)?;
@@ -142,12 +142,14 @@ pub async fn read_run(
                 let tables = tables
                     .by_ref()
                     .map(|table| table.map_err(|error| damaged(&error)));
-                from_tables(tables, draft)
+                from_tables(tables, &named, draft)
             }
-            RowsForm::Parquet => from_tables(groups(file)?, draft),
-            RowsForm::Npz => from_tables(std::iter::once(npz_table(file, bytes_max)), draft),
+            RowsForm::Parquet => from_tables(groups(file)?, &named, draft),
+            RowsForm::Npz => {
+                from_tables(std::iter::once(npz_table(file, bytes_max)), &named, draft)
+            }
             RowsForm::Csv | RowsForm::Json => {
-                let mut rows = CsvRows::new(BufReader::new(file))?;
+                let mut rows = CsvRows::new(BufReader::new(file), &named)?;
                 let mut draft = draft(rows.columns.clone())?;
                 while let Some(values) = rows.next()? {
                     draft.push(values)?;
@@ -164,6 +166,7 @@ async fn from_json(
     jobs: Jobs,
     memory: &Memory,
     options: &HttpOptions,
+    named: NamedColumns,
     request: Request<Body>,
 ) -> Result<RunDraft, ApiError> {
     let rows_max = options.run_max_rows;
@@ -176,9 +179,10 @@ async fn from_json(
         let (template, columns) = read_json_columns(&text)?;
         drop(text);
         let (titles, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
-        let named = titles.iter().zip(&values);
-        let named = named.map(|(title, values)| column(title, matches!(values, Values::Texts(_))));
-        let mut draft = jobs.draft_run(template, named.collect(), rows_max)?;
+        let kinds = titles.iter().zip(&values);
+        let kinds = kinds
+            .map(|(title, values): (&String, _)| (&**title, matches!(values, Values::Texts(_))));
+        let mut draft = jobs.draft_run(template, named.columns(kinds)?, rows_max)?;
         draft.push(values)?;
         Ok(draft)
     });
@@ -241,16 +245,17 @@ fn groups(file: File) -> Result<impl Iterator<Item = Result<RowTable, ApiError>>
 /// A draft of tables that all have the columns of the first.
 fn from_tables(
     tables: impl Iterator<Item = Result<RowTable, ApiError>>,
+    named: &NamedColumns,
     draft: impl Fn(Vec<RunColumn>) -> Result<RunDraft, JobsError>,
 ) -> Result<RunDraft, ApiError> {
     let mut begun: Option<RunDraft> = None;
     for table in tables {
         let table = table?;
         let titles = table.columns.iter();
-        let titles = titles.map(|(name, values)| column(name, values.kind() == TableKind::Texts));
+        let titles = titles.map(|(name, values)| (&**name, values.kind() == TableKind::Texts));
         let draft = match &mut begun {
             Some(draft) => draft,
-            None => begun.insert(draft(titles.collect())?),
+            None => begun.insert(draft(named.columns(titles)?)?),
         };
         draft.push(
             table

@@ -2,4 +2,4 @@
 
 pub mod body;
 mod text;
-mod titles;
+pub mod titles;

@@ -1,13 +1,12 @@
 //! Rows as CSV and NDJSON, some lines at a time. What a column holds, numbers or texts, is decided by the first row.
 
-use std::io::{BufRead, Read};
+use std::io::{BufRead, Chain, Cursor, Read};
 
 use serde_json::{Map, Value};
 
 use crate::contact::evaluate::varied::Values;
-use crate::http::extract::run_rows::titles::column;
+use crate::http::extract::run_rows::titles::{NamedColumns, faulty, is_unit};
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::run::head::RunColumn;
 
 /// Rows that are read at once.
@@ -15,28 +14,33 @@ const ROWS: usize = 8192;
 /// Longest line in bytes.
 const LINE_BYTES_MAX: u64 = 1 << 20;
 
-pub(super) fn faulty(detail: impl Into<String>) -> ApiError {
-    ApiError::new(ProblemKind::FaultyTable, detail)
-}
-
-/// Rows in CSV, whose first line names the columns.
+/// Rows in CSV, whose first line names the columns; fields are parted by what parts the titles, commas, semicolons or tabs. A second line may give
+/// the units.
 pub(super) struct CsvRows<R: Read> {
-    reader: csv::Reader<R>,
+    reader: csv::Reader<Chain<Cursor<Vec<u8>>, R>>,
+    /// Commas may stand in numbers.
+    decimal_comma: bool,
     /// The columns.
     pub columns: Vec<RunColumn>,
     /// The next row, if there is one.
     record: Option<csv::StringRecord>,
 }
 
-impl<R: Read> CsvRows<R> {
+impl<R: BufRead> CsvRows<R> {
     /// Reads the header and the first row.
     ///
     /// # Errors
     /// `faulty-table`
-    pub(super) fn new(source: R) -> Result<CsvRows<R>, ApiError> {
+    pub(super) fn new(mut source: R, named: &NamedColumns) -> Result<CsvRows<R>, ApiError> {
+        let mut first = Vec::new();
+        let read = (&mut source).take(LINE_BYTES_MAX);
+        let read = { read }.read_until(b'\n', &mut first);
+        read.map_err(|error| ApiError::internal(&error))?;
+        let delimiter = delimiter(&first);
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
-            .from_reader(source);
+            .delimiter(delimiter)
+            .from_reader(Cursor::new(first).chain(source));
         let titles = reader.headers();
         let titles = titles.map_err(|error| faulty(format!("line 1: {error}")))?;
         let titles: Vec<String> = titles
@@ -45,19 +49,27 @@ impl<R: Read> CsvRows<R> {
             .collect();
         let mut rows = CsvRows {
             reader,
+            decimal_comma: delimiter != b',',
             columns: Vec::new(),
             record: Some(csv::StringRecord::new()),
         };
         rows.advance()?;
+        let units = rows.record.clone();
+        let units = units.filter(|units| units.iter().all(is_unit) && !units.is_empty());
+        if units.is_some() {
+            rows.advance()?;
+        }
+        let unit = |place: usize| units.as_ref().and_then(|units| units.get(place));
         let first = rows.record.as_ref();
         let text = |place: usize| {
             let field = first.and_then(|record| record.get(place)).unwrap_or("");
-            !field.is_empty() && field.parse::<f64>().is_err()
+            !field.is_empty() && number(field, rows.decimal_comma).is_none()
         };
         let columns = titles.iter().enumerate();
         rows.columns = columns
-            .map(|(place, title)| column(title, text(place)))
-            .collect();
+            .map(|(place, title)| named.column(title, unit(place), text(place)))
+            .collect::<Result<_, _>>()?;
+        named.all_among(&rows.columns)?;
         Ok(rows)
     }
 
@@ -80,7 +92,9 @@ impl<R: Read> CsvRows<R> {
                 match values {
                     Values::Texts(texts) => texts.push(field.to_owned()),
                     Values::Numbers(numbers) if field.is_empty() => numbers.push(f64::NAN),
-                    Values::Numbers(numbers) => numbers.push(field.parse().map_err(|_| wrong())?),
+                    Values::Numbers(numbers) => {
+                        numbers.push(number(field, self.decimal_comma).ok_or_else(wrong)?);
+                    }
                 }
             }
             self.advance()?;
@@ -100,6 +114,32 @@ impl<R: Read> CsvRows<R> {
     }
 }
 
+/// What parts the titles, outside of quotes: tabs if there is one, else semicolons, else commas.
+fn delimiter(header: &[u8]) -> u8 {
+    let mut quoted = false;
+    let outside: Vec<u8> = header
+        .iter()
+        .copied()
+        .filter(|byte| {
+            quoted ^= *byte == b'"';
+            !quoted
+        })
+        .collect();
+    let found = [b'\t', b';']
+        .into_iter()
+        .find(|mark| outside.contains(mark));
+    found.unwrap_or(b',')
+}
+
+/// A number, with a comma in place of its point where one may be.
+fn number(field: &str, decimal_comma: bool) -> Option<f64> {
+    let plain = field.parse().ok();
+    plain.or_else(|| {
+        let pointed = field.replacen(',', ".", 1);
+        (decimal_comma && !field.contains('.')).then(|| pointed.parse().ok())?
+    })
+}
+
 /// Rows as JSON objects, one in a line.
 pub(super) struct JsonRows<R: BufRead> {
     source: R,
@@ -114,7 +154,7 @@ impl<R: BufRead> JsonRows<R> {
     ///
     /// # Errors
     /// `faulty-table`
-    pub(super) fn new(source: R) -> Result<JsonRows<R>, ApiError> {
+    pub(super) fn new(source: R, named: &NamedColumns) -> Result<JsonRows<R>, ApiError> {
         let mut rows = JsonRows {
             source,
             line: 0,
@@ -123,9 +163,8 @@ impl<R: BufRead> JsonRows<R> {
         };
         rows.advance()?;
         let members = rows.row.iter().flatten();
-        rows.columns = members
-            .map(|(title, value)| column(title, value.is_string()))
-            .collect();
+        let members = members.map(|(title, value)| (&**title, value.is_string()));
+        rows.columns = named.columns(members)?;
         Ok(rows)
     }
 
@@ -210,8 +249,9 @@ mod tests {
     fn csv_and_ndjson_of_the_same_rows_are_the_same_columns() {
         let csv = "\u{feff}creepage_x, km ,section\r\n0.1,,a\r\n-2e-3,37.5,\"b, c\"\r\n";
         let json = "{\"creepage_x\":0.1,\"km\":null,\"section\":\"a\"}\n\n{\"section\":\"b, c\",\"km\":37.5,\"creepage_x\":-2e-3}";
-        let mut by_csv = CsvRows::new(csv.as_bytes()).unwrap();
-        let mut by_json = JsonRows::new(json.as_bytes()).unwrap();
+        let named = NamedColumns::default();
+        let mut by_csv = CsvRows::new(csv.as_bytes(), &named).unwrap();
+        let mut by_json = JsonRows::new(json.as_bytes(), &named).unwrap();
         assert_eq!(by_csv.columns, by_json.columns);
         let pointers: Vec<_> = by_csv
             .columns
@@ -233,9 +273,37 @@ mod tests {
     }
 
     #[test]
+    fn tables_of_simulations_are_read_with_their_units_and_decimal_commas() {
+        let comma =
+            "time,Normal force,longitudinal creepage,spin\n[s],[kN],[-],[1/m]\n0.1,80,0.001,0.4\n";
+        let semicolon =
+            "time;Normal force [kN];longitudinal creepage;spin (1/m)\r\n0,1;80;0,001;4,0e-1\r\n";
+        let tab = "time\tnormal_force\tcreepage_x\tspin\ns\tkN\t-\t1/m\n0.1\t80\t0.001\t0.4\n";
+        for text in [comma, semicolon, tab] {
+            let mut rows = CsvRows::new(text.as_bytes(), &NamedColumns::default()).unwrap();
+            let places: Vec<_> = (rows.columns.iter())
+                .map(|column| (column.pointer.as_deref(), column.factor))
+                .collect();
+            let expected = [
+                (None, 1.0),
+                (Some("/load/normal_force_n"), 1e3),
+                (Some("/motion/creepage_x"), 1.0),
+                (Some("/motion/spin_per_mm"), 1e-3),
+            ];
+            assert_eq!(places, expected, "{text}");
+            let values = rows.next().unwrap().unwrap();
+            let numbers = [0.1, 80.0, 0.001, 0.4].map(|number| Values::Numbers(vec![number]));
+            assert_eq!(values, numbers, "{text}");
+        }
+    }
+
+    #[test]
     fn faults_name_the_line() {
-        let csv = |text: &str| CsvRows::new(text.as_bytes()).and_then(|mut rows| rows.next());
-        let json = |text: &str| JsonRows::new(text.as_bytes()).and_then(|mut rows| rows.next());
+        let named = NamedColumns::default();
+        let csv =
+            |text: &str| CsvRows::new(text.as_bytes(), &named).and_then(|mut rows| rows.next());
+        let json =
+            |text: &str| JsonRows::new(text.as_bytes(), &named).and_then(|mut rows| rows.next());
         for (read, words) in [
             (csv("creepage_x\n0.1\nx\n"), ["line 3", "creepage_x"]),
             (csv("creepage_x,a\n0.1\n"), ["the table", "fields"]),
