@@ -177,6 +177,15 @@ async fn a_table_of_a_simulation_is_read_with_its_units() {
             assert!((force / other - 1.0).abs() < 1e-12, "{row} {same}");
         }
     }
+}
+
+#[tokio::test]
+async fn a_table_whose_units_are_not_clear_is_refused() {
+    let server = Server::start().await;
+    let mut case = template("table");
+    case["load"]["normal_force_n"] = json!(1e5);
+    let job = server.submit(&case).await;
+    let template = job.rsplit('/').next().expect("an id");
     for (query, table, words) in [
         (
             "",

@@ -178,11 +178,10 @@ impl RunDraft {
         if self.rows > self.rows_max {
             return Err(JobsError::TooManyRows(self.rows_max));
         }
-        let factors = self.columns.iter().map(|column| column.factor);
-        for ((held, more), factor) in self.held.iter_mut().zip(columns).zip(factors) {
+        for ((held, more), column) in self.held.iter_mut().zip(columns).zip(&self.columns) {
             match (held, more) {
                 (Values::Numbers(held), Values::Numbers(more)) => {
-                    held.extend(more.into_iter().map(|number| factor * number));
+                    held.extend(more.into_iter().map(|number| column.in_case(number)));
                 }
                 (Values::Texts(held), Values::Texts(more)) => held.extend(more),
                 _ => unreachable!("kinds were compared"),

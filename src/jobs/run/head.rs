@@ -34,6 +34,16 @@ fn unchanged() -> f64 {
 }
 
 impl RunColumn {
+    /// A number that was sent, in the unit of the case: to 15 digits, so that 64.1 kN are 64100 N.
+    #[must_use]
+    pub fn in_case(&self, number: f64) -> f64 {
+        if self.factor == 1.0 {
+            return number;
+        }
+        let number = self.factor * number;
+        format!("{number:.14e}").parse().unwrap_or(number)
+    }
+
     /// What it holds.
     #[must_use]
     pub fn kind(&self) -> TableKind {
@@ -147,5 +157,25 @@ impl RunHead {
         let each = u64::from(self.chunk_rows);
         let begin = (chunk * each).min(self.rows);
         begin..(begin + each).min(self.rows)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_in_another_unit_are_converted_to_15_digits() {
+        let column = |factor| RunColumn {
+            name: "Q [kN]".to_owned(),
+            pointer: None,
+            factor,
+            text: false,
+        };
+        assert_ne!(64.1 * 1e3, 64_100.0, "what the digits are for");
+        assert_eq!(column(1e3).in_case(64.1), 64_100.0);
+        assert_eq!(column(1e-3).in_case(-0.3), -3e-4);
+        assert_eq!(column(1.0).in_case(0.1 + 0.2), 0.1 + 0.2);
+        assert!(column(1e3).in_case(f64::NAN).is_nan());
     }
 }
