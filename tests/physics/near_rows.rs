@@ -1,6 +1,8 @@
 //! Rows that start from rows like them: their answers are those of their cases alone, within what either is off by, for less work.
 
 use railhead::contact;
+use railhead::contact::case::limits::Limits;
+use railhead::contact::evaluate::many::solve::own_bytes;
 use railhead::contact::evaluate::many::task::RowStarts;
 use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
 use railhead::contact::evaluate::varied::VariedColumn;
@@ -192,4 +194,14 @@ fn where_rows_have_no_answer_together_each_has_its_own() {
             .filter(|row| *row != 2)
             .all(|row| bits(&alone, row) == bits(&answer, row))
     );
+}
+
+#[test]
+fn rows_that_are_solved_together_are_counted_with_their_memory() {
+    let case = case("boundary_element");
+    let checked = contact::check(&case, &Limits::default()).expect("a sound case");
+    let [alone, together] =
+        [RowStarts::Own, RowStarts::Neighbours].map(|starts| own_bytes(&checked, starts));
+    assert_eq!(alone, checked.cost().own_bytes());
+    assert!(together > alone, "{together} of {alone} bytes");
 }

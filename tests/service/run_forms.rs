@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::errors::assert_problem;
 use crate::runs::{columns, ended, template};
-use crate::server::{Server, Setup};
+use crate::server::{Answer, Server, Setup};
 
 /// The same rows as a table in some form.
 fn table() -> RowTable {
@@ -33,13 +33,7 @@ fn table() -> RowTable {
 #[tokio::test]
 async fn the_same_rows_are_answered_alike_whatever_form_they_come_in() {
     let server = Server::start().await;
-    let job = server
-        .submit(&{
-            let mut case = template("table");
-            case["load"]["normal_force_n"] = json!(1e5);
-            case
-        })
-        .await;
+    let template = kept_template(&server).await;
     let kinds: Vec<_> = table()
         .columns
         .iter()
@@ -65,7 +59,7 @@ async fn the_same_rows_are_answered_alike_whatever_form_they_come_in() {
             encode(&table()).expect("a file"),
         ),
     ] {
-        let path = format!("/v1/runs?template={}", &job[9..]);
+        let path = format!("/v1/runs?template={template}");
         let send =
             |request: reqwest::RequestBuilder| request.header("content-type", form).body(body);
         let answer = server.send(Method::POST, &path, send).await;
@@ -101,20 +95,14 @@ async fn more_rows_or_bytes_than_allowed_are_refused() {
         "body-too-large",
         "run-max-rows",
     );
-    let mut case = template("table");
-    case["load"]["normal_force_n"] = json!(1e5);
-    let job = server.submit(&case).await;
+    let template = kept_template(&server).await;
     let send = |request: reqwest::RequestBuilder| {
         request
             .header("content-type", "text/csv")
             .body("creepage_x\n".repeat(1000))
     };
     let answer = server
-        .send(
-            Method::POST,
-            &format!("/v1/runs?template={}", &job[9..]),
-            send,
-        )
+        .send(Method::POST, &format!("/v1/runs?template={template}"), send)
         .await;
     assert_problem(&answer, 413, "body-too-large", "4096");
     let send = |request: reqwest::RequestBuilder| {
@@ -128,14 +116,27 @@ async fn more_rows_or_bytes_than_allowed_are_refused() {
     );
 }
 
+/// The id of a job whose case rows by the table are filled into.
+async fn kept_template(server: &Server) -> String {
+    let mut case = template("table");
+    case["load"]["normal_force_n"] = json!(1e5);
+    let job = server.submit(&case).await;
+    job.rsplit('/').next().expect("an id").to_owned()
+}
+
+/// Sends a table in CSV over a template.
+async fn send_table(server: &Server, template: &str, table: &'static str) -> Answer {
+    let path = format!("/v1/runs?template={template}");
+    let csv =
+        |request: reqwest::RequestBuilder| request.header("content-type", "text/csv").body(table);
+    server.send(Method::POST, &path, csv).await
+}
+
 /// A table as a simulation writes it, and the same rows in the words of this service.
 #[tokio::test]
 async fn a_table_of_a_simulation_is_read_with_its_units() {
     let server = Server::start().await;
-    let mut case = template("table");
-    case["load"]["normal_force_n"] = json!(1e5);
-    let job = server.submit(&case).await;
-    let template = job.rsplit('/').next().expect("an id");
+    let template = kept_template(&server).await;
     let tables = [
         (
             "",
@@ -152,11 +153,7 @@ async fn a_table_of_a_simulation_is_read_with_its_units() {
     ];
     let mut answers = Vec::new();
     for (query, table) in tables {
-        let path = format!("/v1/runs?template={template}{query}");
-        let send = |request: reqwest::RequestBuilder| {
-            request.header("content-type", "text/csv").body(table)
-        };
-        let sent = server.send(Method::POST, &path, send).await;
+        let sent = send_table(&server, &format!("{template}{query}"), table).await;
         assert_eq!(sent.status, 202, "{}", sent.text);
         assert_eq!(sent.json["columns"][0]["pointer"], "/load/normal_force_n");
         let factor = if query.is_empty() && table.starts_with("normal") {
@@ -182,10 +179,7 @@ async fn a_table_of_a_simulation_is_read_with_its_units() {
 #[tokio::test]
 async fn a_table_whose_units_are_not_clear_is_refused() {
     let server = Server::start().await;
-    let mut case = template("table");
-    case["load"]["normal_force_n"] = json!(1e5);
-    let job = server.submit(&case).await;
-    let template = job.rsplit('/').next().expect("an id");
+    let template = kept_template(&server).await;
     for (query, table, words) in [
         (
             "",
@@ -203,11 +197,7 @@ async fn a_table_whose_units_are_not_clear_is_refused() {
             ["`Q`", "no title"],
         ),
     ] {
-        let path = format!("/v1/runs?template={template}{query}");
-        let send = |request: reqwest::RequestBuilder| {
-            request.header("content-type", "text/csv").body(table)
-        };
-        let refused = server.send(Method::POST, &path, send).await;
+        let refused = send_table(&server, &format!("{template}{query}"), table).await;
         assert_problem(&refused, 422, "faulty-table", words[0]);
         assert!(
             words.iter().all(|word| refused.text.contains(word)),

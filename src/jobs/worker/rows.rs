@@ -6,7 +6,7 @@ use bytes::Bytes;
 use serde_json::json;
 
 use crate::contact::error::SolveError;
-use crate::contact::evaluate::many::solve::solve_many;
+use crate::contact::evaluate::many::solve::{own_bytes, solve_many};
 use crate::contact::evaluate::many::task::ManyTask;
 use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::monitor::Monitor;
@@ -38,7 +38,7 @@ pub(crate) fn solve_chunk(
     let (varied, carried) = parted(&head, chunk);
     let limits = &shared.options.limits;
     if let Ok(checked) = (shared.engine.check)(&head.case, limits) {
-        control.set_memory_bytes(checked.cost().own_bytes());
+        control.set_memory_bytes(own_bytes(&checked, head.starts()));
     }
     let task = ManyTask {
         case: &head.case,

@@ -6,12 +6,12 @@ use crate::contact::evaluate::many::likeness::Likeness;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::RowMotion;
 
-/// Groups that are open at a time, so that memory does not grow with the rows.
+/// Groups that are open at a time, so that memory does not grow with the rows. Chosen by judgement; how much it matters was not measured.
 const GROUPS_MAX: usize = 64;
 /// Motions of a case that is solved as one: the first of them is not started from another, and a case without an answer is solved again row by
-/// row.
+/// row. Chosen by judgement; how much it matters was not measured.
 const MOTIONS_MAX: usize = 128;
-/// Rows that are put in order together: the time for that grows with their square.
+/// Rows that are put in order together: the time for that grows with their square. Chosen by judgement; how much it matters was not measured.
 const CHAINED_MAX: usize = 4096;
 /// Steps that differ by no more than this are equally long. Numeric safety: those of a grid differ by rounding.
 const SAME_STEP: f64 = 1e-6;
@@ -77,6 +77,16 @@ impl OpenGroups {
     pub(crate) fn close(self) -> impl Iterator<Item = Group> {
         self.groups.into_iter()
     }
+}
+
+/// The largest case that rows like this one are solved in.
+pub(crate) fn largest(checked: &CheckedCase) -> Option<CheckedCase> {
+    let motion = checked.problem.row_motion()?;
+    let motions = std::iter::repeat_n(motion, MOTIONS_MAX);
+    Some(CheckedCase {
+        problem: checked.problem.of_rows(motions),
+        ..checked.clone()
+    })
 }
 
 impl Group {

@@ -16,11 +16,11 @@ use crate::contact::solution::words::answer::Solution;
 
 /// Rows that are being solved.
 pub(crate) struct RowsInWork<'a> {
-    pub(crate) task: &'a ManyTask<'a>,
-    pub(crate) solve: &'a RowSolver<'a>,
-    pub(crate) monitor: &'a dyn Monitor,
+    task: &'a ManyTask<'a>,
+    solve: &'a RowSolver<'a>,
+    monitor: &'a dyn Monitor,
     /// Where their answers go.
-    pub(crate) answer: &'a mut ManyAnswer,
+    answer: &'a mut ManyAnswer,
     known: KnownPair,
     /// Rows that are over, and all.
     done: usize,

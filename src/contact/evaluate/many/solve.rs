@@ -13,6 +13,7 @@ use crate::contact::case::words::solver::MethodName;
 use crate::contact::error::SolveError;
 use crate::contact::evaluate::answer::{RowStatus, RowsAnswer};
 use crate::contact::evaluate::column::Column;
+use crate::contact::evaluate::many::near_rows::largest;
 use crate::contact::evaluate::many::row_solver::RowsInWork;
 use crate::contact::evaluate::many::task::{ManyTask, RowSolver, RowStarts};
 use crate::contact::evaluate::many_answer::{ManyAnswer, ManyStatus, NumberColumns, RowNumbers};
@@ -73,6 +74,17 @@ pub fn expected_seconds(task: &ManyTask) -> f64 {
         _ => TABLE_SECONDS,
     };
     rows as f64 * each + left as f64 * checked.cost().seconds
+}
+
+/// Memory in bytes that rows of this case need at a time and share with nobody.
+#[must_use]
+pub fn own_bytes(checked: &CheckedCase, starts: RowStarts) -> u64 {
+    let together = match starts {
+        RowStarts::Own => None,
+        RowStarts::Neighbours => largest(checked),
+    };
+    let alone = checked.cost().own_bytes();
+    together.map_or(alone, |case| case.cost().own_bytes().max(alone))
 }
 
 /// Rows that [`expected_seconds`] looks at.

@@ -55,7 +55,8 @@ impl<R: BufRead> CsvRows<R> {
         };
         rows.advance()?;
         let units = rows.record.clone();
-        let units = units.filter(|units| units.iter().all(is_unit) && !units.is_empty());
+        let units = units
+            .filter(|units| units.iter().all(is_unit) && units.iter().any(|unit| !unit.is_empty()));
         if units.is_some() {
             rows.advance()?;
         }
@@ -295,6 +296,13 @@ mod tests {
             let numbers = [0.1, 80.0, 0.001, 0.4].map(|number| Values::Numbers(vec![number]));
             assert_eq!(values, numbers, "{text}");
         }
+    }
+
+    #[test]
+    fn an_empty_first_row_is_a_row() {
+        let named = NamedColumns::default();
+        let mut rows = CsvRows::new("km,curvature\n,\n2,3\n".as_bytes(), &named).unwrap();
+        assert_eq!(rows.next().unwrap().unwrap()[0].len(), 2);
     }
 
     #[test]

@@ -131,11 +131,20 @@ impl NamedColumns {
         Ok(columns)
     }
 
-    /// Every title that was named is that of a column.
+    /// Every title that was named is that of a column, and was named once.
     ///
     /// # Errors
     /// `faulty-table`: one is not.
     pub(super) fn all_among(&self, columns: &[RunColumn]) -> Result<(), ApiError> {
+        let titles = || self.0.iter().map(|(title, _)| title);
+        if let Some(twice) = titles().enumerate().find_map(|(place, title)| {
+            titles()
+                .take(place)
+                .any(|other| other == title)
+                .then_some(title)
+        }) {
+            return Err(faulty(format!("`column` names `{twice}` twice")));
+        }
         let missing = |title: &String| columns.iter().all(|column| column.name != *title);
         match self.0.iter().find(|(title, _)| missing(title)) {
             None => Ok(()),
@@ -311,6 +320,11 @@ mod tests {
         assert_eq!(of("t:x"), (Some("/motion/creepage_x".to_owned()), 1.0));
         let wrong = NamedColumns(vec![("a".to_owned(), "load".to_owned())]);
         assert!(wrong.column("a", None, false).is_err());
+        let twice = ["a:creepage_x", "a:creepage_y"]
+            .into_iter()
+            .filter_map(named_column);
+        let twice = NamedColumns(twice.collect()).columns(std::iter::once(("a", false)));
+        assert!(format!("{twice:?}").contains("twice"));
         assert!(
             named
                 .columns(["ny"].into_iter().map(|title| (title, false)))
