@@ -1,10 +1,6 @@
-//! Is the house in order? Directions of use, forbidden words, sizes of files and functions.
-//!
-//! Rules that hold everywhere are tests below. Those that some files still break are in `rules.rs`; `exceptions.rs` holds them to their list.
+//! Checks of structure: directions of use between modules, and words that are forbidden in a room.
 
-mod exceptions;
 mod folders;
-mod lengths;
 mod order;
 mod rules;
 mod sources;
@@ -253,34 +249,13 @@ fn links_of_the_documents_lead_somewhere() {
     assert_eq!(dead, Vec::<String>::new());
 }
 
-/// The longest function of a script, from the line with its name to the brace that closes it at the same indentation.
-fn longest_function(text: &str) -> usize {
-    let lines: Vec<&str> = text.lines().collect();
-    let indent = |line: &str| line.len() - line.trim_start().len();
-    let begins = |line: &str| {
-        let line = line.trim_start().trim_start_matches("export ");
-        let line = line.trim_start_matches("async ");
-        line.ends_with('{') && (line.starts_with("function ") || line.contains(") {"))
-    };
-    let length = |(first, line): (usize, &&str)| {
-        let closes =
-            |other: &&str| other.trim_start().starts_with('}') && indent(other) == indent(line);
-        let length = lines[first + 1..].iter().position(closes);
-        length.map_or(0, |length| length + 2)
-    };
-    let functions = lines.iter().enumerate().filter(|(_, line)| begins(line));
-    functions.map(length).max().unwrap_or(0)
-}
-
 #[test]
-fn scripts_of_the_page_are_short_and_say_what_they_are_for() {
-    assert_eq!(longest_function("function a() {\n  if (b) {\n  }\n}\n"), 4);
+fn scripts_of_the_page_begin_with_their_purpose() {
     let mut folders = vec![
         root().join("src/http/page/web/js"),
         root().join("tests/page"),
     ];
-    let mut wrong = Vec::new();
-    let mut seen = 0;
+    let mut silent = Vec::new();
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(&folder).expect("a folder") {
             let path = entry.expect("an entry").path();
@@ -291,18 +266,14 @@ fn scripts_of_the_page_are_short_and_say_what_they_are_for() {
                     folders.push(path);
                 }
             } else if name.ends_with(".js") || name.ends_with(".mjs") {
-                seen += 1;
                 let text = fs::read_to_string(&path).expect("a script");
-                let sizes = [text.lines().count(), longest_function(&text)];
-                let most = [rules::FILE_LINES_MAX, rules::FUNCTION_LINES_MAX];
-                if sizes[0] > most[0] || sizes[1] > most[1] || !text.starts_with("// ") {
-                    wrong.push(format!("{name}: {sizes:?}"));
+                if !text.starts_with("// ") {
+                    silent.push(name);
                 }
             }
         }
     }
-    assert!(seen > 30, "{seen}");
-    assert_eq!(wrong, Vec::<String>::new());
+    assert_eq!(silent, Vec::<String>::new());
 }
 
 #[test]
