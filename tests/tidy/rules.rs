@@ -161,7 +161,7 @@ fn words(sources: &Sources) -> Findings {
     let wrong = files.filter(|(path, text)| {
         !WORDS.iter().any(|folder| path.starts_with(folder)) && derives(text)
     });
-    found(wrong.map(|(path, _)| path.to_owned()))
+    wrong.map(|(path, _)| path.to_owned()).collect()
 }
 
 #[cfg(test)]
