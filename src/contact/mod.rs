@@ -56,7 +56,6 @@ pub mod rolling_stage;
 pub mod slices;
 pub mod solution;
 pub mod time_limit;
-pub mod trial;
 pub mod unlike_bodies;
 pub(crate) mod unlike_motions;
 pub(crate) mod wheel_balance;

@@ -1,10 +1,9 @@
 //! What requests and connections may cost, and who may send them.
 
+use crate::jobs::runtime_probe::USUAL_LIMIT;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
-
-use crate::contact::trial::USUAL_LIMIT;
 
 /// The limits of a service; every one is a flag of `serve`.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -9,13 +9,13 @@ use uuid::Uuid;
 
 use crate::contact::error::CaseError;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::trial::{TriedTime, tried};
 use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::{Job, QueuePlace, State};
 use crate::jobs::model::labels::Labels;
 use crate::jobs::options::Options;
+use crate::jobs::runtime_probe::{ProbedTime, probe};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::cluster::Bell;
 use crate::jobs::store::list::{BatchFilter, Filter, Page};
@@ -73,11 +73,11 @@ impl Jobs {
         (self.shared.engine.check)(case, &self.shared.options.limits)
     }
 
-    /// How long a case takes here, solved for at most about so long.
+    /// Solve time of a case on this machine, found by solving it for at most about `limit`.
     #[must_use]
-    pub fn tried(&self, checked: &CheckedCase, limit: Duration) -> TriedTime {
+    pub fn probe(&self, checked: &CheckedCase, limit: Duration) -> ProbedTime {
         let engine = &self.shared.engine;
-        tried(checked, limit, |monitor| {
+        probe(checked, limit, |monitor| {
             let mut slices = (engine.slices)(checked).into_iter();
             slices.try_for_each(|slice| (engine.solve)(checked, slice, monitor).map(drop))
         })

@@ -69,6 +69,7 @@ pub mod result_cache;
 pub mod result_place;
 pub mod results;
 pub mod run;
+pub mod runtime_probe;
 pub mod shared;
 pub mod staged_bytes;
 pub mod storage_fault;

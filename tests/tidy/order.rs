@@ -39,7 +39,6 @@ const ORDER: &[&str] = &[
     "contact::pulled_wheel",
     "contact::wheelset",
     "contact::slices",
-    "contact::trial",
     "contact::evaluate",
     "contact",
     "contact::evaluate::many",
@@ -72,6 +71,7 @@ const ORDER: &[&str] = &[
     "jobs::metrics",
     "jobs::result_place",
     "jobs::trace",
+    "jobs::runtime_probe",
     "jobs::options",
     "jobs::open_store",
     "jobs::attempts",
@@ -147,7 +147,6 @@ pub const DOOR: &[&str] = &[
     "contact::rolling::operator_store",
     "contact::slices",
     "contact::solution",
-    "contact::trial",
 ];
 
 /// The place of a module in the order; nothing if it has none.

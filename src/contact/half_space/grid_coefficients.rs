@@ -1,8 +1,9 @@
 //! Influence coefficients between equal rectangles on a regular grid, see
 //! [`GridOperator`](crate::contact::half_space::grid_operator::GridOperator).
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::NullaryFnOnce;
 
+use crate::contact::numerics::simd;
 use crate::contact::numerics::simd_ln::Float;
 
 /// Displacement i cells along x and j cells along y away from a cell with unit pressure, stored at `j * nx + i`.
@@ -19,7 +20,7 @@ pub(crate) fn coefficients(
     let places = |n: usize, d: f64| -> Vec<f64> { (0..n).map(|i| (i as f64 + 0.5) * d).collect() };
     let (x, y) = (places(nx, dx), places(ny, dy));
     let mut corners = vec![0.0; nx * ny];
-    Arch::new().dispatch(Corners {
+    simd::dispatch(Corners {
         x: &x,
         y: &y,
         out: &mut corners,

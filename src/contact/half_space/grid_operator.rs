@@ -1,12 +1,13 @@
 //! Normal influence between equal rectangles on a regular grid, applied as a convolution: by transforms along the longer axis, where the
 //! grid is padded, and as plain sums along the shorter one.
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::NullaryFnOnce;
 use rustfft::num_complex::Complex;
 
 use crate::contact::half_space::grid_coefficients::{coefficients, lines};
 use crate::contact::half_space::line_sums::{LineSums, Spectra};
 use crate::contact::half_space::transforms::{FftFloat, FftPlanners, FftPlans};
+use crate::contact::numerics::simd;
 
 /// Normal displacement at the centres of `nx` by `ny` equal rectangles caused by uniform pressures on them, both bodies
 /// together.
@@ -192,7 +193,7 @@ impl<T: FftFloat> GridOperator<T> {
             fill(pair, one, lines, |p| T::of(p * down), pressure);
         }
         self.plans.forward.process_with_scratch(loaded, scratch);
-        Arch::new().dispatch(self.sums.of_pairs(pairs, first..last + 1, spectra));
+        simd::dispatch(self.sums.of_pairs(pairs, first..last + 1, spectra));
         self.plans.backward.process_with_scratch(pairs, scratch);
         for (k, pair) in pairs.chunks_exact(width).enumerate() {
             spread(&pair[..lines.cells], 2 * k, lines, up, displacement);
@@ -201,7 +202,7 @@ impl<T: FftFloat> GridOperator<T> {
 
     /// Adds the displacement in mm at every centre caused by additional pressures in MPa on some cells.
     pub fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
-        Arch::new().dispatch(Addition {
+        simd::dispatch(Addition {
             nx: self.nx,
             lines: &self.coefficients,
             changes,

@@ -5,7 +5,9 @@
 use std::f64::consts::FRAC_1_PI;
 use std::ops::Range;
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::NullaryFnOnce;
+
+use crate::contact::numerics::simd;
 
 /// Stresses `xx, yy, zz, xy, xz, yz`.
 pub type Stress = [f64; 6];
@@ -34,7 +36,7 @@ pub fn stresses(
     points: &[Lanes; 3],
     nu: f64,
 ) -> [Stress; LANES] {
-    Arch::new().dispatch(FeltStresses {
+    simd::dispatch(FeltStresses {
         packs,
         felt,
         points,

@@ -44,7 +44,7 @@ impl RootExit {
 /// The result of a search for a root.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Root {
-    /// The argument with the smallest value found.
+    /// The root, or without convergence the evaluated argument with the smallest magnitude of the value.
     pub(crate) place: f64,
     /// How the search ended.
     pub(crate) exit: RootExit,
@@ -60,11 +60,15 @@ pub(crate) fn find_root<E>(
     let (mut low, mut high): (Option<[f64; 2]>, Option<[f64; 2]>) = (None, None);
     let mut place = start.clamp(-FRACTION_MAX, FRACTION_MAX);
     let (mut stride, mut last) = (0.0_f64, None::<[f64; 2]>);
+    let mut best = [place, f64::INFINITY];
     let ended = |place, exit| Ok(Root { place, exit });
     for _ in 0..TRIALS_MAX {
         let value = f(place, &mut tolerance)?;
         if value.abs() <= tolerance {
             return ended(place, RootExit::Found);
+        }
+        if value.abs() < best[1] {
+            best = [place, value.abs()];
         }
         let below = value < 0.0;
         let (mine, other) = if below {
@@ -82,13 +86,13 @@ pub(crate) fn find_root<E>(
         if let (Some([p, f]), Some([q, g])) = (low, high) {
             let narrow = (CLOSED * q.abs().max(p.abs())).max(CLOSED_OF_TOLERANCE * tolerance);
             if (q - p).abs() <= narrow {
-                return ended(place, RootExit::BracketClosed);
+                return ended(best[0], RootExit::BracketClosed);
             }
             place = (p * g - q * f) / (g - f);
             continue;
         }
         if place.abs() >= FRACTION_MAX && (place < 0.0) != below {
-            return ended(place, RootExit::SignKept);
+            return ended(best[0], RootExit::SignKept);
         }
         // Only one bound is known: follow the line through the last two points, but limit how much the step grows.
         let needed = match slope.filter(|slope| *slope > 0.0) {
@@ -103,7 +107,7 @@ pub(crate) fn find_root<E>(
         let step = if below { stride } else { -stride };
         place = (place + step).clamp(-FRACTION_MAX, FRACTION_MAX);
     }
-    ended(place, RootExit::TrialsUsedUp)
+    ended(best[0], RootExit::TrialsUsedUp)
 }
 
 #[cfg(test)]
@@ -125,6 +129,25 @@ mod tests {
             assert_eq!(root.exit, RootExit::Found, "{goal}");
             assert!((root.place - goal).abs() < 1e-8, "{goal}: {root:?}");
         }
+    }
+
+    #[test]
+    fn without_convergence_the_best_evaluated_argument_is_returned() {
+        // The value jumps from -1 to 0.2: only arguments beyond the jump are near 0.
+        let mut seen = Vec::new();
+        let root = find_root(0.1, |at, least| {
+            *least = 1e-9;
+            let value = if at < 2.0 { -1.0 } else { 0.2 + 0.01 * at };
+            seen.push([at, f64::abs(value)]);
+            Ok::<f64, ()>(value)
+        })
+        .unwrap();
+        assert_eq!(root.exit, RootExit::BracketClosed);
+        let least = seen
+            .iter()
+            .map(|[_, value]| *value)
+            .fold(f64::INFINITY, f64::min);
+        assert!(seen.contains(&[root.place, least]), "{root:?}");
     }
 
     #[test]

@@ -14,6 +14,7 @@
 //! | lengths of vectors in inner loops | [`length`] |
 //! | connected cells | [`flood_fill`] |
 //! | logarithms in bulk | [`simd_ln`] |
+//! | the instruction set of the kernels | [`simd`] |
 //!
 //! Some iterations of the physics resemble one of these, and stay where they are because what they do beside the iteration differs:
 //!
@@ -43,6 +44,7 @@ pub mod maximum;
 pub mod monotone_root;
 pub mod pair_root;
 pub mod quadrature;
+pub mod simd;
 pub mod simd_ln;
 pub mod small_lu;
 pub mod spline;

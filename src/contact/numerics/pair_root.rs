@@ -48,10 +48,15 @@ fn at_once<E>(
     let (mut place, mut off) = (start, f(start, &mut tolerance)?);
     let mut inverse = [[1.0, 0.0], [0.0, 1.0]];
     let mut worse = 0;
-    for _ in 0..TRIALS_AT_ONCE {
+    let mut trials = 0;
+    loop {
         if length(off) <= tolerance {
             return Ok(Some(place));
         }
+        if trials == TRIALS_AT_ONCE || worse == WORSE_MAX {
+            return Ok(None);
+        }
+        trials += 1;
         let mut step = times(&inverse, off).map(|s| -s);
         let factor = (STEP_MAX / length(step)).min(1.0);
         step = step.map(|s| factor * s);
@@ -71,12 +76,8 @@ fn at_once<E>(
             (place, off, worse) = (next, found, 0);
         } else {
             worse += 1;
-            if worse == WORSE_MAX {
-                break;
-            }
         }
     }
-    Ok(None)
 }
 
 /// For every trial of the second argument, finds the first that makes the first value 0. Both searches are bracketed: slow but sure.
@@ -85,7 +86,8 @@ fn one_in_the_other<E>(
     f: &mut impl FnMut([f64; 2], &mut f64) -> Result<[f64; 2], E>,
 ) -> Result<PairRoot, E> {
     let mut first = start[0];
-    let mut exit_inner = RootExit::Found;
+    // Second argument, the first one found for it, and how that search ended.
+    let mut pairs = Vec::new();
     let Root { place, exit } = find_root(start[1], |second, tolerance| {
         let (mut off, mut outer) = ([0.0; 2], 0.0);
         let inner = find_root(first, |at, tolerance| {
@@ -93,10 +95,15 @@ fn one_in_the_other<E>(
             *tolerance = INNER_TOLERANCE * outer;
             Ok::<f64, E>(off[0])
         })?;
-        (first, exit_inner) = (inner.place, inner.exit);
+        first = inner.place;
+        pairs.push((second, inner));
         *tolerance = outer;
         Ok::<f64, E>(off[1])
     })?;
+    let inner = pairs.iter().rev().find(|(second, _)| *second == place);
+    let (first, exit_inner) = inner.map_or((first, RootExit::Found), |(_, inner)| {
+        (inner.place, inner.exit)
+    });
     let exits = [exit, exit_inner];
     let kept = exits.into_iter().find(|exit| *exit == RootExit::SignKept);
     let last = if exit.converged() { exit_inner } else { exit };

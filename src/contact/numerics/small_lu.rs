@@ -3,7 +3,9 @@
 //! Column by column, each elimination one update of contiguous values: no blocks, no recursion, no buffers. For larger matrices faer,
 //! which eliminates many columns at once, is faster.
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::NullaryFnOnce;
+
+use crate::contact::numerics::simd;
 
 /// Largest number of unknowns that this factorisation is for. Timed beside faer's on matrices of 4 to 192 unknowns in a release build with
 /// AVX-512: it takes 0.33 of the time with 4, 0.5 with 16, 0.7 with 24, 0.9 with 32 and 1.2 with 48.
@@ -14,7 +16,7 @@ pub(crate) const SMALL: usize = 32;
 pub(crate) fn factor(matrix: &mut [f64], order: &mut [usize]) {
     debug_assert_eq!(matrix.len(), order.len() * order.len());
     // The loops inside are compiled for the instruction set of this machine.
-    Arch::new().dispatch(Factorisation { matrix, order });
+    simd::dispatch(Factorisation { matrix, order });
 }
 
 struct Factorisation<'a> {

@@ -8,13 +8,12 @@
 
 use std::ops::Range;
 
-use pulp::Arch;
-
 use crate::contact::half_space::strip_operator::assembly::{CellEdges, SegmentRows};
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::mesh::strips::{Mesh, Segment};
 use crate::contact::method::Method;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::simd;
 use crate::contact::numerics::simd_ln::Float;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
 use crate::contact::rolling::motion::Motion;
@@ -201,14 +200,14 @@ impl Differences {
             transposed: zeros(),
         };
         let mut edges = CellEdges::<T>::new(mesh);
-        let (arch, mut rows) = (Arch::new(), Vec::new());
+        let mut rows = Vec::new();
         for segment in &mesh.segments {
             if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
                 return Err(stop);
             }
             rows.resize(3 * cells * segment.cells.len(), T::ZERO);
             edges.observe_from(mesh, segment.chord.y);
-            arch.dispatch(SegmentRows {
+            simd::dispatch(SegmentRows {
                 reversible: false,
                 edges: &mut edges,
                 points: &edges_of(mesh, segment),

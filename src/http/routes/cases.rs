@@ -103,14 +103,14 @@ pub(crate) async fn check(
         memory.trial(limit).await
     };
     if let Some(turn) = turn {
-        let tried = tokio::task::spawn_blocking(move || {
+        let probed = tokio::task::spawn_blocking(move || {
             let _held = (turn, share);
-            jobs.tried(&case, limit)
+            jobs.probe(&case, limit)
         });
         // A solve that panics is the matter of its job; the formulas still stand.
-        if let Ok(tried) = tried.await {
-            report.estimate.seconds = tried.seconds;
-            report.estimate.found_by = tried.found_by;
+        if let Ok(probed) = probed.await {
+            report.estimate.seconds = probed.seconds;
+            report.estimate.found_by = probed.found_by;
         }
     }
     Ok(Json(report))

@@ -1,17 +1,14 @@
-//! Which arithmetic is this? Two machines with the same name here give the same bits, as far as a probe of everything that may differ can tell.
+//! Names the arithmetic of a machine. A probe of everything that may differ decides whether two machines give the same bits.
 
 use faer::Mat;
 use faer::prelude::Solve;
-use pulp::Arch;
+use railhead::contact::numerics::simd::SimdLevel;
 use realfft::RealFftPlanner;
 
 use crate::recorder::record::Digest;
 
-/// The instruction set of the kernels, and a digest of what the functions of the C library, a factorisation and a transform give: the first
-/// differ between libraries, the others between caches and instruction sets.
-pub fn arithmetic() -> String {
-    let level = format!("{:?}", Arch::new());
-    let level = level.split(['(', ' ']).next().unwrap_or_default();
+/// The SIMD level of the kernels, and a digest of results of the C library, a factorisation and a transform.
+pub fn arithmetic(level: SimdLevel) -> String {
     let mut digest = Digest::new();
     for index in 0..200 {
         let x = 0.037 + 0.0713 * f64::from(index);

@@ -2,11 +2,12 @@
 
 use std::ops::{ControlFlow, Range};
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::NullaryFnOnce;
 
 use crate::contact::mesh::observation::observe;
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::simd;
 use crate::contact::numerics::simd_ln::Float;
 
 /// Cells of a strip that are folded at once.
@@ -147,7 +148,7 @@ impl OperatorAssembly<'_> {
         let rows = self.first_row[self.first_row.len() - 1];
         let mut matrix = vec![T::ZERO; rows * self.row_length];
         let mut edges = CellEdges::new(self.mesh);
-        let (arch, mut points) = (Arch::new(), Vec::new());
+        let mut points = Vec::new();
         let reversible = self.mesh.is_reversible();
         let places = self.first_row.windows(2);
         for (place, segment) in places.zip(&self.mesh.segments) {
@@ -156,7 +157,7 @@ impl OperatorAssembly<'_> {
             }
             observe(self.mesh, segment, &mut points);
             edges.observe_from(self.mesh, segment.chord.y);
-            arch.dispatch(SegmentRows {
+            simd::dispatch(SegmentRows {
                 edges: &mut edges,
                 points: &points,
                 mesh: self.mesh,

@@ -1,11 +1,12 @@
 //! The stored numbers of the operator between strips. Only this file asks whether they are in single or double precision.
 
-use pulp::{Arch, WithSimd};
+use pulp::WithSimd;
 
 use crate::contact::half_space::strip_operator::assembly::OperatorAssembly;
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::half_space::strip_operator::product::{Product, RowLayout};
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::simd;
 
 /// The stored numbers.
 #[derive(Debug, Clone)]
@@ -75,7 +76,7 @@ fn multiply<'a, T>(
 ) where
     Product<'a, T>: WithSimd<Output = ()>,
 {
-    Arch::new().dispatch(Product {
+    simd::dispatch(Product {
         matrix,
         layout,
         tx,

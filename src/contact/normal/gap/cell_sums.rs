@@ -1,6 +1,8 @@
 //! The loops over all cells of the conjugate gradients, in the machine's lanes.
 
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
+
+use crate::contact::numerics::simd;
 
 /// Arrays over cells go on to a multiple of this: no machine has more lanes.
 pub(crate) const LANES: usize = 8;
@@ -66,7 +68,7 @@ pub(crate) struct CellProduct<'a>(pub(crate) &'a [f64], pub(crate) &'a [f64]);
 
 /// Runs a loop in the lanes of this machine.
 pub(crate) fn run<W: WithSimd>(work: W) -> W::Output {
-    Arch::new().dispatch(work)
+    simd::dispatch(work)
 }
 
 impl WithSimd for Distances<'_> {

@@ -1,7 +1,8 @@
 //! Displacements of some places by unit pressures on the cells of a regular grid nearby, by the closed form.
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::NullaryFnOnce;
 
+use crate::contact::numerics::simd;
 use crate::contact::numerics::simd_ln::Float;
 
 /// Places where displacements are wanted, and a block of cells that press.
@@ -20,7 +21,7 @@ impl NearCells<'_> {
     /// The coefficient [`rectangle`](crate::contact::half_space::kernels::rectangle) calls `zz`, as differences of values at the corners, which
     /// neighbouring cells share. They lose digits with the square of the distance over the side of a cell: at a distance of 1000 sides ten are left.
     pub(crate) fn coefficients(self) -> Vec<f32> {
-        Arch::new().dispatch(self)
+        simd::dispatch(self)
     }
 }
 

@@ -1,9 +1,10 @@
 //! How large parts of the loads look from several points at once: how many points of a quadrature each needs along and across.
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::NullaryFnOnce;
 
 use crate::contact::half_space::point_loads::{LANES, Lanes};
 use crate::contact::numerics::quadrature::RULES;
+use crate::contact::numerics::simd;
 
 /// Number of rules; the code one above the last asks for a division of the part.
 pub const ORDERS: usize = RULES.len();
@@ -57,7 +58,7 @@ pub fn look(
     codes: &mut Vec<PartCodes>,
 ) {
     let LoadResolution { sizes } = resolution;
-    Arch::new().dispatch(Look {
+    simd::dispatch(Look {
         parts,
         points,
         limits: sizes.map(|size| size * size),

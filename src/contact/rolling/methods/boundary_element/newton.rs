@@ -160,13 +160,16 @@ impl<'a> Newton<'a> {
         let mut recent = [0.0_f64; 3];
         let mut last = f64::INFINITY;
         report.residual = self.evaluate(law, t, workspace, &mut report);
-        while report.iterations < law.steps_max {
+        loop {
             if report.residual < least {
                 least = report.residual;
                 best.copy_from_slice(t);
             }
             if report.residual <= law.tolerance {
                 report.exit = NewtonExit::Converged;
+                break;
+            }
+            if report.iterations == law.steps_max {
                 break;
             }
             recent[report.iterations as usize % 3] = report.residual;

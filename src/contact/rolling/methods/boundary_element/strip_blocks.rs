@@ -1,6 +1,8 @@
 //! Factored blocks, one segment after the other, and their inverse.
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::NullaryFnOnce;
+
+use crate::contact::numerics::simd;
 
 /// Factored blocks of all segments.
 #[derive(Debug, Default)]
@@ -53,7 +55,7 @@ impl StripBlocks {
     /// `x ← P⁻¹ x`, block by block. `gathered` has room for the unknowns of each.
     pub(super) fn apply(&self, gathered: &mut [f64], x: &mut [f64]) {
         // One dispatch for all blocks: the loops inside are compiled for the instruction set of this machine.
-        Arch::new().dispatch(Elimination {
+        simd::dispatch(Elimination {
             blocks: self,
             gathered,
             x,

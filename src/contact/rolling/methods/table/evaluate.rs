@@ -1,7 +1,6 @@
 //! The table as a function: creep forces, the share that sticks, and derivatives, of one ellipse and any creepage.
 
-use pulp::Arch;
-
+use crate::contact::numerics::simd;
 use crate::contact::rolling::methods::table::axis::{Axis, Weights};
 use crate::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
 use crate::contact::rolling::methods::table::grid::{
@@ -294,9 +293,9 @@ impl EllipseTable<'_> {
             size: size.first,
         };
         let combined = |rows: &[f32; NEAR], weights: &[f64; 4]| self.combined(rows, weights);
-        let arch = Arch::new();
         if SLOPES {
-            let [value, by_pole, by_direction] = arch.dispatch(ValueAndSlopes(&table.spline, near));
+            let [value, by_pole, by_direction] =
+                simd::dispatch(ValueAndSlopes(&table.spline, near));
             Sums {
                 value: combined(&value, &size.value),
                 by_size: combined(&value, &size.slope),
@@ -309,7 +308,7 @@ impl EllipseTable<'_> {
                 ..Sums::default()
             }
         } else {
-            let value = arch.dispatch(Value(&table.spline, near));
+            let value = simd::dispatch(Value(&table.spline, near));
             Sums {
                 value: combined(&value, &size.value),
                 ..Sums::default()

@@ -1,7 +1,6 @@
 //! The table at one Poisson's ratio: a third of the numbers, for many rows of one material.
 
-use pulp::Arch;
-
+use crate::contact::numerics::simd;
 use crate::contact::rolling::methods::table::near_nodes::{NearNodes, SIZE_ROW, ValueOfMaterial};
 use crate::contact::rolling::methods::table::shape_coefficients::{
     MaterialCoefficients, ShapeCoefficients, poisson_weights,
@@ -50,7 +49,7 @@ impl MaterialTable {
     /// The functions at a place, with the weights of its four sizes.
     #[inline(always)]
     pub(super) fn value(&self, near: &NearNodes, sizes: &[f64; 4]) -> [f64; OUTPUTS] {
-        let rows = Arch::new().dispatch(ValueOfMaterial(self.spline.as_flattened(), *near));
+        let rows = simd::dispatch(ValueOfMaterial(self.spline.as_flattened(), *near));
         let mut sums = [0.0; OUTPUTS];
         for (row, weight) in rows.chunks_exact(OUTPUTS).zip(sizes) {
             for (sum, value) in sums.iter_mut().zip(row) {

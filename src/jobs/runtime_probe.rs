@@ -1,7 +1,7 @@
-//! How long a case takes, found by solving it for a moment: whoever plans by a time wants it of this machine and this case, and the
-//! formulas of `case/solve_time.rs` know neither how often a mesh is refined nor how fast the machine is.
+//! Solve time of a case, measured by solving it for a moment.
 //!
-//! Most cases end within the limit. Of one that does not, the formulas tell the rest, set right by what was solved meanwhile.
+//! The cost formulas of the physics do not include the speed of the machine or the number of refinements. Most cases end within the limit of
+//! a probe. For the others the formulas extrapolate from the part that was solved.
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -12,34 +12,34 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::words::found_by::FoundBy;
 
-/// Cases that are thought to take more memory of their own are not tried, in bytes: they are checked beside the workers.
+/// Largest memory of its own, in bytes, of a case that is probed: probes run outside the memory budget of the workers.
 const BYTES_MAX: u64 = 128 << 20;
 
-/// How long a case is tried where nothing else is asked: 98 of 100 cases of the stress bench end within it, and nobody waits for it long.
+/// Default limit of a probe. 98 % of the cases of the stress bench end within it.
 pub const USUAL_LIMIT: Duration = Duration::from_millis(200);
 
-/// A single motion, or the first of several, that was not done in time takes at least so many times as long as it was given. Of the 27 such
-/// cases of `cargo bench --bench stress -- --only times` 25 are within a factor of 3.
+/// Least total time of a first motion that did not end within a probe, over the time of the probe. Of 27 such cases of
+/// `cargo bench --bench stress -- --only times` 25 are within a factor of 3.
 const REST_TIMES: f64 = 2.0;
-/// Motions done from which on they tell how long the others take.
+/// Number of solved motions from which on they determine the time of the others.
 const MOTIONS_MIN: usize = 3;
 
-/// The time of a case, and how it was found.
+/// Solve time of a case, and its source.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TriedTime {
+pub struct ProbedTime {
     /// Solve time in s on one core.
     pub seconds: f64,
     /// How it was found.
     pub found_by: FoundBy,
 }
 
-struct TrialClock {
+struct ProbeClock {
     began: Instant,
     limit: Duration,
     progress: Cell<f64>,
 }
 
-impl Monitor for TrialClock {
+impl Monitor for ProbeClock {
     fn tick(&self, progress: f64) -> ControlFlow<Stop> {
         self.progress.set(progress);
         if self.elapsed() > self.limit {
@@ -53,20 +53,20 @@ impl Monitor for TrialClock {
     }
 }
 
-/// The time of a case, solved for at most about so long by `solve`.
-pub fn tried(
+/// Runs `solve` for at most about `limit` and returns the solve time of the whole case.
+pub fn probe(
     case: &CheckedCase,
     limit: Duration,
     solve: impl FnOnce(&dyn Monitor) -> Result<(), SolveError>,
-) -> TriedTime {
+) -> ProbedTime {
     let cost = case.cost();
     if limit.is_zero() || cost.own_bytes() > BYTES_MAX {
-        return TriedTime {
+        return ProbedTime {
             seconds: cost.seconds,
             found_by: FoundBy::Formulas,
         };
     }
-    let clock = TrialClock {
+    let clock = ProbeClock {
         began: Instant::now(),
         limit,
         progress: Cell::new(0.0),
@@ -81,10 +81,10 @@ pub fn tried(
         }
         Err(_) => (taken, FoundBy::FailedSolve),
     };
-    TriedTime { seconds, found_by }
+    ProbedTime { seconds, found_by }
 }
 
-/// The time of a case from the formulas, the time taken so far and the progress then.
+/// Solve time of a case from the formulas, the time taken so far and the progress reached.
 fn from_part(case: &CheckedCase, formulas: f64, taken: f64, progress: f64) -> f64 {
     let motions = case.problem.motions.len();
     let done = (progress * motions as f64) as usize;
@@ -126,36 +126,36 @@ mod tests {
         checked(&sweep, &json!({ "target_error": 0.005 }))
     }
 
-    fn try_for(case: &CheckedCase, limit: Duration) -> TriedTime {
-        tried(case, limit, |monitor| solve(case, monitor).map(drop))
+    fn probe_for(case: &CheckedCase, limit: Duration) -> ProbedTime {
+        probe(case, limit, |monitor| solve(case, monitor).map(drop))
     }
 
     #[test]
-    fn a_case_that_ends_in_time_is_told_as_solved() {
-        let found = try_for(&sweep(3), Duration::from_secs(3600));
+    fn a_case_that_ends_in_time_is_reported_as_solved() {
+        let found = probe_for(&sweep(3), Duration::from_secs(3600));
         assert_eq!(found.found_by, FoundBy::Solve);
         assert!(found.seconds > 0.0);
     }
 
     #[test]
-    fn without_time_or_with_too_much_memory_the_formulas_tell() {
+    fn without_time_or_memory_for_a_probe_the_formulas_are_used() {
         let case = sweep(3);
-        let formulas = TriedTime {
+        let formulas = ProbedTime {
             seconds: case.cost().seconds,
             found_by: FoundBy::Formulas,
         };
-        assert_eq!(try_for(&case, Duration::ZERO), formulas);
+        assert_eq!(probe_for(&case, Duration::ZERO), formulas);
         let mesh = json!({ "strips": 70, "cells": 60 });
         let large = checked(&motion(), &json!({ "mesh": mesh }));
         assert!(large.cost().own_bytes() > BYTES_MAX);
-        let found = try_for(&large, Duration::from_secs(3600));
+        let found = probe_for(&large, Duration::from_secs(3600));
         assert_eq!(found.found_by, FoundBy::Formulas);
     }
 
     #[test]
-    fn motions_done_in_time_tell_how_long_the_others_take() {
+    fn motions_done_in_time_determine_the_time_of_the_others() {
         let case = sweep(5000);
-        let found = try_for(&case, Duration::from_millis(2));
+        let found = probe_for(&case, Duration::from_millis(2));
         assert_eq!(found.found_by, FoundBy::PartOfSolve);
         assert!(found.seconds > 2e-3, "{found:?}");
         // Each of like motions takes what those done took, whatever the formulas expect of one.
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_motion_takes_longer_than_the_trial() {
+    fn a_single_motion_takes_longer_than_the_probe() {
         let case = checked(&motion(), &json!({ "target_error": 0.005 }));
         let told = from_part(&case, case.cost().seconds, 7.0, 0.5);
         assert_eq!(told, REST_TIMES * 7.0);
