@@ -80,7 +80,7 @@ mod tests {
         let tenant: Arc<str> = "t".into();
         let (id, age) = (Uuid::now_v7(), Duration::from_millis(200));
         for round in 1..=2 {
-            let before = asked.load(Ordering::SeqCst);
+            let (before, began) = (asked.load(Ordering::SeqCst), Instant::now());
             let all = (0..1000).map(|_| {
                 let (reads, asked, tenant) = (reads.clone(), asked.clone(), tenant.clone());
                 tokio::spawn(async move {
@@ -94,9 +94,10 @@ mod tests {
             for found in all.collect::<Vec<_>>() {
                 assert!(found.await.unwrap().unwrap() > before, "older than allowed");
             }
-            // One, on a machine that is not very slow.
+            // A read serves all callers until it is too old.
             let made = asked.load(Ordering::SeqCst) - before;
-            assert!(made <= 20, "round {round}: {made}");
+            let most = 1 + began.elapsed().as_millis() / age.as_millis();
+            assert!(u128::from(made) <= most, "round {round}: {made}");
             tokio::time::sleep(age).await;
         }
         // A failed read is the answer of its caller alone, and what is not followed is forgotten.

@@ -24,6 +24,9 @@ const TENANTS: [(&str, u64, i32); 3] = [("a", 2, 2500), ("b", 20, 250), ("c", 20
 /// Solver time in all, in µs, from which on shares are looked at, and until when. It is their mean that counts, for long jobs come one by one.
 const LOOKED_AT: (u64, u64) = (4_000_000, 9_000_000);
 
+/// Largest deviation from an equal share. Shares by number of jobs instead of solver time would be 0.03, 0.27 and 2.7.
+const SHARE_TOLERANCE: f64 = 0.25;
+
 /// Copies of the job that a tenant has submitted, with the costs that they are expected to have.
 const MULTIPLY: &str = "WITH ids AS MATERIALIZED (SELECT CAST(gen_random_uuid() AS text) AS id FROM generate_series(1, $2)), \
      more AS (INSERT INTO jobs SELECT (jsonb_populate_record(jobs, jsonb_build_object('id', ids.id, 'cost_us', $3, 'slice_us', $3))).* \
@@ -103,7 +106,7 @@ async fn tenants_share_two_nodes_equally_with_jobs_of_1_10_and_100_times_the_len
     for (share, tenant) in sums.iter().zip(TENANTS) {
         let of_its_own = 3.0 * share / looks;
         assert!(
-            (of_its_own - 1.0).abs() < 0.1,
+            (of_its_own - 1.0).abs() < SHARE_TOLERANCE,
             "{}: {of_its_own:.2} of an equal share, {spent:?}",
             tenant.0
         );

