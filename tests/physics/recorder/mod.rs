@@ -26,9 +26,9 @@ use crate::recorder::comparison::{Precision, compare};
 use crate::recorder::machine::arithmetic;
 use crate::recorder::record::{Record, Recording};
 
-/// Largest change of a given contact with another arithmetic, relative to the scale of the quantity. Kernels without SIMD move numbers by 7e-7
-/// at most (matrices are kept in single precision), pressures whose samples are rounded to twelve digits by 7e-5.
-const ELSEWHERE: f64 = 1e-4;
+/// Largest change of a given contact with another arithmetic, relative to the scale of the quantity: less than half of the usual target.
+/// Kernels without SIMD move creepages that are found for a force by 9e-4, peaks of the traction by 1.2e-4 and all other numbers by 7e-7.
+const ELSEWHERE: f64 = 2e-3;
 /// Largest change of the resultants of gaps and wheels, of which nothing else is compared. The last bits can turn decisions about grids and
 /// heights; answers then differ within the target (wheels without SIMD by 5e-3 of the friction limit).
 const FOUND_ELSEWHERE: f64 = 0.01;
