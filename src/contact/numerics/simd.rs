@@ -36,7 +36,7 @@ impl SimdLevel {
     /// The level that kernels use on this thread.
     #[must_use]
     pub fn current() -> SimdLevel {
-        SimdLevel(CHOSEN.get().unwrap_or_else(Arch::new))
+        SimdLevel(CHOSEN.get().unwrap_or_default())
     }
 
     /// Runs `work` with the kernels of this level on this thread.
