@@ -64,6 +64,7 @@ mod pictures;
 mod point_fields;
 mod pooler;
 mod postgres;
+mod profile_files;
 mod profiles;
 mod relocation;
 mod requests;

@@ -1,6 +1,6 @@
 //! Between the words of a case and the types of the numerics: a change of a solver does not change the contract.
 
-use crate::contact::case::words::contact::{FormatName, SideName};
+use crate::contact::case::words::contact::{FormatName, SideName, UnitName};
 use crate::contact::case::words::friction::{FallName, Friction};
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
@@ -12,6 +12,7 @@ use crate::contact::friction::interface::{Interface, LayerYield};
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::friction::passage::HeatedLaw;
 use crate::contact::geometry::formats::format::Format;
+use crate::contact::geometry::length_unit::LengthUnit;
 use crate::contact::geometry::wheel_rail::Side;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::method::{Method, TractionBound};
@@ -23,6 +24,17 @@ impl From<SideName> for Side {
         match name {
             SideName::Left => Side::Left,
             SideName::Right => Side::Right,
+        }
+    }
+}
+
+impl From<UnitName> for LengthUnit {
+    fn from(name: UnitName) -> LengthUnit {
+        match name {
+            UnitName::Mm => LengthUnit::Mm,
+            UnitName::Cm => LengthUnit::Cm,
+            UnitName::M => LengthUnit::M,
+            UnitName::Inch => LengthUnit::Inch,
         }
     }
 }

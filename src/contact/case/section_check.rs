@@ -11,18 +11,21 @@ use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
 use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::problem::profile_points;
+use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::words::profile_quality::SectionQuality;
 
 /// Contact modulus G/(1 − ν) of steel on steel in MPa, for the smoothing that is suggested.
 const STEEL_MPA: f64 = 82_000.0 / (1.0 - 0.28);
 
 /// What a cross-section was taken for.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SectionReport {
     /// `rail` or `wheel`: what the file says, or what the points look like.
     pub body: &'static str,
     /// Its points, and the smoothing that suits them on steel beside another profile of this kind.
     pub quality: SectionQuality,
+    /// How its points or its file were read.
+    pub remarks: Vec<RemarkEntry>,
 }
 
 /// Reads and checks a cross-section as `rail` or `wheel` of a case has it.
@@ -55,5 +58,10 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
     Ok(SectionReport {
         body: body.name(),
         quality: profile_points::section(&profile, advised[0]),
+        remarks: profile
+            .remarks
+            .iter()
+            .map(|remark| remark.clone().at_pointer(""))
+            .collect(),
     })
 }

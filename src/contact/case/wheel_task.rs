@@ -8,6 +8,7 @@ use crate::contact::case::words::motion::{Motions, Wheelset};
 use crate::contact::error::Fault;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::formats::format as formats;
+use crate::contact::geometry::length_unit::LengthUnit;
 use crate::contact::geometry::profile::{Body, Profile, Reading};
 use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
@@ -16,6 +17,7 @@ use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelT
 use crate::contact::normal::wheel_height::wheelset_task::WheelsetMove;
 use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::PrescribedForces;
 
 /// The task of a wheel on a rail, whose profiles may be known, with its remarks; `None` without faults where the load or the contact
@@ -238,23 +240,58 @@ pub(crate) fn profile_at(
             Smoothing::ByNoise(SmoothingWord::Auto) => 0.0,
         },
     };
-    if let (Some(format), Some(text)) = (section.format, &section.text) {
-        let refuse = |detail| fault(format!("{pointer}/text"), detail);
-        let contents = formats::read(format.into(), text).map_err(refuse)?;
-        let is_wheel = body == Body::Wheel;
-        if contents.wheel.is_some_and(|wheel| wheel != is_wheel) {
-            let other = if is_wheel { "rail" } else { "wheel" };
-            return Err(refuse(format!(
-                "the file says that it belongs to a {other}; that of a {name} is needed"
-            )));
-        }
-        reading.mirror_y = reading.mirror_y.or(contents.mirror_y);
-        reading.mirror_z = reading.mirror_z.or(contents.mirror_z);
-        return Profile::new(body, &contents.points, reading).map_err(refuse);
+    let stated_mm = section.unit.map(|unit| LengthUnit::from(unit).mm());
+    let scaled = |points: &[[f64; 2]], scale: f64| -> Vec<[f64; 2]> {
+        let scaled = points.iter().map(|point| point.map(|part| part * scale));
+        scaled.collect()
+    };
+    let (Some(format), Some(text)) = (section.format, &section.text) else {
+        let points = section.points_mm.as_deref().unwrap_or_default();
+        let profile = match stated_mm {
+            None | Some(1.0) => Profile::new(body, points, reading),
+            Some(mm) => Profile::new(body, &scaled(points, mm), reading),
+        };
+        return profile.map_err(|detail| fault(format!("{pointer}/points_mm"), detail));
+    };
+    let refuse = |detail| fault(format!("{pointer}/text"), detail);
+    let mut contents = formats::read(format.into(), text).map_err(refuse)?;
+    let is_wheel = body == Body::Wheel;
+    if contents.wheel.is_some_and(|wheel| wheel != is_wheel) {
+        let other = if is_wheel { "rail" } else { "wheel" };
+        return Err(refuse(format!(
+            "the file says that it belongs to a {other}; that of a {name} is needed"
+        )));
     }
-    let points = section.points_mm.as_deref().unwrap_or_default();
-    Profile::new(body, points, reading)
-        .map_err(|detail| fault(format!("{pointer}/points_mm"), detail))
+    reading.mirror_y = reading.mirror_y.or(contents.mirror_y);
+    reading.mirror_z = reading.mirror_z.or(contents.mirror_z);
+    let file_mm = contents.unit_mm.unwrap_or(1.0);
+    if let Some(mm) = stated_mm.filter(|mm| *mm != file_mm) {
+        contents.points = scaled(&contents.points, mm / file_mm);
+    }
+    let mut profile = Profile::new(body, &contents.points, reading).map_err(refuse)?;
+    let differs = stated_mm.zip(contents.unit_mm);
+    if let Some((stated_mm, file_mm)) = differs.filter(|(stated, file)| stated != file) {
+        profile.remarks.push(Remark::ProfileUnitDiffers {
+            profile: name,
+            stated_mm,
+            file_mm,
+        });
+    }
+    if let Some(stated) = contents.wrong_count {
+        profile.remarks.push(Remark::ProfileCountDiffers {
+            profile: name,
+            stated,
+            found: contents.points.len(),
+        });
+    }
+    if let Some((count, line)) = contents.header_rows {
+        profile.remarks.push(Remark::ProfileHeaderRows {
+            profile: name,
+            count,
+            line,
+        });
+    }
+    Ok(profile)
 }
 
 fn fault(pointer: String, detail: String) -> Fault {

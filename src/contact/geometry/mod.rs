@@ -9,6 +9,7 @@ pub mod formats;
 pub mod frame;
 pub mod grouping;
 pub mod holes;
+pub mod length_unit;
 pub mod local_gap;
 pub mod locus_lines;
 pub mod overlaps;

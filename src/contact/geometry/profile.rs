@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use crate::contact::geometry::crossing;
+use crate::contact::geometry::length_unit::LengthUnit;
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead};
 use crate::contact::geometry::profile_quality::samples::{KnownPoints, Points};
@@ -21,6 +22,10 @@ pub const ARC_LENGTH: [f64; 2] = [5.0, 500.0];
 pub const POINTS_MIN: usize = 8;
 /// Most points of one profile.
 pub const POINTS_MAX: usize = 20_000;
+/// Width in mm of the head of a usual rail (60E1).
+const RAIL_WIDTH: f64 = 72.0;
+/// Width in mm of a usual wheel (EN 13715).
+const WHEEL_WIDTH: f64 = 135.0;
 /// Points nearer to each other than this are one, in mm.
 const NEAR: f64 = 1e-3;
 /// Cosine of the turn from which on a point runs back against its neighbours: 102°, which no corner of a measured profile has, while points
@@ -102,10 +107,22 @@ impl Profile {
         let length = arc_length(&points);
         let [shortest, longest] = ARC_LENGTH;
         if !(shortest..=longest).contains(&length) {
+            let hint = match likely_unit(body, &points) {
+                Some((width, unit)) => format!(
+                    "the section is {width:.4} mm wide; if its numbers are in {unit} and not in mm, state unit: \"{unit}\""
+                ),
+                None => "is another unit than mm used, or are the points not in order?".to_owned(),
+            };
             return Err(format!(
-                "the arc length of the points is {length:.4} mm; {shortest} to {longest} mm are allowed (is another unit than mm \
-                 used, or are the points not in order?)"
+                "the arc length of the points is {length:.4} mm; {shortest} to {longest} mm are allowed ({hint})"
             ));
+        }
+        if let Some((width_mm, unit)) = likely_unit(body, &points) {
+            remarks.push(Remark::ProfileSizeUnusual {
+                profile: body.name(),
+                width_mm,
+                unit,
+            });
         }
         orient(body, &mut points, reading, &mut remarks)?;
         straighten(body, &mut points, &mut remarks)?;
@@ -328,6 +345,18 @@ fn orient(
         points.reverse();
     }
     Ok(())
+}
+
+/// The width of a section, and the unit in which it would be that of a usual rail head or wheel, if that is not mm.
+fn likely_unit(body: Body, points: &[[f64; 2]]) -> Option<(f64, &'static str)> {
+    let usual = match body {
+        Body::Rail => RAIL_WIDTH,
+        Body::Wheel => WHEEL_WIDTH,
+    };
+    let y = || points.iter().map(|point| point[0]);
+    let width = y().fold(f64::NEG_INFINITY, f64::max) - y().fold(f64::INFINITY, f64::min);
+    let unit = LengthUnit::likely(width, usual)?;
+    (unit != LengthUnit::Mm).then(|| (width, unit.symbol()))
 }
 
 fn middle(points: &[[f64; 2]]) -> f64 {

@@ -52,6 +52,7 @@ pub(crate) const FILES: &[PageFile] = files!(
     "js/field/stick.js",
     "js/fieldmap.js",
     "js/fields.js",
+    "js/files.js",
     "js/form.js",
     "js/format.js",
     "js/historyform.js",

@@ -10,6 +10,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::contact::CrossSection;
+use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::words::profile_quality::SectionQuality;
 use crate::http::dto::job::rfc3339;
 use crate::http::extract::caller::Caller;
@@ -44,6 +45,8 @@ pub(crate) struct KeptProfile {
     body: &'static str,
     /// How far its points can be trusted.
     quality: SectionQuality,
+    /// How its points or its file were read, with pointers into the cross-section.
+    remarks: Vec<RemarkEntry>,
     /// When it was first sent.
     #[schema(format = "date-time")]
     created_at: String,
@@ -87,6 +90,7 @@ pub(crate) async fn keep(
         digest: kept.digest,
         body: report.body,
         quality: report.quality,
+        remarks: report.remarks,
         created_at: rfc3339(kept.created_at),
     });
     Ok((status, location, body).into_response())

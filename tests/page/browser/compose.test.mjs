@@ -11,7 +11,7 @@ const EXAMPLES = readdirSync(new URL('../../../api/examples/', import.meta.url))
 /** @param {import('playwright-core').Page} page */
 const json = async (page) => JSON.parse(await page.locator('.code textarea').inputValue());
 /** @param {import('playwright-core').Page} page */
-const sound = (page) => page.locator('.verdict .good').waitFor();
+const sound = (page) => page.locator('.verdict .checked').waitFor();
 /** @param {import('playwright-core').Page} page @param {string} file */
 const choose = (page, file) => page.locator('select').first().selectOption(file);
 
@@ -127,15 +127,25 @@ test('form and JSON are faces of one document, and broken JSON loses nothing', (
   await page.locator('#field-friction-coefficient-fault').waitFor();
 }));
 
+/**
+ * Drops files as the browser does.
+ * @param {import('playwright-core').Page} page
+ * @param {string} place
+ * @param {Record<string, string | number[]>} files Text, or bytes.
+ */
+async function drop(page, place, files) {
+  const dataTransfer = await page.evaluateHandle((given) => {
+    const data = new DataTransfer();
+    for (const [name, content] of Object.entries(given)) data.items.add(new File([typeof content === 'string' ? content : new Uint8Array(content)], name));
+    return data;
+  }, files);
+  await page.dispatchEvent(place, 'drop', { dataTransfer });
+}
+
 test('files of profiles go where they belong, also when they are dropped anywhere', () => onPage('', async (page) => {
   await sound(page);
   const files = { 'worn.ban': example('wheel-rail-flange').contact.rail.text, 'worn.whl': example('wheel-rail-flange').contact.wheel.text };
-  const transfer = await page.evaluateHandle((given) => {
-    const data = new DataTransfer();
-    for (const [name, text] of Object.entries(given)) data.items.add(new File([text], name));
-    return data;
-  }, files);
-  await page.dispatchEvent('.stage', 'drop', { dataTransfer: transfer });
+  await drop(page, '.stage', files);
   await page.locator('svg[aria-label^="Wheel on rail"] .rail').waitFor();
   const { contact } = await json(page);
   assert.equal(contact.type, 'profiles');
@@ -145,6 +155,69 @@ test('files of profiles go where they belong, also when they are dropped anywher
   await page.locator('#field-contact-rail').setInputFiles({ name: 'other.csv', mimeType: 'text/csv', buffer: Buffer.from('1 2\n3 4') });
   await page.locator('.field.bad .drop').waitFor();
   assert.equal((await json(page)).contact.rail.text, '1 2\n3 4');
+}));
+
+test('files dropped on the header or on another view are taken and lead to the case', () => onPage('', async (page) => {
+  const { contact } = example('wheel-rail-flange');
+  const files = { 'a.ban': miniprof(contact.rail.text), 'a.whl': miniprof(contact.wheel.text) };
+  await sound(page);
+  for (const [view, place] of [['jobs', 'main'], ['compare', 'header.top'], ['line', 'footer'], ['licences', 'main'], ['compose', 'header.top']]) {
+    await page.goto(`${service.base}/#/${view}`);
+    await page.locator(`nav a[aria-current=page], main`).first().waitFor();
+    await page.evaluate(() => sessionStorage.clear());
+    await drop(page, place, files);
+    await page.waitForFunction(() => location.hash.startsWith('#/compose') && document.querySelector('#h-drawing')?.textContent === 'a on a');
+    await sound(page);
+    // Another name, so that the next drop shows.
+    await page.locator('.code textarea').fill(JSON.stringify({ ...(await json(page)), name: 'a on a', contact: { type: 'radii', rolling_mm: 460, lateral_mm: 300 } }));
+  }
+  // The browser does not open a file that nothing takes.
+  const prevented = await page.evaluate(() => {
+    const data = new DataTransfer();
+    data.items.add(new File(['1'], 'a.txt'));
+    return ['dragover', 'drop'].map((type) => !document.querySelector('header')?.dispatchEvent(new DragEvent(type, { dataTransfer: data, bubbles: true, cancelable: true })));
+  });
+  assert.deepEqual(prevented, [true, true]);
+}));
+
+test('two files dropped together replace both, and one file of unknown body is asked for', () => onPage('', async (page) => {
+  const { contact } = example('wheel-rail-flange');
+  await sound(page);
+  await drop(page, '.form', { 'old.ban': miniprof(contact.rail.text), 'old.whl': miniprof(contact.wheel.text) });
+  await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'old on old');
+  const rows = { rail: contact.rail.text, wheel: contact.wheel.text };
+  await drop(page, '.form', { 'SUIC519A.dat': rows.rail, 'RUIC519A.dat': rows.wheel });
+  await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'RUIC519A on SUIC519A');
+  const after = (await json(page)).contact;
+  assert.deepEqual([after.rail, after.wheel], [{ format: 'columns', text: rows.rail }, { format: 'columns', text: rows.wheel }]);
+  await drop(page, '.form', { 'RUIC519A.dat': rows.wheel });
+  await page.getByText('RUIC519A.dat does not say whether it is a rail or a wheel').waitFor();
+  assert.deepEqual((await json(page)).contact, after);
+  await page.getByRole('button', { name: 'Exchange rail and wheel' }).click();
+  assert.deepEqual((await json(page)).contact.rail, after.wheel);
+}));
+
+test('files in UTF-16 and with letters of Windows are read by the readers of the service', () => onPage('', async (page) => {
+  const { contact } = example('wheel-rail-flange');
+  await sound(page);
+  const rail = `\ufeff! Größe\r\n${contact.rail.text.trim().replaceAll('.', ',')}`;
+  const units = [...rail].flatMap((c) => [c.charCodeAt(0) & 255, c.charCodeAt(0) >> 8]);
+  const wheel = [...`% Größe\r${contact.wheel.text.trim().replaceAll('\n', '\r')}\r`].map((c) => c.charCodeAt(0));
+  await drop(page, '.form', { 'rail.csv': units, 'wheel.csv': wheel });
+  await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'wheel on rail');
+  await sound(page);
+  assert.ok((await json(page)).contact.wheel.text.startsWith('% Größe'));
+}));
+
+test('a case with warnings is not called ready', () => onPage('', async (page) => {
+  await sound(page);
+  assert.match(await page.locator('.verdict .good').innerText(), /^Ready to solve\. About /);
+  const { contact } = example('wheel-rail-flange');
+  const rail = miniprof(contact.rail.text).replace(/XYPoints=\d+/, 'XYPoints=7');
+  await drop(page, '.form', { 'a.ban': rail, 'a.whl': miniprof(contact.wheel.text) });
+  await page.getByText('1 warning.').waitFor();
+  assert.equal(await page.locator('.verdict .good').count(), 0);
+  await page.getByText('while the header of the file states 7').waitFor();
 }));
 
 /** A file of MiniProf: a header, and x toward the track's centre. @param {string} text Two columns, y to the field side. */
@@ -158,12 +231,7 @@ test('two files dropped and one click lead from an empty service to the patch', 
   const { contact } = example('wheel-rail-flange');
   const files = { 'mine.ban': miniprof(contact.rail.text), 'mine.whl': miniprof(contact.wheel.text) };
   await sound(page);
-  const transfer = await page.evaluateHandle((given) => {
-    const data = new DataTransfer();
-    for (const [name, text] of Object.entries(given)) data.items.add(new File([text], name));
-    return data;
-  }, files);
-  await page.dispatchEvent('.form', 'drop', { dataTransfer: transfer });
+  await drop(page, '.form', files);
   await page.locator('svg[aria-label*="first touch"] .rail').waitFor();
   await sound(page);
   await page.getByRole('button', { name: /^Solve/ }).click();

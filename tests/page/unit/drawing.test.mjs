@@ -3,7 +3,8 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { gapOf } from '../../../src/http/page/web/js/placing.js';
 import { inOrder } from '../../../src/http/page/web/js/starts.js';
-import { parseGapCurve, parseGrid, profileKind } from '../../../src/http/page/web/js/tables.js';
+import { bodiesOf, decoded, profileKind } from '../../../src/http/page/web/js/files.js';
+import { parseGapCurve, parseGrid } from '../../../src/http/page/web/js/tables.js';
 
 test('the gap is the vertical distance of the lower side of the wheel from the upper side of the rail', () => {
   /** @type {[number, number][]} */
@@ -19,6 +20,7 @@ test('the gap is the vertical distance of the lower side of the wheel from the u
 
 test('files of gaps and grids are read whatever separates their numbers', () => {
   assert.deepEqual(parseGapCurve('# y gap\n3; 0.2\n-3\t0.1\n0, 0\n'), { y_mm: [-3, 0, 3], gap_mm: [0.1, 0, 0.2] });
+  assert.deepEqual(parseGapCurve('3;0,2\r-3;0,1\r0;0,0'), { y_mm: [-3, 0, 3], gap_mm: [0.1, 0, 0.2] });
   assert.equal(parseGapCurve('1\n2\n3'), null);
   const grid = parseGrid(',1,2,3\n20, 4,5,6\n10, 7,8,9\n');
   assert.deepEqual(grid, { x_mm: [1, 2, 3], y_mm: [10, 20], values: [[7, 8, 9], [4, 5, 6]] });
@@ -26,12 +28,57 @@ test('files of gaps and grids are read whatever separates their numbers', () => 
   assert.equal(parseGrid('0 1 2\n10 7 8\n20 9'), null);
 });
 
-test('the name of a file tells its format and body', () => {
-  assert.deepEqual(profileKind('worn.BAN'), { format: 'miniprof', body: 'rail' });
-  assert.deepEqual(profileKind('left.whl'), { format: 'miniprof', body: 'wheel' });
-  assert.deepEqual(profileKind('a.prw'), { format: 'simpack', body: 'wheel' });
-  assert.deepEqual(profileKind('my-rail.csv'), { format: 'columns', body: 'rail' });
-  assert.deepEqual(profileKind('x.txt'), { format: 'columns', body: null });
+test('contents and name of a file tell its format and body', () => {
+  /** @param {string} name */
+  const kind = (name, text = '1 2\n3 4') => profileKind({ name, text });
+  assert.deepEqual(kind('worn.BAN'), { format: 'miniprof', body: 'rail' });
+  assert.deepEqual(kind('left.whl'), { format: 'miniprof', body: 'wheel' });
+  assert.deepEqual(kind('a.prw'), { format: 'simpack', body: 'wheel' });
+  assert.deepEqual(kind('my-rail.csv'), { format: 'columns', body: 'rail' });
+  assert.deepEqual(kind('x.txt'), { format: 'columns', body: null });
+  assert.deepEqual(kind('x.txt', 'Date=1\nXYPoints=2\nColumnDef=X,Y\n\n1 2\n3 4'), { format: 'miniprof', body: null });
+  assert.deepEqual(kind('x.dat', '#MINIWHEELPROF\nMINIPROF 2020\n\n1 2'), { format: 'miniprof', body: 'wheel' });
+  assert.deepEqual(kind('x.dat', '! a\nheader.begin\n type = 1\nheader.end\nspline.begin\n type = 0\n'), { format: 'simpack', body: 'wheel' });
+  assert.deepEqual(kind('x.prr', 'HEADER.BEGIN\n TYPE = 0\nHEADER.END\nSPLINE.BEGIN'), { format: 'simpack', body: 'rail' });
+});
+
+test('two files always become both bodies, and one file only a body that is certain', () => {
+  /** @param {string} name */
+  const file = (name) => ({ name, text: name });
+  const [rail, wheel] = [file('a.ban'), file('b.whl')];
+  const [one, two] = [file('SUIC519A.dat'), file('RUIC519A.dat')];
+  for (const missing of [[], ['rail'], ['wheel'], ['rail', 'wheel']]) {
+    const given = /** @type {('rail' | 'wheel')[]} */ (missing);
+    assert.deepEqual(bodiesOf([rail, wheel], given), { rail, wheel });
+    assert.deepEqual(bodiesOf([wheel, rail], given), { rail, wheel });
+    assert.deepEqual(bodiesOf([one, two], given), { rail: one, wheel: two });
+    assert.deepEqual(bodiesOf([one, rail], given), { rail, wheel: one });
+    assert.deepEqual(bodiesOf([wheel, one], given), { rail: one, wheel });
+    assert.match(String(bodiesOf([wheel, file('c.whl')], given)), /both a wheel/);
+    assert.match(String(bodiesOf([wheel, rail, one], given)), /3 files/);
+    assert.deepEqual(bodiesOf([wheel], given), { wheel });
+    assert.deepEqual(bodiesOf([wheel], given, 'rail'), { wheel });
+    assert.deepEqual(bodiesOf([one], given, 'rail'), { rail: one });
+  }
+  assert.match(String(bodiesOf([one], [])), /SUIC519A.dat does not say/);
+  assert.deepEqual(bodiesOf([one], ['wheel']), { wheel: one });
+});
+
+test('files are read in the encodings of instruments and office programs', () => {
+  const text = 'Größe 1;2';
+  /** @param {number[]} bytes */
+  const of = (bytes) => decoded(new Uint8Array(bytes).buffer);
+  const units = [...text].map((c) => c.charCodeAt(0));
+  const little = units.flatMap((unit) => [unit & 255, unit >> 8]);
+  const big = units.flatMap((unit) => [unit >> 8, unit & 255]);
+  assert.equal(of([...new TextEncoder().encode(text)]), text);
+  assert.equal(of([0xef, 0xbb, 0xbf, ...new TextEncoder().encode(text)]), text);
+  assert.equal(of(units), text, 'latin1');
+  assert.equal(of([0xff, 0xfe, ...little]), text);
+  assert.equal(of([0xfe, 0xff, ...big]), text);
+  assert.equal(of(little), text);
+  assert.equal(of(big), text);
+  assert.equal(of([]), '');
 });
 
 test('a case is written in the order that a person would choose, and loses nothing', () => {

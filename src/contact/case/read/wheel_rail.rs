@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, number, shown};
 use crate::contact::case::words::contact::{
-    Contact, CrossSection, FormatName, SideName, Smoothing, SmoothingWord,
+    Contact, CrossSection, FormatName, SideName, Smoothing, SmoothingWord, UnitName,
 };
 use crate::contact::geometry::profile::{POINTS_MAX, POINTS_MIN};
 
@@ -14,6 +14,12 @@ const FORMATS: [(&str, FormatName); 3] = [
     ("columns", FormatName::Columns),
     ("simpack", FormatName::Simpack),
     ("miniprof", FormatName::Miniprof),
+];
+const UNITS: [(&str, UnitName); 4] = [
+    ("mm", UnitName::Mm),
+    ("cm", UnitName::Cm),
+    ("m", UnitName::M),
+    ("inch", UnitName::Inch),
 ];
 pub(crate) const ROLLING_RADIUS: AllowedRange = AllowedRange::positive(1e5, "mm");
 pub(crate) const DISTANCE: AllowedRange = AllowedRange::positive(1e5, "mm");
@@ -99,6 +105,7 @@ pub(crate) fn section_of(block: &mut Object) -> Option<CrossSection> {
             "points_mm",
             "format",
             "text",
+            "unit",
             "mirror_y",
             "mirror_z",
             "smoothing_mm",
@@ -108,6 +115,10 @@ pub(crate) fn section_of(block: &mut Object) -> Option<CrossSection> {
     let mirror_y = flag(block, "mirror_y");
     let mirror_z = flag(block, "mirror_z");
     let smoothing_mm = smoothing(block);
+    let unit = match block.has("unit") {
+        true => block.word("unit", &UNITS, &[]).map(Some),
+        false => Some(None),
+    };
     let (points_mm, format, text) = match (block.has("points_mm"), block.has("text")) {
         (true, false) => {
             if block.has("format") {
@@ -146,6 +157,7 @@ pub(crate) fn section_of(block: &mut Object) -> Option<CrossSection> {
         profile: None,
         format,
         text,
+        unit: unit?,
         mirror_y: mirror_y?,
         mirror_z: mirror_z?,
         smoothing_mm: smoothing_mm?,

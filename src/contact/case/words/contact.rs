@@ -162,7 +162,7 @@ fn is_false(value: &bool) -> bool {
 /// y is positive to the field side and z positive down unless `mirror_y` and `mirror_z`, the file or the shape itself say otherwise.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct CrossSection {
-    /// Points `[y, z]` in mm, in order along the cross-section.
+    /// Points `[y, z]` in order along the cross-section, in mm or in `unit`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub points_mm: Option<Vec<[f64; 2]>>,
@@ -178,6 +178,10 @@ pub struct CrossSection {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub text: Option<String>,
+    /// Unit of the points or of the text. When left out it is the unit that the file names, else mm. All other lengths of a case are in mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub unit: Option<UnitName>,
     /// `true` if y of the points is positive toward the track centre. When left out, the file decides; if it does not say, the place of the
     /// flange decides for a wheel, and y of a rail is taken as positive to the field side.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -304,10 +308,25 @@ pub enum SideName {
 #[serde(rename_all = "snake_case")]
 #[schema(as = Format)]
 pub enum FormatName {
-    /// Two columns y and z, separated by blanks, commas, semicolons or tabs.
+    /// Columns of numbers, the first two or those with the titles y and z, separated by blanks, commas, semicolons or tabs.
     Columns,
     /// Simpack's `.prr` (rail) and `.prw` (wheel).
     Simpack,
     /// MiniProf's `.ban` (rail) and `.whl` (wheel).
     Miniprof,
+}
+
+/// A unit of length of cross-sections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = LengthUnit)]
+pub enum UnitName {
+    /// Millimetre.
+    Mm,
+    /// Centimetre.
+    Cm,
+    /// Metre.
+    M,
+    /// Inch, 25.4 mm.
+    Inch,
 }

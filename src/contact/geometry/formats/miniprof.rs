@@ -1,60 +1,52 @@
 //! MiniProf's rail and wheel profiles, `.ban` and `.whl`.
 //!
-//! Lines `Name=value`, an empty line, then one point per line in the columns that `ColumnDef` names; its `X` is y here and
-//! its `Y` is z. Instruments differ in the sense of both: `X` usually points to the track centre, the sense of z is found from
-//! the shape.
+//! A header of lines `Name=value`, or of free words in files of older versions, then one point per line. `ColumnDef` names the columns:
+//! its `X` is y here and its `Y` is z; without it they are the first two. Instruments differ in the sense of both: `X` usually
+//! points to the track centre, the sense of z is found from the shape.
 
-use crate::contact::geometry::formats::profile_file::{
-    ProfileFile, has_decimal_commas, numbers, unreadable,
-};
+use crate::contact::geometry::formats::lines::keyword;
+use crate::contact::geometry::formats::profile_file::ProfileFile;
+use crate::contact::geometry::formats::table;
+use crate::contact::geometry::length_unit::LengthUnit;
 
-/// Reads the points, after a header of lines with `=`.
+/// Reads the points.
 pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
-    let mut contents = ProfileFile {
-        mirror_y: Some(true),
-        ..ProfileFile::default()
-    };
+    let table = table::read(text)?;
     let mut columns = [0, 1];
-    let mut expected = None;
-    for (k, line) in text.lines().enumerate() {
-        let line = line.trim().trim_start_matches('"').trim();
-        if line.is_empty() {
-            continue;
-        }
-        if let Some((name, value)) = line.split_once('=') {
-            match name.trim() {
-                "ColumnDef" => {
-                    columns =
-                        places(value).ok_or_else(|| unreadable(k, line, "a list with X and Y"))?;
-                }
-                "XYPoints" => expected = value.trim().parse::<usize>().ok(),
-                _ => {}
+    let mut stated = None;
+    for line in &table.header {
+        match keyword(line) {
+            Some((name, value)) if name == "columndef" => {
+                columns = places(&value).ok_or_else(|| {
+                    table.refuse(line, "a list with X and Y, such as ColumnDef=X,Y,A,C,")
+                })?;
             }
-            continue;
+            Some((name, value)) if name == "xypoints" => stated = value.parse::<usize>().ok(),
+            _ => {}
         }
-        let row = numbers(line)
-            .filter(|row| columns.iter().all(|column| *column < row.len()))
-            .filter(|_| !has_decimal_commas(line));
-        let row = row.ok_or_else(|| {
-            unreadable(
-                k,
-                line,
-                "a line of finite numbers in the columns of ColumnDef",
-            )
-        })?;
-        contents.points.push(columns.map(|column| row[column]));
     }
-    match expected {
-        Some(count) if count != contents.points.len() => Err(format!(
-            "{} points found, but XYPoints says {count}",
-            contents.points.len()
-        )),
-        _ if contents.points.is_empty() => Err("no points found".to_owned()),
-        _ => Ok(contents),
-    }
+    let points = table.points(columns)?;
+    let counts = [points.len(), points.len() + table.remarked];
+    let mm = table.stated_unit().map(LengthUnit::mm);
+    let scale = mm.unwrap_or(1.0);
+    Ok(ProfileFile {
+        points: points
+            .into_iter()
+            .map(|point| point.map(|part| part * scale))
+            .collect(),
+        unit_mm: mm,
+        mirror_y: Some(true),
+        wrong_count: stated.filter(|count| !counts.contains(count)),
+        header_rows: table.header_rows,
+        ..ProfileFile::default()
+    })
 }
 
 fn places(value: &str) -> Option<[usize; 2]> {
-    let place = |name: &str| value.split(',').position(|column| column.trim() == name);
+    let names: Vec<&str> = value
+        .split(|c: char| c.is_whitespace() || c == ',' || c == ';')
+        .filter(|name| !name.is_empty())
+        .collect();
+    let place = |name: &str| names.iter().position(|own| own.eq_ignore_ascii_case(name));
     Some([place("X")?, place("Y")?])
 }

@@ -1,78 +1,91 @@
 //! Simpack's rail and wheel profiles, `.prr` and `.prw`.
 //!
 //! A header with the type, a spline block with settings `name = value`, and points between `point.begin` and
-//! `point.end`. What starts with `!` is a remark. The settings are applied in the order of their numbers in the file:
+//! `point.end`, in any order and in any case. The settings are applied in the order of their numbers in the file:
 //! shift, rotation, mirroring; lengths are divided by `units.len.f` per metre.
 
 use std::f64::consts::TAU;
 
-use crate::contact::geometry::formats::profile_file::{ProfileFile, numbers, unreadable};
+use crate::contact::geometry::formats::lines::{
+    Comma, Held, comma_of, has_decimal_commas, held, keyword, lines, unreadable,
+};
+use crate::contact::geometry::formats::profile_file::ProfileFile;
+use crate::contact::geometry::length_unit::LengthUnit;
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Default)]
 struct SimpackSettings {
     wheel: Option<bool>,
     in_spline: bool,
     shift: [f64; 2],
     rotate: f64,
-    /// Allowed range of y and of z; not applied if the lower bound exceeds the upper one.
+    /// Allowed range of y and of z; not applied if the lower bound is not below the upper one.
     bounds: [[f64; 2]; 2],
     mirror: [bool; 2],
-    per_metre: f64,
-    per_radian: f64,
+    per_metre: Option<f64>,
+    unit: Option<LengthUnit>,
+    per_radian: Option<f64>,
+    /// Name of another file that holds the points.
+    file: Option<String>,
 }
 
 /// Reads the points; their weights are ignored.
 pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
-    let mut settings = SimpackSettings {
-        wheel: None,
-        in_spline: false,
-        shift: [0.0; 2],
-        rotate: 0.0,
-        bounds: [[1.0, 0.0]; 2],
-        mirror: [false; 2],
-        per_metre: 1000.0,
-        per_radian: 1.0,
-    };
+    let mut settings = SimpackSettings::default();
     let mut points: Vec<[f64; 2]> = Vec::new();
+    let lines = lines(text);
+    let comma = comma_of(&lines);
     let mut in_points = false;
-    let mut ended = false;
-    for (k, line) in text.lines().enumerate() {
-        let line = line.split('!').next().unwrap_or_default().trim();
-        if line.is_empty() {
-            continue;
-        }
-        match line {
+    let mut blocks = 0;
+    for line in &lines {
+        let word = line.bare.split_whitespace().next().unwrap_or_default();
+        match word.to_ascii_lowercase().as_str() {
+            "" => {}
+            "point.begin" if blocks > 0 => {
+                return Err(format!(
+                    "line {}: a second block of points begins; one cross-section is needed",
+                    line.place
+                ));
+            }
             "point.begin" => in_points = true,
-            "point.end" => (in_points, ended) = (false, true),
+            "point.end" => (in_points, blocks) = (false, blocks + 1),
             "spline.begin" => settings.in_spline = true,
             "spline.end" => settings.in_spline = false,
-            _ if in_points => match numbers(line).as_deref() {
-                Some([y, z] | [y, z, _]) => points.push([*y, *z]),
-                _ => return Err(unreadable(k, line, "a point y, z with an optional weight")),
-            },
+            _ if in_points => {
+                let mixed = comma == Comma::Separator && has_decimal_commas(&line.bare);
+                match held(&line.bare, comma) {
+                    Held::Row(numbers) if !mixed => points.push([numbers[0], numbers[1]]),
+                    _ => {
+                        let needed = "a point y, z with an optional weight";
+                        return Err(unreadable(line, needed, comma));
+                    }
+                }
+            }
             _ => {
-                if let Some((name, value)) = line.split_once('=') {
+                if let Some((name, value)) = keyword(line) {
                     settings
-                        .take(name.trim(), value.trim())
-                        .ok_or_else(|| unreadable(k, line, "a number"))?;
+                        .take(&name, &value)
+                        .ok_or_else(|| unreadable(line, "a number", comma))?;
                 }
             }
         }
     }
-    if !ended {
-        return Err("no block from point.begin to point.end found".to_owned());
+    match settings.file.take() {
+        Some(file) if points.is_empty() => Err(format!(
+            "the points are in another file, {}: send its text, with the format columns if it holds columns of y and z",
+            file.chars().take(100).collect::<String>()
+        )),
+        _ if in_points => Err("point.end is missing: the text ends within its points".to_owned()),
+        _ if blocks == 0 => Err("no block from point.begin to point.end found".to_owned()),
+        _ => settings.apply(points),
     }
-    settings.apply(points)
 }
 
 impl SimpackSettings {
     /// Stores one setting; `None` if a known setting has no valid number.
     fn take(&mut self, name: &str, value: &str) -> Option<()> {
-        let number = || {
-            value
-                .parse::<f64>()
-                .ok()
-                .filter(|number| number.is_finite())
+        let number = || match held(&format!("0 {value}"), Comma::Separator) {
+            Held::Row(numbers) => Some(numbers[1]),
+            _ => None,
         };
         let flag = || number().map(|number| number != 0.0);
         match name {
@@ -86,15 +99,17 @@ impl SimpackSettings {
             "bound.z.max" => self.bounds[1][1] = number()?,
             "mirror.y" => self.mirror[0] = flag()?,
             "mirror.z" => self.mirror[1] = flag()?,
-            "units.len.f" => self.per_metre = number().filter(|f| *f > 0.0)?,
-            "units.ang.f" => self.per_radian = number().filter(|f| *f > 0.0)?,
+            "units.len" => self.unit = LengthUnit::named(value),
+            "units.len.f" => self.per_metre = Some(number().filter(|f| *f > 0.0)?),
+            "units.ang.f" => self.per_radian = Some(number().filter(|f| *f > 0.0)?),
+            "file" if value != "-" && !value.is_empty() => self.file = Some(value.to_owned()),
             _ => {}
         }
         Some(())
     }
 
     fn apply(&self, mut points: Vec<[f64; 2]>) -> Result<ProfileFile, String> {
-        let angle = self.rotate / self.per_radian;
+        let angle = self.rotate / self.per_radian.unwrap_or(1.0);
         if angle.abs() > TAU {
             return Err(format!(
                 "a rotation of {angle} rad is more than a whole turn"
@@ -112,17 +127,21 @@ impl SimpackSettings {
             };
             within(0) && within(1)
         });
-        let scale =
-            [0, 1].map(|k| 1000.0 / self.per_metre * if self.mirror[k] { -1.0 } else { 1.0 });
+        let unit_mm = self.per_metre.map(|per_metre| 1000.0 / per_metre);
+        let unit_mm = unit_mm.or(self.unit.map(LengthUnit::mm));
+        let mm = unit_mm.unwrap_or(1.0);
+        let scale = self.mirror.map(|mirror| if mirror { -mm } else { mm });
         for point in &mut points {
             *point = [point[0] * scale[0], point[1] * scale[1]];
         }
         Ok(ProfileFile {
             points,
+            unit_mm,
             // After the file's own mirroring, y is positive to the field side and z down.
             mirror_y: Some(false),
             mirror_z: Some(false),
             wheel: self.wheel,
+            ..ProfileFile::default()
         })
     }
 }

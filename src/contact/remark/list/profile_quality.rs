@@ -27,6 +27,62 @@ macro_rules! profile_remarks {
             advice: "Give `mirror_y` to decide this yourself.",
             detail: format!("{profile}: the flange was found at positive y, so y has been mirrored"),
 
+            /// The header of a profile file states another number of points than the file has, commented-out rows included.
+            ProfileCountDiffers {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Points by the header.
+                stated: usize = 82,
+                /// Rows that were read.
+                found: usize = 83,
+            }
+            code: "profile-count-differs",
+            severity: Warning,
+            advice: "Nothing if the file was edited by hand; otherwise check that it is complete.",
+            detail: format!("{profile}: {found} points were read, while the header of the file states {stated}"),
+
+            /// Rows of numbers above the points of a profile file were read as a part of its header.
+            ProfileHeaderRows {
+                /// Whose.
+                profile: &'static str = "wheel",
+                /// Rows of numbers in the header.
+                count: usize = 1,
+                /// Line of the first.
+                line: usize = 7,
+            }
+            code: "profile-header-rows",
+            severity: Info,
+            advice: "Nothing if these rows are no points: old files state dimensions of the wheel there.",
+            detail: format!("{profile}: rows of numbers above the points ({count}, the first in line {line}) were read as a part of the header"),
+
+            /// The case states another unit for a profile than its file does; the case was followed.
+            ProfileUnitDiffers {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Length of the stated unit.
+                stated_mm: f64 = 1.0,
+                /// Length of the unit that the file names.
+                file_mm: f64 = 1000.0,
+            }
+            code: "profile-unit-differs",
+            severity: Warning,
+            advice: "Leave `unit` out to use the unit of the file.",
+            detail: format!("{profile}: unit states {stated_mm} mm per unit of length, while the file states {file_mm} mm; unit was used"),
+
+            /// A profile has a usual size only if its numbers are in another unit.
+            ProfileSizeUnusual {
+                /// Whose.
+                profile: &'static str = "rail",
+                /// Its width.
+                width_mm: f64 = 7.2,
+                /// The unit in which its width would be usual.
+                unit: &'static str = "cm",
+            }
+            code: "profile-size-unusual",
+            severity: Warning,
+            advice: "State `unit` of the cross-section if its numbers are not in mm; models of a reduced scale need nothing.",
+            detail: format!("{profile}: the profile is {width_mm:.4} mm wide; if its numbers are in {unit}, state unit: \"{unit}\""),
+
             /// Points of a profile that lie nearly at the same place were merged.
             ProfilePointsMerged {
                 /// Whose.

@@ -2,7 +2,6 @@
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { apiKey } from './api.js';
-import { takeProfiles } from './contactform.js';
 import { at, placeInText } from './document.js';
 import { drawEllipse } from './drawing/patch.js';
 import { drawGapCurve, drawGrid } from './drawing/gaps.js';
@@ -11,7 +10,7 @@ import { editText, openExample, queue, solve, solveLive } from './editing.js';
 import { offered, rangeOf } from './field/quantities.js';
 import { fieldId } from './field.js';
 import { caseForm } from './form.js';
-import { bytes, count, number, seconds, withError } from './format.js';
+import { count, number, seconds, withError } from './format.js';
 import { placed } from './placing.js';
 import { lacksSection } from './starts.js';
 
@@ -24,13 +23,8 @@ import { lacksSection } from './starts.js';
 export function compose(app) {
   const state = app.store.get().compose;
   const busy = state.solving || state.unreadable !== '' || !state.document;
-  const drop = (/** @type {DragEvent} */ event) => {
-    event.preventDefault();
-    const files = [...(event.dataTransfer?.files ?? [])];
-    if (files.length) takeProfiles(app, files).catch(app.refused);
-  };
   return html`<h1 class="visually-hidden">Compose a case</h1>
-    <div class="compose" @dragover=${(/** @type {DragEvent} */ event) => event.preventDefault()} @drop=${drop}>
+    <div class="compose">
       <section class="panel form" aria-labelledby="h-form">
         <header class="bar"><h2 id="h-form">Case</h2>${examplePicker(app)}</header>
         <div class="scroll">${caseForm(app)}</div>
@@ -106,7 +100,9 @@ function verdict(state) {
   }
   if (!checked) return html`<p class="quiet">Checking …</p>`;
   const motions = checked.motions > 1 ? `${count(checked.motions)} motions, about` : 'About';
-  return html`<p class="good">Sound. ${motions} ${seconds(checked.estimate.seconds)} and ${bytes(checked.estimate.bytes)}.</p>
+  const warnings = checked.remarks.filter(({ severity }) => severity === 'warning').length;
+  const state = warnings === 0 ? 'Ready to solve' : warnings === 1 ? '1 warning' : `${warnings} warnings`;
+  return html`<p class=${warnings ? 'checked warn' : 'checked good'}>${state}. ${motions} ${seconds(checked.estimate.seconds)}.</p>
     ${profileQuality(checked)}
     ${checked.remarks.map((remark) => html`<p class=${remark.severity === 'warning' ? 'warn' : 'quiet'}>${remark.detail}</p>`)}`;
 }

@@ -6,12 +6,15 @@ import { change, editDocument } from './editing.js';
 import { hasSections, lacksSection, withContact } from './starts.js';
 import { faultAt, field, fieldId } from './field.js';
 import { number } from './format.js';
-import { parseGapCurve, parseGrid, profileKind } from './tables.js';
+import { bodiesOf, decoded, profileKind } from './files.js';
+import { parseGapCurve, parseGrid } from './tables.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./document.js').JsonObject} JsonObject */
 
-const FILES = '.ban,.whl,.prr,.prw,.txt,.csv,.dat';
+/** @typedef {import('./files.js').Body} Body */
+
+const BODIES = /** @type {const} */ (['rail', 'wheel']);
 
 const DROP_HINT = html`<p class="hint">Or drop the measured files of a rail and a wheel anywhere here.</p>`;
 
@@ -48,7 +51,7 @@ function profileFields(app) {
     change(app, '/contact/lateral_shift_mm', Number(/** @type {HTMLInputElement} */ (event.target).value));
   const side = at(document, '/contact/side') ?? 'right';
   return html`
-    <div class="pair">${sectionZone(app, 'rail')}${sectionZone(app, 'wheel')}</div>
+    ${sectionZones(app)}
     <div class="segs" role="group" aria-label="Side of the track">${['left', 'right'].map((name) => html`<label class="seg">
       <input type="radio" name="side" .checked=${side === name} @change=${() => change(app, '/contact/side', name)}><span>${name} rail</span></label>`)}</div>
     <div class="pair">${field(app, '/contact/rolling_radius_mm', 'Rolling radius', 'mm')}
@@ -71,19 +74,27 @@ function wheelsetFields(app) {
   const ask = (/** @type {Event} */ event) =>
     change(app, '/contact/kinematics', /** @type {HTMLInputElement} */ (event.target).checked ? {} : undefined);
   return html`
-    <div class="pair">${sectionZone(app, 'rail')}${sectionZone(app, 'wheel')}</div>
+    ${sectionZones(app)}
     <div class="pair">${field(app, '/contact/rolling_radius_mm', 'Rolling radius', 'mm')}${field(app, '/contact/gauge_mm', 'Gauge', 'mm', { empty: '1435' })}</div>
     ${place('lateral_shift_mm', 'Shift to the left', 'mm')}${place('yaw_rad', 'Yaw', 'mrad', 0.001)}
     <div class="checks"><label><input type="checkbox" .checked=${asked} @change=${ask}> Δr and equivalent conicity</label></div>
     ${at(document, '/contact/right') === undefined ? nothing : html`<p class="hint">What differs on the right is changed in the JSON.</p>`}`;
 }
 
-/** @param {App} app @param {'rail' | 'wheel'} body */
+/** @param {App} app */
+function sectionZones(app) {
+  const { document } = app.store.get().compose;
+  const both = document && BODIES.every((body) => isObject(at(document, `/contact/${body}`)) && !lacksSection(document, body));
+  return html`<div class="pair">${sectionZone(app, 'rail')}${sectionZone(app, 'wheel')}</div>
+    ${both ? html`<button class="link" @click=${() => exchange(app)}>Exchange rail and wheel</button>` : nothing}`;
+}
+
+/** @param {App} app @param {Body} body */
 function sectionZone(app, body) {
   const { document, files } = app.store.get().compose;
   const section = at(document ?? {}, `/contact/${body}`);
   const title = body === 'rail' ? 'Rail' : 'Wheel';
-  const take = (/** @type {File} */ file) => takeProfiles(app, [file], body);
+  const take = (/** @type {File} */ file) => void takeProfiles(app, [file], body).catch(app.refused);
   if (!document || lacksSection(document, body)) {
     return dropZone(title, '', `/contact/${body}`, app, take, 'drop or choose a file: MiniProf, Simpack or columns of y and z');
   }
@@ -119,9 +130,11 @@ function dropZone(title, what, pointer, app, take, wanted) {
   };
   const drop = (/** @type {DragEvent} */ event) => {
     over(event, false);
+    const files = event.dataTransfer?.files;
+    // Several files belong to several places.
+    if (!files || files.length !== 1) return;
     event.stopPropagation();
-    const file = event.dataTransfer?.files[0];
-    if (file) take(file);
+    take(files[0]);
   };
   const chosen = (/** @type {Event} */ event) => {
     const input = /** @type {HTMLInputElement} */ (event.target);
@@ -132,13 +145,13 @@ function dropZone(title, what, pointer, app, take, wanted) {
     <label class="drop" @dragover=${(/** @type {DragEvent} */ event) => over(event, true)}
       @dragleave=${(/** @type {DragEvent} */ event) => over(event, false)} @drop=${drop}>
       <span>${title}</span><span class="quiet">${what || (wanted ?? 'drop or choose a file')}</span>
-      <input type="file" class="visually-hidden" id=${fieldId(pointer)} accept=${FILES} @change=${chosen}></label>
+      <input type="file" class="visually-hidden" id=${fieldId(pointer)} @change=${chosen}></label>
     ${fault ? html`<p class="fault">${fault.detail}</p>` : nothing}</div>`;
 }
 
 /** @param {App} app @param {File} file */
 async function takeGap(app, file) {
-  const curve = parseGapCurve(await file.text());
+  const curve = parseGapCurve(decoded(await file.arrayBuffer()));
   if (!curve) return app.say(`${file.name} has no two columns of numbers, y and gap in mm.`);
   const document = app.store.get().compose.document ?? {};
   editDocument(app, put(put(document, '/contact/y_mm', curve.y_mm), '/contact/gap_mm', curve.gap_mm));
@@ -146,7 +159,7 @@ async function takeGap(app, file) {
 
 /** @param {App} app @param {File} file @param {string} member */
 async function takeGrid(app, file, member) {
-  const grid = parseGrid(await file.text());
+  const grid = parseGrid(decoded(await file.arrayBuffer()));
   if (!grid) return app.say(`${file.name} is no grid with x in its first row and y in its first column.`);
   const document = app.store.get().compose.document ?? {};
   const { type } = /** @type {JsonObject} */ (document.contact);
@@ -160,27 +173,40 @@ function nameOf({ wheel, rail }) {
 }
 
 /**
- * Takes files of cross-sections. The end of the name says which body it is; else it is the one dropped on, or the one that is missing.
+ * Takes files of cross-sections.
  * @param {App} app
  * @param {readonly File[]} files
- * @param {'rail' | 'wheel'} [onto]
+ * @param {Body} [onto] The body whose place they were dropped on.
  */
 export async function takeProfiles(app, files, onto) {
+  const read = await Promise.all(files.map(async (file) => ({ name: file.name, text: decoded(await file.arrayBuffer()) })));
   const { document: before, files: taken } = app.store.get().compose;
   const fresh = !before || !hasSections(at(before, '/contact/type'));
   let document = fresh ? put(put(withContact(before, 'profiles'), '/labels', undefined), '/name', undefined) : before;
+  const missing = BODIES.filter((body) => !Object.keys(at(document, `/contact/${body}`) ?? {}).length);
+  const bodies = bodiesOf(read, missing, onto);
+  if (typeof bodies === 'string') return app.say(bodies);
   const known = { ...taken };
-  for (const file of files) {
-    const { format, body } = profileKind(file.name);
-    const missing = isObject(at(document, '/contact/rail')) && Object.keys(at(document, '/contact/rail') ?? {}).length ? 'wheel' : 'rail';
-    const target = (format === 'columns' ? onto : undefined) ?? body ?? onto ?? missing;
-    const text = await file.text();
-    document = put(document, `/contact/${target}`, { format, text });
-    known[target] = { name: file.name, text };
-    if (onto && target !== onto) app.say(`${file.name} is a ${target}, by its name.`);
+  for (const body of BODIES) {
+    const file = bodies[body];
+    if (!file) continue;
+    document = put(document, `/contact/${body}`, { format: profileKind(file).format, text: file.text });
+    // The other side of a wheelset has the same body, unless it is changed in the JSON.
+    if (at(document, `/contact/right/${body}`)) document = put(document, `/contact/right/${body}`, undefined);
+    known[body] = file;
+    if (onto && body !== onto && files.length === 1) app.say(`${file.name} is a ${body}, by its contents or its name.`);
   }
+  if (isObject(at(document, '/contact/right')) && !Object.keys(at(document, '/contact/right') ?? {}).length) document = put(document, '/contact/right', undefined);
   const name = at(document, '/name');
   if (name === undefined || name === nameOf(taken)) document = put(document, '/name', nameOf(known));
   app.compose({ example: '', files: known });
   editDocument(app, document);
+}
+
+/** Takes rail and wheel for each other. @param {App} app */
+function exchange(app) {
+  const { document, files } = app.store.get().compose;
+  const [rail, wheel] = BODIES.map((body) => at(document ?? {}, `/contact/${body}`));
+  app.compose({ files: { rail: files.wheel, wheel: files.rail } });
+  editDocument(app, put(put(document ?? {}, '/contact/rail', wheel), '/contact/wheel', rail));
 }

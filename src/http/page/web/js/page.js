@@ -2,6 +2,7 @@
 
 import { health, Refused } from './api.js';
 import { openComparison } from './compare.js';
+import { takeProfiles } from './contactform.js';
 import { openKept, solve } from './editing.js';
 import './fieldmap.js';
 import { loadCurves } from './late.js';
@@ -81,6 +82,18 @@ addEventListener('keydown', (event) => {
   if (event.key !== 'Enter' || !(event.ctrlKey || event.metaKey) || store.get().route.view !== 'compose') return;
   event.preventDefault();
   solve(app);
+});
+// Files may be dropped anywhere. The browser would open them in place of the page.
+addEventListener('dragover', (event) => {
+  if (event.dataTransfer?.types.includes('Files')) event.preventDefault();
+});
+addEventListener('drop', (event) => {
+  if (!event.dataTransfer?.types.includes('Files')) return;
+  event.preventDefault();
+  const files = [...event.dataTransfer.files];
+  if (!files.length) return;
+  app.go(formatRoute('compose'));
+  takeProfiles(app, files).catch(app.refused);
 });
 // The first picture after "Solve" ends the time that the reader waited.
 root.addEventListener('drawn', () => {

@@ -1,16 +1,17 @@
 // Tables in files that people drop: columns of numbers, and grids with their axes in the first row and column.
 
-/** @typedef {'simpack' | 'miniprof' | 'columns'} ProfileFormat */
-
 /**
- * The rows of numbers of a text; remarks after `#`, `!` and `%` and lines without numbers are left out.
+ * The rows of numbers of a text; remarks after `#`, `!`, `%` and `//` and lines without numbers are left out. Commas are decimal if they stand in
+ * numbers that blanks or semicolons separate, and no number has a decimal point.
  * @param {string} text
  * @returns {number[][]}
  */
 export function rowsOf(text) {
-  return text
-    .split(/\r?\n/)
-    .map((line) => line.replace(/[#!%].*/, '').trim())
+  const decimal = !/\d\.\d/.test(text) && (/[;\t] *-?\d+,\d/.test(text) || /\d,\d+[;\t ]+-?\d/.test(text));
+  const plain = decimal ? text.replace(/(\d),(\d)/g, '$1.$2') : text;
+  return plain
+    .split(/\r\n?|\n/)
+    .map((line) => line.replace(/([#!%]|\/\/).*/, '').trim())
     .filter(Boolean)
     .map((line) => line.split(/[\s,;]+/).filter(Boolean).map(Number))
     .filter((row) => row.length && row.some(Number.isFinite));
@@ -43,19 +44,4 @@ export function parseGrid(text) {
   if (![...x_mm, ...body.flat()].every(Number.isFinite)) return null;
   if (body[0][0] > body[body.length - 1][0]) body.reverse();
   return { x_mm, y_mm: body.map(([y]) => y), values: body.map((row) => row.slice(1)) };
-}
-
-/**
- * What a file of a cross-section is, by the end of its name; null where the name does not say which body.
- * @param {string} name
- * @returns {{ format: ProfileFormat, body: 'rail' | 'wheel' | null }}
- */
-export function profileKind(name) {
-  const end = name.toLowerCase().split('.').pop() ?? '';
-  const worded = /rail/i.test(name) ? 'rail' : /wheel/i.test(name) ? 'wheel' : null;
-  if (end === 'ban') return { format: 'miniprof', body: 'rail' };
-  if (end === 'whl') return { format: 'miniprof', body: 'wheel' };
-  if (end === 'prr') return { format: 'simpack', body: 'rail' };
-  if (end === 'prw') return { format: 'simpack', body: 'wheel' };
-  return { format: 'columns', body: worded };
 }
