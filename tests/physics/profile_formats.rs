@@ -54,7 +54,8 @@ fn plain() -> String {
 #[track_caller]
 fn is_section(format: Format, text: &str, form: &str) -> ProfileFile {
     let contents = read(format, text).unwrap_or_else(|fault| panic!("{form}: {fault}"));
-    assert_eq!(contents.points, section(), "{form}");
+    let is_same = contents.points == section();
+    assert!(is_same, "{form}: {} points", contents.points.len());
     contents
 }
 
@@ -321,6 +322,8 @@ fn a_line_that_cannot_be_read_is_shown_with_its_place() {
     );
     let endless = format!("{}3 {}", "0 1\n".repeat(8), "x".repeat(100_000));
     assert!(read(Format::Columns, &endless).unwrap_err().len() < 3000);
+    let many = read(Format::Columns, &"1 2\n".repeat(100_001)).unwrap_err();
+    assert!(many.contains("more than 100000 lines"), "{many}");
     assert_eq!(
         read(Format::Columns, "# nothing\n").unwrap_err(),
         "no points found"

@@ -176,9 +176,16 @@ async fn units_hold_for_both_sides_of_a_wheelset() {
     wheelset["contact"]["right"] = json!({ "rail": in_m(&rail), "wheel": in_m(&wheel) });
     let checked = server.post("/v1/cases/check", &wheelset).await;
     assert_eq!(checked.status, 200, "{}", checked.text);
-    assert!(!checked.text.contains("profile-size-unusual"), "{}", checked.text);
+    assert!(
+        !checked.text.contains("profile-size-unusual"),
+        "{}",
+        checked.text
+    );
     let right_wheel = &mut wheelset["contact"]["right"]["wheel"];
-    right_wheel.as_object_mut().expect("a section").remove("unit");
+    right_wheel
+        .as_object_mut()
+        .expect("a section")
+        .remove("unit");
     let refused = server.post("/v1/cases/check", &wheelset).await;
     let fault = &refused.json["errors"][0];
     assert_eq!(fault["pointer"], "/contact/right/wheel/points_mm");
@@ -245,4 +252,29 @@ async fn edited_files_are_taken_with_remarks_and_broken_ones_are_shown() {
             [&json!("/text"), &fault["detail"]]
         );
     }
+}
+
+#[tokio::test]
+async fn lengths_of_the_track_in_another_unit_are_named() {
+    let server = Server::start().await;
+    let (case, _) = case();
+    for (member, value, unit) in [
+        ("gauge_mm", 1.435, "m"),
+        ("gauge_mm", 56.5, "inch"),
+        ("flange_back_distance_mm", 136.0, "cm"),
+        ("rolling_radius_mm", 0.46, "m"),
+        ("rolling_radius_mm", 46.0, "cm"),
+    ] {
+        let mut case = case.clone();
+        case["contact"][member] = json!(value);
+        let checked = server.post("/v1/cases/check", &case).await;
+        let words = format!("would be usual in {unit}: lengths are in mm");
+        assert!(
+            checked.text.contains(&words) && checked.text.contains(member),
+            "{}",
+            checked.text
+        );
+    }
+    let checked = server.post("/v1/cases/check", &case).await;
+    assert!(!checked.text.contains("length-unusual"), "{}", checked.text);
 }

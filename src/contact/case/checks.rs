@@ -12,7 +12,7 @@ use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{MethodName, Output, Solver};
 use crate::contact::case::words::thermal::ThermalWords;
-use crate::contact::case::{contact_task, history, motions, wheel_task, wheelsets};
+use crate::contact::case::{contact_task, history, length_units, motions, wheel_task, wheelsets};
 use crate::contact::error::Fault;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
@@ -163,12 +163,18 @@ fn on_rails(
     limits: &Limits,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
     let modulus = elasticity.map(|elasticity| elasticity.contact_modulus());
-    match contact {
+    let unusual = length_units::unusual(contact);
+    let task = match contact {
         Contact::Wheelset { .. } => {
             wheelsets::task(contact, given.load, given.motion, modulus, limits)
         }
         _ => wheel_task::task(contact, given.load, modulus, given.known),
-    }
+    };
+    let task = task.map_err(|faults| length_units::explained(faults, &unusual))?;
+    Ok(task.map(|(task, mut remarks)| {
+        remarks.extend(unusual);
+        (task, remarks)
+    }))
 }
 
 /// Faults of motions beside what goes with them: contact, friction and its limit under a normal force, and outputs.

@@ -11,6 +11,7 @@ pub mod digest;
 pub mod elasticity;
 pub mod history;
 pub mod known_pair;
+pub mod length_units;
 pub mod limits;
 pub mod motions;
 pub mod pair_quality;

@@ -1,6 +1,6 @@
 //! The formats of profile files, and how the format of a text is recognised.
 
-use crate::contact::geometry::formats::lines::{lines, shown};
+use crate::contact::geometry::formats::lines::{each_line, shown};
 use crate::contact::geometry::formats::profile_file::ProfileFile;
 use crate::contact::geometry::formats::{columns, miniprof, simpack};
 
@@ -125,8 +125,7 @@ fn looks_like(text: &str) -> Option<Format> {
     {
         return Some(Format::Miniprof);
     }
-    let names = lines(text);
-    names.iter().find_map(|line| {
+    each_line(text).find_map(|line| {
         let name = line
             .bare
             .split(|c: char| c == '=' || c == ':' || c.is_whitespace())

@@ -6,6 +6,8 @@ use std::borrow::Cow;
 const REMARK: [char; 5] = ['#', '%', '!', '$', '"'];
 /// Signs that begin a remark at the start of a line; elsewhere they separate or quote.
 const REMARK_AT_START: [char; 2] = [';', '\''];
+/// Lines of a text that are not empty: five for each point that a cross-section may have.
+const LINES_MAX: usize = 100_000;
 /// Signs of a line that a message shows.
 const SHOWN_MAX: usize = 300;
 
@@ -18,6 +20,8 @@ pub(crate) struct Line<'a> {
     pub(crate) text: &'a str,
     /// The line without its remark, without the quotes of quoted cells, and without blanks around it.
     pub(crate) bare: Cow<'a, str>,
+    /// Whether an empty line is above it.
+    pub(crate) after_empty: bool,
 }
 
 /// Whether a comma separates numbers or stands before their decimals.
@@ -30,7 +34,7 @@ pub(crate) enum Comma {
 /// What a line holds.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Held {
-    /// Nothing but blanks or a remark.
+    /// A remark alone.
     Nothing,
     /// Two numbers or more, possibly with words behind them.
     Row(Vec<f64>),
@@ -45,17 +49,36 @@ pub(crate) enum Held {
     Words,
 }
 
-/// The lines of a text, whatever ends them.
-pub(crate) fn lines(text: &str) -> Vec<Line<'_>> {
+/// The lines of a text that are not empty, whatever ends them.
+pub(crate) fn each_line(text: &str) -> impl Iterator<Item = Line<'_>> {
+    let mut after_empty = false;
     text.split('\n')
         .flat_map(|line| line.strip_suffix('\r').unwrap_or(line).split('\r'))
         .enumerate()
-        .map(|(k, text)| Line {
-            place: k + 1,
-            text,
-            bare: bare(text),
+        .filter_map(move |(k, text)| {
+            let is_empty = text.trim().is_empty();
+            let after_empty = std::mem::replace(&mut after_empty, is_empty);
+            (!is_empty).then(|| Line {
+                place: k + 1,
+                text,
+                bare: bare(text),
+                after_empty,
+            })
         })
-        .collect()
+}
+
+/// The same, if they are not too many.
+///
+/// # Errors
+/// A sentence with the limit.
+pub(crate) fn lines(text: &str) -> Result<Vec<Line<'_>>, String> {
+    let lines: Vec<Line> = each_line(text).take(LINES_MAX + 1).collect();
+    if lines.len() > LINES_MAX {
+        return Err(format!(
+            "the text has more than {LINES_MAX} lines; a cross-section has fewer"
+        ));
+    }
+    Ok(lines)
 }
 
 /// A line without its remark.

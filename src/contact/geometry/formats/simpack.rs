@@ -32,7 +32,7 @@ struct SimpackSettings {
 pub(crate) fn read(text: &str) -> Result<ProfileFile, String> {
     let mut settings = SimpackSettings::default();
     let mut points: Vec<[f64; 2]> = Vec::new();
-    let lines = lines(text);
+    let lines = lines(text)?;
     let comma = comma_of(&lines);
     let mut in_points = false;
     let mut blocks = 0;

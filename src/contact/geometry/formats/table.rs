@@ -79,9 +79,9 @@ impl Scanned<'_> {
     /// all others, if they lie apart from the next row.
     fn header_rows(&self, [from, to]: [usize; 2], points: &[[f64; 2]]) -> usize {
         let rows: Vec<usize> = self.rows(from, to).collect();
-        let is_empty = |k: &usize| self.lines[*k].text.trim().is_empty();
-        let blank = (from..to).find(is_empty).unwrap_or(from);
-        let attached = rows.iter().take_while(|k| **k < blank).count();
+        let blank = (from..to).find(|k| self.lines[*k].after_empty);
+        let is_attached = |k: &&usize| blank.is_some_and(|blank| **k < blank);
+        let attached = rows.iter().take_while(is_attached).count();
         let length = |k: &usize| match &self.held[*k] {
             Held::Row(numbers) => numbers.len(),
             _ => 0,
@@ -90,22 +90,71 @@ impl Scanned<'_> {
             && length(&rows[0]) != length(&rows[1])
             && rows[2..].iter().all(|k| length(k) == length(&rows[1]));
         let chord = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
-        let count = if attached > 0 {
+        let count = if (1..=HEADER_ROWS_MAX).contains(&attached) {
             attached
         } else {
             usize::from(lone)
         };
-        if count == 0 || count > HEADER_ROWS_MAX || 2 * count >= rows.len() {
+        if count == 0 || 2 * count >= rows.len() {
             return 0;
         }
-        let mut chords: Vec<f64> = points[count..].windows(2).map(chord).collect();
+        let chords = points[count..].windows(2).map(chord);
+        let mut chords: Vec<f64> = chords.collect();
         let middle = chords.len() / 2;
-        if chords.is_empty() {
-            return 0;
-        }
         let usual = *chords.select_nth_unstable_by(middle, f64::total_cmp).1;
         let apart = chord(&points[count - 1..=count]) > CHORDS_APART * usual;
         if apart { count } else { 0 }
+    }
+
+    /// A broken row directly above the first row: it is no header.
+    fn broken_row(&self, from: usize, first: usize) -> Option<usize> {
+        let above = (from..first)
+            .rev()
+            .take_while(|k| !self.lines[*k + 1].after_empty);
+        let is_row = |k: &usize| {
+            matches!(
+                self.held[*k],
+                Held::Broken {
+                    word: Some(_),
+                    has_number: true
+                }
+            )
+        };
+        above.filter(is_row).last()
+    }
+
+    /// The first line that may not stand behind the rows or between them. Words may: they are the end of a file.
+    fn bad_line(&self, first: usize) -> Option<usize> {
+        let is_bad = |k: &usize| match self.held[*k] {
+            Held::Broken { .. } => true,
+            Held::Words => !self.lines[*k].bare.starts_with(is_end),
+            Held::Row(_) => {
+                self.comma == Comma::Separator && has_decimal_commas(&self.lines[*k].bare)
+            }
+            Held::Nothing => false,
+        };
+        (first..self.lines.len()).find(is_bad)
+    }
+
+    /// Rows that are remarks.
+    fn remarked(&self, first: usize) -> usize {
+        let lines = self.lines[first..].iter();
+        lines
+            .filter(|line| is_remarked_row(line, self.comma))
+            .count()
+    }
+
+    fn nothing_found(&self) -> String {
+        let is_broken = |k: &usize| matches!(self.held[*k], Held::Broken { .. });
+        if let Some(k) = (0..self.held.len()).find(is_broken) {
+            return self.refuse(k);
+        }
+        match self.remarked(0) {
+            0 => "no points found".to_owned(),
+            count => format!(
+                "no points found; {count} rows are remarks, since they begin with #, %, !, \", ' or ;"
+            ),
+        }
     }
 }
 
@@ -114,7 +163,7 @@ impl Scanned<'_> {
 /// # Errors
 /// A sentence that names the line that cannot be read, or that there are no rows.
 pub(crate) fn read(text: &str) -> Result<Table<'_>, String> {
-    let lines = lines(text);
+    let lines = lines(text)?;
     let comma = comma_of(&lines);
     let held = lines.iter().map(|line| held(&line.bare, comma)).collect();
     let scanned = Scanned { lines, held, comma };
@@ -129,42 +178,16 @@ pub(crate) fn read(text: &str) -> Result<Table<'_>, String> {
         .collect();
     let left_out = scanned.header_rows([from, to], &points);
     let Some(first) = places.get(left_out).copied() else {
-        return Err(nothing_found(&scanned));
+        return Err(scanned.nothing_found());
     };
-    // A broken row directly above the others is no header.
-    let attached = (from..first)
-        .rev()
-        .take_while(|k| !scanned.lines[*k].text.trim().is_empty());
-    let mut attached = attached.collect::<Vec<_>>().into_iter().rev();
-    let is_broken_row = |k: &usize| {
-        let broken_word = matches!(
-            &scanned.held[*k],
-            Held::Broken {
-                word: Some(_),
-                has_number: true
-            }
-        );
-        left_out == 0 && broken_word
-    };
-    if let Some(k) = attached.find(is_broken_row) {
+    let broken = scanned.broken_row(from, first).filter(|_| left_out == 0);
+    if let Some(k) = broken.or_else(|| scanned.bad_line(first)) {
         return Err(scanned.refuse(k));
     }
-    let skipped = scanned.rows(0, first).collect::<Vec<_>>();
-    let header_rows = skipped
-        .first()
-        .map(|k| (skipped.len(), scanned.lines[*k].place));
-    // Words behind the rows are the end of a file, unless a number that failed stands among them.
-    let bad = |k: &usize| match &scanned.held[*k] {
-        Held::Broken { .. } => true,
-        Held::Words => !scanned.lines[*k].bare.starts_with(is_end),
-        Held::Row(_) => comma == Comma::Separator && is_mixed(&scanned.lines[*k], &scanned),
-        Held::Nothing => false,
-    };
-    if let Some(k) = (first..scanned.lines.len()).find(bad) {
-        return Err(scanned.refuse(k));
-    }
-    let remarked = scanned.lines[first..].iter();
-    let remarked = remarked.filter(|line| is_remarked_row(line, comma)).count();
+    let in_header: Vec<usize> = scanned.rows(0, first).collect();
+    let first_of = |k: &usize| (in_header.len(), scanned.lines[*k].place);
+    let header_rows = in_header.first().map(first_of);
+    let remarked = scanned.remarked(first);
     let mut header = scanned.lines;
     let body = header.split_off(first);
     let rows = body.into_iter().zip(scanned.held.into_iter().skip(first));
@@ -184,29 +207,6 @@ pub(crate) fn read(text: &str) -> Result<Table<'_>, String> {
 /// Whether a line of words that begins with this may end a file: `END`, `[END]`, `}`, a DOS end of file.
 fn is_end(c: char) -> bool {
     c.is_alphabetic() || "[]{}()<>=-_\u{1a}".contains(c)
-}
-
-/// Whether a row has decimal commas in a text whose rows have decimal points.
-fn is_mixed(line: &Line, scanned: &Scanned) -> bool {
-    has_decimal_commas(&line.bare) && scanned.comma == Comma::Separator
-}
-
-fn nothing_found(scanned: &Scanned) -> String {
-    if let Some(k) =
-        (0..scanned.held.len()).find(|k| matches!(scanned.held[*k], Held::Broken { .. }))
-    {
-        return scanned.refuse(k);
-    }
-    let remarked = scanned.lines.iter();
-    let remarked = remarked
-        .filter(|line| is_remarked_row(line, scanned.comma))
-        .count();
-    match remarked {
-        0 => "no points found".to_owned(),
-        count => format!(
-            "no points found; {count} rows are remarks, since they begin with #, %, !, \", ' or ;"
-        ),
-    }
 }
 
 impl Table<'_> {

@@ -128,6 +128,18 @@ macro_rules! normal_remarks {
                 "the largest pressure is {pressure_max_mpa:.4e} MPa, more than {usual_max_mpa} MPa: bodies of steel would yield"
             ),
 
+            /// A length of the track or the wheelset would be usual in another unit than mm.
+            LengthUnusual {
+                /// The length as given.
+                length_mm: f64 = 1.435,
+                /// The unit in which it would be usual.
+                unit: &'static str = "m",
+            }
+            code: "length-unusual",
+            severity: Warning,
+            advice: "Check its unit: lengths are in mm.",
+            detail: format!("{length_mm} mm is unusual here and would be usual in {unit}: lengths are in mm"),
+
             /// The load is larger than any wheel bears.
             LoadImplausible {
                 /// Normal force of all patches.
