@@ -101,8 +101,8 @@ function verdict(state) {
   if (!checked) return html`<p class="quiet">Checking …</p>`;
   const motions = checked.motions > 1 ? `${count(checked.motions)} motions, about` : 'About';
   const warnings = checked.remarks.filter(({ severity }) => severity === 'warning').length;
-  const state = warnings === 0 ? 'Ready to solve' : warnings === 1 ? '1 warning' : `${warnings} warnings`;
-  return html`<p class=${warnings ? 'checked warn' : 'checked good'}>${state}. ${motions} ${seconds(checked.estimate.seconds)}.</p>
+  const told = warnings === 0 ? 'Ready to solve' : warnings === 1 ? '1 warning' : `${warnings} warnings`;
+  return html`<p class=${warnings ? 'checked warn' : 'checked good'}>${told}. ${motions} ${seconds(checked.estimate.seconds)}.</p>
     ${profileQuality(checked)}
     ${checked.remarks.map((remark) => html`<p class=${remark.severity === 'warning' ? 'warn' : 'quiet'}>${remark.detail}</p>`)}`;
 }

@@ -3,7 +3,7 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt, put } from './document.js';
 import { change, editDocument } from './editing.js';
-import { hasSections, lacksSection, withContact } from './starts.js';
+import { hasSections, lacksSection, withContact, withoutNameOf } from './starts.js';
 import { faultAt, field, fieldId } from './field.js';
 import { number } from './format.js';
 import { bodiesOf, decoded, profileKind } from './files.js';
@@ -179,10 +179,12 @@ function nameOf({ wheel, rail }) {
  * @param {Body} [onto] The body whose place they were dropped on.
  */
 export async function takeProfiles(app, files, onto) {
-  const read = await Promise.all(files.map(async (file) => ({ name: file.name, text: decoded(await file.arrayBuffer()) })));
-  const { document: before, files: taken } = app.store.get().compose;
+  const read = await Promise.all(files.map(async (file) => ({ name: file.name, text: decoded(await file.arrayBuffer()) }))).catch(() => null);
+  if (!read) return app.say('A file cannot be read. Is it a folder?');
+  const { document: before, files: taken, example, examples } = app.store.get().compose;
   const fresh = !before || !hasSections(at(before, '/contact/type'));
-  let document = fresh ? put(put(withContact(before, 'profiles'), '/labels', undefined), '/name', undefined) : before;
+  const shipped = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (examples.find(({ name }) => name === example)?.case));
+  let document = fresh ? put(put(withContact(before, 'profiles'), '/labels', undefined), '/name', undefined) : withoutNameOf(before, shipped);
   const missing = BODIES.filter((body) => !Object.keys(at(document, `/contact/${body}`) ?? {}).length);
   const bodies = bodiesOf(read, missing, onto);
   if (typeof bodies === 'string') return app.say(bodies);
