@@ -108,6 +108,10 @@ fn a_section_is_the_same_in_every_form_of_columns_that_people_write() {
             rows(|k, y, z| format!("{y} {z} 0.5 {k}\n")),
         ),
         (
+            "words that begin like numbers",
+            rows(|k, y, z| format!("{y} {z}{}\n", if k == 9 { " 2nd time 12:30" } else { "" })),
+        ),
+        (
             "a weight in some rows",
             rows(|k, y, z| format!("{y} {z}{}\n", if k == 7 { " 0.5" } else { "" })),
         ),
@@ -277,7 +281,7 @@ fn a_line_that_cannot_be_read_is_shown_with_its_place() {
         ("1 2\nNaN 4", 2, vec!["\"NaN\" at column 1"]),
         ("1 2\ninf 4", 2, vec!["\"inf\""]),
         ("1 2\n3 4.5.6", 2, vec!["\"4.5.6\" at column 3"]),
-        ("1 2\n3 4,0O", 2, vec!["\"0O\" at column 5"]),
+        ("1 2\n3 4,0O", 2, vec!["\"4,0O\" at column 3"]),
         ("1 2\n3 ******", 2, vec!["\"******\""]),
         ("1 2\n3 1.#QNAN 5", 2, vec!["\"1.#QNAN\""]),
         (
@@ -287,7 +291,15 @@ fn a_line_that_cannot_be_read_is_shown_with_its_place() {
         ),
         ("1.0 2.x\n3 4\n5 6", 1, vec!["\"2.x\" at column 5"]),
         (
-            "1.5 2,5\n3,5 4,5\n5.5 6.5",
+            "1.5 2.5\n3.5 4,5",
+            2,
+            vec![
+                "\"4,5\" at column 5",
+                "decimal commas and decimal points are mixed",
+            ],
+        ),
+        (
+            "1.5 2.5\n3,5 4,5\n5.5 6.5",
             2,
             vec!["decimal commas and decimal points are mixed"],
         ),

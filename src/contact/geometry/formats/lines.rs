@@ -156,13 +156,21 @@ pub(crate) fn held(bare: &str, comma: Comma) -> Held {
     if bare.is_empty() {
         return Held::Nothing;
     }
+    if comma == Comma::Separator
+        && let Some(word) = mixed_word(bare)
+    {
+        return broken(Some(word), true);
+    }
     let mut numbers = Vec::new();
     let mut malformed = None;
     for word in words(bare, comma) {
         match number(word, comma) {
             Some(number) if malformed.is_none() => numbers.push(number),
             Some(_) => return broken(malformed, true),
-            None if begins_like_number(word) => malformed = malformed.or(Some(word)),
+            // Behind two numbers it is a word: `2nd measurement`, `12:30`.
+            None if begins_like_number(word) && numbers.len() < 2 => {
+                malformed = malformed.or(Some(word));
+            }
             None => break,
         }
     }
@@ -172,6 +180,16 @@ pub(crate) fn held(bare: &str, comma: Comma) -> Held {
         1 => broken(None, true),
         _ => Held::Row(numbers),
     }
+}
+
+/// The second word of a line such as `1.5 2,5`, in which blanks separate and the comma is within a number.
+fn mixed_word(bare: &str) -> Option<&str> {
+    let mut words = bare.split_whitespace();
+    let _first = number(words.next()?, Comma::Separator)?;
+    let second = words.next().filter(|word| !word.starts_with(','))?;
+    let second = second.trim_end_matches([',', ';']);
+    let is_mixed = second.contains(',') && begins_like_number(second);
+    is_mixed.then_some(second)
 }
 
 fn broken(word: Option<&str>, has_number: bool) -> Held {
@@ -267,7 +285,8 @@ pub(crate) fn unreadable(line: &Line, needed: &str, comma: Comma) -> String {
         Held::Words => words(&line.bare, comma).next().and_then(place),
         Held::Nothing | Held::Row(_) => None,
     };
-    let hint = if comma == Comma::Separator && has_decimal_commas(&line.bare) {
+    let is_mixed = has_decimal_commas(&line.bare) || mixed_word(&line.bare).is_some();
+    let hint = if comma == Comma::Separator && is_mixed {
         "; decimal commas and decimal points are mixed in this text"
     } else {
         ""
