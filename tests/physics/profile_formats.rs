@@ -68,32 +68,31 @@ fn with_line(text: &str, k: usize, line: &str) -> String {
     lines.join("\n")
 }
 
-#[test]
-fn a_section_is_the_same_in_every_form_of_columns_that_people_write() {
-    let forms = [
+/// Forms of the same rows: line ends, encodings, separators and decimal signs.
+fn written_forms() -> Vec<(&'static str, String)> {
+    let commas = |text: String| text.replace('.', ",");
+    let in_utf16 = plain().chars().flat_map(|c| [c, '\0']).collect();
+    vec![
         ("plain", plain()),
         ("carriage returns", plain().replace('\n', "\r")),
         ("carriage returns doubled", plain().replace('\n', "\r\r\n")),
         ("byte order mark", format!("\u{feff}{}", plain())),
-        (
-            "UTF-16 as single characters",
-            plain().chars().flat_map(|c| [c, '\0']).collect(),
-        ),
+        ("UTF-16 as single characters", in_utf16),
         ("a DOS end of file", plain() + "\u{1a}"),
         ("tabs", rows(|_, y, z| format!("\t{y}\t{z}\t\n"))),
         ("commas", rows(|_, y, z| format!("{y},{z}\n"))),
         ("quoted cells", rows(|_, y, z| format!("\"{y}\",\"{z}\"\n"))),
         (
             "decimal commas and semicolons",
-            rows(|_, y, z| format!("{y};{z};\n").replace('.', ",")),
+            commas(rows(|_, y, z| format!("{y};{z};\n"))),
         ),
         (
             "decimal commas and blanks",
-            rows(|_, y, z| format!("{y}  {z}\n").replace('.', ",")),
+            commas(rows(|_, y, z| format!("{y}  {z}\n"))),
         ),
         (
             "decimal commas and commas",
-            rows(|_, y, z| format!("{y}, {z}\n").replace('.', ",")),
+            commas(rows(|_, y, z| format!("{y}, {z}\n"))),
         ),
         (
             "exponents of Fortran",
@@ -103,70 +102,57 @@ fn a_section_is_the_same_in_every_form_of_columns_that_people_write() {
             "signs of minus of a text program",
             plain().replace('-', "\u{2212}"),
         ),
+    ]
+}
+
+/// Forms with more than the points: columns, words, titles, a header, an end.
+fn extended_forms() -> Vec<(&'static str, String)> {
+    let behind =
+        |words: &str| rows(|k, y, z| format!("{y} {z}{}\n", if k == 9 { words } else { "" }));
+    let reversed = rows(|k, y, z| format!("{k};{z};{y}\n"));
+    let separated = rows(|_, y, z| format!("{y},{z}\n"));
+    let parted = rows(|k, y, z| format!("{y} {z}\n{}", if k % 5 == 0 { "\n\n" } else { "" }));
+    let header = "Site 12\n24/3/1994 10:20\n83\n\n";
+    vec![
         (
             "further columns",
             rows(|k, y, z| format!("{y} {z} 0.5 {k}\n")),
         ),
-        (
-            "words that begin like numbers",
-            rows(|k, y, z| format!("{y} {z}{}\n", if k == 9 { " 2nd time 12:30" } else { "" })),
-        ),
-        (
-            "a weight in some rows",
-            rows(|k, y, z| format!("{y} {z}{}\n", if k == 7 { " 0.5" } else { "" })),
-        ),
-        (
-            "words behind a row",
-            rows(|k, y, z| format!("{y} {z}{}\n", if k == 9 { " dent (see photo)" } else { "" })),
-        ),
+        ("a weight in one row", behind(" 0.5")),
+        ("words behind a row", behind(" dent (see photo)")),
+        ("words that begin like numbers", behind(" 2nd time 12:30")),
         ("titles", format!("y z\n{}", plain())),
-        (
-            "titles in another order",
-            rows(|k, y, z| format!("{}{k};{z};{y}\n", if k == 0 { "No;Z;Y\n" } else { "" })),
-        ),
-        (
-            "titles of MiniProf",
-            rows(|k, y, z| format!("{}{y},{z}\n", if k == 0 { "X,Y\n" } else { "" })),
-        ),
+        ("titles in another order", format!("No;Z;Y\n{reversed}")),
+        ("titles of MiniProf", format!("X,Y\n{separated}")),
         (
             "a header of words, a date and a count",
-            format!("Site 12\n24/3/1994 10:20\n83\n\n{}", plain()),
+            header.to_owned() + &plain(),
         ),
         ("an end of words", plain() + "\nEND\n"),
-        (
-            "empty lines",
-            rows(|k, y, z| format!("{y} {z}\n{}", if k % 5 == 0 { "\n\n" } else { "" })),
-        ),
-    ];
-    for (form, text) in &forms {
+        ("empty lines", parted),
+    ]
+}
+
+#[test]
+fn a_section_is_the_same_in_every_form_of_columns_that_people_write() {
+    for (form, text) in written_forms().iter().chain(&extended_forms()) {
         is_section(Format::Columns, text, form);
     }
+}
+
+#[test]
+fn remarks_and_rows_commented_out_are_no_points() {
     for sign in ["#", "%", "!", "$", "//", "\"", " # ", "\t% "] {
-        let behind = rows(|k, y, z| {
-            format!(
-                "{y} {z}{}\n",
-                if k == 11 {
-                    format!("  {sign} {OFF}")
-                } else {
-                    String::new()
-                }
-            )
-        });
-        is_section(
-            Format::Columns,
-            &behind,
-            &format!("a remark behind a row: {sign}"),
-        );
+        let remark = format!("  {sign} {OFF}");
+        let behind = |k| if k == 11 { remark.as_str() } else { "" };
+        let text = rows(|k, y, z| format!("{y} {z}{}\n", behind(k)));
+        is_section(Format::Columns, &text, sign);
     }
     for sign in ["#", "%", "!", "$", "//", "\"", "'", ";", "  \" ", "## "] {
-        let text = with_line(&plain(), 40, &format!("{sign}{OFF}"));
-        is_section(
-            Format::Columns,
-            &text,
-            &format!("a row commented out: {sign}"),
-        );
-        let text = with_line(&plain(), 40, &format!("{sign} note"));
-        is_section(Format::Columns, &text, &format!("a remark: {sign}"));
+        for words in [OFF, " note"] {
+            let text = with_line(&plain(), 40, &format!("{sign}{words}"));
+            is_section(Format::Columns, &text, sign);
+        }
     }
 }
 
@@ -217,6 +203,11 @@ fn a_section_is_the_same_in_every_form_of_miniprof_that_instruments_write() {
         );
         assert_eq!(contents.header_rows, None, "{form}");
     }
+}
+
+#[test]
+fn rows_of_numbers_in_a_header_are_no_points() {
+    let dos = "MINIPROF 101 148 1994 3 24\na.prd\nStock.......: \nWheel ID....:\n".to_owned();
     // Rows of numbers above the points: the dimensions of a wheel.
     for (form, header, line) in [
         (
@@ -248,7 +239,7 @@ fn a_section_is_the_same_in_every_form_of_miniprof_that_instruments_write() {
         assert_eq!(first, line, "{form}");
     }
     // A part of the points that an empty line cuts off is no header.
-    let cut = modern.clone() + &with_line(&miniprof_rows(), 5, "");
+    let cut = "ColumnDef=X,Y\n\n".to_owned() + &with_line(&miniprof_rows(), 5, "");
     assert_eq!(
         is_section(Format::Miniprof, &cut, "cut off").header_rows,
         None
@@ -325,6 +316,10 @@ fn a_line_that_cannot_be_read_is_shown_with_its_place() {
             "{fault}"
         );
     }
+}
+
+#[test]
+fn whole_lines_are_shown_and_texts_without_points_say_why() {
     // The whole line is shown, up to some hundred characters.
     let long = format!("{}3 {}", "0 1\n".repeat(8), "x".repeat(200));
     assert!(
