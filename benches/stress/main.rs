@@ -1,7 +1,7 @@
 //! Stability: thousands of cases from all over the allowed ground, every answer held against the laws of contact.
 //!
 //! `cargo bench --bench stress [-- cases seed]` prints the table and writes it to `docs/stability.md`; it ends with an error if a
-//! case crashes, hangs or breaks a law. `-- --only` with `times`, `after`, `physics`, `maintenance`, `histories`, `rows`, `creep-map`, `sweep-with-zones` or
+//! case crashes, hangs or breaks a law. `-- --only` with `times`, `after`, `physics`, `maintenance`, `histories`, `rows`, `routes`, `creep-map`, `sweep-with-zones` or
 //! `damaged-profile` prints one section, `-- --case 1511` one case as JSON, of another run with its seed behind the number.
 
 extern crate railhead_contact as railhead;
@@ -12,10 +12,16 @@ mod contacts;
 mod damaged;
 mod damaged_table;
 mod damaged_trials;
+#[path = "../../tests/routes/features.rs"]
+mod features;
 mod histories;
 mod laws;
 mod maintenance;
+#[path = "../../tests/routes/matrix.rs"]
+mod matrix;
 mod physics;
+#[path = "../../tests/physics/profile_cases.rs"]
+mod profile_cases;
 #[path = "../../tests/physics/profile_reference_files.rs"]
 mod profile_reference_files;
 #[path = "../../tests/physics/profile_shapes.rs"]
@@ -76,12 +82,20 @@ fn main() -> ExitCode {
             Some("maintenance") => maintenance::table(SEED),
             Some("histories") => histories::table(SEED),
             Some("rows") => rows::table(SEED),
+            Some("routes") => {
+                let shown = matrix::matrix(&features::full_selection());
+                println!("{}", shown.table());
+                return match shown.wrong.is_empty() {
+                    true => ExitCode::SUCCESS,
+                    false => ExitCode::FAILURE,
+                };
+            }
             Some("creep-map") => sweeps::creep_maps(),
             Some("sweep-with-zones") => sweeps::with_zones(),
             Some("damaged-profile") => damaged_table::tables(SEED),
             _ => {
                 eprintln!(
-                    "--only takes times, after, physics, maintenance, histories, rows, creep-map, sweep-with-zones or damaged-profile"
+                    "--only takes times, after, physics, maintenance, histories, rows, routes, creep-map, sweep-with-zones or damaged-profile"
                 );
                 return ExitCode::FAILURE;
             }

@@ -16,6 +16,8 @@ use serde_json::{Value, json};
 
 use crate::gap_samples::steel;
 use crate::profile_cases::generated;
+use crate::profile_shapes::rail_60e1;
+use crate::profile_trust::on_rail;
 
 pub fn case(method: &str) -> Value {
     let contact = json!({ "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 });
@@ -159,6 +161,30 @@ fn a_row_that_cannot_be_solved_has_a_status_and_costs_no_other_row() {
     assert_eq!(answer.status, refused);
     assert!(answer.numbers[1][1].is_nan() && answer.method[1].is_none());
     assert_eq!(answer.without_answer(), 1);
+    assert!(
+        answer.reason[1].starts_with("/contact/rolling_mm: -1"),
+        "{:?}",
+        answer.reason
+    );
+    assert!(answer.reason[0].is_empty() && answer.reason[2].is_empty());
+}
+
+#[test]
+fn a_row_on_a_rough_profile_tells_what_is_wrong_with_it() {
+    let hole: Vec<_> = rail_60e1()
+        .into_iter()
+        .filter(|at| at[0].abs() > 25.0)
+        .collect();
+    let mut case = on_rail(&hole);
+    case["outputs"] = json!(["resultants"]);
+    let load = numbers("/load/vertical_force_n", &[7.5e4]);
+    let answer = solved(&case, &[load]);
+    assert_eq!(answer.status, [ManyStatus::Unsolvable]);
+    assert!(
+        answer.reason[0].contains("/contact/rail"),
+        "{:?}",
+        answer.reason
+    );
 }
 
 #[test]

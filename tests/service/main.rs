@@ -74,6 +74,7 @@ mod retention;
 mod run_forms;
 mod run_starts;
 mod runs;
+mod same_answers;
 mod schema;
 mod schemathesis;
 mod seaweed;

@@ -19,9 +19,7 @@ use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::method::Method;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
-use crate::contact::problem::memory::{
-    SizeInput, length_over_width, positions, segments, spinning,
-};
+use crate::contact::problem::memory::{SizeInput, length_over_width, segments, spinning};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::history::task::HistoryTask;
@@ -101,9 +99,9 @@ impl CheckedParts {
                     .as_ref()
                     .map_or_else(|| vec![1.0], |(task, _)| segments(task)),
                 motions: motions.as_ref().map_or(1, |m| m.motions.len())
-                    * task.as_ref().map_or(1, |(task, _)| positions(task)),
+                    * task.as_ref().map_or(1, |(task, _)| task.positions()),
                 spinning: motions.as_ref().map_or(0, |m| spinning(&m.motions))
-                    * task.as_ref().map_or(1, |(task, _)| positions(task)),
+                    * task.as_ref().map_or(1, |(task, _)| task.positions()),
                 history: motions.as_ref().is_some_and(|m| m.history.is_some()),
                 pressed: motions.as_ref().is_some_and(ExpandedMotions::begin_pressed),
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),

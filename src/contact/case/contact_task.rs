@@ -123,7 +123,7 @@ pub(crate) fn gap(
 }
 
 /// Refuses a patch that is absurdly large, small, slender or heavily loaded; `load_pointer` is what loads it.
-fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> {
+pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> {
     let [x_min, x_max, y_min, y_max] = patch.extent;
     let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
     let semi_axes = SEMI_AXIS_MIN..=SEMI_AXIS_MAX;

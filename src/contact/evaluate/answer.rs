@@ -7,10 +7,15 @@ pub enum RowStatus {
     Ok,
     /// The resultants are there; the bound of their error is above the target.
     TargetMissed,
-    /// No resultants: the bound of the table is above the target, and `auto` would solve the row.
+    /// No resultants: `auto` would solve the row on a mesh. The bound of the table is above the target, or the table does not represent the friction
+    /// or the layer of the case.
     NeedsSolver,
     /// No resultants: the table does not cover the ellipse, whose ratio of semi-axes is beyond 0.1 to 10.
     NotCovered,
+    /// No resultants: the case of the row has faults, such as an absurdly large patch.
+    Refused,
+    /// No resultants: some number of the answer is not finite.
+    NotFinite,
 }
 
 impl RowStatus {
@@ -22,7 +27,15 @@ impl RowStatus {
             RowStatus::TargetMissed => "target_missed",
             RowStatus::NeedsSolver => "needs_solver",
             RowStatus::NotCovered => "not_covered",
+            RowStatus::Refused => "refused",
+            RowStatus::NotFinite => "not_finite",
         }
+    }
+
+    /// The row has resultants.
+    #[must_use]
+    pub fn has_answer(self) -> bool {
+        matches!(self, RowStatus::Ok | RowStatus::TargetMissed)
     }
 }
 
@@ -60,7 +73,69 @@ pub struct RowsAnswer {
     pub status: Vec<RowStatus>,
 }
 
+/// The numbers of a row, in the order of [`RowsAnswer::columns`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RowAnswer {
+    pub(crate) numbers: [f64; 6],
+    pub(crate) gradients: [f64; 9],
+    pub(crate) status: RowStatus,
+}
+
+impl RowAnswer {
+    /// A row without an answer.
+    pub(crate) fn without(status: RowStatus) -> RowAnswer {
+        RowAnswer {
+            numbers: [f64::NAN; 6],
+            gradients: [f64::NAN; 9],
+            status,
+        }
+    }
+
+    /// The row itself, or one without an answer where a number that is answered is not finite.
+    fn finite(self, with_gradients: bool) -> RowAnswer {
+        let gradients = self.gradients.iter().filter(|_| with_gradients);
+        let mut answered = self.numbers.iter().chain(gradients);
+        match self.status.has_answer() && !answered.all(|number| number.is_finite()) {
+            true => RowAnswer::without(RowStatus::NotFinite),
+            false => self,
+        }
+    }
+}
+
 impl RowsAnswer {
+    /// Room for so many rows.
+    pub(crate) fn with_capacity(rows: usize, gradients: bool) -> RowsAnswer {
+        let column = || Vec::with_capacity(rows);
+        RowsAnswer {
+            force_x_n: column(),
+            force_y_n: column(),
+            moment_z_n_mm: column(),
+            error_estimate: column(),
+            friction_power_n: column(),
+            stick_share: column(),
+            gradients: gradients.then(|| std::array::from_fn(|_| column())),
+            status: Vec::with_capacity(rows),
+        }
+    }
+
+    /// Adds a row: the only place where rows are written. Rows with an answer have finite numbers only.
+    pub(crate) fn push(&mut self, row: RowAnswer) {
+        let row = row.finite(self.gradients.is_some());
+        let columns = [
+            &mut self.force_x_n,
+            &mut self.force_y_n,
+            &mut self.moment_z_n_mm,
+            &mut self.error_estimate,
+            &mut self.friction_power_n,
+            &mut self.stick_share,
+        ];
+        let gradients = self.gradients.iter_mut().flatten().zip(row.gradients);
+        for (column, number) in columns.into_iter().zip(row.numbers).chain(gradients) {
+            column.push(number);
+        }
+        self.status.push(row.status);
+    }
+
     /// Bytes that it takes.
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -84,5 +159,35 @@ impl RowsAnswer {
             columns.extend(named.map(|(name, column)| (*name, &column[..])));
         }
         columns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_whose_numbers_are_not_all_finite_has_no_answer() {
+        let ok = RowAnswer {
+            numbers: [1.0, 2.0, 3.0, 0.1, 0.2, 0.3],
+            gradients: [f64::NAN; 9],
+            status: RowStatus::Ok,
+        };
+        let mut answer = RowsAnswer::with_capacity(9, false);
+        answer.push(ok);
+        for place in 0..6 {
+            let mut row = ok;
+            row.numbers[place] = [f64::NAN, f64::INFINITY][place % 2];
+            answer.push(row);
+        }
+        assert_eq!(answer.status[0], RowStatus::Ok);
+        assert_eq!(answer.status[1..], [RowStatus::NotFinite; 6]);
+        for (name, column) in answer.columns() {
+            assert!(column[0].is_finite(), "{name}");
+            assert!(column[1..].iter().all(|number| number.is_nan()), "{name}");
+        }
+        let mut answer = RowsAnswer::with_capacity(1, true);
+        answer.push(ok);
+        assert_eq!(answer.status, [RowStatus::NotFinite], "its derivatives");
     }
 }

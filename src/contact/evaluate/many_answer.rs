@@ -1,7 +1,7 @@
-//! What many rows are answered with: columns of numbers, a word for each row, and the method that answered it.
+//! What many rows are answered with: columns of numbers, a word for each row, the method that answered it, and why there is no answer.
 
 use crate::contact::case::words::solver::{MethodName, Output};
-use crate::contact::error::SolveError;
+use crate::contact::error::{CaseError, SolveError};
 use crate::contact::evaluate::answer::GRADIENT_NAMES;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::Problem;
@@ -65,6 +65,37 @@ impl ManyStatus {
     }
 }
 
+/// Why a row has no answer: the word that clients read, and the reason in words.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RowFailure {
+    pub(crate) status: ManyStatus,
+    pub(crate) reason: String,
+}
+
+impl RowFailure {
+    /// The failure of a solve; nothing for a solve that was stopped from outside.
+    pub(crate) fn of(error: &SolveError) -> Option<RowFailure> {
+        Some(RowFailure {
+            status: ManyStatus::of(error)?,
+            reason: error.to_string(),
+        })
+    }
+
+    /// The failure of a case with faults.
+    pub(crate) fn refused(CaseError(faults): &CaseError) -> RowFailure {
+        let first = faults.first();
+        let first = first.map(|fault| format!("{}: {}", fault.pointer, fault.detail));
+        let more = match faults.len() {
+            0 | 1 => String::new(),
+            count => format!("; and {} more faults", count - 1),
+        };
+        RowFailure {
+            status: ManyStatus::Refused,
+            reason: first.unwrap_or_default() + &more,
+        }
+    }
+}
+
 /// Names of the columns of numbers that every answer has, in the order of [`RowNumbers`].
 pub const NUMBER_NAMES: [&str; 12] = [
     "normal_force_n",
@@ -78,6 +109,14 @@ pub const NUMBER_NAMES: [&str; 12] = [
     "area_mm2",
     "pressure_max_mpa",
     "patches",
+    "iterations",
+];
+
+/// Columns that may have no number in a row with an answer: estimates of given meshes, shares without zones, iterations of the table.
+const NUMBERS_LEFT_OUT: [&str; 4] = [
+    "error_estimate",
+    "moment_error_estimate",
+    "stick_share",
     "iterations",
 ];
 
@@ -189,6 +228,43 @@ impl NumberColumns {
     }
 }
 
+/// The reason of a row before it is solved.
+const NOT_SOLVED: &str = "the row was not solved; submit its case as a job";
+
+/// The answer to a row.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SolvedRow {
+    pub(crate) target_met: bool,
+    pub(crate) method: Option<MethodName>,
+    /// In the order of [`NumberColumns::names`].
+    pub(crate) numbers: Vec<f64>,
+}
+
+impl SolvedRow {
+    /// The row itself, unless a number that it must have is not finite. Derivatives of several patches do not exist.
+    fn finite(self, columns: &NumberColumns) -> Result<SolvedRow, RowFailure> {
+        let names = columns.names();
+        let named = names.iter().zip(&self.numbers);
+        let left_out = |name: &str, number: f64| {
+            number.is_nan() && (NUMBERS_LEFT_OUT.contains(&name) || GRADIENT_NAMES.contains(&name))
+        };
+        let wrong = named
+            .filter(|(name, number)| !number.is_finite() && !left_out(name, **number))
+            .map(|(name, _)| (*name).to_owned())
+            .next();
+        match wrong {
+            None => Ok(self),
+            Some(quantity) => {
+                let error = SolveError::NotFinite { quantity };
+                Err(RowFailure {
+                    status: ManyStatus::Unsolvable,
+                    reason: error.to_string(),
+                })
+            }
+        }
+    }
+}
+
 /// The answers to rows in their order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ManyAnswer {
@@ -196,6 +272,8 @@ pub struct ManyAnswer {
     pub status: Vec<ManyStatus>,
     /// The method that answered it.
     pub method: Vec<Option<MethodName>>,
+    /// Why a row has no answer; empty where it has one.
+    pub reason: Vec<String>,
     /// Which columns there are.
     pub columns: NumberColumns,
     /// A column for each of their names, a number for each row, NaN where there is none.
@@ -208,6 +286,7 @@ impl ManyAnswer {
         ManyAnswer {
             status: vec![ManyStatus::SolverFailed; rows],
             method: vec![None; rows],
+            reason: vec![NOT_SOLVED.to_owned(); rows],
             numbers: vec![vec![f64::NAN; rows]; columns.names().len()],
             columns,
         }
@@ -220,8 +299,26 @@ impl ManyAnswer {
         rows.by_ref().filter(|row| !row.has_answer()).count()
     }
 
-    /// Notes the numbers of a row that prescribes no force, as far as it has any.
-    pub(crate) fn set(&mut self, row: usize, numbers: impl IntoIterator<Item = f64>) {
+    /// Notes what became of a row: the only place where answers are written. An answer with a number that is not finite is a failure.
+    pub(crate) fn set(&mut self, row: usize, outcome: Result<SolvedRow, RowFailure>) {
+        let outcome = outcome.and_then(|solved| solved.finite(&self.columns));
+        let (numbers, reason);
+        (self.status[row], self.method[row], numbers, reason) = match outcome {
+            Ok(SolvedRow {
+                target_met,
+                method,
+                numbers,
+            }) => {
+                let status = match target_met {
+                    true => ManyStatus::Ok,
+                    false => ManyStatus::TargetMissed,
+                };
+                (status, method, numbers, String::new())
+            }
+            Err(RowFailure { status, reason }) => (status, None, Vec::new(), reason),
+        };
+        self.reason[row] = reason;
+        let numbers = numbers.into_iter().chain(std::iter::repeat(f64::NAN));
         for (column, number) in self.numbers.iter_mut().zip(numbers) {
             column[row] = number;
         }
@@ -239,13 +336,12 @@ impl ManyAnswer {
         };
         of_row(&self.columns, &mut numbers);
         let points = || points_of(solution, motion);
-        let missed = points().any(|point| point.target_met == Some(false));
-        self.status[row] = match missed {
-            true => ManyStatus::TargetMissed,
-            false => ManyStatus::Ok,
+        let solved = SolvedRow {
+            target_met: points().all(|point| point.target_met != Some(false)),
+            method: points().next().map(|point| point.solver.method),
+            numbers,
         };
-        self.method[row] = points().next().map(|point| point.solver.method);
-        self.set(row, numbers);
+        self.set(row, Ok(solved));
     }
 }
 
@@ -288,4 +384,51 @@ fn numbers_of(solution: &Solution, motion: usize, columns: &NumberColumns) -> Op
     });
     let slopes = slopes.into_iter().flatten().filter(|_| columns.gradients);
     Some(numbers.into_iter().chain(found).chain(slopes).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn solved() -> SolvedRow {
+        SolvedRow {
+            target_met: true,
+            method: Some(MethodName::BoundaryElement),
+            numbers: vec![1.0; NUMBER_NAMES.len()],
+        }
+    }
+
+    #[test]
+    fn an_answer_with_a_number_that_is_not_finite_is_a_failure_with_its_reason() {
+        for (place, name) in NUMBER_NAMES.iter().enumerate() {
+            for number in [f64::NAN, f64::INFINITY] {
+                let mut answer = ManyAnswer::new(1, NumberColumns::default());
+                let mut row = solved();
+                row.numbers[place] = number;
+                answer.set(0, Ok(row));
+                let kept = NUMBERS_LEFT_OUT.contains(name) && number.is_nan();
+                assert_eq!(answer.status[0] == ManyStatus::Ok, kept, "{name} {number}");
+                if !kept {
+                    assert_eq!(answer.status[0], ManyStatus::Unsolvable);
+                    assert!(answer.reason[0].contains(name), "{:?}", answer.reason);
+                    let mut numbers = answer.numbers.iter();
+                    assert!(numbers.all(|column| column[0].is_nan()) && answer.method[0].is_none());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_failure_after_an_answer_leaves_no_number_of_it() {
+        let mut answer = ManyAnswer::new(1, NumberColumns::default());
+        answer.set(0, Ok(solved()));
+        assert!(answer.reason[0].is_empty() && answer.without_answer() == 0);
+        let error = SolveError::NotCovered {
+            reason: "too slender".to_owned(),
+        };
+        answer.set(0, Err(RowFailure::of(&error).expect("a failure")));
+        assert_eq!(answer.status, [ManyStatus::NotCovered]);
+        assert_eq!(answer.reason, ["too slender"]);
+        assert!(answer.numbers.iter().all(|column| column[0].is_nan()));
+    }
 }

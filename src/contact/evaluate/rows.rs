@@ -1,14 +1,18 @@
 //! Evaluates rows: Hertz's ellipse and the creep forces of each, by the table or by the simplified theory.
 
+use std::f64::consts::PI;
+
 use serde_json::Value;
 
+use crate::contact::case::contact_task::plausible;
+use crate::contact::case::read::friction::COEFFICIENT_LEAST;
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::error::{CaseError, Fault, SolveError};
-use crate::contact::evaluate::answer::{RowStatus, RowsAnswer};
+use crate::contact::evaluate::answer::{RowAnswer, RowStatus, RowsAnswer};
 use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::rows_checks::{FAULTS_MAX, faults_of_case, faults_of_column};
 use crate::contact::evaluate::variable::{Row, Variable};
-use crate::contact::normal::hertz::HertzShape;
+use crate::contact::normal::hertz::{Ellipse, HertzShape};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::methods::fastsim::{self, EllipseMesh};
 use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
@@ -29,6 +33,8 @@ pub struct Rows {
     /// Shear modulus and Poisson's ratio where the bodies have their own.
     pair: Option<[f64; 2]>,
     young: bool,
+    /// Kalker's reduction factor, 1 of clean surfaces.
+    reduction: f64,
     radii: bool,
     method: RowMethod,
     target: Option<f64>,
@@ -42,6 +48,8 @@ enum RowMethod {
         auto: bool,
     },
     Fastsim(Box<EllipseMesh>, f64),
+    /// Neither represents the case: rows are left to the solver.
+    Solver,
 }
 
 impl Rows {
@@ -85,6 +93,7 @@ impl Rows {
             pair: (!given(Variable::PoissonRatio))
                 .then_some([elasticity.shear_modulus, elasticity.poisson_ratio]),
             young: given(Variable::YoungModulus),
+            reduction: checked.problem.interface.reduction,
             radii: given(Variable::Rolling),
             method,
             target: match checked.run.resolution {
@@ -93,6 +102,12 @@ impl Rows {
             },
             gradients: checked.run.wants(Output::Gradients),
         })
+    }
+
+    /// Is there a method that answers such rows? Otherwise all of them are left to the solver.
+    #[must_use]
+    pub fn has_method(&self) -> bool {
+        !matches!(self.method, RowMethod::Solver)
     }
 
     /// The answers.
@@ -110,17 +125,7 @@ impl Rows {
     }
 
     fn evaluate_to(&self, mut note: impl FnMut([f64; 2])) -> RowsAnswer {
-        let column = || Vec::with_capacity(self.rows);
-        let mut answer = RowsAnswer {
-            force_x_n: column(),
-            force_y_n: column(),
-            moment_z_n_mm: column(),
-            error_estimate: column(),
-            friction_power_n: column(),
-            stick_share: column(),
-            gradients: self.gradients.then(|| std::array::from_fn(|_| column())),
-            status: Vec::with_capacity(self.rows),
-        };
+        let mut answer = RowsAnswer::with_capacity(self.rows, self.gradients);
         let material = self.material_table();
         let mut state = Shapes {
             material: material.as_ref(),
@@ -132,7 +137,9 @@ impl Rows {
             for (variable, values) in &self.varied {
                 row[*variable as usize] = values[number];
             }
-            note(self.answer_row(&row, &mut state, &mut answer));
+            let (row, patch) = self.answer_row(&row, &mut state);
+            answer.push(row);
+            note(patch);
         }
         answer
     }
@@ -145,7 +152,8 @@ impl Rows {
         wanted.then(|| table().of_material(self.material(&self.fixed)[1]))
     }
 
-    fn answer_row(&self, row: &Row, shapes: &mut Shapes<'_>, answer: &mut RowsAnswer) -> [f64; 2] {
+    /// The answer to a row, and its normal force in N and √(ab) in mm.
+    fn answer_row(&self, row: &Row, shapes: &mut Shapes<'_>) -> (RowAnswer, [f64; 2]) {
         let at = |variable: Variable| row[variable as usize];
         let [modulus, poisson] = self.material(row);
         let force = at(Variable::NormalForce);
@@ -162,9 +170,25 @@ impl Rows {
             limit: at(Variable::Friction) * force,
             c: (a * b).sqrt(),
             ratio,
-            modulus,
+            modulus: self.reduction * modulus,
             poisson,
         };
+        let place = [force, patch.c];
+        if !self.has_method() {
+            return (RowAnswer::without(RowStatus::NeedsSolver), place);
+        }
+        let ellipse = Ellipse {
+            a,
+            b,
+            pressure_max: 1.5 * (force / a) / (PI * b),
+            approach: 0.0,
+            normal_force: force,
+        };
+        let friction = at(Variable::Friction);
+        let lost = friction > 0.0 && friction < COEFFICIENT_LEAST;
+        if lost || plausible(&ellipse.patch(), "/load").is_err() {
+            return (RowAnswer::without(RowStatus::Refused), place);
+        }
         let motion = [
             at(Variable::CreepageX),
             at(Variable::CreepageY),
@@ -178,8 +202,7 @@ impl Rows {
                 found = RowCreep::none(RowStatus::NeedsSolver);
             }
         }
-        push(answer, &patch, motion, &found);
-        [force, patch.c]
+        (found.of_patch(&patch, motion), place)
     }
 
     /// Shear modulus and Poisson's ratio of a row.
@@ -235,6 +258,7 @@ impl Rows {
                     ..RowCreep::ok(creep)
                 }
             }
+            RowMethod::Solver => RowCreep::none(RowStatus::NeedsSolver),
         }
     }
 }
@@ -285,37 +309,39 @@ impl RowCreep {
             status,
         }
     }
-}
 
-fn push(answer: &mut RowsAnswer, patch: &RowPatch, motion: [f64; 3], found: &RowCreep) {
-    let (limit, c) = (patch.limit, patch.c);
-    let creep = &found.creep;
-    let force = [
-        limit * creep.force[0],
-        limit * creep.force[1],
-        limit * c * creep.force[2],
-    ];
-    answer.force_x_n.push(force[0]);
-    answer.force_y_n.push(force[1]);
-    answer.moment_z_n_mm.push(force[2]);
-    answer.error_estimate.push(limit * creep.bound);
-    let power = motion[0] * force[0] + motion[1] * force[1] + motion[2] * force[2];
-    answer.friction_power_n.push(power);
-    answer.stick_share.push(creep.stick);
-    answer.status.push(found.status);
-    let Some(gradients) = &mut answer.gradients else {
-        return;
-    };
-    // Without friction there are neither forces nor derivatives.
-    let unit = if limit > 0.0 {
-        limit * patch.unit()
-    } else {
-        0.0
-    };
-    for (place, column) in gradients.iter_mut().enumerate() {
-        let (force, creepage) = (place / 3, place % 3);
+    /// The same in N and mm.
+    fn of_patch(&self, patch: &RowPatch, motion: [f64; 3]) -> RowAnswer {
+        let (limit, c) = (patch.limit, patch.c);
+        let creep = &self.creep;
+        let force = [
+            limit * creep.force[0],
+            limit * creep.force[1],
+            limit * c * creep.force[2],
+        ];
+        let power = motion[0] * force[0] + motion[1] * force[1] + motion[2] * force[2];
+        // Without friction there are neither forces nor derivatives.
+        let unit = if limit > 0.0 {
+            limit * patch.unit()
+        } else {
+            0.0
+        };
         let arm = |k: usize| if k == 2 { c } else { 1.0 };
-        column.push(found.slopes[force][creepage] * unit * arm(force) * arm(creepage));
+        RowAnswer {
+            numbers: [
+                force[0],
+                force[1],
+                force[2],
+                limit * creep.bound,
+                power,
+                creep.stick,
+            ],
+            gradients: std::array::from_fn(|place| {
+                let (force, creepage) = (place / 3, place % 3);
+                self.slopes[force][creepage] * unit * arm(force) * arm(creepage)
+            }),
+            status: self.status,
+        }
     }
 }
 
@@ -356,6 +382,9 @@ impl<'a> Shapes<'a> {
 }
 
 fn method_of(checked: &CheckedCase) -> Result<RowMethod, SolveError> {
+    if checked.problem.plain().is_none() {
+        return Ok(RowMethod::Solver);
+    }
     Ok(match (checked.run.method_asked, checked.run.resolution) {
         (MethodName::Fastsim, resolution) => {
             let size = match resolution {

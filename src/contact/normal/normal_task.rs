@@ -26,6 +26,18 @@ pub enum NormalTask {
 }
 
 impl NormalTask {
+    /// Number of positions of the bodies: several of a wheelset only.
+    #[must_use]
+    pub fn positions(&self) -> usize {
+        match self {
+            NormalTask::Wheelset(task) => task.poses.len(),
+            NormalTask::Hertz(_)
+            | NormalTask::Given(_)
+            | NormalTask::Gap(_)
+            | NormalTask::Wheel(_) => 1,
+        }
+    }
+
     /// The contact where it is known; nothing where it has to be found.
     #[must_use]
     pub fn known_footprint(&self) -> Option<Footprint> {

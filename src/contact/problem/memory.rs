@@ -85,14 +85,6 @@ pub(crate) fn spinning(motions: &[Motion]) -> usize {
     motions.iter().filter(spin).count()
 }
 
-/// Positions of a wheelset, each with answers of its own; 1 of other contacts.
-pub(crate) fn positions(task: &NormalTask) -> usize {
-    match task {
-        NormalTask::Wheelset(task) => task.poses.len(),
-        _ => 1,
-    }
-}
-
 /// Half-length along rolling over half-width of an ellipse.
 pub(crate) fn length_over_width(task: &NormalTask) -> Option<f64> {
     match task {
@@ -260,12 +252,12 @@ impl CheckedCase {
             method: self.run.method,
             resolution: self.run.resolution,
             segments: segments(&self.problem.task),
-            motions: self.problem.motions.len() * positions(&self.problem.task),
+            motions: self.problem.motions.len() * self.problem.task.positions(),
             spinning: if self.problem.is_coupled(&self.run) {
                 // Each motion has a region, and with it meshes, of its own.
                 self.problem.motions.len()
             } else {
-                spinning(&self.problem.motions) * positions(&self.problem.task)
+                spinning(&self.problem.motions) * self.problem.task.positions()
             },
             history: self.problem.history.is_some(),
             pressed: (self.problem.history.iter()).any(|h| h.start == HistoryStart::Pressed),

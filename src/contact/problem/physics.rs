@@ -8,10 +8,11 @@ use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::rolling::history::task::HistoryTask;
-use crate::contact::rolling::methods::table::solve::{outside, tells};
+use crate::contact::rolling::methods::table::solve::{outside, unlike};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 
 /// What is asked: the physics.
@@ -64,6 +65,16 @@ pub(crate) struct RowMotion {
     pub(crate) speed: Option<f64>,
 }
 
+/// A contact whose forces follow from an ellipse, its load, one coefficient of friction, the elastic constants and the motion alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PlainContact {
+    pub(crate) ellipse: Ellipse,
+    /// Coefficient of friction.
+    pub(crate) coefficient: f64,
+    /// Kalker's reduction factor: the part of the shear modulus that tractions meet.
+    pub(crate) reduction: f64,
+}
+
 /// Proof that a problem went through the checks. `tests/tidy` allows it, and literals of [`Problem`], in `case/` and here only.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Checked(());
@@ -110,9 +121,15 @@ impl Problem {
         else {
             return None;
         };
-        let by_balance = match self.task {
+        let by_balance = match &self.task {
             NormalTask::Hertz(_) | NormalTask::Given(_) | NormalTask::Gap(_) => false,
-            NormalTask::Wheel(_) => self.wheelset.is_some() || self.pull().is_some(),
+            // Friction carries a part of a vertical force, and with it the patches depend on the motion.
+            NormalTask::Wheel(wheel) => {
+                self.wheelset.is_some()
+                    || self.pull().is_some()
+                    || matches!(wheel.loading, WheelLoad::Vertical(_))
+                        && !self.friction.is_frictionless()
+            }
             NormalTask::Wheelset(_) => true,
         };
         let row = RowMotion {
@@ -145,14 +162,43 @@ impl Problem {
         }
     }
 
+    /// The question as a plain contact, if it is one; its motions, forces and history are not looked at. Every member of a question is named
+    /// here, so that a new one must be judged.
+    pub(crate) fn plain(&self) -> Option<PlainContact> {
+        let Problem {
+            elasticity: _,
+            friction: FrictionLaw::Constant(coefficient),
+            interface:
+                Interface {
+                    reduction,
+                    layer,
+                    yielding: None,
+                },
+            task: NormalTask::Hertz(ellipse),
+            motions: _,
+            part: _,
+            wheelset: None,
+            drive_torque: None,
+            wheelset_forces: [None, None],
+            forces: _,
+            speeds: _,
+            history: _,
+            checked: _,
+        } = self
+        else {
+            return None;
+        };
+        (*layer == 0.0).then_some(PlainContact {
+            ellipse: *ellipse,
+            coefficient: *coefficient,
+            reduction: *reduction,
+        })
+    }
+
     /// Does the table of creep forces cover the patch?
     pub(crate) fn is_in_table(&self) -> bool {
-        let NormalTask::Hertz(ellipse) = &self.task else {
-            return false;
-        };
-        matches!(self.friction, FrictionLaw::Constant(_))
-            && outside(ellipse.a / ellipse.b).is_none()
-            && tells(&self.elasticity, self.interface, &self.friction)
+        let inside = |plain: PlainContact| outside(plain.ellipse.a / plain.ellipse.b).is_none();
+        self.plain().is_some_and(inside) && unlike(&self.elasticity).is_none()
     }
 
     /// The forces in N that the rail is to carry under one wheel, along and across the track, if any is prescribed. That across

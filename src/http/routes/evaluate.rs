@@ -119,8 +119,10 @@ pub(crate) struct EvaluateColumns {
     /// ∂`moment_z_n_mm`/∂`spin_per_mm`; with `gradients` only.
     #[schema(nullable = false)]
     moment_z_n_mm_by_spin_per_mm: Option<Vec<Option<f64>>>,
-    /// `ok`; `target_missed`: the bound is above the target; `needs_solver`: the bound is above the target and `auto` does not solve
-    /// rows here; submit the row as a job; `not_covered`: a/b is beyond 0.1 to 10.
+    /// `ok`; `target_missed`: the bound is above the target; `needs_solver`: the bound is above the target, or the table does not represent the law
+    /// of friction or the layer, and `auto` does not solve rows here: submit them as a run; `not_covered`: a/b is beyond 0.1 to 10; `refused`: the
+    /// case of the row has faults, which `POST /v1/cases/check` names; `not_finite`: a number of the answer is not finite. Only rows that are `ok` or
+    /// `target_missed` have numbers, and all of them.
     status: Vec<String>,
 }
 

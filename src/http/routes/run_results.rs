@@ -79,13 +79,15 @@ pub(crate) struct RunRow {
     status: String,
     /// The method that answered it; null without an answer.
     method: Option<String>,
+    /// Why it has no answer, such as the first fault of its case; null with an answer.
+    reason: Option<String>,
 }
 
 /// The answers of an ended run in the order of its rows.
 ///
 /// One line, or one row of a table, for each row that was sent, whatever became of it. Columns: `row`, the columns that were passed through unchanged,
-/// `status`, `method`, then numbers: forces and moment are sums over the patches about the origin of the case, `error_estimate` is that of the less
-/// certain force. A cancelled run keeps the answers it had computed.
+/// `status`, `method`, then numbers and `reason`: forces and moment are sums over the patches about the origin of the case, `error_estimate` is that of
+/// the less certain force, and `reason` tells why a row has no answer. A cancelled run keeps the answers it had computed.
 #[utoipa::path(
     get,
     path = "/v1/runs/{id}/results",

@@ -9,7 +9,7 @@ use tokio::runtime::Handle;
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::many::solve::expected_seconds;
-use crate::contact::evaluate::many::task::{ManyTask, RowStarts};
+use crate::contact::evaluate::many::task::{ManyTask, RowStarts, several_answers};
 use crate::contact::evaluate::many_answer::NumberColumns;
 use crate::contact::evaluate::request_faults::{column_pointer, of_first_row, of_values};
 use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
@@ -21,7 +21,7 @@ use crate::jobs::handle::Jobs;
 use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::profiles::{KnownSections, unknown};
 use crate::jobs::run::chunk::RunChunk;
-use crate::jobs::run::head::{RunColumn, RunHead};
+use crate::jobs::run::head::{REASON, RunColumn, RunHead};
 use crate::jobs::run::model::Run;
 use crate::jobs::submit::microseconds;
 
@@ -371,14 +371,14 @@ impl RunDraft {
 
 /// What the case of a run may not ask for.
 fn faults_of_template(checked: &CheckedCase) -> Vec<Fault> {
-    let mut faults = Vec::new();
-    if checked.problem.motions.len() != 1 {
-        let detail = format!(
-            "{} motions given; a row has one motion, and columns vary it",
-            checked.problem.motions.len()
-        );
-        faults.push(Fault::new("/template/motion", detail));
-    }
+    let several = several_answers(checked);
+    let mut faults: Vec<Fault> = several
+        .map(|fault| Fault {
+            pointer: format!("/template{}", fault.pointer),
+            ..fault
+        })
+        .into_iter()
+        .collect();
     let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
     if let Some(other) = checked
         .run
@@ -406,7 +406,7 @@ fn faults_of_columns(columns: &[RunColumn]) -> Vec<Fault> {
             let detail = format!("the column `{}` is there twice", column.name);
             faults.push(Fault::new(column_pointer(&column.name), detail));
         }
-        let own = ["row", "status", "method"];
+        let own = ["row", "status", "method", REASON];
         let answered = NumberColumns::all().names();
         if column.pointer.is_none()
             && (own.contains(&&*column.name) || answered.contains(&&*column.name))

@@ -14,6 +14,9 @@ use crate::jobs::error::JobsError;
 /// The form of heads and chunks that is written.
 const FORM: u32 = 1;
 
+/// The column that tells why a row has no answer.
+pub const REASON: &str = "reason";
+
 /// A column of the rows of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunColumn {
@@ -81,6 +84,9 @@ pub struct RunHead {
     /// Rows start from rows that are like them.
     #[serde(default)]
     pub from_neighbours: bool,
+    /// The answers tell why a row has none; those of older runs do not.
+    #[serde(default)]
+    pub with_reasons: bool,
     /// Number of rows.
     pub rows: u64,
     /// Rows of each chunk but the last.
@@ -99,6 +105,7 @@ impl RunHead {
             profiles: BTreeMap::new(),
             method,
             from_neighbours: false,
+            with_reasons: true,
             rows: 0,
             chunk_rows: 0,
         }
@@ -132,7 +139,8 @@ impl RunHead {
         }
     }
 
-    /// Names and kinds of the columns of the answers, in their order: the row, what was carried along, what became of it, its numbers.
+    /// Names and kinds of the columns of the answers, in their order: the row, what was carried along, what became of it, its numbers,
+    /// and why it has none.
     #[must_use]
     pub fn answers(&self) -> Vec<(String, TableKind)> {
         let carried = self
@@ -144,10 +152,12 @@ impl RunHead {
         let numbers = self.numbers.iter();
         let numbers = numbers.map(|name| (name.clone(), TableKind::Numbers));
         let row = ("row".to_owned(), TableKind::Integers);
+        let reason = (REASON.to_owned(), TableKind::Texts);
         std::iter::once(row)
             .chain(carried)
             .chain(words)
             .chain(numbers)
+            .chain(self.with_reasons.then_some(reason))
             .collect()
     }
 

@@ -20,7 +20,7 @@ use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::error::JobsError;
 use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::run::chunk::{RunChunk, parted};
-use crate::jobs::run::head::RunHead;
+use crate::jobs::run::head::{REASON, RunHead};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::submission::StoredCase;
 
@@ -114,6 +114,9 @@ fn table(
     columns.push(("method".to_owned(), TableColumn::Texts(method.collect())));
     let numbers = head.numbers.iter().cloned().zip(answer.numbers);
     columns.extend(numbers.map(|(name, values)| (name, TableColumn::Numbers(values))));
+    if head.with_reasons {
+        columns.push((REASON.to_owned(), TableColumn::Texts(answer.reason)));
+    }
     RowTable { columns }
 }
 

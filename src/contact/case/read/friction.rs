@@ -11,7 +11,7 @@ use crate::contact::case::words::friction::{
 
 const COEFFICIENT: AllowedRange = AllowedRange::closed(0.0, 100.0, "");
 /// A smaller friction coefficient is refused unless it is 0: dimensionless motions would overflow.
-const COEFFICIENT_LEAST: f64 = 1e-12;
+pub(crate) const COEFFICIENT_LEAST: f64 = 1e-12;
 const ACROSS: AllowedRange = AllowedRange::closed(COEFFICIENT_LEAST, 100.0, "");
 const SPEED: AllowedRange = AllowedRange::positive(1e9, "mm/s");
 const PLACE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");

@@ -3,9 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::contact::evaluate::many_answer::{Found, NUMBER_NAMES, NumberColumns};
-use crate::contact::friction::law::FrictionLaw;
 use crate::contact::normal::hertz::Ellipse;
-use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::{Problem, RowMotion};
 use crate::contact::rolling::motion::Motion;
@@ -124,15 +122,10 @@ impl Similar {
     }
 }
 
-/// The ellipse and the coefficient of friction of a question whose answer scales with them.
+/// The ellipse and the coefficient of friction of a question whose answer scales with them. The slip that pressure gives bodies of unlike material
+/// does not scale with the coefficient.
 fn scalable(problem: &Problem) -> Option<(Ellipse, f64)> {
-    let NormalTask::Hertz(ellipse) = &problem.task else {
-        return None;
-    };
-    let FrictionLaw::Constant(friction) = problem.friction else {
-        return None;
-    };
-    // A layer has a thickness of its own, and yields at a stress of its own.
-    let layer = problem.interface.layer != 0.0 || problem.interface.yielding.is_some();
-    (friction > 0.0 && !layer).then_some((*ellipse, friction))
+    let plain = problem.plain()?;
+    let scales = plain.coefficient > 0.0 && problem.elasticity.difference == 0.0;
+    scales.then_some((plain.ellipse, plain.coefficient))
 }

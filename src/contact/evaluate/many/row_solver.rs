@@ -8,7 +8,7 @@ use crate::contact::case::known_pair::KnownPair;
 use crate::contact::error::SolveError;
 use crate::contact::evaluate::many::near_rows::{Group, OpenGroups};
 use crate::contact::evaluate::many::task::{ManyTask, RowSolver, RowStarts};
-use crate::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
+use crate::contact::evaluate::many_answer::{ManyAnswer, ManyStatus, RowFailure};
 use crate::contact::method::Method;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::problem::checked_case::CheckedCase;
@@ -30,7 +30,7 @@ pub(crate) struct RowsInWork<'a> {
 /// Why a case has no solution.
 enum RowEnd {
     Stopped,
-    Status(ManyStatus),
+    Failed(RowFailure),
 }
 
 impl<'a> RowsInWork<'a> {
@@ -63,9 +63,12 @@ impl<'a> RowsInWork<'a> {
             if self.watch(1).tick(0.0).is_break() {
                 return Err(SolveError::Cancelled);
             }
-            let Ok(checked) = self.task.checked(&self.known, *row) else {
-                self.end(*row, ManyStatus::Refused);
-                continue;
+            let checked = match self.task.checked(&self.known, *row) {
+                Ok(checked) => checked,
+                Err(error) => {
+                    self.end(*row, RowFailure::refused(&error));
+                    continue;
+                }
             };
             let motion = checked.problem.row_motion();
             let together = self.task.starts == RowStarts::Neighbours
@@ -103,12 +106,12 @@ impl<'a> RowsInWork<'a> {
                         let answered = (&solution, motion);
                         self.answer.set_solution(member.row, answered, of_row);
                         self.done += 1;
-                        if self.answer.status[member.row] == ManyStatus::TargetMissed {
+                        if self.answer.status[member.row] != ManyStatus::Ok {
                             self.again(member.row)?;
                         }
                     }
                 }
-                Err(RowEnd::Status(_)) => {
+                Err(RowEnd::Failed(_)) => {
                     for member in members {
                         // A row of a group has no faults.
                         if let Ok(checked) = self.task.checked(&self.known, member.row) {
@@ -130,7 +133,7 @@ impl<'a> RowsInWork<'a> {
             Ok(solution) => self.answer.set_solution(row, (&solution, 0), |_, _| ()),
             Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
             // It keeps the answer of its group.
-            Err(RowEnd::Status(_)) => {}
+            Err(RowEnd::Failed(_)) => {}
         }
         Ok(())
     }
@@ -142,13 +145,13 @@ impl<'a> RowsInWork<'a> {
                 self.done += 1;
             }
             Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
-            Err(RowEnd::Status(status)) => self.end(row, status),
+            Err(RowEnd::Failed(failure)) => self.end(row, failure),
         }
         Ok(())
     }
 
-    fn end(&mut self, row: usize, status: ManyStatus) {
-        self.answer.status[row] = status;
+    fn end(&mut self, row: usize, failure: RowFailure) {
+        self.answer.set(row, Err(failure));
         self.done += 1;
     }
 
@@ -157,8 +160,11 @@ impl<'a> RowsInWork<'a> {
         let solved = catch_unwind(AssertUnwindSafe(|| (self.solve)(checked, &watch)));
         match solved {
             Ok(Ok(solution)) => Ok(solution),
-            Ok(Err(error)) => Err(ManyStatus::of(&error).map_or(RowEnd::Stopped, RowEnd::Status)),
-            Err(_) => Err(RowEnd::Status(ManyStatus::SolverFailed)),
+            Ok(Err(error)) => Err(RowFailure::of(&error).map_or(RowEnd::Stopped, RowEnd::Failed)),
+            Err(_) => Err(RowEnd::Failed(RowFailure {
+                status: ManyStatus::SolverFailed,
+                reason: "the solver stopped on a defect of its own".to_owned(),
+            })),
         }
     }
 

@@ -16,11 +16,14 @@ use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::many::near_rows::largest;
 use crate::contact::evaluate::many::row_solver::RowsInWork;
 use crate::contact::evaluate::many::task::{ManyTask, RowSolver, RowStarts};
-use crate::contact::evaluate::many_answer::{ManyAnswer, ManyStatus, NumberColumns, RowNumbers};
+use crate::contact::evaluate::many_answer::{
+    ManyAnswer, ManyStatus, NumberColumns, RowFailure, RowNumbers, SolvedRow,
+};
 use crate::contact::evaluate::rows::Rows;
 use crate::contact::evaluate::varied::{Values, VariedColumn};
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
 
 /// Solves rows: numbers of Hertz contacts by `table` and `fastsim`, or by `auto` where the table's bound meets the target, are evaluated
 /// without meshes; every other row is checked and solved as a case of its own.
@@ -104,13 +107,18 @@ fn evaluable(task: &ManyTask, checked: &CheckedCase) -> Option<(Rows, MethodName
         Values::Texts(_) => None,
     });
     let columns = numbers.collect::<Option<Vec<Column>>>()?;
-    let rows = Rows::new(task.case, checked, columns).ok()?;
+    let rows = Rows::new(task.case, checked, columns).ok();
+    let rows = rows.filter(Rows::has_method)?;
     Some((rows, checked.run.method_asked))
 }
 
-/// Is a row that was evaluated so left to the solver?
+/// Is a row that was evaluated so left to the solver? It tells the reason of a row without finite numbers.
 fn to_solve(status: RowStatus, method: MethodName) -> bool {
-    method == MethodName::Auto && matches!(status, RowStatus::NeedsSolver | RowStatus::NotCovered)
+    match status {
+        RowStatus::Ok | RowStatus::TargetMissed => false,
+        RowStatus::NotCovered => method == MethodName::Auto,
+        RowStatus::NeedsSolver | RowStatus::Refused | RowStatus::NotFinite => true,
+    }
 }
 
 /// Takes over an evaluated row; `false` if it is to be solved.
@@ -125,11 +133,19 @@ fn take(
     if to_solve(status, method) {
         return false;
     }
-    answer.status[row] = match status {
-        RowStatus::Ok => ManyStatus::Ok,
-        RowStatus::TargetMissed => ManyStatus::TargetMissed,
-        RowStatus::NeedsSolver | RowStatus::NotCovered => ManyStatus::NotCovered,
-    };
+    if !status.has_answer() {
+        let reason = format!(
+            "a/b of the ellipse is beyond {RATIO_MIN} to {RATIO_MAX}; \"method\": \"table\" covers no other, use boundary_element or fastsim"
+        );
+        answer.set(
+            row,
+            Err(RowFailure {
+                status: ManyStatus::NotCovered,
+                reason,
+            }),
+        );
+        return true;
+    }
     let area = std::f64::consts::PI * c * c;
     let error = evaluated.error_estimate[row];
     let numbers: RowNumbers = [
@@ -146,17 +162,17 @@ fn take(
         1.0,
         f64::NAN,
     ];
-    if answer.status[row].has_answer() {
-        answer.method[row] = Some(match method {
+    let slopes = evaluated.gradients.iter().flatten();
+    let slopes = slopes.map(|column| column[row]);
+    let solved = SolvedRow {
+        target_met: status == RowStatus::Ok,
+        method: Some(match method {
             MethodName::Auto => MethodName::Table,
             asked => asked,
-        });
-        let slopes = evaluated.gradients.iter().flatten();
-        answer.set(
-            row,
-            numbers.into_iter().chain(slopes.map(|column| column[row])),
-        );
-    }
+        }),
+        numbers: numbers.into_iter().chain(slopes).collect(),
+    };
+    answer.set(row, Ok(solved));
     true
 }
 

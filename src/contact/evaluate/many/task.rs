@@ -59,8 +59,28 @@ impl ManyTask<'_> {
         let case = case_of_row(self.case, self.columns, self.profiles, row)
             .map_err(|(pointer, reason)| CaseError(vec![Fault::new(pointer, reason)]))?;
         let mut checked = contact::check_with(known, &case, self.limits)?;
+        if let Some(fault) = several_answers(&checked) {
+            return Err(CaseError(vec![fault]));
+        }
         let own = checked.run.time_limit;
         checked.run.time_limit = Some(own.map_or(self.time_limit, |own| own.min(self.time_limit)));
         Ok(checked)
     }
+}
+
+/// The fault of a case that has several answers, so that no row stands for it.
+#[must_use]
+pub fn several_answers(checked: &CheckedCase) -> Option<Fault> {
+    let problem = &checked.problem;
+    let (motions, positions) = (problem.motions.len(), problem.task.positions());
+    if motions > 1 {
+        let detail = format!("{motions} motions given; a row has one motion, and columns vary it");
+        return Some(Fault::new("/motion", detail));
+    }
+    (positions > 1).then(|| {
+        let detail = format!(
+            "{positions} positions of the wheelset with their motions given; a row has one position with one motion, and columns vary them"
+        );
+        Fault::new("/contact", detail)
+    })
 }

@@ -1,0 +1,521 @@
+//! Every feature of a case through every route: each answer is that of the case alone, within both estimates.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::time::Duration;
+
+use railhead::contact;
+use railhead::contact::case::limits::Limits;
+use railhead::contact::error::CaseError;
+use railhead::contact::evaluate::answer::RowStatus;
+use railhead::contact::evaluate::column::Column;
+use railhead::contact::evaluate::many::solve::solve_many;
+use railhead::contact::evaluate::many::task::{ManyTask, RowStarts};
+use railhead::contact::evaluate::rows::Rows;
+use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use railhead::contact::monitor::{Monitor, Unmonitored};
+use railhead::contact::problem::checked_case::CheckedCase;
+use railhead::contact::rolling::operator_store::OperatorStore;
+use railhead::contact::solution::words::answer::Solution;
+use serde_json::{Map, Value, json};
+
+use crate::features::{Feature, Motions, ROWS};
+
+/// A way in which a case arrives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Route {
+    /// A job with a list of motions.
+    List,
+    /// A job with a sweep.
+    Sweep,
+    /// A run whose rows start from their own cases.
+    Run,
+    /// A run whose rows start from each other.
+    RunFromNeighbours,
+    /// Rows at once.
+    Evaluate,
+    /// Two wheels by themselves in the places of those of a wheelset.
+    TwoProfiles,
+}
+
+/// All of them.
+pub const ROUTES: [Route; 6] = [
+    Route::List,
+    Route::Sweep,
+    Route::Run,
+    Route::RunFromNeighbours,
+    Route::Evaluate,
+    Route::TwoProfiles,
+];
+
+/// What a feature and a route have to do with each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Expected {
+    /// Each answer is that of the case alone.
+    Agrees,
+    /// There is no such request.
+    Absent,
+    /// The request is refused, with these words.
+    Refused(&'static str),
+    /// `auto` leaves rows to the solver: no numbers.
+    LeftToSolver,
+    /// The motions share the patches of the first, and a remark says so.
+    SharedPatches,
+}
+
+/// An answer in N and N mm.
+#[derive(Debug, Clone)]
+struct Answer {
+    /// `F_x`, `F_y`, `M_z` and the normal force.
+    numbers: [f64; 4],
+    /// Their estimated errors, NaN where there is none.
+    errors: [f64; 4],
+    /// Creepages that were found for prescribed forces.
+    creepages: [Option<f64>; 2],
+    /// μN, and its product with √(A/π).
+    scales: [f64; 2],
+    remarks: Vec<String>,
+}
+
+/// Errors of answers that have no estimate of their own, relative to μN: those of given meshes, solved to a residual.
+const WITHOUT_ESTIMATE: f64 = 1e-3;
+/// Rounding, relative to μN.
+const ROUNDING: f64 = 1e-6;
+/// Normal forces of patches that are found agree so well, relative to themselves.
+const NORMAL: f64 = 2e-3;
+/// A creepage is this many times as uncertain as the force that it is found for, relative to themselves: up to half the limit.
+const CREEPAGE: f64 = 5.0;
+
+/// What the matrix showed: a line for each feature, and what is wrong.
+#[derive(Debug, Default)]
+pub struct Shown {
+    pub lines: String,
+    pub wrong: Vec<String>,
+    /// The largest difference over the sum of both estimates.
+    pub worst: f64,
+    pub compared: usize,
+}
+
+impl Shown {
+    /// All of it as a table.
+    pub fn table(&self) -> String {
+        let titles = ROUTES.map(|route| format!("{route:?}")).join(" | ");
+        let mut text = format!(
+            "| feature | {titles} |\n|{}\n{}",
+            "---|".repeat(1 + ROUTES.len()),
+            self.lines
+        );
+        let _ = writeln!(
+            text,
+            "\n{} answers compared with the case alone; largest difference over the sum of both estimates: {:.2}.\n",
+            self.compared, self.worst
+        );
+        for why in &self.wrong {
+            let _ = writeln!(text, "- {why}");
+        }
+        text
+    }
+}
+
+/// Sends features through all routes.
+pub fn matrix(features: &[Feature]) -> Shown {
+    let mut shown = Shown::default();
+    for feature in features {
+        let _ = write!(shown.lines, "| {}", feature.name);
+        let mut alone = Alone::new(feature);
+        for route in ROUTES {
+            let expected = feature.expected(route);
+            let word = match checked(feature, &mut alone, route, expected) {
+                Ok(None) => "–".to_owned(),
+                Ok(Some((count, worst))) => {
+                    shown.compared += count;
+                    shown.worst = shown.worst.max(worst);
+                    match count {
+                        0 => "no numbers".to_owned(),
+                        _ => format!("{worst:.2}"),
+                    }
+                }
+                Err(why) => {
+                    shown
+                        .wrong
+                        .push(format!("{}, {route:?}: {why}", feature.name));
+                    "WRONG".to_owned()
+                }
+            };
+            let _ = write!(shown.lines, " | {word}");
+        }
+        shown.lines.push_str(" |\n");
+    }
+    shown
+}
+
+/// Compares a route with the cases alone: how many answers, and the largest difference over both estimates.
+fn checked(
+    feature: &Feature,
+    alone: &mut Alone,
+    route: Route,
+    expected: Expected,
+) -> Result<Option<(usize, f64)>, String> {
+    if expected == Expected::Absent {
+        return Ok(None);
+    }
+    let found = through(feature, route);
+    match (expected, found) {
+        (Expected::Refused(words), Err(why)) => match why.contains(words) {
+            true => Ok(Some((0, 0.0))),
+            false => Err(format!("`{words}` is not in: {why}")),
+        },
+        (Expected::Refused(_), Ok(_)) => {
+            Err("answered, although it is on the list of refused combinations".to_owned())
+        }
+        (_, Err(why)) => Err(format!("refused: {why}")),
+        (Expected::LeftToSolver, Ok(rows)) => match rows.iter().all(Option::is_none) {
+            true => Ok(Some((0, 0.0))),
+            false => Err("answered, although it is to be left to the solver".to_owned()),
+        },
+        (Expected::SharedPatches, Ok(rows)) => {
+            let said = rows.iter().flatten().all(|row| {
+                row.remarks
+                    .iter()
+                    .any(|code| code == "normal-forces-alone-balance")
+            });
+            match said {
+                true => Ok(Some((0, 0.0))),
+                false => Err("no remark says that patches are shared".to_owned()),
+            }
+        }
+        (_, Ok(rows)) => {
+            let of_motions = matches!(route, Route::List | Route::Sweep);
+            let with_columns = !of_motions || feature.motions == Motions::Wheelset;
+            let mut worst: f64 = 0.0;
+            for (row, found) in rows.iter().enumerate() {
+                let Some(found) = found else {
+                    return Err(format!("row {row} has no answer"));
+                };
+                let known = alone.answer(row, with_columns)?;
+                worst =
+                    worst.max(compare(found, &known).map_err(|why| format!("row {row}: {why}"))?);
+            }
+            Ok(Some((rows.len(), worst)))
+        }
+    }
+}
+
+/// The largest difference of two answers over the sum of their estimates.
+fn compare(found: &Answer, known: &Answer) -> Result<f64, String> {
+    let [limit, moment] = known.scales;
+    let scales = [limit, limit, moment, known.numbers[3]];
+    let mut worst: f64 = 0.0;
+    for k in 0..4 {
+        let [a, b] = [found, known].map(|answer| answer.numbers[k]);
+        let error = |answer: &Answer| match (k, answer.errors[k].is_nan()) {
+            (3, _) => NORMAL * scales[3],
+            (_, true) => WITHOUT_ESTIMATE * scales[k],
+            _ => answer.errors[k],
+        };
+        let allowed = error(found) + error(known) + ROUNDING * scales[k];
+        let off = (a - b).abs();
+        if off.is_nan() || off > allowed {
+            let name = ["F_x", "F_y", "M_z", "N"][k];
+            return Err(format!("{name} is {a}, alone {b}, ± {allowed}"));
+        }
+        worst = worst.max(if allowed > 0.0 { off / allowed } else { 0.0 });
+    }
+    for k in 0..2 {
+        let (Some(a), Some(b)) = (found.creepages[k], known.creepages[k]) else {
+            continue;
+        };
+        let uncertain = (found.errors[k] + known.errors[k]).max(2.0 * ROUNDING * limit);
+        let allowed = CREEPAGE * uncertain / known.numbers[k].abs() * b.abs();
+        let off = (a - b).abs();
+        if off.is_nan() || off > allowed {
+            return Err(format!("creepage {k} is {a}, alone {b}, ± {allowed}"));
+        }
+    }
+    Ok(worst)
+}
+
+/// The cases of the rows, each solved alone when it is first asked for.
+struct Alone<'a> {
+    feature: &'a Feature,
+    known: BTreeMap<(usize, bool), Answer>,
+}
+
+impl Alone<'_> {
+    fn new(feature: &Feature) -> Alone<'_> {
+        Alone {
+            feature,
+            known: BTreeMap::new(),
+        }
+    }
+
+    fn answer(&mut self, row: usize, with_columns: bool) -> Result<Answer, String> {
+        let key = (row, with_columns && !self.feature.columns.is_empty());
+        if let Some(known) = self.known.get(&key) {
+            return Ok(known.clone());
+        }
+        let case = self.feature.case_of_row(row, with_columns);
+        let answer = answers(&solved(&case).map_err(|why| format!("alone: {why}"))?)
+            .into_iter()
+            .next()
+            .ok_or("alone: no answer")?;
+        self.known.insert(key, answer.clone());
+        Ok(answer)
+    }
+}
+
+/// A case as a job solves it.
+fn solved(case: &Value) -> Result<Solution, String> {
+    let checked = contact::check(case, &Limits::default()).map_err(|error| error.to_string())?;
+    let solved = contact::solve_with(&Arc::new(OperatorStore::default()), &checked, &Unmonitored);
+    solved
+        .map(|(solution, _)| solution)
+        .map_err(|error| error.to_string())
+}
+
+/// The answers of a solution, motion by motion.
+fn answers(solution: &Solution) -> Vec<Answer> {
+    let sum = |of: &dyn Fn(usize) -> f64| (0..solution.patches.len()).map(of).sum::<f64>();
+    let area = sum(&|k| solution.patches[k].area_mm2);
+    let positions = solution
+        .wheelset
+        .as_ref()
+        .map_or(1, |all| all.positions.len());
+    let totals = solution.total.iter().enumerate();
+    totals
+        .map(|(motion, total)| {
+            let of_position = |k: usize| {
+                let Some(wheelset) = &solution.wheelset else {
+                    return true;
+                };
+                let position = &wheelset.positions[motion];
+                position.left.patches.contains(&k) || position.right.patches.contains(&k)
+            };
+            let normal = sum(&|k| match of_position(k) {
+                true => solution.patches[k].normal_force_n,
+                false => 0.0,
+            });
+            let limit = sum(&|k| {
+                let patch = &solution.patches[k];
+                patch.friction_limit_n.unwrap_or(0.3 * patch.normal_force_n)
+            }) / positions as f64;
+            let error = total.error_estimate;
+            let of = |of: fn(&railhead::contact::solution::words::answer::ErrorEstimate) -> f64| {
+                error.as_ref().map_or(f64::NAN, of)
+            };
+            let point = solution.patches[0].points.get(motion);
+            Answer {
+                numbers: [
+                    total.force_x_n,
+                    total.force_y_n,
+                    total.moment_z_n_mm,
+                    normal,
+                ],
+                errors: [
+                    of(|error| error.force_x_n),
+                    of(|error| error.force_y_n),
+                    of(|error| error.moment_z_n_mm),
+                    0.0,
+                ],
+                creepages: [
+                    point.map(|point| point.motion.creepage_x),
+                    point.map(|point| point.motion.creepage_y),
+                ],
+                scales: [limit, limit * (area / std::f64::consts::PI).sqrt()],
+                remarks: solution
+                    .remarks
+                    .iter()
+                    .map(|remark| remark.code.to_owned())
+                    .collect(),
+            }
+        })
+        .collect()
+}
+
+/// The answers of a route, `None` for rows that are left to the solver; or why it refuses.
+fn through(feature: &Feature, route: Route) -> Result<Vec<Option<Answer>>, String> {
+    match route {
+        Route::List => of_motions(feature, false),
+        Route::Sweep => of_motions(feature, true),
+        Route::Run => run(feature, RowStarts::Own),
+        Route::RunFromNeighbours => run(feature, RowStarts::Neighbours),
+        Route::Evaluate => evaluated(feature),
+        Route::TwoProfiles => two_profiles(feature),
+    }
+}
+
+/// A job with all motions.
+fn of_motions(feature: &Feature, sweep: bool) -> Result<Vec<Option<Answer>>, String> {
+    let mut case = feature.case.clone();
+    match feature.motions {
+        Motions::Wheelset => {
+            let each =
+                (0..ROWS).map(|row| feature.case_of_row(row, false)["motion"]["wheelset"].clone());
+            case["motion"]["wheelset"] = each.collect();
+            for (pointer, values) in &feature.columns {
+                let name = pointer
+                    .strip_prefix("/contact/")
+                    .expect("a place of the wheelset");
+                case["contact"][name] = json!({ "values": values });
+            }
+        }
+        Motions::Creepages if sweep => {
+            let mut swept: Map<String, Value> =
+                case["motion"].as_object().expect("a motion").clone();
+            for (pointer, values) in &feature.motion_columns {
+                let name = pointer.rsplit('/').next().expect("a name");
+                swept.insert(name.to_owned(), json!({ "values": values }));
+            }
+            case["motion"] = json!({ "sweep": swept });
+        }
+        Motions::Creepages => {
+            case["motion"] = (0..ROWS)
+                .map(|row| feature.case_of_row(row, false)["motion"].clone())
+                .collect();
+        }
+    }
+    let solution = solved(&case)?;
+    Ok(answers(&solution).into_iter().map(Some).collect())
+}
+
+fn run(feature: &Feature, starts: RowStarts) -> Result<Vec<Option<Answer>>, String> {
+    let operators = Arc::new(OperatorStore::default());
+    let columns = feature.all_columns();
+    let task = ManyTask {
+        case: &feature.case_of_row(0, true),
+        columns: &columns,
+        profiles: &BTreeMap::new(),
+        limits: &Limits::default(),
+        time_limit: Duration::from_secs(600),
+        starts,
+    };
+    let solve = |checked: &CheckedCase, monitor: &dyn Monitor| {
+        contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)
+    };
+    let answer = solve_many(&task, &solve, &Unmonitored).map_err(|error| error.to_string())?;
+    if let Some(why) = answer.reason.iter().find(|why| !why.is_empty()) {
+        return Err(why.clone());
+    }
+    let names = answer.columns.names();
+    let rows = (0..ROWS).map(|row| {
+        let of = |name: &str| {
+            let place = names.iter().position(|known| *known == name);
+            place.map(|place| answer.numbers[place][row])
+        };
+        let number = |name: &str| of(name).unwrap_or(f64::NAN);
+        let error = number("error_estimate");
+        Some(Answer {
+            numbers: ["force_x_n", "force_y_n", "moment_z_n_mm", "normal_force_n"].map(number),
+            errors: [error, error, number("moment_error_estimate"), 0.0],
+            creepages: ["creepage_x", "creepage_y"].map(of),
+            scales: [f64::NAN; 2],
+            remarks: Vec::new(),
+        })
+    });
+    Ok(rows.collect())
+}
+
+fn evaluated(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
+    let case = feature.case_of_row(0, true);
+    let columns = feature.all_columns().into_iter().map(|column| Column {
+        pointer: column.pointer,
+        values: match column.values {
+            Values::Numbers(values) => values,
+            Values::Texts(_) => unreachable!("numbers"),
+        },
+    });
+    let told = |error: CaseError| error.to_string();
+    let checked = contact::check(&case, &Limits::default()).map_err(told)?;
+    let rows = Rows::new(&case, &checked, columns.collect()).map_err(told)?;
+    let (answer, patches) = rows.evaluate_with_patches();
+    let rows = (0..ROWS).map(|row| {
+        let status = answer.status[row];
+        if !status.has_answer() {
+            let left = status == RowStatus::NeedsSolver;
+            return if left {
+                Ok(None)
+            } else {
+                Err(format!("row {row} is {}", status.name()))
+            };
+        }
+        let error = answer.error_estimate[row];
+        let [normal, length] = patches[row];
+        Ok(Some(Answer {
+            numbers: [
+                answer.force_x_n[row],
+                answer.force_y_n[row],
+                answer.moment_z_n_mm[row],
+                normal,
+            ],
+            errors: [error, error, length * error, 0.0],
+            creepages: [None; 2],
+            scales: [f64::NAN; 2],
+            remarks: Vec::new(),
+        }))
+    });
+    rows.collect()
+}
+
+/// Both wheels of a wheelset by themselves, each under the vertical force that it carries there; their sums stand for the wheelset.
+fn two_profiles(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
+    let mut found = Vec::new();
+    for row in 0..ROWS {
+        let case = feature.case_of_row(row, true);
+        let whole = solved(&case)?;
+        let position = &whole.wheelset.as_ref().ok_or("no wheelset")?.positions[0];
+        let sides = [("left", &position.left), ("right", &position.right)].map(|(side, wheel)| {
+            let mut single = case.clone();
+            single["contact"]["type"] = json!("profiles");
+            single["contact"]["side"] = json!(side);
+            single["contact"]["roll_rad"] = json!(position.roll_rad);
+            single["load"] = json!({ "vertical_force_n": wheel.force_z_n.abs() });
+            single["motion"]["wheelset"] = json!({
+                "speed_mm_per_s": case["motion"]["wheelset"]["speed_mm_per_s"],
+                "angular_velocity_rad_per_s": position.angular_velocity_rad_per_s,
+                "lateral_velocity_mm_per_s": case["motion"]["wheelset"]["lateral_velocity_mm_per_s"].as_f64().unwrap_or(0.0),
+            });
+            solved(&single).map(|solution| answers(&solution)[0].clone())
+        });
+        let [left, right] = sides;
+        let (left, right) = (left?, right?);
+        // Moments of the wheels are about origins of their own.
+        let known = answers(&whole)[0].clone();
+        let plus = |k: usize| left.numbers[k] + right.numbers[k];
+        found.push(Some(Answer {
+            numbers: [plus(0), plus(1), known.numbers[2], plus(3)],
+            errors: [0, 1, 2, 3].map(|k| left.errors[k] + right.errors[k]),
+            creepages: [None; 2],
+            scales: [f64::NAN; 2],
+            remarks: Vec::new(),
+        }));
+    }
+    Ok(found)
+}
+
+impl Feature {
+    /// The case of a row, with the motion of the row and, with columns, its other numbers.
+    pub fn case_of_row(&self, row: usize, with_columns: bool) -> Value {
+        let columns = match with_columns {
+            true => self.all_columns(),
+            false => varied(&self.motion_columns),
+        };
+        case_of_row(&self.case, &columns, &BTreeMap::new(), row).expect("places of the case")
+    }
+
+    fn all_columns(&self) -> Vec<VariedColumn> {
+        let mut columns = varied(&self.motion_columns);
+        columns.extend(varied(&self.columns));
+        columns
+    }
+}
+
+fn varied(columns: &[(&'static str, [f64; ROWS])]) -> Vec<VariedColumn> {
+    let columns = columns.iter();
+    columns
+        .map(|(pointer, values)| VariedColumn {
+            pointer: (*pointer).to_owned(),
+            values: Values::Numbers(values.to_vec()),
+        })
+        .collect()
+}
