@@ -20,8 +20,6 @@ mod maintenance;
 #[path = "../../tests/routes/matrix.rs"]
 mod matrix;
 mod physics;
-#[path = "../../tests/physics/profile_cases.rs"]
-mod profile_cases;
 #[path = "../../tests/physics/profile_reference_files.rs"]
 mod profile_reference_files;
 #[path = "../../tests/physics/profile_shapes.rs"]
@@ -83,7 +81,7 @@ fn main() -> ExitCode {
             Some("histories") => histories::table(SEED),
             Some("rows") => rows::table(SEED),
             Some("routes") => {
-                let shown = matrix::matrix(&features::full_selection());
+                let shown = matrix::matrix(&features::selection(true));
                 println!("{}", shown.table());
                 return match shown.wrong.is_empty() {
                     true => ExitCode::SUCCESS,

@@ -4,7 +4,7 @@
 use serde_json::{Value, json};
 
 use crate::matrix::{Expected, Route};
-use crate::profile_cases::generated;
+use crate::profile_shapes::{rail_60e1, s1002};
 
 /// Rows of a feature.
 pub const ROWS: usize = 3;
@@ -225,9 +225,16 @@ fn gap_grid() -> Feature {
     feature("gap_grid", contact, json!({ "normal_force_n": 8e4 })).but(Route::Evaluate, NOT_HERTZ)
 }
 
+fn wheel_on_rail() -> Value {
+    json!({
+        "type": "profiles", "rail": { "points_mm": rail_60e1() }, "wheel": { "points_mm": s1002() }, "side": "right",
+        "rolling_radius_mm": 460, "cant_rad": 0.025,
+    })
+}
+
 /// A wheel of S1002 on 60E1 under the sum of its normal forces.
 fn profiles() -> Feature {
-    let contact = generated()["contact"].clone();
+    let contact = wheel_on_rail();
     let mut feature = feature("profiles", contact, json!({ "normal_force_n": 75_000 }))
         .but(Route::Evaluate, NOT_HERTZ);
     feature.motion_columns = vec![
@@ -273,7 +280,7 @@ fn profiles_with_wheelset() -> Feature {
 }
 
 fn wheelset() -> Feature {
-    let mut contact = generated()["contact"].clone();
+    let mut contact = wheel_on_rail();
     let members = contact.as_object_mut().expect("a contact");
     members.remove("side");
     members.insert("type".to_owned(), json!("wheelset"));
@@ -494,41 +501,34 @@ fn short(contact: &Feature) -> &'static [usize] {
     }
 }
 
-/// Features that the tests try: every form of friction, every contact, every question.
-pub fn short_selection() -> Vec<Feature> {
-    let frictions = frictions();
+/// Every form of friction, every contact and every question; with `full`, every form of friction on every contact between every pair of bodies.
+pub fn selection(full: bool) -> Vec<Feature> {
+    let (frictions, bodies) = (frictions(), bodies());
     let mut features = Vec::new();
     for contact in contacts() {
-        for friction in short(&contact) {
-            features.push(rubbing(contact.clone(), &frictions[*friction]));
-        }
-    }
-    for pair in bodies() {
-        let mut similar = rubbing(radii(), &frictions[0]);
-        similar
-            .columns
-            .retain(|(pointer, _)| *pointer != "/contact/lateral_mm");
-        features.push(between(similar, &pair));
-        features.push(between(rubbing(ellipse(), &frictions[5]), &pair));
-        features.push(between(pressure_grid(), &pair));
-    }
-    features.push(between(gap_profile(), &bodies()[1]));
-    features.extend(questions());
-    features
-}
-
-/// Every form of friction on every contact between every pair of bodies, and every question.
-pub fn full_selection() -> Vec<Feature> {
-    let mut features = Vec::new();
-    for contact in contacts() {
-        for friction in frictions() {
-            let rubbing = rubbing(contact.clone(), &friction);
-            for pair in bodies() {
-                features.push(between(rubbing.clone(), &pair));
+        let chosen = match full {
+            true => (0..frictions.len()).collect(),
+            false => short(&contact).to_vec(),
+        };
+        for friction in chosen {
+            let rubbing = rubbing(contact.clone(), &frictions[friction]);
+            if full {
+                features.extend(bodies.iter().map(|pair| between(rubbing.clone(), pair)));
             }
             features.push(rubbing);
         }
     }
+    for pair in &bodies {
+        // Similar ellipses under coefficients of their own.
+        let mut similar = rubbing(radii(), &frictions[0]);
+        similar
+            .columns
+            .retain(|(pointer, _)| *pointer != "/contact/lateral_mm");
+        features.push(between(similar, pair));
+        features.push(between(rubbing(ellipse(), &frictions[5]), pair));
+        features.push(between(pressure_grid(), pair));
+    }
+    features.push(between(gap_profile(), &bodies[1]));
     features.extend(questions());
     features
 }

@@ -4,20 +4,16 @@ extern crate railhead_contact as railhead;
 
 mod features;
 mod matrix;
-#[path = "../physics/profile_cases.rs"]
-mod profile_cases;
-#[path = "../physics/profile_reference_files.rs"]
-mod profile_reference_files;
 #[path = "../physics/profile_shapes.rs"]
 mod profile_shapes;
 
-use features::short_selection;
+use features::selection;
 use matrix::matrix;
 
 /// `RAILHEAD_ROUTES=wheelset` tries the features whose names contain this word.
 #[test]
 fn every_feature_is_answered_on_every_route_as_the_case_alone() {
-    let mut features = short_selection();
+    let mut features = selection(false);
     if let Ok(word) = std::env::var("RAILHEAD_ROUTES") {
         features.retain(|feature| feature.name.contains(&word));
     }
