@@ -87,7 +87,7 @@ const CREEPAGES: [RowColumn; 3] = [
 fn frictions() -> Vec<(&'static str, Value)> {
     let layer = json!({ "shear_modulus_mpa": 1500, "thickness_mm": 0.02 });
     let yielding = json!({ "shear_modulus_mpa": 1500, "thickness_mm": 0.02, "yield_mpa": 100, "hardening_mpa_per_mm": 2000 });
-    let falling = |law: &str| json!({ "law": law, "limit": 0.15, "terms": [{ "coefficient": 0.15, "half_speed_mm_per_s": 100 }] });
+    let falling = |law: &str| json!({ "law": law, "limit": 0.15, "terms": [{ "coefficient": 0.15, "half_speed_mm_per_s": 200 }] });
     let and = |mut friction: Value, name: &str, value: Value| {
         friction[name] = value;
         friction
@@ -265,10 +265,7 @@ fn profiles_with_wheelset() -> Feature {
             "/motion",
             json!({ "wheelset": { "speed_mm_per_s": SPEED, "free_rolling_radius_mm": 460.5 } }),
         )
-        .but(
-            Route::List,
-            Expected::Refused("a list of motions of the wheelset"),
-        )
+        .but(Route::List, Expected::Refused("an object is needed"))
         .but(Route::Sweep, Expected::Absent);
     feature.motions = Motions::Wheelset;
     feature.motion_columns = vec![(
@@ -428,7 +425,8 @@ fn histories() -> Vec<Feature> {
     let several_points = Expected::Refused("a row has one motion");
     let mut whole = of("a history", json!({ "history": several }))
         .but(Route::Run, several_points)
-        .but(Route::RunFromNeighbours, several_points);
+        .but(Route::RunFromNeighbours, several_points)
+        .but(Route::NearMotions, several_points);
     whole.motion_columns = vec![("/motion/history/creepage_x", [1e-3, -5e-4, 2e-3])];
     vec![
         one_point("one point of a history", "steady"),

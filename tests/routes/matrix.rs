@@ -33,6 +33,8 @@ pub enum Route {
     Run,
     /// A run whose rows start from each other.
     RunFromNeighbours,
+    /// The same with rows that differ in their motions alone.
+    NearMotions,
     /// Rows at once.
     Evaluate,
     /// Two wheels by themselves in the places of those of a wheelset.
@@ -40,11 +42,12 @@ pub enum Route {
 }
 
 /// All of them.
-pub const ROUTES: [Route; 6] = [
+pub const ROUTES: [Route; 7] = [
     Route::List,
     Route::Sweep,
     Route::Run,
     Route::RunFromNeighbours,
+    Route::NearMotions,
     Route::Evaluate,
     Route::TwoProfiles,
 ];
@@ -186,8 +189,11 @@ fn checked(
             }
         }
         (_, Ok(rows)) => {
-            let of_motions = matches!(route, Route::List | Route::Sweep);
-            let with_columns = !of_motions || feature.motions == Motions::Wheelset;
+            let with_columns = match route {
+                Route::List | Route::Sweep => feature.motions == Motions::Wheelset,
+                Route::NearMotions => false,
+                _ => true,
+            };
             let mut worst: f64 = 0.0;
             for (row, found) in rows.iter().enumerate() {
                 let Some(found) = found else {
@@ -338,8 +344,9 @@ fn through(feature: &Feature, route: Route) -> Result<Vec<Option<Answer>>, Strin
     match route {
         Route::List => of_motions(feature, false),
         Route::Sweep => of_motions(feature, true),
-        Route::Run => run(feature, RowStarts::Own),
-        Route::RunFromNeighbours => run(feature, RowStarts::Neighbours),
+        Route::Run => run(feature, RowStarts::Own, true),
+        Route::RunFromNeighbours => run(feature, RowStarts::Neighbours, true),
+        Route::NearMotions => run(feature, RowStarts::Neighbours, false),
         Route::Evaluate => evaluated(feature),
         Route::TwoProfiles => two_profiles(feature),
     }
@@ -379,11 +386,15 @@ fn of_motions(feature: &Feature, sweep: bool) -> Result<Vec<Option<Answer>>, Str
     Ok(answers(&solution).into_iter().map(Some).collect())
 }
 
-fn run(feature: &Feature, starts: RowStarts) -> Result<Vec<Option<Answer>>, String> {
+fn run(
+    feature: &Feature,
+    starts: RowStarts,
+    with_columns: bool,
+) -> Result<Vec<Option<Answer>>, String> {
     let operators = Arc::new(OperatorStore::default());
-    let columns = feature.all_columns();
+    let columns = feature.varied_columns(with_columns);
     let task = ManyTask {
-        case: &feature.case_of_row(0, true),
+        case: &feature.case_of_row(0, with_columns),
         columns: &columns,
         profiles: &BTreeMap::new(),
         limits: &Limits::default(),
@@ -418,13 +429,16 @@ fn run(feature: &Feature, starts: RowStarts) -> Result<Vec<Option<Answer>>, Stri
 
 fn evaluated(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
     let case = feature.case_of_row(0, true);
-    let columns = feature.all_columns().into_iter().map(|column| Column {
-        pointer: column.pointer,
-        values: match column.values {
-            Values::Numbers(values) => values,
-            Values::Texts(_) => unreachable!("numbers"),
-        },
-    });
+    let columns = feature
+        .varied_columns(true)
+        .into_iter()
+        .map(|column| Column {
+            pointer: column.pointer,
+            values: match column.values {
+                Values::Numbers(values) => values,
+                Values::Texts(_) => unreachable!("numbers"),
+            },
+        });
     let told = |error: CaseError| error.to_string();
     let checked = contact::check(&case, &Limits::default()).map_err(told)?;
     let rows = Rows::new(&case, &checked, columns.collect()).map_err(told)?;
@@ -496,16 +510,15 @@ fn two_profiles(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
 impl Feature {
     /// The case of a row, with the motion of the row and, with columns, its other numbers.
     pub fn case_of_row(&self, row: usize, with_columns: bool) -> Value {
-        let columns = match with_columns {
-            true => self.all_columns(),
-            false => varied(&self.motion_columns),
-        };
+        let columns = self.varied_columns(with_columns);
         case_of_row(&self.case, &columns, &BTreeMap::new(), row).expect("places of the case")
     }
 
-    fn all_columns(&self) -> Vec<VariedColumn> {
+    fn varied_columns(&self, with_columns: bool) -> Vec<VariedColumn> {
         let mut columns = varied(&self.motion_columns);
-        columns.extend(varied(&self.columns));
+        if with_columns {
+            columns.extend(varied(&self.columns));
+        }
         columns
     }
 }
