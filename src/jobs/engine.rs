@@ -7,6 +7,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::contact;
+use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
@@ -17,8 +18,9 @@ use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
 use crate::contact::solve_slice;
 
-/// Checks a case against limits.
-pub type Check = dyn Fn(&Value, &Limits) -> Result<CheckedCase, CaseError> + Send + Sync;
+/// Checks a case against limits; parts that were read for the case before are not read again.
+pub type Check =
+    dyn Fn(&KnownPair, &Value, &Limits) -> Result<CheckedCase, CaseError> + Send + Sync;
 
 /// Where a checked case is cut: ranges of motions, one after the other.
 pub type Slices = dyn Fn(&CheckedCase) -> Vec<Range<usize>> + Send + Sync;
@@ -54,13 +56,21 @@ impl Engine {
         let operators = Arc::new(operators);
         let store = Arc::clone(&operators);
         Engine {
-            check: Arc::new(contact::check),
+            check: Arc::new(contact::check_with),
             slices: Arc::new(slices),
             solve: Arc::new(move |checked, slice, monitor| {
                 solve_slice(&store, checked, slice, monitor)
             }),
             operators,
         }
+    }
+
+    /// Checks a case of which no part is known.
+    ///
+    /// # Errors
+    /// Every fault of the case.
+    pub fn check_one(&self, case: &Value, limits: &Limits) -> Result<CheckedCase, CaseError> {
+        (self.check)(&KnownPair::default(), case, limits)
     }
 
     /// The same with another solver, which solves every case at once.

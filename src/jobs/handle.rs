@@ -7,6 +7,7 @@ use serde_json::Value;
 use tokio::time::timeout;
 use uuid::Uuid;
 
+use crate::contact::case::known_pair::KnownPair;
 use crate::contact::error::CaseError;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::attempts::attempt_control::StopReason;
@@ -70,7 +71,20 @@ impl Jobs {
     /// # Errors
     /// Every fault of the case.
     pub fn check(&self, case: &Value) -> Result<CheckedCase, CaseError> {
-        (self.shared.engine.check)(case, &self.shared.options.limits)
+        let limits = &self.shared.options.limits;
+        self.shared.engine.check_one(case, limits)
+    }
+
+    /// As [`Jobs::check`], for one of many cases.
+    ///
+    /// # Errors
+    /// Every fault of the case.
+    pub(crate) fn check_next(
+        &self,
+        known: &KnownPair,
+        case: &Value,
+    ) -> Result<CheckedCase, CaseError> {
+        (self.shared.engine.check)(known, case, &self.shared.options.limits)
     }
 
     /// Solve time of a case on this machine, found by solving it for at most about `limit`.

@@ -85,7 +85,7 @@ async fn arrow_in_and_out_is_what_csv_is() {
 }
 
 /// An NPZ archive of arrays of float64, as `numpy.savez_compressed` writes it.
-fn npz(arrays: &[(&str, Vec<f64>)]) -> Vec<u8> {
+pub fn npz(arrays: &[(&str, Vec<f64>)]) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     for (name, values) in arrays {
         let header = format!(

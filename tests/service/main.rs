@@ -16,6 +16,7 @@ mod check_case;
 mod cli;
 mod clients;
 mod clocks;
+mod columns;
 mod contract;
 mod cost;
 mod crash;

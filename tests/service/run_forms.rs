@@ -24,7 +24,7 @@ fn table() -> RowTable {
             ),
             (
                 "section".to_owned(),
-                TableColumn::Texts(["a", "b", "a"].map(str::to_owned).to_vec()),
+                TableColumn::Texts(["a", "b", "a"].map(|text| Some(text.to_owned())).to_vec()),
             ),
         ],
     }

@@ -13,8 +13,8 @@ use crate::contact::evaluate::sections::{named_sections, put_section};
 pub enum Values {
     /// Finite numbers.
     Numbers(Vec<f64>),
-    /// Texts, such as digests of profiles.
-    Texts(Vec<String>),
+    /// Texts, such as digests of profiles; nothing where a row has none.
+    Texts(Vec<Option<String>>),
 }
 
 /// A column: where it stands in the case, and a value for each row.
@@ -47,7 +47,7 @@ impl Values {
     pub fn value(&self, row: usize) -> Value {
         match self {
             Values::Numbers(numbers) => Value::from(numbers[row]),
-            Values::Texts(texts) => Value::from(texts[row].as_str()),
+            Values::Texts(texts) => Value::from(texts[row].as_deref()),
         }
     }
 

@@ -26,7 +26,8 @@ pub(crate) struct RunRequest {
     #[schema(value_type = Object)]
     template: Value,
     /// Columns of numbers or of texts, all of the same length. A JSON pointer such as `/load/normal_force_n` or a short name such as
-    /// `normal_force_n` varies the case; a column of any other name is carried along to the answers.
+    /// `normal_force_n` varies the case. Columns of places, times and sections, such as `km`, and those of `?carry=` are carried along to the
+    /// answers; any other name is refused.
     columns: BTreeMap<String, Vec<CellValue>>,
 }
 
@@ -137,6 +138,10 @@ pub(crate) struct SentColumn {
     pointer: Option<String>,
     /// What its numbers are multiplied by, from the unit of the column to that of the case.
     factor: f64,
+    /// The unit that its title or a line of units names.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    unit: Option<String>,
 }
 
 /// A column of the answers.
@@ -192,6 +197,7 @@ impl From<Run> for RunAnswer {
             name: column.name.clone(),
             pointer: column.pointer.clone(),
             factor: column.factor,
+            unit: column.unit.clone(),
         };
         let own = format!("/v1/runs/{}", chunks.id);
         let links = ["results", "manifest", "totals", "cancel", "events"];

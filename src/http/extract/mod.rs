@@ -13,3 +13,4 @@ pub mod query;
 pub mod rows;
 pub mod run_rows;
 pub mod submit_options;
+pub mod titles;

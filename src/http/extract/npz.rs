@@ -8,7 +8,8 @@ use axum::body::Bytes;
 use zip::ZipArchive;
 
 use crate::contact::evaluate::column::Column;
-use crate::http::extract::batch::table::column_pointer;
+use crate::http::extract::rows::column;
+use crate::http::extract::titles::{faulty, places, require_few};
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 
@@ -20,16 +21,15 @@ const KINDS: &str = "float32, float64, or integers";
 /// # Errors
 /// `faulty-table` with the array; `body-too-large` if there is more in it.
 pub fn read_npz(data: Bytes, max_bytes: usize) -> Result<Vec<Column>, ApiError> {
-    read_arrays(data, max_bytes)?
-        .into_iter()
-        .map(|(name, values)| {
-            if let Some(row) = values.iter().position(|value| !value.is_finite()) {
-                return Err(faulty(format!("array `{name}`, row {row}: no number")));
-            }
-            let pointer = column_pointer(&name).map_err(faulty)?;
-            Ok(Column { pointer, values })
-        })
-        .collect()
+    let arrays = read_arrays(data, max_bytes)?;
+    let named = places(arrays.iter().map(|(name, _)| (name.as_str(), None)))?;
+    for (name, values) in &arrays {
+        if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+            return Err(faulty(format!("array `{name}`, row {row}: no number")));
+        }
+    }
+    let values = arrays.into_iter().map(|(_, values)| values);
+    Ok(named.into_iter().zip(values).map(column).collect())
 }
 
 /// The arrays of an archive with their names, all of one length.
@@ -40,6 +40,7 @@ pub fn read_arrays(data: Bytes, max_bytes: usize) -> Result<Vec<(String, Vec<f64
     let unread =
         |error: &dyn std::fmt::Display| faulty(format!("the NPZ archive cannot be read: {error}"));
     let mut archive = ZipArchive::new(Cursor::new(data)).map_err(|error| unread(&error))?;
+    require_few(archive.len())?;
     let mut left = max_bytes as u64;
     let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
     for place in 0..archive.len() {
@@ -77,10 +78,6 @@ pub fn too_large(max_bytes: usize) -> ApiError {
         "the arrays are larger than the {max_bytes} bytes that are allowed (`--evaluate-max-mib`)"
     );
     ApiError::new(ProblemKind::BodyTooLarge, detail)
-}
-
-fn faulty(detail: String) -> ApiError {
-    ApiError::new(ProblemKind::FaultyTable, detail)
 }
 
 /// The numbers of an NPY file.

@@ -1,5 +1,6 @@
 //! Reads rows: a template case and columns of numbers, as JSON or CSV, straight into columns.
 
+use std::collections::HashSet;
 use std::fmt;
 use std::io::Cursor;
 
@@ -7,19 +8,24 @@ use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::header;
 use http_body_util::{BodyExt, Limited};
-use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
+use serde::de::{
+    Deserialize, DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor,
+};
 use serde_json::Value;
 
 use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::varied::Values;
-use crate::http::extract::batch::table::{column_pointer, column_pointers};
 use crate::http::extract::json::{Strict, unreadable};
+use crate::http::extract::titles::{
+    Place, delimiter, faulty, is_line_of_units, number, places, require_few,
+};
 use crate::http::layers::admission::too_long;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::codec::arrow;
-use crate::jobs::codec::table::TableColumn;
+use crate::jobs::codec::table::{COLUMNS_MAX, TableColumn};
+use crate::jobs::run::head::converted;
 
 /// The bytes that a request's body may have, or has as far as it says.
 #[must_use]
@@ -81,43 +87,55 @@ pub fn read_json(text: &[u8]) -> Result<(Value, Vec<Column>), ApiError> {
 pub fn read_json_columns(text: &[u8]) -> Result<(Value, NamedValues), ApiError> {
     let read: RowsBody =
         serde_json::from_slice(text).map_err(|error| ApiError::malformed(&error))?;
-    Ok((read.template, read.columns))
+    require_few(read.columns.count)?;
+    Ok((read.template, read.columns.columns))
 }
 
 /// Columns with their names.
 pub type NamedValues = Vec<(String, Values)>;
 
-/// Columns from CSV, whose first line names them as a table of a batch does.
+/// Columns from CSV, whose first line names them as a table of a batch does; the second line may give their units.
 ///
 /// # Errors
 /// `faulty-table` with line and column.
 pub fn read_csv(text: &[u8]) -> Result<Vec<Column>, ApiError> {
-    let faulty = |detail: String| ApiError::new(ProblemKind::FaultyTable, detail);
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let end = text
         .iter()
         .position(|byte| *byte == b'\n')
         .unwrap_or(text.len());
-    let (head, lines) = text.split_at(end);
-    let pointers = column_pointers(head).map_err(|detail| faulty(format!("line 1: {detail}")))?;
-    let mut columns: Vec<Column> = pointers
-        .into_iter()
-        .map(|pointer| Column {
-            pointer,
-            values: Vec::new(),
-        })
-        .collect();
+    let delimiter = delimiter(&text[..end]);
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
-        .from_reader(lines);
+        .flexible(true)
+        .delimiter(delimiter)
+        .from_reader(text);
+    let unread = |error: csv::Error| faulty(format!("the table cannot be read: {error}"));
+    let mut record = csv::StringRecord::new();
+    reader.read_record(&mut record).map_err(unread)?;
+    require_few(record.len())?;
+    let titles: Vec<String> = record.iter().map(|title| title.trim().to_owned()).collect();
     let mut record = csv::ByteRecord::new();
-    loop {
-        let more = reader.read_byte_record(&mut record);
-        if !more.map_err(|error| faulty(format!("the table cannot be read: {error}")))? {
-            return Ok(columns);
-        }
+    let mut more = reader.read_byte_record(&mut record).map_err(unread)?;
+    let units: Vec<String> = record.iter().map(|unit| field(unit).to_owned()).collect();
+    let units = Some(units)
+        .filter(|units| more && units.len() == titles.len())
+        .filter(|units| is_line_of_units(units.iter().map(String::as_str)));
+    if units.is_some() {
+        more = reader.read_byte_record(&mut record).map_err(unread)?;
+    }
+    let unit = |place: usize| units.as_ref().map(|units| units[place].as_str());
+    let named = titles.iter().enumerate();
+    let named = places(named.map(|(place, title)| (title.as_str(), unit(place))));
+    let named = named.map_err(|error| {
+        let detail = format!("line 1: {}", error.detail());
+        error.saying(detail)
+    })?;
+    let mut columns = vec![Vec::new(); named.len()];
+    while more {
         let line = || {
             let start = record.position().map_or(0, csv::Position::byte);
-            line_at(text, end + usize::try_from(start).unwrap_or(0))
+            line_at(text, usize::try_from(start).unwrap_or(0))
         };
         if record.len() != columns.len() {
             let detail = format!(
@@ -128,20 +146,40 @@ pub fn read_csv(text: &[u8]) -> Result<Vec<Column>, ApiError> {
             );
             return Err(faulty(detail));
         }
-        for (field, column) in record.iter().zip(&mut columns) {
-            let text = std::str::from_utf8(field).unwrap_or("?").trim();
-            match text.parse::<f64>() {
-                Ok(number) if number.is_finite() => column.values.push(number),
+        for (place, (text, values)) in record.iter().zip(&mut columns).enumerate() {
+            let text = field(text);
+            match number(text, delimiter != b',') {
+                Some(number) if number.is_finite() => values.push(number),
                 _ => {
                     let detail = format!(
-                        "line {}, column `{}`: `{text}` is no number",
+                        "line {}, column `{}`: `{text}` is not a number",
                         line(),
-                        column.pointer
+                        titles[place]
                     );
                     return Err(faulty(detail));
                 }
             }
         }
+        more = reader.read_byte_record(&mut record).map_err(unread)?;
+    }
+    Ok(named.into_iter().zip(columns).map(column).collect())
+}
+
+fn field(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap_or("?").trim()
+}
+
+/// A column from its place and the numbers that were sent.
+#[must_use]
+pub fn column((place, mut values): (Place, Vec<f64>)) -> Column {
+    if place.factor != 1.0 {
+        for value in &mut values {
+            *value = converted(*value, place.factor);
+        }
+    }
+    Column {
+        pointer: place.pointer,
+        values,
     }
 }
 
@@ -150,35 +188,37 @@ pub fn read_csv(text: &[u8]) -> Result<Vec<Column>, ApiError> {
 /// # Errors
 /// `faulty-table` with the column.
 pub fn read_arrow(data: Bytes) -> Result<Vec<Column>, ApiError> {
-    let faulty = |detail: String| ApiError::new(ProblemKind::FaultyTable, detail);
     let unread =
         |error: &dyn fmt::Display| faulty(format!("the Arrow data cannot be read: {error}"));
-    let mut columns: Vec<Column> = Vec::new();
+    let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
+    let mut named = Vec::new();
     for table in arrow::read(Cursor::new(data)).map_err(|error| unread(&error))? {
         let table = table.map_err(|error| unread(&error))?;
-        for (place, (title, values)) in table.columns.into_iter().enumerate() {
+        if columns.is_empty() {
+            let titles = table.columns.iter().map(|(title, _)| (&**title, None));
+            named = places(titles)?;
+            let empty = |(title, _): &(String, TableColumn)| (title.clone(), Vec::new());
+            columns = table.columns.iter().map(empty).collect();
+        }
+        for ((title, held), (_, values)) in columns.iter_mut().zip(table.columns) {
             let numbers = match values {
                 TableColumn::Numbers(numbers) => numbers,
                 #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
                 TableColumn::Integers(values) => values.iter().map(|value| *value as f64).collect(),
                 TableColumn::Texts(_) => {
-                    return Err(faulty(format!("column `{title}` holds texts, no numbers")));
+                    let detail = format!("column `{title}` holds texts; numbers are needed");
+                    return Err(faulty(detail));
                 }
             };
             if let Some(row) = numbers.iter().position(|number| !number.is_finite()) {
-                let row = row + columns.get(place).map_or(0, |column| column.values.len());
+                let row = row + held.len();
                 return Err(faulty(format!("column `{title}`, row {row}: no number")));
             }
-            match columns.get_mut(place) {
-                Some(column) => column.values.extend(numbers),
-                None => columns.push(Column {
-                    pointer: column_pointer(&title).map_err(faulty)?,
-                    values: numbers,
-                }),
-            }
+            held.extend(numbers);
         }
     }
-    Ok(columns)
+    let values = columns.into_iter().map(|(_, values)| values);
+    Ok(named.into_iter().zip(values).map(column).collect())
 }
 
 /// Number of the line that a record begins on which follows this place, from 1; the reader's own place lies before the end of the line before.
@@ -193,7 +233,7 @@ fn line_at(text: &[u8], place: usize) -> usize {
 /// The JSON body of rows.
 struct RowsBody {
     template: Value,
-    columns: NamedValues,
+    columns: RowColumns,
 }
 
 impl<'de> Deserialize<'de> for RowsBody {
@@ -220,7 +260,7 @@ impl<'de> Visitor<'de> for BodyVisitor {
                     template.replace(value).is_some()
                 }
                 "columns" => columns
-                    .replace(members.next_value::<RowColumns>()?.0)
+                    .replace(members.next_value::<RowColumns>()?)
                     .is_some(),
                 _ => {
                     let known = "allowed: `template`, `columns`";
@@ -242,37 +282,45 @@ impl<'de> Visitor<'de> for BodyVisitor {
     }
 }
 
-struct RowColumns(NamedValues);
+/// Columns; of those beyond [`COLUMNS_MAX`] only the count is kept.
+#[derive(Default)]
+struct RowColumns {
+    columns: NamedValues,
+    count: usize,
+}
 
 impl<'de> Deserialize<'de> for RowColumns {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer
-            .deserialize_map(RowColumnsVisitor)
-            .map(RowColumns)
+        deserializer.deserialize_map(RowColumnsVisitor)
     }
 }
 
 struct RowColumnsVisitor;
 
 impl<'de> Visitor<'de> for RowColumnsVisitor {
-    type Value = NamedValues;
+    type Value = RowColumns;
 
     fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
         formatter.write_str("an object of columns, each named by a JSON pointer into the case")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<NamedValues, A::Error> {
-        let mut columns: NamedValues = Vec::new();
+    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<RowColumns, A::Error> {
+        let (mut read, mut seen) = (RowColumns::default(), HashSet::new());
         while let Some(pointer) = members.next_key::<String>()? {
-            if columns.iter().any(|(known, _)| *known == pointer) {
+            read.count += 1;
+            if read.count > COLUMNS_MAX {
+                members.next_value::<IgnoredAny>()?;
+                continue;
+            }
+            if !seen.insert(pointer.clone()) {
                 return Err(A::Error::custom(format_args!(
                     "the column `{pointer}` is written twice"
                 )));
             }
             let values = members.next_value_seed(RowValues(&pointer))?;
-            columns.push((pointer, values));
+            read.columns.push((pointer, values));
         }
-        Ok(columns)
+        Ok(read)
     }
 }
 
@@ -299,7 +347,10 @@ impl<'de> Visitor<'de> for RowValues<'_> {
         match first.map_err(|error| self.at(0, &error))? {
             None => Ok(Values::Numbers(Vec::new())),
             Some(First::Number(first)) => self.rest(items, first).map(Values::Numbers),
-            Some(First::Text(first)) => self.rest(items, first).map(Values::Texts),
+            Some(First::Text(first)) => {
+                let texts = self.rest::<_, String>(items, first)?;
+                Ok(Values::Texts(texts.into_iter().map(Some).collect()))
+            }
         }
     }
 }
@@ -376,6 +427,8 @@ mod tests {
         assert_eq!(template, serde_json::json!({ "a": 1 }));
         let csv = "\u{feff}creepage_x, /load/normal_force_n\r\n0.1,80000\r\n-2e-3, 9 \r\n";
         assert_eq!(read_csv(csv.as_bytes()).unwrap(), columns);
+        let units = "creepage_x;Normal force\n[%];[kN]\n10;80\n-0,2;0,009\n";
+        assert_eq!(read_csv(units.as_bytes()).unwrap(), columns);
     }
 
     #[test]
@@ -387,6 +440,8 @@ mod tests {
             fault.contains("/motion/creepage_x") && fault.contains("row 1"),
             "{fault}"
         );
+        let twice = format!("{:?}", read_csv(b"creepage_x,nu_x [-]\n1,2\n").unwrap_err());
+        assert!(twice.contains("twice"), "{twice}");
         for (csv, words) in [
             ("creepage_x\n0.1\nx\n", ["line 3", "creepage_x"]),
             ("creepage_x\n0.1\nnan\n", ["line 3", "nan"]),

@@ -111,6 +111,14 @@ impl ApiError {
         failure
     }
 
+    /// A table whose columns have these faults.
+    #[must_use]
+    pub fn faulty_table(detail: String, faults: Vec<Fault>) -> Self {
+        let mut failure = ApiError::new(ProblemKind::FaultyTable, detail);
+        failure.problem.errors = faults;
+        failure
+    }
+
     /// A query with faults; `faults` is not empty.
     #[must_use]
     pub fn bad_query(faults: Vec<Fault>) -> Self {
@@ -153,12 +161,19 @@ impl ApiError {
 
 impl From<CaseError> for ApiError {
     fn from(CaseError(faults): CaseError) -> Self {
+        let first = faults.first();
+        let first = first.map_or(String::new(), |fault| match &*fault.pointer {
+            "" => fault.detail.clone(),
+            pointer => format!("`{pointer}`: {}", fault.detail),
+        });
         let detail = match faults.len() {
-            1 => "the case has 1 fault".to_owned(),
+            1 => format!("the case has 1 fault: {first}"),
             count if count > FAULTS_LISTED => {
-                format!("the case has {count} faults; the first {FAULTS_LISTED} are listed")
+                format!(
+                    "the case has {count} faults, of which {FAULTS_LISTED} are listed; the first: {first}"
+                )
             }
-            count => format!("the case has {count} faults"),
+            count => format!("the case has {count} faults; the first: {first}"),
         };
         let mut failure = ApiError::new(ProblemKind::FaultyCase, detail);
         failure.problem.errors = faults

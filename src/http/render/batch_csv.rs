@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
-use crate::http::render::csv::{finish, number};
+use crate::http::render::csv::{finish, number, text_field};
 use crate::http::render::forces::Forces;
 use crate::jobs::model::batch::BatchItem;
 
@@ -52,13 +52,17 @@ const LABEL: &str = "label:";
 #[derive(Debug, Clone)]
 pub(crate) struct Columns(Vec<String>);
 
-impl Default for Columns {
-    fn default() -> Self {
-        Columns(default_names().map(str::to_owned).collect())
-    }
-}
-
 impl Columns {
+    /// The usual columns, and before `remarks` one for each of these labels.
+    #[must_use]
+    pub(crate) fn with_labels(keys: &[String]) -> Columns {
+        let mut names: Vec<String> = default_names().map(str::to_owned).collect();
+        let place = names.iter().position(|name| name == "remarks");
+        let place = place.unwrap_or(names.len());
+        names.splice(place..place, keys.iter().map(|key| format!("{LABEL}{key}")));
+        Columns(names)
+    }
+
     /// Reads names with commas between.
     #[must_use]
     pub(crate) fn read(text: &str) -> Option<Columns> {
@@ -90,7 +94,7 @@ impl Columns {
     /// None that memory does not have.
     pub(crate) fn head(&self) -> Result<Vec<u8>, csv::Error> {
         let mut out = csv::Writer::from_writer(Vec::new());
-        out.write_record(&self.0)?;
+        out.write_record(self.0.iter().map(|name| text_field(name).into_owned()))?;
         finish(out)
     }
 
@@ -105,7 +109,7 @@ impl Columns {
         error: &str,
     ) -> Result<(), csv::Error> {
         out.write_record(self.0.iter().map(|name| match name.as_str() {
-            "error" => error.to_owned(),
+            "error" => text_field(error).into_owned(),
             name => of_job(item, name).unwrap_or_default(),
         }))
     }
@@ -151,12 +155,12 @@ fn of_job(item: &BatchItem, name: &str) -> Option<String> {
     Some(match name {
         "index" => item.index.to_string(),
         "id" => job.id.to_string(),
-        "name" => for_sheets(job.name.as_deref().unwrap_or_default()),
+        "name" => text_field(job.name.as_deref().unwrap_or_default()).into_owned(),
         "state" => job.state.name().to_owned(),
         "cached" => job.cached.to_string(),
         _ => {
             let label = job.labels.get(name.strip_prefix(LABEL)?);
-            for_sheets(label.map_or("", String::as_str))
+            text_field(label.map_or("", String::as_str)).into_owned()
         }
     })
 }
@@ -314,14 +318,4 @@ fn codes(remarks: &[RemarkEntry], point: usize, patch: Option<usize>) -> String 
         }
     }
     codes.join(" ")
-}
-
-/// A text of a client as a field of a table. Programs for sheets take what begins like a formula for one; an apostrophe
-/// says that it is none.
-fn for_sheets(text: &str) -> String {
-    if text.starts_with(['=', '+', '-', '@']) {
-        format!("'{text}")
-    } else {
-        text.to_owned()
-    }
 }

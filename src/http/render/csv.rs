@@ -1,5 +1,6 @@
 //! CSV (RFC 4180): a header with the names, one line per row. Zones are words; what lies outside the patch is empty.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table};
@@ -46,6 +47,26 @@ pub(crate) fn lines(table: &Table, rows: Range<usize>) -> Result<Vec<u8>, csv::E
         end_row(&mut out, table, row)?;
     }
     finish(out)
+}
+
+/// A text of a client as a field of a table. Spreadsheets run a text that begins like a formula, even behind blanks, tabs or line breaks; a
+/// leading apostrophe marks it as text. Numbers are written as they are.
+#[must_use]
+pub(crate) fn text_field(text: &str) -> Cow<'_, str> {
+    let begin = text.trim_start_matches(|mark: char| mark.is_whitespace() || mark.is_control());
+    // Spreadsheets take the wide forms for the same signs.
+    let formula = begin.starts_with(['=', '+', '-', '@', '＝', '＋', '－', '＠']);
+    match formula && !is_number(text) {
+        true => Cow::Owned(format!("'{text}")),
+        false => Cow::Borrowed(text),
+    }
+}
+
+/// Digits with a sign, a point or a comma, and an exponent.
+fn is_number(text: &str) -> bool {
+    let digits = |mark: char| mark.is_ascii_digit() || "+-.,eE".contains(mark);
+    let text = text.trim();
+    text.chars().all(digits) && text.replacen(',', ".", 1).parse::<f64>().is_ok()
 }
 
 /// What was written.
@@ -100,6 +121,21 @@ pub(crate) fn single(value: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn texts_that_begin_like_formulas_are_marked_and_numbers_are_not() {
+        for text in [
+            "=1+1", "+1+1", "-1-1", "@SUM(1)", " =1", "\t=1", "\r@a", "-", "-a", "+inf", "-nan",
+            "－1", "=5", "- 5", "-5;1", "-1,2,3", "\u{a0}=1",
+        ] {
+            assert_eq!(text_field(text), format!("'{text}"));
+        }
+        for text in [
+            "-5", "+5", "-5.25", "-5,25", "-1e-3", "+.5", "", "a=1", "1-1", "'=1", "é",
+        ] {
+            assert_eq!(text_field(text), text);
+        }
+    }
 
     #[test]
     fn numbers_read_back_as_they_were() {

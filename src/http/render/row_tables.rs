@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::fmt::Write;
 
+use crate::http::render::csv::text_field;
 use crate::http::render::rows::write_number;
 use crate::jobs::codec::arrow::ArrowWriter;
 use crate::jobs::codec::parquet::TableWriter;
@@ -56,7 +57,7 @@ impl RowWriter {
         match self {
             RowWriter::Csv(names) => {
                 let mut writer = csv::Writer::from_writer(Vec::new());
-                writer.write_record(names)?;
+                writer.write_record(names.iter().map(|name| text_field(name).into_owned()))?;
                 Ok(writer.into_inner()?)
             }
             _ => Ok(Vec::new()),
@@ -112,7 +113,9 @@ fn csv_lines(table: &RowTable) -> Result<Vec<u8>, WriteError> {
             match column {
                 TableColumn::Integers(values) => write!(field, "{}", values[row])?,
                 TableColumn::Numbers(values) => write_number(&mut field, values[row], ""),
-                TableColumn::Texts(values) => field.push_str(&values[row]),
+                TableColumn::Texts(values) => {
+                    field.push_str(&text_field(values[row].as_deref().unwrap_or_default()));
+                }
             }
             writer.write_field(&field)?;
         }
@@ -133,7 +136,6 @@ fn json_lines(table: &RowTable) -> Result<String, WriteError> {
             match column {
                 TableColumn::Integers(values) => write!(text, "{}", values[row])?,
                 TableColumn::Numbers(values) => write_number(&mut text, values[row], "null"),
-                TableColumn::Texts(values) if values[row].is_empty() => text.push_str("null"),
                 TableColumn::Texts(values) => text.push_str(&serde_json::to_string(&values[row])?),
             }
         }
@@ -154,7 +156,7 @@ mod tests {
                 ("f".to_owned(), TableColumn::Numbers(vec![f64::NAN, 0.1])),
                 (
                     "t".to_owned(),
-                    TableColumn::Texts(vec!["a, \"b\"".to_owned(), String::new()]),
+                    TableColumn::Texts(vec![Some("a, \"b\"".to_owned()), None]),
                 ),
             ],
         };

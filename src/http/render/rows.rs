@@ -95,7 +95,9 @@ pub(crate) fn arrow_body(answer: RowsAnswer) -> Body {
 
 fn part(answer: &RowsAnswer, range: Range<usize>) -> RowTable {
     let status = answer.status[range.clone()].iter();
-    let status = status.map(|status| status.name().to_owned()).collect();
+    let status = status
+        .map(|status| Some(status.name().to_owned()))
+        .collect();
     let numbers = answer.columns().into_iter();
     let numbers = numbers.map(|(name, column)| {
         let column = TableColumn::Numbers(column[range.clone()].to_vec());

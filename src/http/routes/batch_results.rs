@@ -33,6 +33,9 @@ use crate::jobs::model::job::State as JobState;
 
 /// Longest time results are waited for, in s.
 const WAIT_MAX_SECONDS: u32 = 3600;
+/// Most columns of labels of a table for which no columns are named: three times as many as one case has labels.
+const LABEL_COLUMNS_MAX: u32 = 100;
+
 /// One line of the results of a batch.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct BatchLine {
@@ -69,7 +72,8 @@ query! {
         after: Uuid as String = id("job");
         /// Only lines of jobs in this state; may be repeated for jobs in one of several
         state: Vec<JobState> as Vec<JobState> = Repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
-        /// Columns of the CSV, with commas between, such as `label:km,force_y_n`; with `patch` among them there is a line for each patch. See `docs/formats.md`
+        /// Columns of the CSV, with commas between, such as `label:km,force_y_n`; with `patch` among them there is a line for each patch. See `docs/formats.md`.
+        /// When left out: the usual columns, and one for each label of the jobs, at most 100
         #[param(example = "label:km,pressure_max_mpa,target_met")]
         columns: Columns as String = reader(Columns::allowed(), Columns::read);
         /// `ndjson` or `csv`; overrides `Accept`
@@ -126,19 +130,26 @@ pub(crate) async fn results(
     let until = wait.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     // What a reader holds of small results; large ones are counted one by one.
     let share = memory.ready_answer(jobs.tenant(), STREAM_BYTES)?;
-    let columns = Arc::new(query.columns.unwrap_or_default());
-    let head = match format {
-        Format::Csv => {
+    let columns = match (format, query.columns) {
+        (Format::Csv, None) => {
+            let keys = jobs.batch_label_keys(id, LABEL_COLUMNS_MAX).await?;
+            Some(Columns::with_labels(&keys))
+        }
+        (_, columns) => columns,
+    };
+    let columns = columns.map(Arc::new);
+    let head = match &columns {
+        Some(columns) => {
             let head = columns.head().map_err(|error| ApiError::internal(&error))?;
             Some(Bytes::from(head))
         }
-        _ => None,
+        None => None,
     };
     let lines = Lines {
         source: Source {
             jobs: jobs.clone(),
             memory,
-            columns: (format == Format::Csv).then_some(columns),
+            columns,
         },
         batch: id,
         until,

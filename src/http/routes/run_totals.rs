@@ -257,6 +257,7 @@ impl Gathered {
             })
             .collect();
         for (row, status) in statuses.iter().enumerate() {
+            let status = status.as_deref().unwrap_or_default();
             note(&mut self.all, status, &columns, row);
             let Some(section) = &self.section else {
                 continue;
@@ -304,7 +305,9 @@ impl Gathered {
 impl RowSection {
     fn key(&self, table: &RowTable, row: usize) -> Option<SectionKey> {
         match table.column(&self.name)? {
-            TableColumn::Texts(texts) => Some(SectionKey::Text(texts[row].clone())),
+            TableColumn::Texts(texts) => {
+                Some(SectionKey::Text(texts[row].clone().unwrap_or_default()))
+            }
             TableColumn::Numbers(numbers) => self.interval(numbers[row]),
             #[expect(clippy::cast_precision_loss, reason = "for an interval")]
             TableColumn::Integers(numbers) => self.interval(numbers[row] as f64),

@@ -15,8 +15,8 @@ use crate::http::extract::ids::RunId;
 use crate::http::extract::labels::{name, new_label};
 use crate::http::extract::query::{Parameters, Repeated, count, id, query, reader};
 use crate::http::extract::run_rows::body::{form, read_run};
-use crate::http::extract::run_rows::titles::{NamedColumns, named_column};
 use crate::http::extract::submit_options::SubmitQuery;
+use crate::http::extract::titles::{NamedColumns, named_column};
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::problems;
@@ -50,9 +50,16 @@ query! {
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
         /// What a column is whose title does not say it, as `TITLE:NAME`; may be repeated. The name is a JSON pointer, a short name or a name with a
-        /// unit, such as `Q:vertical_force [kN]`; without a name the column is carried along to the answers
+        /// unit, such as `Q:vertical_force [kN]`; a unit in the title or in a line of units may be left out. Without a name the column is carried along
+        /// to the answers
         #[param(max_items = 100, example = json!(["Q:vertical_force [kN]"]))]
         column: Vec<(String, String)> as Vec<String> = Repeated(reader("`TITLE:NAME`", named_column));
+        /// Titles of columns that are carried along to the answers, with commas between. Columns of places, times, sections and vehicles, such as `km`,
+        /// `time` or `axle_no`, need no mention; any other column whose title names nothing in the case is refused
+        #[param(example = "Y_left,curvature")]
+        carry: Vec<String> as String = reader("titles of columns with commas between", |text| {
+            Some(text.split(',').map(|title| title.trim().to_owned()).collect())
+        });
         /// Where rows that are solved on a mesh start: `own`, each from its own case alone, also when left out; `neighbours`, from rows that ask
         /// the same but for their motions, or that are similar, which takes less time where motions are near each other
         #[param(pattern = "^(own|neighbours)$", example = "neighbours")]
@@ -112,7 +119,10 @@ pub(crate) async fn submit(
         idempotency_key,
     };
     let form = form(&jobs, request.headers(), run.template).await?;
-    let read = (form, NamedColumns(run.column.unwrap_or_default()));
+    let carried = run.carry.unwrap_or_default().into_iter();
+    let named = run.column.unwrap_or_default().into_iter();
+    let named = named.chain(carried.map(|title| (title, String::new())));
+    let read = (form, NamedColumns(named.collect()));
     let draft = read_run(&jobs, &memory, &options, read, request).await?;
     let (run, replayed) = jobs.submit_run(draft, options_of_run).await?;
     let location = [(header::LOCATION, format!("/v1/runs/{}", run.chunks.id))];

@@ -88,6 +88,15 @@ impl Jobs {
         }
     }
 
+    /// The keys of the labels of the jobs of a batch, sorted, the first `limit`.
+    ///
+    /// # Errors
+    /// A failed database.
+    pub async fn batch_label_keys(&self, id: Uuid, limit: u32) -> Result<Vec<String>, JobsError> {
+        let store = &self.shared.store;
+        Ok(store.batch_label_keys(&self.tenant, id, limit).await?)
+    }
+
     /// The result of a line that lies outside the table: its size, and its text without the closing brace, read while it is taken. What cannot be
     /// read costs its own line and no other.
     ///

@@ -3,13 +3,55 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::contact::evaluate::placing::put;
+use crate::contact::evaluate::placing::{self, Replaced, put};
 use crate::jobs::error::JobsError;
+use crate::jobs::idempotency;
 use crate::jobs::store::submission::StoredCase;
 
 /// A value and the members that lead to its place.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cell(pub Vec<String>, pub Value);
+
+impl Cell {
+    /// The place as a JSON pointer.
+    #[must_use]
+    pub fn pointer(&self) -> String {
+        let escaped = |part: &String| format!("/{}", part.replace('~', "~0").replace('/', "~1"));
+        self.0.iter().map(escaped).collect()
+    }
+}
+
+/// Digest of the cells of a row, whatever their order.
+#[must_use]
+pub fn digest(cells: &[Cell]) -> [u8; 32] {
+    let places = cells.iter().map(|cell| (cell.pointer(), cell.1.clone()));
+    idempotency::digest(&Value::Object(places.collect()))
+}
+
+/// As [`fill`], in the template itself; [`restore`] takes the values of the row away again.
+///
+/// # Errors
+/// As [`fill`]; the template is then unchanged.
+pub fn fill_in_place(template: &mut Value, row: &[Cell]) -> Result<Vec<Replaced>, (usize, String)> {
+    let mut filled = Vec::with_capacity(row.len());
+    for (number, Cell(path, value)) in row.iter().enumerate() {
+        match placing::replace(template, path, value.clone()) {
+            Ok(replaced) => filled.push(replaced),
+            Err(reason) => {
+                restore(template, row, filled);
+                return Err((number, reason));
+            }
+        }
+    }
+    Ok(filled)
+}
+
+/// Undoes [`fill_in_place`].
+pub fn restore(template: &mut Value, row: &[Cell], filled: Vec<Replaced>) {
+    for (Cell(path, _), replaced) in row.iter().zip(filled).rev() {
+        placing::restore(template, path, replaced);
+    }
+}
 
 /// The template with the values of a row in their places.
 ///

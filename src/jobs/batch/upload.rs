@@ -7,10 +7,12 @@ use serde_json::Value;
 use tokio::runtime::Handle;
 use uuid::Uuid;
 
+use crate::contact::case::known_pair::KnownPair;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::sections::named_sections;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::batch::staging::{StagedCase, Staging};
-use crate::jobs::batch::template::Cell;
+use crate::jobs::batch::template::{self, Cell};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
@@ -49,11 +51,9 @@ pub struct BatchCase {
     pub own: CaseOptions,
 }
 
-/// A row of a table: the case that it makes of the template, what it puts into it, and its own options.
+/// A row of a table: what it puts into the template, and its own options.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchRow {
-    /// The case.
-    pub case: Value,
     /// What the row puts into the template.
     pub cells: Vec<Cell>,
     /// Its own options.
@@ -67,6 +67,8 @@ pub struct BatchUpload {
     pub(crate) id: Uuid,
     pub(crate) staging: Option<Staging>,
     pub(crate) template: Option<Bytes>,
+    /// The case that rows fill.
+    rows: Option<RowTemplate>,
     digest: blake3::Hasher,
     /// Cases seen so far.
     pub cases: u32,
@@ -90,11 +92,28 @@ pub struct BatchUpload {
     pub(crate) in_table: bool,
 }
 
+/// The case that rows of a table fill one after the other, in place.
+#[derive(Debug)]
+struct RowTemplate {
+    case: Value,
+    /// The cross-sections that were read last.
+    known: KnownPair,
+}
+
 impl BatchUpload {
-    /// The case that rows added with [`BatchUpload::add_row`] fill.
-    pub fn set_template(&mut self, template: Bytes) {
+    /// Sets what is stored once for all its cases.
+    pub(crate) fn set_template(&mut self, template: Bytes) {
         self.digest.update(&template);
         self.template = Some(template);
+    }
+
+    /// Sets the case that rows added with [`BatchUpload::add_row`] fill.
+    pub fn set_row_template(&mut self, case: Value) {
+        self.set_template(Bytes::from(case.to_string()));
+        self.rows = Some(RowTemplate {
+            case,
+            known: KnownPair::default(),
+        });
     }
 
     /// Checks one more case and keeps it if it has no fault. `case` is what `text` says, or why it says nothing. Blocks;
@@ -123,7 +142,9 @@ impl BatchUpload {
             false => Ok(text.to_owned()),
         };
         let kept = kept.map_err(|error| JobsError::Damaged(error.to_string()))?;
-        self.check(line, &case, prefix, (false, own), &kept)
+        self.digest.update(&idempotency::digest(&case));
+        let checked = self.jobs.check(&case);
+        self.keep(line, checked, prefix, (false, own), &kept)
     }
 
     /// As [`BatchUpload::add`], of a row of a table.
@@ -138,20 +159,63 @@ impl BatchUpload {
     ) -> Result<(), JobsError> {
         // Checked and solved as a case of this size, however little is kept of it.
         self.count(text.len() + self.template.as_ref().map_or(0, Bytes::len))?;
-        let Some(BatchRow { case, cells, own }) = self.good(line, text, row) else {
+        let Some(row) = self.good(line, text, row) else {
             return Ok(());
         };
-        // A profile that the row names is kept with it.
-        let row = named_sections(&case).is_empty();
+        let Some(mut template) = self.rows.take() else {
+            let detail = "a row of a table without a template";
+            return Err(JobsError::Damaged(detail.to_owned()));
+        };
+        let added = self.add_filled(line, &mut template, row);
+        self.rows = Some(template);
+        added
+    }
+
+    /// Adds the case that a row makes of the template, which is afterwards as before.
+    fn add_filled(
+        &mut self,
+        line: Option<u64>,
+        template: &mut RowTemplate,
+        BatchRow { cells, own }: BatchRow,
+    ) -> Result<(), JobsError> {
+        self.digest.update(&template::digest(&cells));
+        let RowTemplate { case, known } = template;
+        let filled = match template::fill_in_place(case, &cells) {
+            Ok(filled) => filled,
+            Err((number, reason)) => {
+                let detail = format!("the column `{}` {reason}", cells[number].pointer());
+                self.reject(line, vec![Fault::new("", detail)]);
+                return Ok(());
+            }
+        };
+        let added = match named_sections(case).is_empty() {
+            true => {
+                let checked = self.jobs.check_next(known, case);
+                let kept = serde_json::to_vec(&cells);
+                kept.map_err(|error| JobsError::Damaged(error.to_string()))
+                    .and_then(|kept| self.keep(line, checked, "", (true, own), &kept))
+            }
+            // A profile that the row names is kept with it.
+            false => self.add_with_profiles(line, case.clone(), own),
+        };
+        template::restore(case, &cells, filled);
+        added
+    }
+
+    /// Adds the case of a row that names profiles.
+    fn add_with_profiles(
+        &mut self,
+        line: Option<u64>,
+        case: Value,
+        own: CaseOptions,
+    ) -> Result<(), JobsError> {
         let Some(case) = self.with_profiles(line, case, "")? else {
             return Ok(());
         };
-        let kept = match row {
-            true => serde_json::to_vec(&cells),
-            false => serde_json::to_vec(&case),
-        };
+        let kept = serde_json::to_vec(&case);
         let kept = kept.map_err(|error| JobsError::Damaged(error.to_string()))?;
-        self.check(line, &case, "", (row, own), &kept)
+        let checked = self.jobs.check(&case);
+        self.keep(line, checked, "", (false, own), &kept)
     }
 
     /// The case with kept profiles in the place of their names; nothing if one is not kept, which is noted.
@@ -239,21 +303,20 @@ impl BatchUpload {
         }
     }
 
-    /// Checks a case and keeps `kept` of it; pointers of its faults begin with `prefix`.
-    fn check(
+    /// Keeps `kept` of a case that was checked, or its faults, whose pointers begin with `prefix`.
+    fn keep(
         &mut self,
         line: Option<u64>,
-        case: &Value,
+        checked: Result<CheckedCase, CaseError>,
         prefix: &str,
         (row, own): (bool, CaseOptions),
         kept: &[u8],
     ) -> Result<(), JobsError> {
-        self.digest.update(&idempotency::digest(case));
         if own != CaseOptions::default() {
             let own = SubmitOptions::default().of_case(own);
             self.digest.update(&own.digest(&[0; 32]));
         }
-        let bound = self.jobs.check(case).and_then(|mut checked| {
+        let bound = checked.and_then(|mut checked| {
             let bound = self.jobs.bind(&mut checked.label.labels);
             bound.map(|()| checked).map_err(CaseError)
         });
@@ -388,6 +451,7 @@ impl Jobs {
             id,
             staging: Some(staging),
             template: None,
+            rows: None,
             digest: blake3::Hasher::new(),
             cases: 0,
             rejected: 0,

@@ -13,7 +13,8 @@ use arrow_ipc::reader::{FileReader, StreamReader};
 use arrow_ipc::writer::StreamWriter;
 use arrow_schema::{ArrowError, DataType, Field, Schema};
 
-use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+use crate::jobs::codec::table::{COLUMNS_MAX, RowTable, TableColumn, TableKind};
+use crate::jobs::codec::{DAMAGED, guarded};
 
 /// The bytes that a file begins with; a stream begins otherwise.
 const FILE_MAGIC: &[u8] = b"ARROW1";
@@ -54,8 +55,7 @@ impl<W: Write> ArrowWriter<W> {
                 Arc::new(values.into_iter().map(there).collect::<Float64Array>()) as ArrayRef
             }
             TableColumn::Texts(values) => {
-                let there = |text: String| (!text.is_empty()).then_some(text);
-                Arc::new(values.into_iter().map(there).collect::<StringArray>()) as ArrayRef
+                Arc::new(values.into_iter().collect::<StringArray>()) as ArrayRef
             }
         });
         let batch = RecordBatch::try_new(self.schema.clone(), columns.collect())?;
@@ -86,13 +86,42 @@ pub fn read<R: Read + Seek + Send + 'static>(
     let mut begin = [0; FILE_MAGIC.len()];
     let read = source.read(&mut begin)?;
     source.seek(SeekFrom::Start(0))?;
-    let batches: Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>> + Send> =
-        match begin[..read] == *FILE_MAGIC {
-            true => Box::new(FileReader::try_new(source, None)?),
-            false => Box::new(StreamReader::try_new(source, None)?),
-        };
-    Ok(batches.map(|batch| table(&batch?)))
+    let damaged = || ArrowError::IpcError(DAMAGED.to_owned());
+    let opened = guarded(|| -> Result<(Batches, Arc<Schema>), ArrowError> {
+        Ok(match begin[..read] == *FILE_MAGIC {
+            true => {
+                let reader = FileReader::try_new(source, None)?;
+                let schema = reader.schema();
+                (Box::new(reader), schema)
+            }
+            false => {
+                let reader = StreamReader::try_new(source, None)?;
+                let schema = reader.schema();
+                (Box::new(reader), schema)
+            }
+        })
+    });
+    let (batches, schema) = opened.ok_or_else(damaged)??;
+    let columns = schema.fields().len();
+    if columns > COLUMNS_MAX {
+        let detail = format!("{columns} columns; at most {COLUMNS_MAX} are allowed");
+        return Err(ArrowError::SchemaError(detail));
+    }
+    // Nothing more is read behind damage.
+    let mut batches = Some(batches);
+    Ok(std::iter::from_fn(move || {
+        let mut reader = batches.take()?;
+        let next = guarded(|| reader.next().map(|batch| table(&batch?)));
+        let next = next.unwrap_or_else(|| Some(Err(damaged())));
+        if matches!(next, Some(Ok(_))) {
+            batches = Some(reader);
+        }
+        next
+    }))
 }
+
+/// Batches of records under way.
+type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>> + Send>;
 
 fn table(batch: &RecordBatch) -> Result<RowTable, ArrowError> {
     let fields = batch.schema();
@@ -112,11 +141,7 @@ fn column(field: &Field, array: &ArrayRef) -> Result<TableColumn, ArrowError> {
         TableColumn::Numbers(values.map(|value| value.map_or(f64::NAN, number)).collect())
     }
     fn texts<'a>(values: impl Iterator<Item = Option<&'a str>>) -> TableColumn {
-        TableColumn::Texts(
-            values
-                .map(|text| text.unwrap_or_default().to_owned())
-                .collect(),
-        )
+        TableColumn::Texts(values.map(|text| text.map(str::to_owned)).collect())
     }
     #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
     Ok(match array.data_type() {
@@ -159,7 +184,7 @@ mod tests {
                 ("f".to_owned(), TableColumn::Numbers(vec![f64::NAN, 0.1])),
                 (
                     "t".to_owned(),
-                    TableColumn::Texts(vec!["é".to_owned(), String::new()]),
+                    TableColumn::Texts(vec![Some("é".to_owned()), None]),
                 ),
             ],
         };
@@ -180,5 +205,35 @@ mod tests {
             assert_eq!(format!("{:?}", read.unwrap()), format!("{table:?}"));
         }
         assert!(read(Cursor::new(b"neither".to_vec())).is_err());
+    }
+
+    #[test]
+    fn damaged_streams_are_errors_whatever_byte_is_wrong() {
+        let numbers = TableColumn::Numbers((0..20).map(f64::from).collect());
+        let texts = TableColumn::Texts((0..20).map(|k| Some(k.to_string())).collect());
+        let table = RowTable {
+            columns: vec![("a".to_owned(), numbers), ("b".to_owned(), texts)],
+        };
+        let kinds: Vec<_> = table
+            .columns
+            .iter()
+            .map(|(name, column)| (name.clone(), column.kind()))
+            .collect();
+        let mut writer = ArrowWriter::new(Vec::new(), &kinds).unwrap();
+        writer.write(table).unwrap();
+        writer.finish().unwrap();
+        let stream = std::mem::take(writer.inner_mut());
+        let mut refused = 0;
+        for place in 0..stream.len() {
+            for wrong in [[0xff; 4], [0x7f; 4], [0, 0, 0, 0x80]] {
+                let mut damaged = stream.clone();
+                let end = (place + wrong.len()).min(damaged.len());
+                damaged[place..end].copy_from_slice(&wrong[..end - place]);
+                let read = read(Cursor::new(damaged));
+                refused +=
+                    usize::from(!read.is_ok_and(|mut tables| tables.all(|table| table.is_ok())));
+            }
+        }
+        assert!(refused > stream.len() / 2, "{refused}");
     }
 }

@@ -1,5 +1,8 @@
 //! A table of rows: named columns of numbers and texts.
 
+/// Most columns of a table that is read. A case has far fewer members that differ from row to row.
+pub const COLUMNS_MAX: usize = 1000;
+
 /// The values of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TableColumn {
@@ -7,8 +10,8 @@ pub enum TableColumn {
     Integers(Vec<i64>),
     /// Numbers; NaN where a row has none.
     Numbers(Vec<f64>),
-    /// Texts; empty where a row has none.
-    Texts(Vec<String>),
+    /// Texts; nothing where a row has none.
+    Texts(Vec<Option<String>>),
 }
 
 /// The kinds of columns.
@@ -79,7 +82,7 @@ impl TableKind {
         match self {
             TableKind::Integers => TableColumn::Integers(vec![0; rows]),
             TableKind::Numbers => TableColumn::Numbers(vec![f64::NAN; rows]),
-            TableKind::Texts => TableColumn::Texts(vec![String::new(); rows]),
+            TableKind::Texts => TableColumn::Texts(vec![None; rows]),
         }
     }
 }

@@ -9,8 +9,10 @@ use crate::jobs::run::head::{RunColumn, RunHead, table_column};
 
 /// What a chunk begins with; no other body of a case does.
 const MAGIC: &[u8] = b"RHROWS1\n";
-/// Numbers are packed by the way.
+/// Cheap compression; chunks are unpacked before every solve.
 const ZSTD_LEVEL: i32 = 1;
+/// In the place of the length of a text: the row has none.
+const NO_TEXT: u64 = u64::MAX;
 
 /// Rows of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,8 +46,9 @@ impl RunChunk {
                 }
                 Values::Texts(texts) => {
                     for text in texts {
-                        plain.extend((text.len() as u64).to_le_bytes());
-                        plain.extend(text.as_bytes());
+                        let length = text.as_ref().map_or(NO_TEXT, |text| text.len() as u64);
+                        plain.extend(length.to_le_bytes());
+                        plain.extend(text.as_deref().unwrap_or_default().as_bytes());
                     }
                 }
             }
@@ -76,10 +79,13 @@ impl RunChunk {
                 return values.collect::<Option<_>>().map(Values::Numbers);
             }
             let texts = (0..rows).map(|_| {
-                let length = usize::try_from(number(&mut rest)?).ok()?;
-                let (text, after) = rest.split_at_checked(length)?;
+                let length = number(&mut rest)?;
+                if length == NO_TEXT {
+                    return Some(None);
+                }
+                let (text, after) = rest.split_at_checked(usize::try_from(length).ok()?)?;
                 rest = after;
-                String::from_utf8(text.to_vec()).ok()
+                String::from_utf8(text.to_vec()).ok().map(Some)
             });
             texts.collect::<Option<_>>().map(Values::Texts)
         };
@@ -123,6 +129,7 @@ mod tests {
     fn a_chunk_comes_back_as_it_was_and_a_broken_one_is_refused() {
         let column = |text| RunColumn {
             factor: 1.0,
+            unit: None,
             name: "c".to_owned(),
             pointer: None,
             text,
@@ -132,7 +139,7 @@ mod tests {
             first_row: 70_000,
             columns: vec![
                 Values::Numbers(vec![0.1, -0.0, 1e300]),
-                Values::Texts(vec!["km 3".to_owned(), String::new(), "é".to_owned()]),
+                Values::Texts(vec![Some("km 3".to_owned()), None, Some(String::new())]),
             ],
         };
         let body = chunk.to_bytes().unwrap();

@@ -1,6 +1,6 @@
 //! A run that is being received: rows are checked and cut into chunks while they arrive.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
 
 use serde_json::Value;
@@ -16,6 +16,7 @@ use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::batch::staging::nameless;
 use crate::jobs::batch::upload::BatchUpload;
+use crate::jobs::codec::table::COLUMNS_MAX;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::submit_options::SubmitOptions;
@@ -31,6 +32,8 @@ const CHUNK_SECONDS: f64 = 3.0;
 const CHUNK_ROWS_MIN: usize = 50;
 /// Bytes of the profiles that the rows of a run may name together: every chunk is solved with all of them at hand.
 const PROFILE_BYTES_MAX: usize = 8 << 20;
+/// Faulty texts of a column that are listed for the rows that are pushed at once.
+const FAULTS_MAX: usize = 20;
 /// Most rows of a chunk, also the rows that decide the size of all chunks.
 const CHUNK_ROWS_MAX: usize = 10_000;
 
@@ -324,6 +327,8 @@ impl RunDraft {
                 continue;
             };
             for (row, name) in (self.rows..).zip(names).filter(|_| of_sections(column)) {
+                // A row without a name is refused with its case.
+                let Some(name) = name else { continue };
                 if self.profiles.contains_key(name) {
                     continue;
                 }
@@ -361,6 +366,8 @@ impl RunDraft {
                 let detail =
                     format!("a value of another kind given; {needed} are needed in this column");
                 faults.push(Fault::new(pointer, detail));
+            } else if let Values::Texts(texts) = values {
+                faults.extend(faults_of_texts(&column.name, texts, self.rows));
             } else if let Some(place) = &column.pointer {
                 faults.extend(of_values(&column.name, place, values, self.rows));
             }
@@ -396,26 +403,46 @@ fn faults_of_template(checked: &CheckedCase) -> Vec<Fault> {
 
 fn faults_of_columns(columns: &[RunColumn]) -> Vec<Fault> {
     let mut faults = Vec::new();
-    for (place, column) in columns.iter().enumerate() {
-        let before = &columns[..place];
-        let twice = before.iter().any(|other| {
-            other.name == column.name
-                || (column.pointer.is_some() && other.pointer == column.pointer)
-        });
-        if twice {
+    if columns.len() > COLUMNS_MAX {
+        let detail = format!(
+            "{} columns given; at most {COLUMNS_MAX} are allowed",
+            columns.len()
+        );
+        return vec![Fault::new("/columns", detail)];
+    }
+    let answered = NumberColumns::all().names();
+    let answered: HashSet<&str> = answered
+        .into_iter()
+        .chain(["row", "status", "method", REASON])
+        .collect();
+    let (mut names, mut places) = (HashSet::new(), HashMap::new());
+    for column in columns {
+        let pointer = column_pointer(&column.name);
+        let place = column.pointer.as_deref();
+        let before = place.and_then(|place| places.insert(place, &column.name));
+        if !names.insert(&column.name) {
             let detail = format!("the column `{}` is there twice", column.name);
-            faults.push(Fault::new(column_pointer(&column.name), detail));
+            faults.push(Fault::new(pointer.clone(), detail));
+        } else if let (Some(before), Some(place)) = (before, place) {
+            let detail = format!(
+                "the columns `{before}` and `{}` are there for one member of the case, `{place}`",
+                column.name
+            );
+            faults.push(Fault::new(pointer.clone(), detail));
         }
-        let own = ["row", "status", "method", REASON];
-        let answered = NumberColumns::all().names();
-        if column.pointer.is_none()
-            && (own.contains(&&*column.name) || answered.contains(&&*column.name))
-        {
+        if has_controls(&column.name) {
+            let detail = format!(
+                "{:?} given; control characters are not allowed in the name of a column",
+                column.name
+            );
+            faults.push(Fault::new(pointer.clone(), detail));
+        }
+        if place.is_none() && answered.contains(&*column.name) {
             let detail = format!(
                 "`{}` is the name of a column of the answers; a column that is carried along needs another name",
                 column.name
             );
-            faults.push(Fault::new(column_pointer(&column.name), detail));
+            faults.push(Fault::new(pointer, detail));
         }
     }
     if columns.iter().all(|column| column.pointer.is_none()) {
@@ -423,6 +450,24 @@ fn faults_of_columns(columns: &[RunColumn]) -> Vec<Fault> {
         faults.push(Fault::new("/columns", detail));
     }
     faults
+}
+
+/// Texts with control characters, which tear tables and lines of logs apart; `first` is the row of the first text.
+fn faults_of_texts(name: &str, texts: &[Option<String>], first: u64) -> Vec<Fault> {
+    let texts = (first..).zip(texts);
+    let texts = texts.filter_map(|(row, text)| Some((row, text.as_deref()?)));
+    texts
+        .filter(|(_, text)| has_controls(text))
+        .take(FAULTS_MAX)
+        .map(|(row, text)| {
+            let detail = format!("{text:?} given; control characters are not allowed");
+            Fault::new(format!("{}/{row}", column_pointer(name)), detail)
+        })
+        .collect()
+}
+
+fn has_controls(text: &str) -> bool {
+    text.chars().any(char::is_control)
 }
 
 fn empty(text: bool) -> Values {

@@ -27,8 +27,21 @@ pub struct RunColumn {
     /// What makes a number that was sent one of the case, in its unit.
     #[serde(default = "unchanged")]
     pub factor: f64,
+    /// The unit that its title or a line of units names.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
     /// It holds texts; otherwise numbers.
     pub text: bool,
+}
+
+/// A number times the factor of its unit, to 15 digits, so that 64.1 kN are 64100 N.
+#[must_use]
+pub fn converted(number: f64, factor: f64) -> f64 {
+    if factor == 1.0 {
+        return number;
+    }
+    let number = factor * number;
+    format!("{number:.14e}").parse().unwrap_or(number)
 }
 
 /// The factor of a column in the unit of the case.
@@ -37,14 +50,10 @@ fn unchanged() -> f64 {
 }
 
 impl RunColumn {
-    /// A number that was sent, in the unit of the case: to 15 digits, so that 64.1 kN are 64100 N.
+    /// A number that was sent, in the unit of the case.
     #[must_use]
     pub fn in_case(&self, number: f64) -> f64 {
-        if self.factor == 1.0 {
-            return number;
-        }
-        let number = self.factor * number;
-        format!("{number:.14e}").parse().unwrap_or(number)
+        converted(number, self.factor)
     }
 
     /// What it holds.
@@ -180,6 +189,7 @@ mod tests {
             name: "Q [kN]".to_owned(),
             pointer: None,
             factor,
+            unit: None,
             text: false,
         };
         assert_ne!(64.1 * 1e3, 64_100.0, "what the digits are for");

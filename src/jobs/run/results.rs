@@ -139,7 +139,7 @@ impl Jobs {
             let column = match (name.as_str(), place) {
                 ("row", _) => TableColumn::Integers(rows.clone().map(u64::cast_signed).collect()),
                 ("status", _) => {
-                    TableColumn::Texts(vec![chunk.why.unwrap_or("lost").to_owned(); count])
+                    TableColumn::Texts(vec![Some(chunk.why.unwrap_or("lost").to_owned()); count])
                 }
                 (_, Some(place)) if head.columns[place].pointer.is_none() => {
                     table_column(sent.columns[place].clone())

@@ -183,6 +183,14 @@ pub trait Store: KeyStore + Send + Sync + Debug {
         bytes: usize,
     ) -> Result<Vec<BatchItem>, StoreError>;
 
+    /// The keys of the labels of the jobs of a batch, sorted, the first `limit`.
+    async fn batch_label_keys(
+        &self,
+        tenant: &str,
+        id: Uuid,
+        limit: u32,
+    ) -> Result<Vec<String>, StoreError>;
+
     /// The case of a job as it was submitted.
     async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>, StoreError>;
 

@@ -37,7 +37,7 @@ pub(crate) fn solve_chunk(
     let first_row = chunk.first_row;
     let (varied, carried) = parted(&head, chunk);
     let limits = &shared.options.limits;
-    if let Ok(checked) = (shared.engine.check)(&head.case, limits) {
+    if let Ok(checked) = shared.engine.check_one(&head.case, limits) {
         control.set_memory_bytes(own_bytes(&checked, head.starts()));
     }
     let task = ManyTask {
@@ -105,9 +105,10 @@ fn table(
 ) -> RowTable {
     let rows = (first_row..).take(answer.status.len());
     let rows = TableColumn::Integers(rows.map(u64::cast_signed).collect());
-    let status = answer.status.iter().map(|status| status.name().to_owned());
+    let status = answer.status.iter();
+    let status = status.map(|status| Some(status.name().to_owned()));
     let method = answer.method.iter();
-    let method = method.map(|method| method.map_or("", |method| method.name()).to_owned());
+    let method = method.map(|method| method.map(|method| method.name().to_owned()));
     let mut columns = vec![("row".to_owned(), rows)];
     columns.extend(carried);
     columns.push(("status".to_owned(), TableColumn::Texts(status.collect())));

@@ -3,6 +3,7 @@
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::HeaderMap;
+use serde_json::Value;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
@@ -30,7 +31,7 @@ pub enum Form {
     /// One case per line.
     Lines,
     /// A table that fills a template.
-    Table(Box<TableBody>),
+    Table(Box<TableBody>, Value),
 }
 
 impl Form {
@@ -38,7 +39,7 @@ impl Form {
         match self {
             Form::Array => Layout::Array,
             Form::Lines => Layout::Lines,
-            Form::Table(_) => Layout::Rows,
+            Form::Table(..) => Layout::Rows,
         }
     }
 }
@@ -66,7 +67,7 @@ pub async fn form(
             let case = jobs.case(job).await;
             let case = case.map_err(|error| ApiError::from(error).about("template"))?;
             let case = jobs.with_profiles(read_json(&case)?).await?;
-            Ok(Form::Table(Box::new(TableBody::new(case))))
+            Ok(Form::Table(Box::default(), case))
         }
         ("text/csv", None) => Err(ApiError::bad_parameter(
             "template",
@@ -99,8 +100,8 @@ pub async fn read_draft(
         request,
     )?;
     let mut draft = jobs.draft()?;
-    if let Form::Table(table) = &form {
-        draft.set_template(table.text());
+    if let Form::Table(_, template) = &mut form {
+        draft.set_row_template(template.take());
     }
     let mut splitter = Splitter::new(form.layout(), options.body_max_bytes);
     let mut portion = Vec::new();
@@ -203,7 +204,7 @@ fn add(
                 .and_then(own_options::read);
             draft.add(element.line, &element.text, case)?;
         }
-        Form::Table(table) => {
+        Form::Table(table, _) => {
             if let Some(row) = table.take(&element.text)? {
                 let row = row.map_err(|detail| vec![Fault::new("", detail)]);
                 draft.add_row(element.line, &element.text, row)?;

@@ -1,202 +1,168 @@
 //! A table of cases: the first line names the columns, every other line fills a template case.
 //!
-//! A column is named by a JSON pointer into the case (`/load/normal_force_n`), by a short name (`normal_force_n`), or as
-//! `label:KEY` for a label; `priority` and `deadline_s` are options of the line. An empty field leaves what the template says.
+//! A column is named by a JSON pointer into the case (`/load/normal_force_n`), by a short name (`normal_force_n`), by a quantity with its unit
+//! (`Normal force [kN]`), or as `label:KEY` for a label; `priority` and `deadline_s` are options of the line. An empty field leaves what the
+//! template says. The line below the titles may give the units.
 
 use std::collections::HashSet;
 
-use axum::body::Bytes;
 use serde_json::Value;
 
+use crate::contact::evaluate::placing::members;
 use crate::http::extract::batch::own_options;
+use crate::http::extract::titles::{
+    Place, delimiter, faulty, is_line_of_units, number, place, question, require_few, short_names,
+};
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
-use crate::jobs::batch::template;
 use crate::jobs::batch::template::Cell;
 use crate::jobs::batch::upload::BatchRow;
 use crate::jobs::model::submit_options::CaseOptions;
-
-/// Short names of columns and what they stand for.
-const SHORT_NAMES: [(&str, &str); 18] = [
-    ("name", "/name"),
-    ("normal_force_n", "/load/normal_force_n"),
-    ("vertical_force_n", "/load/vertical_force_n"),
-    ("approach_mm", "/load/approach_mm"),
-    ("creepage_x", "/motion/creepage_x"),
-    ("creepage_y", "/motion/creepage_y"),
-    ("spin_per_mm", "/motion/spin_per_mm"),
-    ("force_x_n", "/motion/force_x_n"),
-    ("force_y_n", "/motion/force_y_n"),
-    ("friction_coefficient", "/friction/coefficient"),
-    ("rolling_mm", "/contact/rolling_mm"),
-    ("lateral_mm", "/contact/lateral_mm"),
-    ("a_mm", "/contact/a_mm"),
-    ("b_mm", "/contact/b_mm"),
-    ("rolling_radius_mm", "/contact/rolling_radius_mm"),
-    ("lateral_shift_mm", "/contact/lateral_shift_mm"),
-    ("yaw_rad", "/contact/yaw_rad"),
-    ("roll_rad", "/contact/roll_rad"),
-];
-
-/// Most columns of a table. A case has far fewer members that differ from line to line.
-const COLUMNS_MAX: usize = 1000;
+use crate::jobs::run::head::converted;
 
 /// A table under way.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct TableBody {
-    template: Value,
-    /// The template as it is stored.
-    text: Bytes,
+    header: Option<Header>,
+}
+
+/// The titles of a table.
+#[derive(Debug)]
+struct Header {
+    titles: Vec<String>,
+    /// What parts the fields.
+    delimiter: u8,
+    /// Known with the line below the titles, which may give their units.
     columns: Option<Vec<TemplateColumn>>,
 }
 
-/// The case of a line with what it puts into the template, or why it stands for none.
+/// What a line puts into the template, or why it stands for no case.
 pub type Row = Result<BatchRow, String>;
 
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq)]
 struct TemplateColumn {
     /// As it stands in the header.
     title: String,
     /// The members that lead to the value; none for an option of the line.
     path: Vec<String>,
+    /// What makes a number one of the case.
+    factor: f64,
     /// The value is text, whatever it looks like.
     text: bool,
 }
 
 impl TableBody {
-    /// A table that fills this case.
-    #[must_use]
-    pub fn new(template: Value) -> Self {
-        TableBody {
-            text: Bytes::from(template.to_string()),
-            template,
-            columns: None,
-        }
-    }
-
-    /// The text of the template.
-    #[must_use]
-    pub fn text(&self) -> Bytes {
-        self.text.clone()
-    }
-
-    /// Takes the next line; the case that it stands for with what it puts into the template, or why it stands for none.
-    /// Nothing for the header.
+    /// Takes the next line: what it puts into the template, or why it stands for no case. Nothing for the header and a line of units.
     ///
     /// # Errors
     /// `faulty-table`: the header cannot be understood.
     pub fn take(&mut self, line: &[u8]) -> Result<Option<Row>, ApiError> {
-        let Some(columns) = &self.columns else {
-            let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
-            let columns = read_header(line).map_err(|detail| {
-                ApiError::new(ProblemKind::FaultyTable, format!("line 1: {detail}"))
-            })?;
-            self.columns = Some(columns);
+        let Some(header) = &mut self.header else {
+            self.header = Some(Header::read(line)?);
             return Ok(None);
         };
-        Ok(Some(fill(&self.template, columns, line)))
-    }
-}
-
-fn read_header(line: &[u8]) -> Result<Vec<TemplateColumn>, String> {
-    let titles = fields(line)?;
-    if titles.len() > COLUMNS_MAX {
-        return Err(format!(
-            "the table has {} columns; allowed: at most {COLUMNS_MAX}",
-            titles.len()
-        ));
-    }
-    let mut seen = HashSet::new();
-    let mut columns = Vec::with_capacity(titles.len());
-    for title in titles {
-        let column = column(title.trim())?;
-        let place = match column.path.is_empty() {
-            true => vec![String::new(), column.title.clone()],
-            false => column.path.clone(),
+        let columns = match &header.columns {
+            Some(columns) => columns,
+            None => {
+                let units = header.units(line);
+                let columns = header.columns(units.as_deref())?;
+                let columns = header.columns.insert(columns);
+                if units.is_some() {
+                    return Ok(None);
+                }
+                columns
+            }
         };
-        if !seen.insert(place) {
-            return Err(format!("the column `{}` is there twice", column.title));
+        Ok(Some(read_row(columns, header.delimiter, line)))
+    }
+}
+
+impl Header {
+    fn read(line: &[u8]) -> Result<Header, ApiError> {
+        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
+        let delimiter = delimiter(line);
+        let titles = fields(line, delimiter);
+        let titles = titles.map_err(|detail| faulty(format!("line 1: {detail}")))?;
+        require_few(titles.len())?;
+        Ok(Header {
+            titles: titles.iter().map(|title| title.trim().to_owned()).collect(),
+            delimiter,
+            columns: None,
+        })
+    }
+
+    /// The units of the columns, if this line holds units.
+    fn units(&self, line: &[u8]) -> Option<Vec<String>> {
+        let units = fields(line, self.delimiter).ok()?;
+        let said = |(title, unit): (&String, &String)| !is_text(title) && !unit.trim().is_empty();
+        let some = self.titles.iter().zip(&units).any(said);
+        let all =
+            units.len() == self.titles.len() && is_line_of_units(units.iter().map(String::as_str));
+        (some && all).then_some(units)
+    }
+
+    fn columns(&self, units: Option<&[String]>) -> Result<Vec<TemplateColumn>, ApiError> {
+        let mut seen = HashSet::new();
+        let mut columns = Vec::with_capacity(self.titles.len());
+        for (number, title) in self.titles.iter().enumerate() {
+            let unit = units.and_then(|units| units.get(number));
+            let column = column(title, unit.map(|unit| unit.trim()));
+            let column = column.map_err(|detail| faulty(format!("line 1: {detail}")))?;
+            let place = match column.path.is_empty() {
+                true => vec![String::new(), column.title.clone()],
+                false => column.path.clone(),
+            };
+            if !seen.insert(place) {
+                let detail = format!("line 1: the column `{title}` is there twice");
+                return Err(faulty(detail));
+            }
+            columns.push(column);
         }
-        columns.push(column);
-    }
-    Ok(columns)
-}
-
-/// The JSON pointer that a short name stands for.
-#[must_use]
-pub fn short_pointer(title: &str) -> Option<&'static str> {
-    let short = SHORT_NAMES.iter().find(|(name, _)| *name == title);
-    short.map(|(_, pointer)| *pointer)
-}
-
-/// The JSON pointers that a header names columns by.
-///
-/// # Errors
-/// A column that is not known, or is there twice.
-pub fn column_pointers(header: &[u8]) -> Result<Vec<String>, String> {
-    let header = header.strip_prefix(b"\xef\xbb\xbf").unwrap_or(header);
-    let columns = read_header(header)?;
-    Ok(columns
-        .iter()
-        .map(|column| pointer_of(&column.path))
-        .collect())
-}
-
-/// The JSON pointer that a title names.
-///
-/// # Errors
-/// It names no place in a case.
-pub fn column_pointer(title: &str) -> Result<String, String> {
-    let path = column(title)?.path;
-    match path.is_empty() {
-        true => Err(format!("`{title}` is no number of a case")),
-        false => Ok(pointer_of(&path)),
+        Ok(columns)
     }
 }
 
-fn pointer_of(path: &[String]) -> String {
-    let escaped = |part: &String| format!("/{}", part.replace('~', "~0").replace('/', "~1"));
-    path.iter().map(escaped).collect()
+/// Does the column hold texts, which have no unit?
+fn is_text(title: &str) -> bool {
+    title == "name"
+        || title == "/name"
+        || title.starts_with("label:")
+        || title.starts_with("/labels/")
 }
 
-fn column(title: &str) -> Result<TemplateColumn, String> {
-    let short = SHORT_NAMES.iter().find(|(name, _)| *name == title);
-    let path = if own_options::NAMES.contains(&title) {
-        Vec::new()
-    } else if let Some((_, pointer)) = short {
-        pointed(pointer)
-    } else if let Some(key) = title.strip_prefix("label:").filter(|key| !key.is_empty()) {
-        vec!["labels".to_owned(), key.to_owned()]
-    } else if title.len() > 1 && title.starts_with('/') {
-        pointed(title)
+fn column(title: &str, unit: Option<&str>) -> Result<TemplateColumn, String> {
+    let label = title.strip_prefix("label:").filter(|key| !key.is_empty());
+    let (path, factor) = if own_options::NAMES.contains(&title) {
+        (Vec::new(), 1.0)
+    } else if let Some(key) = label {
+        (vec!["labels".to_owned(), key.to_owned()], 1.0)
     } else {
-        let names: Vec<String> = SHORT_NAMES
-            .iter()
-            .map(|(name, _)| format!("`{name}`"))
-            .collect();
-        return Err(format!(
-            "`{title}` names no column; allowed: {}, `priority`, `deadline_s`, `label:KEY`, or a JSON pointer such as `/load/normal_force_n`; columns are parted by commas",
-            names.join(", ")
-        ));
+        let found = match title {
+            "/" => Ok(None),
+            title => place(title, unit.filter(|_| !is_text(title))),
+        };
+        match found.map_err(|detail| format!("column `{title}`: {detail}"))? {
+            Some(Place { pointer, factor }) => (members(&pointer), factor),
+            None => {
+                return Err(format!(
+                    "`{title}` names no column; {} allowed: {}, a quantity with its unit such as `normal_force [kN]`, `priority`, `deadline_s`, \
+                     `label:KEY`, which carries a column along, or a JSON pointer such as `/load/normal_force_n`",
+                    question(title, unit),
+                    short_names()
+                ));
+            }
+        }
     };
     let text = matches!(path.first().map(String::as_str), Some("labels" | "name"));
     Ok(TemplateColumn {
         title: title.to_owned(),
         path,
+        factor,
         text,
     })
 }
 
-/// The members of a JSON pointer (RFC 6901).
-fn pointed(pointer: &str) -> Vec<String> {
-    let parts = pointer.split('/').skip(1);
-    parts
-        .map(|part| part.replace("~1", "/").replace("~0", "~"))
-        .collect()
-}
-
-fn fill(template: &Value, columns: &[TemplateColumn], line: &[u8]) -> Row {
-    let fields = fields(line)?;
+fn read_row(columns: &[TemplateColumn], delimiter: u8, line: &[u8]) -> Row {
+    let fields = fields(line, delimiter)?;
     if fields.len() != columns.len() {
         return Err(format!(
             "the line has {} fields, the header has {}",
@@ -204,17 +170,16 @@ fn fill(template: &Value, columns: &[TemplateColumn], line: &[u8]) -> Row {
             columns.len()
         ));
     }
-    let (mut cells, mut titles) = (Vec::new(), Vec::new());
+    let mut cells = Vec::new();
     let mut own = CaseOptions::default();
     for (column, field) in columns.iter().zip(&fields) {
         let field = field.trim();
         if field.is_empty() {
             continue;
         }
-        let value = if column.text {
-            Value::from(field)
-        } else {
-            read_value(field)
+        let value = match column.text {
+            true => Value::from(field),
+            false => read_value(field, column.factor, delimiter != b','),
         };
         if column.path.is_empty() {
             own_options::set(&mut own, &column.title, &value)
@@ -222,25 +187,33 @@ fn fill(template: &Value, columns: &[TemplateColumn], line: &[u8]) -> Row {
             continue;
         }
         cells.push(Cell(column.path.clone(), value));
-        titles.push(&column.title);
     }
-    let case = template::fill(template, &cells)
-        .map_err(|(number, reason)| format!("the column `{}` {reason}", titles[number]))?;
-    Ok(BatchRow { case, cells, own })
+    Ok(BatchRow { cells, own })
 }
 
-/// A number, `true`, `false` or `null` as JSON has them; everything else is text, and the case says whether it may be.
-fn read_value(field: &str) -> Value {
-    match serde_json::from_str(field) {
+/// A number in the unit of the case, `true`, `false` or `null` as JSON has them; everything else is text, and the case says whether it may be.
+fn read_value(field: &str, factor: f64, decimal_comma: bool) -> Value {
+    let value = match serde_json::from_str(field) {
         Ok(value @ (Value::Number(_) | Value::Bool(_) | Value::Null)) => value,
-        _ => Value::from(field),
+        _ => {
+            let number = number(field, decimal_comma).filter(|number| number.is_finite());
+            match number.filter(|_| decimal_comma) {
+                Some(number) => Value::from(number),
+                None => Value::from(field),
+            }
+        }
+    };
+    match value.as_f64() {
+        Some(number) if factor != 1.0 => Value::from(converted(number, factor)),
+        _ => value,
     }
 }
 
 /// The fields of one line of CSV.
-fn fields(line: &[u8]) -> Result<Vec<String>, String> {
+fn fields(line: &[u8], delimiter: u8) -> Result<Vec<String>, String> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
+        .delimiter(delimiter)
         .from_reader(line);
     let mut record = csv::StringRecord::new();
     match reader.read_record(&mut record) {
@@ -255,20 +228,26 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::jobs::batch::template::fill;
+    use crate::jobs::codec::table::COLUMNS_MAX;
 
-    fn filled(header: &str, line: &str) -> Result<Value, String> {
+    fn taken(lines: &[&str]) -> Result<Vec<Row>, ApiError> {
+        let mut table = TableBody::default();
+        let rows = lines.iter().map(|line| table.take(line.as_bytes()));
+        rows.filter_map(Result::transpose).collect()
+    }
+
+    fn filled(lines: &[&str]) -> Value {
         let template = json!({ "motion": { "creepage_x": 0.001 }, "contact": { "y_mm": [0, 1] }, "solver": "x" });
-        let mut table = TableBody::new(template);
-        assert!(table.take(header.as_bytes()).expect("a header").is_none());
-        let row = table.take(line.as_bytes()).expect("a line");
-        row.expect("a case").map(|row| row.case)
+        let row = taken(lines).expect("a table").remove(0).expect("a row");
+        fill(&template, &row.cells).expect("a case")
     }
 
     #[test]
     fn columns_lead_to_members_of_the_case() {
         let header =
             "\u{feff}label:km,normal_force_n, creepage_x ,/contact/y_mm/1,/solver,name\r\n";
-        let case = filled(header, "37.2,8e4,,-2,\"a, \"\"b\"\"\",12\r\n").unwrap();
+        let case = filled(&[header, "37.2,8e4,,-2,\"a, \"\"b\"\"\",12\r\n"]);
         let expected = json!({
             "labels": { "km": "37.2" },
             "load": { "normal_force_n": 8e4 },
@@ -281,27 +260,53 @@ mod tests {
     }
 
     #[test]
+    fn units_semicolons_and_decimal_commas_give_the_same_case() {
+        let expected = filled(&["label:km,normal_force_n,spin_per_mm", "37.2,64100,4e-4"]);
+        for lines in [
+            &["label:km,Normal force [kN],spin [1/m]", "37.2,64.1,0.4"][..],
+            &["label:km;Normal force [kN];spin [1/m]", "37.2;64,1;0,4"],
+            &[
+                "label:km\tNormal force\tspin",
+                "[km]\t[kN]\t[1/m]",
+                "37.2\t64,1\t0,4",
+            ],
+            &[
+                "label:km,normal_force_n,spin_per_m",
+                ",N,",
+                "37.2,64100,0.4",
+            ],
+        ] {
+            assert_eq!(filled(lines), expected, "{lines:?}");
+        }
+    }
+
+    #[test]
     fn lines_that_do_not_fit_say_so() {
         for (header, line, word) in [
             ("name,a_mm", "x", "1 fields, the header has 2"),
-            ("/solver/mesh", "3", "neither an object nor an array"),
-            ("/contact/y_mm/2", "3", "array with 2 entries"),
             ("priority", "soon", "allowed: high, normal, low"),
         ] {
-            let fault = filled(header, line).unwrap_err();
+            let fault = taken(&[header, line])
+                .expect("a table")
+                .remove(0)
+                .unwrap_err();
             assert!(fault.contains(word), "{fault}");
         }
         let many: Vec<String> = (0..=COLUMNS_MAX).map(|k| format!("label:k{k}")).collect();
-        for header in [
-            "speed",
-            "name,name",
-            "a_mm;b_mm",
-            "label:",
-            "/",
-            &many.join(","),
+        for (header, words) in [
+            ("speed", "has no unit"),
+            ("Q_left", "normal_force [kN]"),
+            ("km", "label:KEY"),
+            ("name,name", "twice"),
+            ("a_mm;b", "`b`"),
+            ("label:", "names no column"),
+            ("/", "names no column"),
+            (&many.join(","), "at most 1000"),
         ] {
-            let table = &mut TableBody::new(json!({}));
-            assert!(table.take(header.as_bytes()).is_err(), "{header}");
+            let refused = format!("{:?}", taken(&[header, "1"]).expect_err(header));
+            assert!(refused.contains(words), "{refused}");
         }
+        let refused = taken(&["normal_force_n,creepage_x", "kN,%", "1,1"]).expect_err("units");
+        assert!(refused.detail().contains("agree"), "{refused:?}");
     }
 }

@@ -15,7 +15,7 @@ use crate::http::extract::json::{essence, read_json};
 use crate::http::extract::npz::{read_arrays, too_large};
 use crate::http::extract::rows::{declared_bytes, read_body, read_json_columns};
 use crate::http::extract::run_rows::text::{CsvRows, JsonRows};
-use crate::http::extract::run_rows::titles::{NamedColumns, faulty};
+use crate::http::extract::titles::{NamedColumns, faulty, require_few};
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
@@ -180,8 +180,9 @@ async fn from_json(
         drop(text);
         let (titles, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
         let kinds = titles.iter().zip(&values);
-        let kinds = kinds
-            .map(|(title, values): (&String, _)| (&**title, matches!(values, Values::Texts(_))));
+        let kinds = kinds.map(|(title, values): (&String, _)| {
+            (&**title, None, matches!(values, Values::Texts(_)))
+        });
         let mut draft = jobs.draft_run(template, named.columns(kinds)?, rows_max)?;
         draft.push(values)?;
         Ok(draft)
@@ -229,6 +230,7 @@ fn groups(file: File) -> Result<impl Iterator<Item = Result<RowTable, ApiError>>
     let damaged =
         |error: &dyn std::fmt::Display| faulty(format!("the Parquet file cannot be read: {error}"));
     let reader = TableReader::new(file).map_err(|error| damaged(&error))?;
+    require_few(reader.names().len())?;
     let large = (0..reader.groups()).find(|group| reader.group_size(*group).1 > GROUP_BYTES_MAX);
     if let Some(group) = large {
         return Err(faulty(format!(
@@ -252,7 +254,8 @@ fn from_tables(
     for table in tables {
         let table = table?;
         let titles = table.columns.iter();
-        let titles = titles.map(|(name, values)| (&**name, values.kind() == TableKind::Texts));
+        let titles =
+            titles.map(|(name, values)| (&**name, None, values.kind() == TableKind::Texts));
         let draft = match &mut begun {
             Some(draft) => draft,
             None => begun.insert(draft(named.columns(titles)?)?),

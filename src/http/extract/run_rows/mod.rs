@@ -2,4 +2,3 @@
 
 pub mod body;
 mod text;
-pub mod titles;

@@ -5,7 +5,9 @@ use std::io::{BufRead, Chain, Cursor, Read};
 use serde_json::{Map, Value};
 
 use crate::contact::evaluate::varied::Values;
-use crate::http::extract::run_rows::titles::{NamedColumns, faulty, is_unit};
+use crate::http::extract::titles::{
+    NamedColumns, delimiter, faulty, is_line_of_units, number, require_few,
+};
 use crate::http::problem::error::ApiError;
 use crate::jobs::run::head::RunColumn;
 
@@ -43,6 +45,7 @@ impl<R: BufRead> CsvRows<R> {
             .from_reader(Cursor::new(first).chain(source));
         let titles = reader.headers();
         let titles = titles.map_err(|error| faulty(format!("line 1: {error}")))?;
+        require_few(titles.len())?;
         let titles: Vec<String> = titles
             .iter()
             .map(|title| title.trim_start_matches('\u{feff}').to_owned())
@@ -55,8 +58,7 @@ impl<R: BufRead> CsvRows<R> {
         };
         rows.advance()?;
         let units = rows.record.clone();
-        let units = units
-            .filter(|units| units.iter().all(is_unit) && units.iter().any(|unit| !unit.is_empty()));
+        let units = units.filter(|units| is_line_of_units(units.iter()));
         if units.is_some() {
             rows.advance()?;
         }
@@ -67,10 +69,8 @@ impl<R: BufRead> CsvRows<R> {
             !field.is_empty() && number(field, rows.decimal_comma).is_none()
         };
         let columns = titles.iter().enumerate();
-        rows.columns = columns
-            .map(|(place, title)| named.column(title, unit(place), text(place)))
-            .collect::<Result<_, _>>()?;
-        named.all_among(&rows.columns)?;
+        let columns = columns.map(|(place, title)| (&**title, unit(place), text(place)));
+        rows.columns = named.columns(columns)?;
         Ok(rows)
     }
 
@@ -86,12 +86,14 @@ impl<R: BufRead> CsvRows<R> {
                 let wrong = || {
                     let line = record.position().map_or(0, csv::Position::line);
                     faulty(format!(
-                        "line {line}, column `{}`: `{field}` is no number, as the first row has there",
+                        "line {line}, column `{}`: `{field}` is not a number; the first row has a number in this column",
                         column.name
                     ))
                 };
                 match values {
-                    Values::Texts(texts) => texts.push(field.to_owned()),
+                    Values::Texts(texts) => {
+                        texts.push(Some(field.to_owned()).filter(|text| !text.is_empty()));
+                    }
                     Values::Numbers(numbers) if field.is_empty() => numbers.push(f64::NAN),
                     Values::Numbers(numbers) => {
                         numbers.push(number(field, self.decimal_comma).ok_or_else(wrong)?);
@@ -113,32 +115,6 @@ impl<R: BufRead> CsvRows<R> {
         }
         Ok(())
     }
-}
-
-/// What parts the titles, outside of quotes: tabs if there is one, else semicolons, else commas.
-fn delimiter(header: &[u8]) -> u8 {
-    let mut quoted = false;
-    let outside: Vec<u8> = header
-        .iter()
-        .copied()
-        .filter(|byte| {
-            quoted ^= *byte == b'"';
-            !quoted
-        })
-        .collect();
-    let found = [b'\t', b';']
-        .into_iter()
-        .find(|mark| outside.contains(mark));
-    found.unwrap_or(b',')
-}
-
-/// A number, with a comma in place of its point where one may be.
-fn number(field: &str, decimal_comma: bool) -> Option<f64> {
-    let plain = field.parse().ok();
-    plain.or_else(|| {
-        let pointed = field.replacen(',', ".", 1);
-        (decimal_comma && !field.contains('.')).then(|| pointed.parse().ok())?
-    })
 }
 
 /// Rows as JSON objects, one in a line.
@@ -164,7 +140,7 @@ impl<R: BufRead> JsonRows<R> {
         };
         rows.advance()?;
         let members = rows.row.iter().flatten();
-        let members = members.map(|(title, value)| (&**title, value.is_string()));
+        let members = members.map(|(title, value)| (&**title, None, value.is_string()));
         rows.columns = named.columns(members)?;
         Ok(rows)
     }
@@ -181,8 +157,8 @@ impl<R: BufRead> JsonRows<R> {
             };
             for (column, values) in self.columns.iter().zip(&mut values) {
                 match (values, row.remove(&column.name)) {
-                    (Values::Texts(texts), Some(Value::String(text))) => texts.push(text),
-                    (Values::Texts(texts), Some(Value::Null)) => texts.push(String::new()),
+                    (Values::Texts(texts), Some(Value::String(text))) => texts.push(Some(text)),
+                    (Values::Texts(texts), Some(Value::Null)) => texts.push(None),
                     (Values::Numbers(numbers), Some(Value::Null)) => numbers.push(f64::NAN),
                     (Values::Numbers(numbers), Some(value)) if value.is_number() => {
                         numbers.push(value.as_f64().unwrap_or(f64::NAN));
@@ -268,7 +244,7 @@ mod tests {
         assert_eq!(values[0], Values::Numbers(vec![0.1, -2e-3]));
         assert_eq!(
             values[2],
-            Values::Texts(vec!["a".to_owned(), "b, c".to_owned()])
+            Values::Texts(["a", "b, c"].map(|text| Some(text.to_owned())).to_vec())
         );
         assert!(by_csv.next().unwrap().is_none() && by_json.next().unwrap().is_none());
     }
@@ -301,7 +277,7 @@ mod tests {
     #[test]
     fn an_empty_first_row_is_a_row() {
         let named = NamedColumns::default();
-        let mut rows = CsvRows::new("km,curvature\n,\n2,3\n".as_bytes(), &named).unwrap();
+        let mut rows = CsvRows::new("km,creepage_x\n,\n2,3\n".as_bytes(), &named).unwrap();
         assert_eq!(rows.next().unwrap().unwrap()[0].len(), 2);
     }
 
@@ -314,11 +290,11 @@ mod tests {
             |text: &str| JsonRows::new(text.as_bytes(), &named).and_then(|mut rows| rows.next());
         for (read, words) in [
             (csv("creepage_x\n0.1\nx\n"), ["line 3", "creepage_x"]),
-            (csv("creepage_x,a\n0.1\n"), ["the table", "fields"]),
-            (json("{\"a\":1}\n{\"b\":1}"), ["line 2", "`a`"]),
-            (json("{\"a\":1}\n{\"a\":\"x\"}"), ["line 2", "kind"]),
-            (json("{\"a\":1}\n{\"a\":1,\"b\":2}"), ["line 2", "`b`"]),
-            (json("{\"a\":1}\nnothing"), ["line 2", "expected"]),
+            (csv("creepage_x,s\n0.1\n"), ["the table", "fields"]),
+            (json("{\"s\":1}\n{\"b\":1}"), ["line 2", "`s`"]),
+            (json("{\"s\":1}\n{\"s\":\"x\"}"), ["line 2", "kind"]),
+            (json("{\"s\":1}\n{\"s\":1,\"b\":2}"), ["line 2", "`b`"]),
+            (json("{\"s\":1}\nnothing"), ["line 2", "expected"]),
         ] {
             let fault = format!("{:?}", read.expect_err("it is faulty"));
             assert!(words.iter().all(|word| fault.contains(word)), "{fault}");

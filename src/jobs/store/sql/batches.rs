@@ -352,6 +352,30 @@ impl SqlStore {
         }
         Ok(items)
     }
+
+    /// The keys of the labels of the jobs of a batch, sorted, the first `limit`.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) async fn batch_label_keys(
+        &self,
+        tenant: &str,
+        id: Uuid,
+        limit: u32,
+    ) -> Result<Vec<String>, StoreError> {
+        let rows = sqlx::query(concat!(
+            "SELECT DISTINCT label.key AS key FROM jobs, ",
+            pairs_of_labels!(),
+            " AS label WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $2) ORDER BY label.key LIMIT $3"
+        ))
+        .bind(id.to_string())
+        .bind(tenant)
+        .bind(i64::from(limit))
+        .fetch_all(&self.readers)
+        .await?;
+        let keys = rows.iter().map(|row| Ok(row.try_get("key")?));
+        keys.collect()
+    }
 }
 
 /// What was given up is not filled any more.

@@ -192,6 +192,15 @@ impl Store for SqlStore {
         engine::again(|| self.batch_items(tenant, id, after, limit, bytes)).await
     }
 
+    async fn batch_label_keys(
+        &self,
+        tenant: &str,
+        id: Uuid,
+        limit: u32,
+    ) -> Result<Vec<String>, StoreError> {
+        engine::again(|| self.batch_label_keys(tenant, id, limit)).await
+    }
+
     async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>, StoreError> {
         engine::again(|| self.case(tenant, id)).await
     }

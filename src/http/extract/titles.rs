@@ -1,0 +1,1293 @@
+//! The titles of the columns of tables: JSON pointers, short names, quantities with a unit, and names that are carried along to the answers.
+//!
+//! Batches, runs and `/v1/evaluate` read titles here, so that a title means the same wherever it is sent.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::f64::consts::PI;
+
+use crate::contact::evaluate::request_faults::column_pointer;
+use crate::http::problem::body::Fault;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+use crate::jobs::codec::table::COLUMNS_MAX;
+use crate::jobs::run::head::RunColumn;
+
+/// Faulty columns and recognised columns that the sentence of a refusal names; `errors` has all faulty ones.
+const NAMED_MAX: usize = 20;
+/// Titles differ from a misspelt name by at most this many letters.
+const MISSPELT_LETTERS: usize = 2;
+/// Shortest name that a misspelt title is compared with.
+const MISSPELT_LENGTH: usize = 5;
+
+/// A refusal of a table.
+pub fn faulty(detail: impl Into<String>) -> ApiError {
+    ApiError::new(ProblemKind::FaultyTable, detail)
+}
+
+/// The refusal of a table with this many columns, if they are too many.
+///
+/// # Errors
+/// `faulty-table`
+pub fn require_few(columns: usize) -> Result<(), ApiError> {
+    match columns > COLUMNS_MAX {
+        false => Ok(()),
+        true => Err(faulty(format!(
+            "the table has {columns} columns; allowed: at most {COLUMNS_MAX}"
+        ))),
+    }
+}
+
+/// Units of a quantity.
+#[derive(Debug)]
+struct Units {
+    /// Each by its name in brackets and at the end of a title, and the factor that makes a value one of the case.
+    list: &'static [(&'static str, &'static str, f64)],
+    /// The unit that messages suggest.
+    usual: &'static str,
+}
+
+const FORCE: Units = Units {
+    list: &[("N", "n", 1.0), ("kN", "kn", 1e3)],
+    usual: "kN",
+};
+const LENGTH: Units = Units {
+    list: &[
+        ("mm", "mm", 1.0),
+        ("m", "m", 1e3),
+        ("cm", "cm", 10.0),
+        ("µm", "um", 1e-3),
+        ("μm", "um", 1e-3),
+        ("um", "um", 1e-3),
+    ],
+    usual: "mm",
+};
+const CURVATURE: Units = Units {
+    list: &[
+        ("1/mm", "per_mm", 1.0),
+        ("1/m", "per_m", 1e-3),
+        ("rad/mm", "rad_per_mm", 1.0),
+        ("rad/m", "rad_per_m", 1e-3),
+    ],
+    usual: "1/m",
+};
+const ANGLE: Units = Units {
+    list: &[
+        ("rad", "rad", 1.0),
+        ("mrad", "mrad", 1e-3),
+        ("deg", "deg", PI / 180.0),
+        ("°", "degrees", PI / 180.0),
+    ],
+    usual: "mrad",
+};
+const SPEED: Units = Units {
+    list: &[
+        ("mm/s", "mm_per_s", 1.0),
+        ("m/s", "m_per_s", 1e3),
+        ("km/h", "km_per_h", 1e3 / 3.6),
+    ],
+    usual: "km/h",
+};
+const RATIO: Units = Units {
+    list: &[
+        ("-", "", 1.0),
+        ("1", "", 1.0),
+        ("%", "percent", 1e-2),
+        ("‰", "permille", 1e-3),
+    ],
+    usual: "-",
+};
+const PRESSURE: Units = Units {
+    list: &[("MPa", "mpa", 1.0), ("N/mm²", "n_per_mm2", 1.0)],
+    usual: "MPa",
+};
+const TORQUE: Units = Units {
+    list: &[
+        ("N·mm", "n_mm", 1.0),
+        ("Nmm", "n_mm", 1.0),
+        ("N mm", "n_mm", 1.0),
+    ],
+    usual: "N·mm",
+};
+const ANGULAR_SPEED: Units = Units {
+    list: &[("rad/s", "rad_per_s", 1.0), ("1/s", "per_s", 1.0)],
+    usual: "rad/s",
+};
+const TEMPERATURE: Units = Units {
+    list: &[("°C", "c", 1.0), ("C", "c", 1.0), ("degC", "c", 1.0)],
+    usual: "°C",
+};
+const TIME: Units = Units {
+    list: &[("s", "s", 1.0)],
+    usual: "s",
+};
+
+/// The ends of names of members and the units that they stand for; the longer ends come first.
+const MEMBER_UNITS: [(&str, &Units); 10] = [
+    ("spin_per_mm", &CURVATURE),
+    ("_mm_per_s", &SPEED),
+    ("_rad_per_s", &ANGULAR_SPEED),
+    ("_n_mm", &TORQUE),
+    ("_mpa", &PRESSURE),
+    ("_rad", &ANGLE),
+    ("_mm", &LENGTH),
+    ("_n", &FORCE),
+    ("_c", &TEMPERATURE),
+    ("_s", &TIME),
+];
+
+/// A quantity that columns vary.
+#[derive(Debug)]
+struct Quantity {
+    /// Where it stands in the case.
+    pointer: &'static str,
+    units: &'static Units,
+    /// Its names here.
+    names: &'static [&'static str],
+    /// Names in vehicle-dynamics codes that mean this quantity if the column has one of its units.
+    codes: &'static [&'static str],
+    /// Names that may mean this quantity or another one. They are refused, and the quantity is suggested.
+    doubtful: &'static [&'static str],
+}
+
+/// Symbols of creepages in codes and papers: ν (Simpack, GENSYS), ξ (Universal Mechanism, Kalker), γ (VAMPIRE, Wickens). Greek letters are
+/// spelt out before titles are compared.
+const QUANTITIES: [Quantity; 13] = [
+    Quantity {
+        pointer: "/load/normal_force_n",
+        units: &FORCE,
+        names: &["normal_force"],
+        codes: &[
+            "n",
+            "fn",
+            "f_n",
+            "normal_load",
+            "normal_contact_force",
+            "contact_normal_force",
+        ],
+        doubtful: &[
+            "q",
+            "fz",
+            "f_z",
+            "f_q",
+            "q_force",
+            "load",
+            "force",
+            "contact_force",
+            "vertical",
+        ],
+    },
+    Quantity {
+        pointer: "/load/vertical_force_n",
+        units: &FORCE,
+        names: &["vertical_force", "wheel_load"],
+        codes: &["vertical_wheel_force", "vertical_load"],
+        doubtful: &[
+            "q",
+            "fz",
+            "f_z",
+            "f_q",
+            "q_force",
+            "load",
+            "force",
+            "wheel_force",
+            "vertical",
+        ],
+    },
+    Quantity {
+        pointer: "/load/approach_mm",
+        units: &LENGTH,
+        names: &["approach"],
+        codes: &[],
+        doubtful: &["penetration", "interpenetration", "indentation"],
+    },
+    Quantity {
+        pointer: "/motion/creepage_x",
+        units: &RATIO,
+        names: &["creepage_x", "longitudinal_creepage"],
+        codes: &[
+            "nu_x",
+            "nux",
+            "xi_x",
+            "xix",
+            "xsi_x",
+            "ksi_x",
+            "ksix",
+            "gamma_x",
+            "gammax",
+            "creep_x",
+            "creepx",
+            "x_creep",
+            "x_creepage",
+            "vx_creep",
+            "creep_vx",
+            "longitudinal_creep",
+            "long_creep",
+            "long_creepage",
+            "creepage_long",
+            "creepage_longitudinal",
+            "creep_longitudinal",
+        ],
+        doubtful: &[
+            "nu_1",
+            "nu1",
+            "xi_1",
+            "xi1",
+            "gamma_1",
+            "gamma1",
+            "vx",
+            "v_x",
+            "slip_x",
+            "slipx",
+            "sx",
+            "s_x",
+            "cx",
+            "longitudinal_slip",
+            "long_slip",
+            "creepage",
+            "creep",
+            "slip",
+        ],
+    },
+    Quantity {
+        pointer: "/motion/creepage_y",
+        units: &RATIO,
+        names: &["creepage_y", "lateral_creepage"],
+        codes: &[
+            "nu_y",
+            "nuy",
+            "xi_y",
+            "xiy",
+            "xsi_y",
+            "ksi_y",
+            "ksiy",
+            "gamma_y",
+            "gammay",
+            "creep_y",
+            "creepy",
+            "y_creep",
+            "y_creepage",
+            "vy_creep",
+            "creep_vy",
+            "lateral_creep",
+            "lat_creep",
+            "lat_creepage",
+            "creepage_lat",
+            "creepage_lateral",
+            "creep_lateral",
+        ],
+        doubtful: &[
+            "nu_2",
+            "nu2",
+            "xi_2",
+            "xi2",
+            "gamma_2",
+            "gamma2",
+            "vy",
+            "v_y",
+            "slip_y",
+            "slipy",
+            "sy",
+            "s_y",
+            "cy",
+            "lateral_slip",
+            "lat_slip",
+            "creepage",
+            "creep",
+            "slip",
+        ],
+    },
+    Quantity {
+        pointer: "/motion/spin_per_mm",
+        units: &CURVATURE,
+        names: &["spin", "spin_creepage"],
+        codes: &[
+            "phi",
+            "phi_z",
+            "phi_spin",
+            "spin_creep",
+            "creep_spin",
+            "creepage_spin",
+            "nu_z",
+            "nuz",
+            "nu_phi",
+            "nu_sp",
+            "nu_spin",
+            "xi_z",
+            "xi_phi",
+            "xi_sp",
+            "xi_spin",
+            "ksi_sp",
+            "ksi_spin",
+            "gamma_sp",
+            "gamma_spin",
+            "gamma_z",
+            "omega_spin",
+        ],
+        doubtful: &[
+            "nu_3", "nu3", "xi_3", "xi3", "gamma_3", "gamma3", "gamma_s", "omega_z", "spin_z",
+        ],
+    },
+    Quantity {
+        pointer: "/motion/force_x_n",
+        units: &FORCE,
+        names: &["force_x"],
+        codes: &[],
+        doubtful: &[
+            "fx",
+            "f_x",
+            "tx",
+            "t_x",
+            "longitudinal_force",
+            "long_force",
+            "creep_force_x",
+            "force",
+            "traction",
+        ],
+    },
+    Quantity {
+        pointer: "/motion/force_y_n",
+        units: &FORCE,
+        names: &["force_y"],
+        codes: &[],
+        doubtful: &[
+            "fy",
+            "f_y",
+            "ty",
+            "t_y",
+            "lateral_force",
+            "lat_force",
+            "creep_force_y",
+            "force",
+            "y",
+            "y_force",
+            "guiding_force",
+        ],
+    },
+    Quantity {
+        pointer: "/friction/coefficient",
+        units: &RATIO,
+        names: &["friction_coefficient", "friction", "mu"],
+        codes: &["mue", "cof", "coefficient_of_friction", "friction_coeff"],
+        doubtful: &["f", "my", "adhesion", "adhesion_coefficient"],
+    },
+    Quantity {
+        pointer: "/motion/speed_mm_per_s",
+        units: &SPEED,
+        names: &["speed", "rolling_speed"],
+        codes: &[
+            "v",
+            "velocity",
+            "vehicle_speed",
+            "vehicle_velocity",
+            "running_speed",
+            "train_speed",
+            "rolling_velocity",
+            "v_vehicle",
+            "v_train",
+        ],
+        doubtful: &["vx", "v_x", "v0", "v_0", "vkmh", "vel", "v_rel"],
+    },
+    Quantity {
+        pointer: "/contact/lateral_shift_mm",
+        units: &LENGTH,
+        names: &["lateral_shift", "lateral_displacement"],
+        codes: &["y_rel", "yrel", "rel_y", "y_shift", "shift_y", "shift"],
+        doubtful: &[
+            "y",
+            "dy",
+            "d_y",
+            "y_w",
+            "y_ws",
+            "y_wheelset",
+            "y_wr",
+            "y_wheel",
+            "u_y",
+            "lateral_position",
+            "lateral",
+            "displacement",
+        ],
+    },
+    Quantity {
+        pointer: "/contact/yaw_rad",
+        units: &ANGLE,
+        names: &["yaw", "yaw_angle"],
+        codes: &["psi", "angle_of_attack", "attack_angle", "aoa"],
+        doubtful: &["alpha", "attack", "p"],
+    },
+    Quantity {
+        pointer: "/contact/roll_rad",
+        units: &ANGLE,
+        names: &["roll", "roll_angle"],
+        codes: &[],
+        doubtful: &["phi", "phi_x"],
+    },
+];
+
+/// Short names of columns and what they stand for.
+const SHORT_NAMES: [(&str, &str); 18] = [
+    ("name", "/name"),
+    ("normal_force_n", "/load/normal_force_n"),
+    ("vertical_force_n", "/load/vertical_force_n"),
+    ("approach_mm", "/load/approach_mm"),
+    ("creepage_x", "/motion/creepage_x"),
+    ("creepage_y", "/motion/creepage_y"),
+    ("spin_per_mm", "/motion/spin_per_mm"),
+    ("force_x_n", "/motion/force_x_n"),
+    ("force_y_n", "/motion/force_y_n"),
+    ("friction_coefficient", "/friction/coefficient"),
+    ("rolling_mm", "/contact/rolling_mm"),
+    ("lateral_mm", "/contact/lateral_mm"),
+    ("a_mm", "/contact/a_mm"),
+    ("b_mm", "/contact/b_mm"),
+    ("rolling_radius_mm", "/contact/rolling_radius_mm"),
+    ("lateral_shift_mm", "/contact/lateral_shift_mm"),
+    ("yaw_rad", "/contact/yaw_rad"),
+    ("roll_rad", "/contact/roll_rad"),
+];
+
+/// Names of places along the track and of times, which are carried along with or without a unit of length or time.
+const PLACES_AND_TIMES: &[&str] = &[
+    "t",
+    "time",
+    "clock",
+    "hour",
+    "step",
+    "time_step",
+    "timestep",
+    "s",
+    "s_track",
+    "track_s",
+    "km",
+    "kp",
+    "pk",
+    "kilometre",
+    "kilometer",
+    "kilometrage",
+    "chainage",
+    "station",
+    "stationing",
+    "mile",
+    "mileage",
+    "milepost",
+    "position",
+    "pos",
+    "place",
+    "location",
+    "distance",
+    "dist",
+    "distance_travelled",
+    "distance_traveled",
+    "track_position",
+    "track_distance",
+    "position_along_track",
+    "distance_along_track",
+    "track_km",
+    "track_chainage",
+    "arc_length",
+    "latitude",
+    "longitude",
+    "date",
+    "datetime",
+    "timestamp",
+];
+
+/// Names of sections of a line, of vehicles and their parts, and of rows, which are carried along; also with an end of [`NUMBERED`].
+const SECTIONS_AND_THINGS: &[&str] = &[
+    "section",
+    "segment",
+    "track",
+    "track_section",
+    "line",
+    "route",
+    "curve",
+    "region",
+    "direction",
+    "site",
+    "switch",
+    "side",
+    "rail",
+    "rail_side",
+    "left_right",
+    "id",
+    "uuid",
+    "key",
+    "name",
+    "title",
+    "label",
+    "tag",
+    "comment",
+    "remark",
+    "note",
+    "description",
+    "case",
+    "run",
+    "scenario",
+    "variant",
+    "simulation",
+    "train",
+    "vehicle",
+    "car",
+    "wagon",
+    "coach",
+    "locomotive",
+    "bogie",
+    "wheelset",
+    "axle",
+    "wheel",
+    "wheel_side",
+    "contact_point",
+    // The answers have columns of these three names, so that one that is carried along is refused for its name.
+    "row",
+    "status",
+    "method",
+    "record",
+    "frame",
+    "sample",
+    "index",
+    "number",
+    "no",
+    "nr",
+    "num",
+    "passage",
+];
+
+/// Ends of names such as `axle_no`.
+const NUMBERED: &[&str] = &[
+    "id", "no", "nr", "num", "number", "name", "index", "code", "type",
+];
+
+/// Units of places and times, by their names in brackets and at the ends of titles.
+const PLACE_UNITS: &[&str] = &[
+    "s", "ms", "us", "min", "h", "d", "km", "m", "cm", "mm", "mi", "ft", "°",
+];
+
+/// Further units that a line of units below the titles may name.
+const OTHER_UNITS: &[&str] = &["Hz", "m/s²", "Nm", "°C"];
+
+/// Where a column stands in the case, and the factor that makes its values those of the case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Place {
+    /// JSON pointer into the case.
+    pub pointer: String,
+    /// Of numbers.
+    pub factor: f64,
+}
+
+/// The place that a title names, with the unit of its column in a line of units; nothing if it names none.
+///
+/// # Errors
+/// The title names a quantity without a unit, or with one that it does not have.
+pub fn place(title: &str, below: Option<&str>) -> Result<Option<Place>, String> {
+    let (bare, in_title) = parted(title);
+    let below = below.map(unbracketed).filter(|unit| !unit.is_empty());
+    let unit = match (in_title, below) {
+        (Some(one), Some(other)) if one != other => {
+            return Err(format!(
+                "has the unit `{one}`, and `{other}` in the line of units; they have to agree"
+            ));
+        }
+        (in_title, below) => in_title.or(below),
+    };
+    let direct = match title.starts_with('/') {
+        true => Some(title),
+        false => short_pointer(title),
+    };
+    if let Some(pointer) = direct {
+        let factor = factor_at(pointer, below)?;
+        return Ok(Some(Place {
+            pointer: pointer.to_owned(),
+            factor,
+        }));
+    }
+    let stem = normal(bare);
+    for quantity in &QUANTITIES {
+        let names = quantity.names.iter().map(|name| (name, true));
+        let codes = quantity.codes.iter().map(|name| (name, false));
+        for (name, own) in names.chain(codes) {
+            if let Some(factor) = quantity.factor(&stem, name, own, unit)? {
+                return Ok(Some(Place {
+                    pointer: quantity.pointer.to_owned(),
+                    factor,
+                }));
+            }
+        }
+    }
+    Ok(None)
+}
+
+impl Quantity {
+    /// The factor of a title that is one of its names; nothing if it is none, or if a name of a code comes without a unit of the quantity.
+    fn factor(
+        &self,
+        stem: &str,
+        name: &str,
+        own: bool,
+        unit: Option<&str>,
+    ) -> Result<Option<f64>, String> {
+        let Some(rest) = stem.strip_prefix(name) else {
+            return Ok(None);
+        };
+        if rest.is_empty() {
+            let factor = match unit {
+                Some(unit) => self.units.factor(unit),
+                // A ratio without a unit is a number.
+                None => self.units.of_suffix("").filter(|_| own),
+            };
+            return match factor {
+                None if own => Err(match unit {
+                    Some(unit) => format!("has the unit `{unit}`; {}", self.allowed()),
+                    None => format!("has no unit; {}", self.allowed()),
+                }),
+                factor => Ok(factor),
+            };
+        }
+        let suffix = rest.strip_prefix('_').filter(|suffix| !suffix.is_empty());
+        let Some(factor) = suffix.and_then(|suffix| self.units.of_suffix(suffix)) else {
+            // Such as `spin_axis`: another quantity.
+            return Ok(None);
+        };
+        match unit {
+            Some(unit) if self.units.factor(unit) != Some(factor) => Err(format!(
+                "ends in one unit and has the unit `{unit}` beside it; they have to agree"
+            )),
+            _ => Ok(Some(factor)),
+        }
+    }
+
+    fn allowed(&self) -> String {
+        let mut units: Vec<&str> = self.units.list.iter().map(|(unit, ..)| *unit).collect();
+        units.dedup();
+        format!(
+            "allowed as in `{} [{}]`: {}",
+            self.names[0],
+            self.units.usual,
+            units.join(", ")
+        )
+    }
+
+    /// The quantity as a client may write it, in this unit if it has it.
+    fn written(&self, unit: Option<&str>) -> String {
+        let unit = unit.filter(|unit| self.units.factor(unit).is_some());
+        format!("{} [{}]", self.names[0], unit.unwrap_or(self.units.usual))
+    }
+
+    /// Does the quantity have this name, or may it?
+    fn may_be(&self, name: &str) -> bool {
+        [self.names, self.codes, self.doubtful]
+            .iter()
+            .any(|names| names.contains(&name))
+    }
+}
+
+impl Units {
+    fn factor(&self, unit: &str) -> Option<f64> {
+        let exact = self.list.iter().find(|(known, ..)| *known == unit);
+        let lower = || {
+            let same = |known: &str| known.to_lowercase() == unit.to_lowercase();
+            self.list.iter().find(|(known, ..)| same(known))
+        };
+        exact.or_else(lower).map(|(.., factor)| *factor)
+    }
+
+    fn of_suffix(&self, suffix: &str) -> Option<f64> {
+        let found = self.list.iter().find(|(_, known, _)| *known == suffix);
+        found.map(|(.., factor)| *factor)
+    }
+}
+
+/// The factor of a column that is named by its place in the case, with this unit in a line of units. A name that ends in its unit is in this unit.
+fn factor_at(pointer: &str, unit: Option<&str>) -> Result<f64, String> {
+    let Some(unit) = unit else {
+        return Ok(1.0);
+    };
+    let known = MEMBER_UNITS.iter().find(|(end, _)| pointer.ends_with(end));
+    match known {
+        Some((_, units)) if units.factor(unit) == Some(1.0) => Ok(1.0),
+        Some((_, units)) => Err(format!(
+            "is in {} by its name, and in `{unit}` by the line of units; they have to agree",
+            units.list[0].0
+        )),
+        None => RATIO.factor(unit).ok_or_else(|| {
+            format!("has the unit `{unit}` in the line of units, which its name does not allow")
+        }),
+    }
+}
+
+/// The JSON pointer that a short name stands for.
+fn short_pointer(title: &str) -> Option<&'static str> {
+    let short = SHORT_NAMES.iter().find(|(name, _)| *name == title);
+    short.map(|(_, pointer)| *pointer)
+}
+
+/// The short names, for messages.
+#[must_use]
+pub fn short_names() -> String {
+    let names = SHORT_NAMES.iter().map(|(name, _)| format!("`{name}`"));
+    names.collect::<Vec<_>>().join(", ")
+}
+
+/// Is this a name of a place, a time, a section or a thing, which says nothing of the contact?
+fn is_carried(title: &str, below: Option<&str>) -> bool {
+    let (bare, in_title) = parted(title);
+    let below = below.map(unbracketed);
+    let stem = normal(bare);
+    let unit = in_title.or(below).filter(|unit| !unit.is_empty());
+    let unitless = unit.is_none_or(|unit| ["-", "1"].contains(&unit));
+    let of_place = unitless || unit.is_some_and(|unit| PLACE_UNITS.contains(&unit));
+    let cut = |ends: &[&str]| {
+        let (before, end) = stem.rsplit_once('_')?;
+        ends.contains(&end).then(|| before.to_owned())
+    };
+    let is = |list: &[&str], ends: &[&str]| {
+        list.contains(&&*stem) || cut(ends).is_some_and(|before| list.contains(&&*before))
+    };
+    // A label has this name in a table of a batch.
+    title.starts_with("label:")
+        || is(PLACES_AND_TIMES, PLACE_UNITS) && of_place
+        || is(SECTIONS_AND_THINGS, NUMBERED) && unitless
+}
+
+/// The quantities that a title may mean, as a client may write them.
+fn suggested(title: &str, below: Option<&str>) -> Vec<String> {
+    let (bare, in_title) = parted(title);
+    let unit = in_title.or(below.map(unbracketed));
+    let unit = unit.filter(|unit| !unit.is_empty());
+    let stem = normal(bare);
+    let written = |quantities: Vec<&Quantity>| -> Vec<String> {
+        let in_unit =
+            |quantity: &&&Quantity| unit.is_none_or(|unit| quantity.units.factor(unit).is_some());
+        let mut fitting: Vec<&&Quantity> = quantities.iter().filter(in_unit).collect();
+        if fitting.is_empty() {
+            fitting = quantities.iter().collect();
+        }
+        fitting.iter().map(|found| found.written(unit)).collect()
+    };
+    // Such as `nu_x` in `cpt_111r.nu_x` and in `nu_x_left`: the longest part of the title that is a name.
+    let tokens: Vec<&str> = stem.split('_').collect();
+    for length in (1..=tokens.len().min(4)).rev() {
+        for part in tokens.windows(length) {
+            let part = part.join("_");
+            let plain = part.trim_end_matches(|end: char| end.is_ascii_digit());
+            // Such as `ql` and `q11r`.
+            let sided = part.trim_end_matches(['l', 'r']);
+            let sided = sided.trim_end_matches(|end: char| end.is_ascii_digit());
+            for name in [part.as_str(), plain, sided] {
+                let found: Vec<&Quantity> = QUANTITIES
+                    .iter()
+                    .filter(|known| known.may_be(name))
+                    .collect();
+                if !found.is_empty() {
+                    return written(found);
+                }
+            }
+        }
+    }
+    let near = |name: &&&str| {
+        name.len() >= MISSPELT_LENGTH && strsim::levenshtein(name, &stem) <= MISSPELT_LETTERS
+    };
+    let misspelt = QUANTITIES
+        .iter()
+        .filter(|quantity| quantity.names.iter().any(|name| near(&name)));
+    let misspelt: Vec<&Quantity> = misspelt.collect();
+    if !misspelt.is_empty() {
+        return written(misspelt);
+    }
+    let of_unit = |quantity: &&Quantity| {
+        unit.is_some_and(|unit| unit != "-" && unit != "1" && quantity.units.factor(unit).is_some())
+    };
+    written(QUANTITIES.iter().filter(of_unit).collect())
+}
+
+/// What a title that is not known may mean, as a question; empty if there is no guess.
+#[must_use]
+pub fn question(title: &str, below: Option<&str>) -> String {
+    let guesses: Vec<String> = suggested(title, below)
+        .into_iter()
+        .map(|guess| format!("`{guess}`"))
+        .collect();
+    match guesses.is_empty() {
+        true => String::new(),
+        false => format!("is it {}?", guesses.join(" or ")),
+    }
+}
+
+/// Columns that a client named: the title of each, and its name here; columns without one are carried along.
+#[derive(Debug, Clone, Default)]
+pub struct NamedColumns(pub Vec<(String, String)>);
+
+/// The title of a column, its unit in a line of units, and whether it holds texts.
+pub type Titled<'a> = (&'a str, Option<&'a str>, bool);
+
+impl NamedColumns {
+    /// The columns of these titles. A title that was named has to be among them, and every other one has to be known.
+    ///
+    /// # Errors
+    /// `faulty-table` with every column at fault: a title is not known, or it names a quantity with a unit that it does not have, or without
+    /// one; or there are too many columns; or the client named a column twice, or one that is not there.
+    pub fn columns<'a>(
+        &self,
+        titles: impl Iterator<Item = Titled<'a>>,
+    ) -> Result<Vec<RunColumn>, ApiError> {
+        let titles: Vec<Titled<'_>> = titles.take(COLUMNS_MAX + 1).collect();
+        if titles.len() > COLUMNS_MAX {
+            return Err(faulty(format!(
+                "the table has more than {COLUMNS_MAX} columns, which are allowed at most"
+            )));
+        }
+        let mut named = HashMap::new();
+        for (title, what) in &self.0 {
+            if named.insert(title.as_str(), what.as_str()).is_some() {
+                return Err(faulty(format!("`{title}` is named twice in the query")));
+            }
+        }
+        let mut missing: HashSet<&str> = named.keys().copied().collect();
+        let (mut columns, mut faults) = (Vec::with_capacity(titles.len()), BTreeMap::new());
+        for (number, (title, below, text)) in titles.iter().copied().enumerate() {
+            // A title may be named without its unit.
+            let found = [title, parted(title).0]
+                .into_iter()
+                .find_map(|name| named.get_key_value(name));
+            if let Some((name, _)) = found {
+                missing.remove(name);
+            }
+            match place_of(title, below, found.map(|(_, what)| *what)) {
+                Ok(place) => columns.push(RunColumn {
+                    name: title.to_owned(),
+                    factor: place.as_ref().map_or(1.0, |place| place.factor),
+                    pointer: place.map(|place| place.pointer),
+                    unit: unit_of(title, below).map(str::to_owned),
+                    text,
+                }),
+                Err(detail) => {
+                    faults.insert(number, (title, detail));
+                }
+            }
+        }
+        if let Some(title) = self
+            .0
+            .iter()
+            .map(|(title, _)| title)
+            .find(|title| missing.contains(title.as_str()))
+        {
+            let titles: Vec<String> = titles
+                .iter()
+                .take(NAMED_MAX)
+                .map(|(title, ..)| format!("`{title}`"))
+                .collect();
+            return Err(faulty(format!(
+                "the query names the column `{title}`, which is no title of the table; its titles: {}",
+                titles.join(", ")
+            )));
+        }
+        match faults.is_empty() {
+            true => Ok(columns),
+            false => Err(refusal(faults.into_values(), &columns)),
+        }
+    }
+}
+
+/// The places of columns that all vary the case, from their titles and the units in a line of units.
+///
+/// # Errors
+/// `faulty-table`: there are too many columns, a title names no place, or two name the same.
+pub fn places<'a>(
+    titles: impl Iterator<Item = (&'a str, Option<&'a str>)>,
+) -> Result<Vec<Place>, ApiError> {
+    let (mut places, mut seen) = (Vec::new(), HashSet::new());
+    for (title, below) in titles {
+        let found = place(title, below);
+        let found = found.map_err(|detail| faulty(format!("column `{title}`: {detail}")))?;
+        let found = found.ok_or_else(|| {
+            faulty(format!(
+                "`{title}` names no column; {} allowed: {}, a quantity with its unit such as `normal_force [kN]`, or a JSON pointer such as \
+                 `/load/normal_force_n`; other columns are left out, since rows are answered in their order",
+                question(title, below),
+                short_names()
+            ))
+        })?;
+        if !seen.insert(found.pointer.clone()) {
+            return Err(faulty(format!("the column `{title}` is there twice")));
+        }
+        places.push(found);
+        require_few(places.len())?;
+    }
+    Ok(places)
+}
+
+/// What a column of a run is: a place in the case, or nothing if it is carried along. `named` is what the client says of it.
+fn place_of(
+    title: &str,
+    below: Option<&str>,
+    named: Option<&str>,
+) -> Result<Option<Place>, String> {
+    let carry = format!("`?carry={title}` carries it along to the answers");
+    match named {
+        Some("") => Ok(None),
+        // Rows are no jobs that have a name.
+        None if title == "name" => Ok(None),
+        Some(what) => {
+            let unit = below.map(unbracketed).filter(|unit| !unit.is_empty());
+            let place = place(what, unit.or(parted(title).1));
+            match place.map_err(|detail| format!("`{what}` {detail}"))? {
+                Some(place) => Ok(Some(place)),
+                None => {
+                    let known = QUANTITIES.iter().map(|quantity| quantity.names[0]);
+                    let known: Vec<&str> = known.collect();
+                    Err(format!(
+                        "`{what}` is named in `column`, which is no place in a case; allowed: a JSON pointer, a short name, or one of {} with a unit",
+                        known.join(", ")
+                    ))
+                }
+            }
+        }
+        None => match place(title, below).map_err(|detail| format!("{detail}; {carry}"))? {
+            Some(place) => Ok(Some(place)),
+            None if is_carried(title, below) => Ok(None),
+            None => {
+                let asked = question(title, below);
+                let example = suggested(title, below).into_iter().next();
+                let example = example.unwrap_or_else(|| "creepage_x [%]".to_owned());
+                Err(format!(
+                    "is not known; {asked}{} `?column={title}:{example}` says so, and {carry}",
+                    if asked.is_empty() {
+                        "if it is a quantity of the case,"
+                    } else {
+                        ""
+                    }
+                ))
+            }
+        },
+    }
+}
+
+/// The unit that a title or a line of units names.
+fn unit_of<'a>(title: &'a str, below: Option<&'a str>) -> Option<&'a str> {
+    let below = below.map(unbracketed).filter(|unit| !unit.is_empty());
+    parted(title).1.or(below)
+}
+
+/// The refusal of a table with faulty columns; also says what the others were taken for.
+fn refusal<'a>(faults: impl Iterator<Item = (&'a str, String)>, good: &[RunColumn]) -> ApiError {
+    let faults: Vec<(&str, String)> = faults
+        .map(|(title, detail)| (title, format!("column `{title}`: {detail}")))
+        .collect();
+    let mut parts: Vec<String> = faults
+        .iter()
+        .take(NAMED_MAX)
+        .map(|(_, detail)| detail.clone())
+        .collect();
+    if faults.len() > NAMED_MAX {
+        parts.push(format!(
+            "{} more columns are refused",
+            faults.len() - NAMED_MAX
+        ));
+    }
+    let recognised: Vec<String> = good
+        .iter()
+        .filter_map(|column| Some((column.name.as_str(), column.pointer.as_deref()?)))
+        .filter(|(name, pointer)| name != pointer)
+        .take(NAMED_MAX)
+        .map(|(name, pointer)| format!("`{name}` as `{pointer}`"))
+        .collect();
+    if !recognised.is_empty() {
+        parts.push(format!("recognised: {}", recognised.join(", ")));
+    }
+    let errors = faults.into_iter().map(|(title, detail)| Fault {
+        pointer: Some(column_pointer(title)),
+        ..Fault::invalid(detail)
+    });
+    ApiError::faulty_table(parts.join("; "), errors.collect())
+}
+
+/// Reads `TITLE:NAME` of the query; the title may contain colons.
+#[must_use]
+pub fn named_column(text: &str) -> Option<(String, String)> {
+    let (title, what) = text.rsplit_once(':')?;
+    (!title.is_empty()).then(|| (title.trim().to_owned(), what.trim().to_owned()))
+}
+
+/// Could this be a unit in a line of units?
+#[must_use]
+pub fn is_unit(text: &str) -> bool {
+    let bare = unbracketed(text);
+    let members = MEMBER_UNITS.iter().map(|(_, units)| *units);
+    let mut known = members.chain([&RATIO]).flat_map(|units| units.list);
+    bare != text
+        || text.is_empty()
+        || known.any(|(unit, ..)| *unit == bare && *unit != "1")
+        || PLACE_UNITS.contains(&bare)
+        || OTHER_UNITS.contains(&bare)
+}
+
+/// Are these the units of the columns below their titles?
+pub fn is_line_of_units<'a>(fields: impl Iterator<Item = &'a str>) -> bool {
+    let mut some = false;
+    let all = fields.map(str::trim).all(|field| {
+        some |= !field.is_empty();
+        is_unit(field)
+    });
+    all && some
+}
+
+/// The mark that parts the fields of a table, by its header: tabs if there is one outside of quotes, else semicolons, else commas.
+#[must_use]
+pub fn delimiter(header: &[u8]) -> u8 {
+    let mut quoted = false;
+    let outside: Vec<u8> = header
+        .iter()
+        .copied()
+        .filter(|byte| {
+            quoted ^= *byte == b'"';
+            !quoted
+        })
+        .collect();
+    let found = [b'\t', b';']
+        .into_iter()
+        .find(|mark| outside.contains(mark));
+    found.unwrap_or(b',')
+}
+
+/// A number, with a comma in place of its point where one may be.
+#[must_use]
+pub fn number(field: &str, decimal_comma: bool) -> Option<f64> {
+    let plain = field.parse().ok();
+    plain.or_else(|| {
+        let pointed = field.replacen(',', ".", 1);
+        (decimal_comma && !field.contains('.')).then(|| pointed.parse().ok())?
+    })
+}
+
+/// A title and the unit in brackets at its end.
+fn parted(title: &str) -> (&str, Option<&str>) {
+    match bracketed(title) {
+        Some((stem, unit)) => (stem.trim(), Some(unit)),
+        None => (title.trim(), None),
+    }
+}
+
+fn bracketed(title: &str) -> Option<(&str, &str)> {
+    let title = title.trim();
+    let (open, rest) = match title.strip_suffix(']') {
+        Some(rest) => ('[', rest),
+        None => ('(', title.strip_suffix(')')?),
+    };
+    let (stem, unit) = rest.rsplit_once(open)?;
+    Some((stem, unit.trim()))
+}
+
+/// A unit without its brackets.
+fn unbracketed(unit: &str) -> &str {
+    bracketed(unit).map_or(unit.trim(), |(_, unit)| unit)
+}
+
+/// A title as names are compared: small letters, Greek ones spelt out, words parted by `_`.
+fn normal(title: &str) -> String {
+    let mut text = String::with_capacity(title.len());
+    let mut before = ' ';
+    for letter in title.chars() {
+        let hump = letter.is_uppercase() && before.is_lowercase();
+        before = letter;
+        if hump {
+            text.push('_');
+        }
+        match letter {
+            ' ' | '-' | '.' | '/' | ':' | '_' => text.push('_'),
+            'µ' | 'μ' => text.push_str("mu"),
+            'ν' | 'υ' => text.push_str("nu"),
+            'ξ' => text.push_str("xi"),
+            'γ' => text.push_str("gamma"),
+            'φ' | 'ϕ' => text.push_str("phi"),
+            'ψ' => text.push_str("psi"),
+            'α' => text.push_str("alpha"),
+            'ω' => text.push_str("omega"),
+            letter => text.extend(letter.to_lowercase()),
+        }
+    }
+    let words = text.split('_').filter(|word| !word.is_empty());
+    words.collect::<Vec<_>>().join("_")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(title: &str, unit: Option<&str>) -> Result<Option<(String, f64)>, String> {
+        let columns = NamedColumns::default().columns([(title, unit, false)].into_iter());
+        let column = columns.map_err(|error| format!("{error:?}"))?.remove(0);
+        Ok(column.pointer.map(|pointer| (pointer, column.factor)))
+    }
+
+    #[test]
+    fn titles_with_units_are_places_and_factors() {
+        for (title, unit, place, factor) in [
+            ("normal_force_n", None, "/load/normal_force_n", 1.0),
+            ("normal_force_n", Some("[N]"), "/load/normal_force_n", 1.0),
+            ("Normal force [kN]", None, "/load/normal_force_n", 1e3),
+            ("NormalForce [kN]", None, "/load/normal_force_n", 1e3),
+            ("wheel_load (kN)", None, "/load/vertical_force_n", 1e3),
+            ("normal_force_kn", None, "/load/normal_force_n", 1e3),
+            ("FN [kN]", None, "/load/normal_force_n", 1e3),
+            ("N", Some("[N]"), "/load/normal_force_n", 1.0),
+            ("Longitudinal creepage", None, "/motion/creepage_x", 1.0),
+            ("creepage_x", Some("%"), "/motion/creepage_x", 1e-2),
+            ("/motion/creepage_x", Some("%"), "/motion/creepage_x", 1e-2),
+            ("lateral creepage [%]", None, "/motion/creepage_y", 1e-2),
+            ("nu_x", Some("[%]"), "/motion/creepage_x", 1e-2),
+            ("nux [-]", None, "/motion/creepage_x", 1.0),
+            ("nu.y [‰]", None, "/motion/creepage_y", 1e-3),
+            ("ξ_y [-]", None, "/motion/creepage_y", 1.0),
+            ("gamma_x", Some("-"), "/motion/creepage_x", 1.0),
+            ("phi [1/m]", None, "/motion/spin_per_mm", 1e-3),
+            ("spin [1/m]", None, "/motion/spin_per_mm", 1e-3),
+            ("spin", Some("[rad/m]"), "/motion/spin_per_mm", 1e-3),
+            ("spin_per_m", None, "/motion/spin_per_mm", 1e-3),
+            ("speed", Some("km/h"), "/motion/speed_mm_per_s", 1e3 / 3.6),
+            ("V [m/s]", None, "/motion/speed_mm_per_s", 1e3),
+            ("yaw [mrad]", None, "/contact/yaw_rad", 1e-3),
+            ("psi", Some("mrad"), "/contact/yaw_rad", 1e-3),
+            ("y_rel [mm]", None, "/contact/lateral_shift_mm", 1.0),
+            ("mu", None, "/friction/coefficient", 1.0),
+            ("µ", None, "/friction/coefficient", 1.0),
+            (
+                "lateral_displacement [m]",
+                None,
+                "/contact/lateral_shift_mm",
+                1e3,
+            ),
+        ] {
+            let expected = Some((place.to_owned(), factor));
+            assert_eq!(read(title, unit), Ok(expected), "{title} {unit:?}");
+        }
+    }
+
+    #[test]
+    fn places_times_and_things_are_carried_along() {
+        for (title, unit) in [
+            ("time [s]", None),
+            ("Time", None),
+            ("TIME", Some("[s]")),
+            ("t", None),
+            ("km", None),
+            ("s", Some("m")),
+            ("s_track", None),
+            ("sTrack", None),
+            ("time_s", None),
+            ("position [km]", None),
+            ("Section", None),
+            ("id", None),
+            ("Wheel ID", None),
+            ("axle_no", None),
+            ("vehicle", None),
+        ] {
+            assert_eq!(read(title, unit), Ok(None), "{title} {unit:?}");
+        }
+    }
+
+    #[test]
+    fn other_titles_are_refused_with_what_they_may_mean() {
+        for (title, unit, words) in [
+            (
+                "Q_left",
+                Some("[kN]"),
+                &["normal_force [kN]", "vertical_force [kN]"][..],
+            ),
+            ("Ql", None, &["normal_force [kN]"]),
+            ("nu_x", None, &["creepage_x [-]"]),
+            ("cpt_111r.nux", None, &["creepage_x [-]"]),
+            ("nu_y_left [%]", None, &["creepage_y [%]"]),
+            ("phi [rad]", None, &["roll [rad]"]),
+            ("alpha", None, &["yaw [mrad]"]),
+            ("y [mm]", None, &["lateral_shift [mm]"]),
+            ("v", None, &["speed [km/h]"]),
+            ("normal_forse", None, &["normal_force [kN]"]),
+            ("whatever [1/m]", None, &["spin [1/m]"]),
+            ("s [%]", None, &["creepage_x [%]"]),
+            ("t", Some("kN"), &["normal_force [kN]"]),
+            ("curvature", None, &["?carry=curvature"]),
+            ("speed_limit", None, &["?carry=speed_limit"]),
+            ("rolling_noise", None, &["?carry=rolling_noise"]),
+        ] {
+            let refused = read(title, unit).expect_err(title);
+            assert!(refused.contains(&format!("`{title}`")), "{refused}");
+            for word in words {
+                assert!(refused.contains(word), "{title} {word}: {refused}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_quantity_without_its_unit_is_refused() {
+        for (title, unit, word) in [
+            ("spin", None, "has no unit"),
+            ("Normal force", None, "kN"),
+            ("yaw [grad]", None, "`grad`"),
+            ("lateral_shift", Some("s"), "`s`"),
+            ("normal_force_n", Some("kN"), "agree"),
+            ("/load/normal_force_n", Some("kN"), "agree"),
+            ("normal_force_kn [N]", None, "agree"),
+            ("spin [1/m]", Some("1/mm"), "agree"),
+        ] {
+            let refused = read(title, unit).expect_err(title);
+            assert!(refused.contains(word), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_client_says_what_a_column_is() {
+        let named = [
+            "Q.left:vertical_force [kN]",
+            "Q.right:vertical_force",
+            "ny: creepage_y",
+            "spin:",
+            "t:x:/motion/creepage_x",
+        ];
+        let named = NamedColumns(named.iter().filter_map(|text| named_column(text)).collect());
+        let titles = [
+            ("Q.left", None, false),
+            ("Q.right", Some("[kN]"), false),
+            ("ny [%]", None, false),
+            ("spin", None, false),
+            ("t:x", None, false),
+        ];
+        let columns = named.columns(titles.into_iter()).expect("columns");
+        let found: Vec<_> = columns
+            .iter()
+            .map(|column| (column.pointer.as_deref(), column.factor))
+            .collect();
+        let vertical = (Some("/load/vertical_force_n"), 1e3);
+        let expected = [
+            vertical,
+            vertical,
+            (Some("/motion/creepage_y"), 1e-2),
+            (None, 1.0),
+            (Some("/motion/creepage_x"), 1.0),
+        ];
+        assert_eq!(found, expected);
+        let of = |named: &[&str]| {
+            let named = named.iter().filter_map(|text| named_column(text));
+            let columns = NamedColumns(named.collect()).columns([("a", None, false)].into_iter());
+            format!("{:?}", columns.expect_err("a refusal"))
+        };
+        assert!(of(&["a:load"]).contains("no place in a case"));
+        assert!(of(&["a:creepage_x", "a:creepage_y"]).contains("twice"));
+        assert!(of(&["b:creepage_x"]).contains("no title"));
+        let refused = of(&["a:spin"]);
+        assert!(
+            refused.contains("`spin` has no unit") && refused.contains("column `a`"),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn columns_are_bounded() {
+        let titles: Vec<String> = (0..=COLUMNS_MAX).map(|k| format!("/a/{k}")).collect();
+        let columns = |count: usize| {
+            let titles = titles[..count]
+                .iter()
+                .map(|title| (title.as_str(), None, false));
+            NamedColumns::default().columns(titles)
+        };
+        assert_eq!(columns(COLUMNS_MAX).expect("columns").len(), COLUMNS_MAX);
+        assert!(columns(COLUMNS_MAX + 1).is_err());
+    }
+}
