@@ -77,7 +77,7 @@ pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value +
 
 /// As a worker does it, operators kept by the process included.
 fn solve_one(engine: &Engine, case: &Value) {
-    let problem = engine.check_one(case, &Limits::default()).expect("a case");
+    let problem = (engine.check)(case, &Limits::default()).expect("a case");
     for slice in (engine.slices)(&problem) {
         (engine.solve)(&problem, slice, &Unmonitored).expect("a solution");
     }

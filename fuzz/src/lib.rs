@@ -9,6 +9,7 @@ use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::http::extract::batch::splitter::{Element, Layout, Splitter};
 use railhead::http::extract::batch::table::TableBody;
 use railhead::http::extract::json::read_strict;
+use railhead::jobs::batch::template::{fill_in_place, restore};
 use serde_json::{Value, json};
 
 /// A case in small, so that a table can fill every kind of member.
@@ -119,11 +120,18 @@ pub fn table(data: &[u8]) {
     let Some(lines) = cut(Layout::Rows, text, usize::from(*piece)) else {
         return;
     };
-    let mut table = TableBody::new(template());
+    let mut table = TableBody::default();
+    let mut filled = template();
     for line in lines {
         match table.take(&line.text) {
             Ok(None) => {}
-            Ok(Some(Ok(row))) => check(&row.case),
+            Ok(Some(Ok(row))) => {
+                if let Ok(replaced) = fill_in_place(&mut filled, &row.cells) {
+                    check(&filled);
+                    restore(&mut filled, &row.cells, replaced);
+                }
+                assert_eq!(filled, template());
+            }
             Ok(Some(Err(reason))) => assert!(!reason.is_empty()),
             Err(_) => return,
         }

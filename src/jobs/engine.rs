@@ -18,8 +18,11 @@ use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
 use crate::contact::solve_slice;
 
-/// Checks a case against limits; parts that were read for the case before are not read again.
-pub type Check =
+/// Checks a case against limits.
+pub type Check = dyn Fn(&Value, &Limits) -> Result<CheckedCase, CaseError> + Send + Sync;
+
+/// Checks one of many cases; cross-sections that were read for the case before are not read again.
+pub type CheckNext =
     dyn Fn(&KnownPair, &Value, &Limits) -> Result<CheckedCase, CaseError> + Send + Sync;
 
 /// Where a checked case is cut: ranges of motions, one after the other.
@@ -35,6 +38,8 @@ pub type Solve = dyn Fn(&CheckedCase, Range<usize>, &dyn Monitor) -> Result<(Sol
 pub struct Engine {
     /// The first step, done at submission and again before solving.
     pub check: Arc<Check>,
+    /// The same for rows of a table.
+    pub check_next: Arc<CheckNext>,
     /// Where the second step is cut, by the case alone.
     pub slices: Arc<Slices>,
     /// The second step, done on a solver thread, slice by slice.
@@ -56,21 +61,14 @@ impl Engine {
         let operators = Arc::new(operators);
         let store = Arc::clone(&operators);
         Engine {
-            check: Arc::new(contact::check_with),
+            check: Arc::new(contact::check),
+            check_next: Arc::new(contact::check_with),
             slices: Arc::new(slices),
             solve: Arc::new(move |checked, slice, monitor| {
                 solve_slice(&store, checked, slice, monitor)
             }),
             operators,
         }
-    }
-
-    /// Checks a case of which no part is known.
-    ///
-    /// # Errors
-    /// Every fault of the case.
-    pub fn check_one(&self, case: &Value, limits: &Limits) -> Result<CheckedCase, CaseError> {
-        (self.check)(&KnownPair::default(), case, limits)
     }
 
     /// The same with another solver, which solves every case at once.

@@ -72,7 +72,7 @@ impl Jobs {
     /// Every fault of the case.
     pub fn check(&self, case: &Value) -> Result<CheckedCase, CaseError> {
         let limits = &self.shared.options.limits;
-        self.shared.engine.check_one(case, limits)
+        (self.shared.engine.check)(case, limits)
     }
 
     /// As [`Jobs::check`], for one of many cases.
@@ -84,7 +84,7 @@ impl Jobs {
         known: &KnownPair,
         case: &Value,
     ) -> Result<CheckedCase, CaseError> {
-        (self.shared.engine.check)(known, case, &self.shared.options.limits)
+        (self.shared.engine.check_next)(known, case, &self.shared.options.limits)
     }
 
     /// Solve time of a case on this machine, found by solving it for at most about `limit`.

@@ -154,7 +154,7 @@ pub fn read_csv(text: &[u8]) -> Result<Vec<Column>, ApiError> {
                     let detail = format!(
                         "line {}, column `{}`: `{text}` is not a number",
                         line(),
-                        titles[place]
+                        named[place].pointer
                     );
                     return Err(faulty(detail));
                 }

@@ -37,7 +37,7 @@ pub(crate) fn solve_chunk(
     let first_row = chunk.first_row;
     let (varied, carried) = parted(&head, chunk);
     let limits = &shared.options.limits;
-    if let Ok(checked) = shared.engine.check_one(&head.case, limits) {
+    if let Ok(checked) = (shared.engine.check)(&head.case, limits) {
         control.set_memory_bytes(own_bytes(&checked, head.starts()));
     }
     let task = ManyTask {

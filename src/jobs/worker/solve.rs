@@ -56,7 +56,7 @@ fn check_and_solve(
         Ok(case) => case,
         Err(error) => return internal(&error.to_string()),
     };
-    let mut checked = match shared.engine.check_one(&case, &shared.options.limits) {
+    let mut checked = match (shared.engine.check)(&case, &shared.options.limits) {
         Ok(checked) => checked,
         Err(error) => return Outcome::Refused(error),
     };
