@@ -161,19 +161,19 @@ impl ApiError {
 
 impl From<CaseError> for ApiError {
     fn from(CaseError(faults): CaseError) -> Self {
-        let first = faults.first();
-        let first = first.map_or(String::new(), |fault| match &*fault.pointer {
-            "" => fault.detail.clone(),
-            pointer => format!("`{pointer}`: {}", fault.detail),
-        });
-        let detail = match faults.len() {
-            1 => format!("the case has 1 fault: {first}"),
-            count if count > FAULTS_LISTED => {
-                format!(
-                    "the case has {count} faults, of which {FAULTS_LISTED} are listed; the first: {first}"
-                )
+        let detail = match faults.as_slice() {
+            [fault] if fault.pointer.is_empty() => {
+                format!("the case has 1 fault: {}", fault.detail)
             }
-            count => format!("the case has {count} faults; the first: {first}"),
+            [fault] => format!(
+                "the case has 1 fault, `{}`: {}",
+                fault.pointer, fault.detail
+            ),
+            faults if faults.len() > FAULTS_LISTED => format!(
+                "the case has {} faults; the first {FAULTS_LISTED} are listed",
+                faults.len()
+            ),
+            faults => format!("the case has {} faults", faults.len()),
         };
         let mut failure = ApiError::new(ProblemKind::FaultyCase, detail);
         failure.problem.errors = faults

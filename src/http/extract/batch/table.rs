@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn units_semicolons_and_decimal_commas_give_the_same_case() {
-        let expected = filled(&["label:km,normal_force_n,spin_per_mm", "37.2,64100,4e-4"]);
+        let expected = filled(&["label:km,normal_force_n,spin_per_mm", "37.2,64100.0,4e-4"]);
         for lines in [
             &["label:km,Normal force [kN],spin [1/m]", "37.2,64.1,0.4"][..],
             &["label:km;Normal force [kN];spin [1/m]", "37.2;64,1;0,4"],
