@@ -116,7 +116,9 @@ fn table(
     let numbers = head.numbers.iter().cloned().zip(answer.numbers);
     columns.extend(numbers.map(|(name, values)| (name, TableColumn::Numbers(values))));
     if head.with_reasons {
-        columns.push((REASON.to_owned(), TableColumn::Texts(answer.reason)));
+        let reasons = answer.reason.into_iter();
+        let reasons = reasons.map(|reason| Some(reason).filter(|reason| !reason.is_empty()));
+        columns.push((REASON.to_owned(), TableColumn::Texts(reasons.collect())));
     }
     RowTable { columns }
 }

@@ -273,7 +273,7 @@ mod tests {
             &[
                 "label:km,normal_force_n,spin_per_m",
                 ",N,",
-                "37.2,64100,0.4",
+                "37.2,64100.0,0.4",
             ],
         ] {
             assert_eq!(filled(lines), expected, "{lines:?}");
