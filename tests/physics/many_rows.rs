@@ -170,7 +170,7 @@ fn a_row_that_cannot_be_solved_has_a_status_and_costs_no_other_row() {
 }
 
 #[test]
-fn a_row_on_a_rough_profile_tells_what_is_wrong_with_it() {
+fn a_row_on_a_rough_profile_has_the_reason_of_its_refusal() {
     let hole: Vec<_> = rail_60e1()
         .into_iter()
         .filter(|at| at[0].abs() > 25.0)

@@ -1,5 +1,5 @@
-//! Features of cases: every form of friction, every pair of bodies, every contact, ways to move, methods and outputs, and what each route does with
-//! them. This is the list of combinations that are refused.
+//! Features of cases: forms of friction, pairs of bodies, contacts, ways to move, methods and outputs. Each feature has the expected outcome on every
+//! route. This is the list of combinations that are refused.
 
 use serde_json::{Value, json};
 
@@ -27,11 +27,11 @@ pub struct Feature {
     pub name: String,
     pub case: Value,
     pub motions: Motions,
-    /// What a job with several motions can vary.
+    /// Numbers that a job with several motions can vary.
     pub motion_columns: Vec<RowColumn>,
-    /// What only rows vary.
+    /// Numbers that only rows vary.
     pub columns: Vec<RowColumn>,
-    /// Routes that do not answer as the case alone.
+    /// Routes that do not give the answer of the case alone.
     pub exceptions: Vec<(Route, Expected)>,
 }
 
@@ -42,7 +42,7 @@ impl Feature {
         exception.map_or(Expected::Agrees, |(_, expected)| *expected)
     }
 
-    /// Replaces what is expected of a route.
+    /// Replaces the expected outcome of a route.
     fn but(mut self, route: Route, expected: Expected) -> Feature {
         self.exceptions.retain(|(of, _)| *of != route);
         self.exceptions.push((route, expected));
@@ -60,7 +60,7 @@ impl Feature {
         self
     }
 
-    /// Rows that vary forces in the place of creepages.
+    /// Replaces the creepages of the rows by prescribed forces.
     fn pulled(mut self, forces: &[RowColumn], given: Value) -> Feature {
         self.case["motion"] = given;
         self.motion_columns = forces.to_vec();

@@ -52,7 +52,7 @@ pub const ROUTES: [Route; 7] = [
     Route::TwoProfiles,
 ];
 
-/// What a feature and a route have to do with each other.
+/// The expected outcome of a feature on a route.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Expected {
     /// Each answer is that of the case alone.
@@ -63,7 +63,7 @@ pub enum Expected {
     Refused(&'static str),
     /// `auto` leaves rows to the solver: no numbers.
     LeftToSolver,
-    /// The motions share the patches of the first, and a remark says so.
+    /// The motions share the patches of the first, with a remark.
     SharedPatches,
 }
 
@@ -81,16 +81,16 @@ struct Answer {
     remarks: Vec<String>,
 }
 
-/// Errors of answers that have no estimate of their own, relative to μN: those of given meshes, solved to a residual.
+/// Error of an answer without an estimate, relative to μN: one on a given mesh, solved to a residual.
 const WITHOUT_ESTIMATE: f64 = 1e-3;
 /// Rounding, relative to μN.
 const ROUNDING: f64 = 1e-6;
 /// Normal forces of patches that are found agree so well, relative to themselves.
 const NORMAL: f64 = 2e-3;
-/// A creepage is this many times as uncertain as the force that it is found for, relative to themselves: up to half the limit.
+/// Relative error of a creepage over the relative error of the force that prescribes it, for forces up to half the limit.
 const CREEPAGE: f64 = 5.0;
 
-/// What the matrix showed: a line for each feature, and what is wrong.
+/// The outcome of the matrix: a line for each feature, and faults.
 #[derive(Debug, Default)]
 pub struct Shown {
     pub lines: String,
@@ -185,7 +185,7 @@ fn checked(
             });
             match said {
                 true => Ok(Some((0, 0.0))),
-                false => Err("no remark says that patches are shared".to_owned()),
+                false => Err("no remark on shared patches".to_owned()),
             }
         }
         (_, Ok(rows)) => {

@@ -227,7 +227,7 @@ async fn a_case_has_the_same_answer_on_every_route_whatever_its_friction() {
 }
 
 #[tokio::test]
-async fn a_row_without_an_answer_tells_its_reason_and_has_one_position_with_one_motion() {
+async fn a_row_without_an_answer_has_a_reason_and_a_run_has_one_position_in_each_row() {
     let server = Server::start().await;
     let mut case = template(&frictions()[0]);
     // An ellipse whose pressure is absurd in the second row, which no look at one number shows.

@@ -7,8 +7,7 @@ pub enum RowStatus {
     Ok,
     /// The resultants are there; the bound of their error is above the target.
     TargetMissed,
-    /// No resultants: `auto` would solve the row on a mesh. The bound of the table is above the target, or the table does not represent the friction
-    /// or the layer of the case.
+    /// No resultants: `auto` would solve the row on a mesh. The bound of the table is above the target, or the table does not represent the case.
     NeedsSolver,
     /// No resultants: the table does not cover the ellipse, whose ratio of semi-axes is beyond 0.1 to 10.
     NotCovered,
@@ -91,7 +90,7 @@ impl RowAnswer {
         }
     }
 
-    /// The row itself, or one without an answer where a number that is answered is not finite.
+    /// The row, without its answer if a number is not finite.
     fn finite(self, with_gradients: bool) -> RowAnswer {
         let gradients = self.gradients.iter().filter(|_| with_gradients);
         let mut answered = self.numbers.iter().chain(gradients);
@@ -118,7 +117,7 @@ impl RowsAnswer {
         }
     }
 
-    /// Adds a row: the only place where rows are written. Rows with an answer have finite numbers only.
+    /// Adds a row. No other function writes rows, so all numbers of a row with an answer are finite.
     pub(crate) fn push(&mut self, row: RowAnswer) {
         let row = row.finite(self.gradients.is_some());
         let columns = [

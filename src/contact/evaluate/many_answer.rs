@@ -241,7 +241,7 @@ pub(crate) struct SolvedRow {
 }
 
 impl SolvedRow {
-    /// The row itself, unless a number that it must have is not finite. Derivatives of several patches do not exist.
+    /// The row, or a failure if a number that it must have is not finite. Several patches have no derivatives.
     fn finite(self, columns: &NumberColumns) -> Result<SolvedRow, RowFailure> {
         let names = columns.names();
         let named = names.iter().zip(&self.numbers);
@@ -299,7 +299,7 @@ impl ManyAnswer {
         rows.by_ref().filter(|row| !row.has_answer()).count()
     }
 
-    /// Notes what became of a row: the only place where answers are written. An answer with a number that is not finite is a failure.
+    /// Writes the outcome of a row. No other function writes rows; an answer with a number that is not finite is a failure.
     pub(crate) fn set(&mut self, row: usize, outcome: Result<SolvedRow, RowFailure>) {
         let outcome = outcome.and_then(|solved| solved.finite(&self.columns));
         let (numbers, reason);

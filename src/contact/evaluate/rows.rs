@@ -202,7 +202,7 @@ impl Rows {
                 found = RowCreep::none(RowStatus::NeedsSolver);
             }
         }
-        (found.of_patch(&patch, motion), place)
+        (found.of_patch(&patch, motion, self.gradients), place)
     }
 
     /// Shear modulus and Poisson's ratio of a row.
@@ -310,8 +310,8 @@ impl RowCreep {
         }
     }
 
-    /// The same in N and mm.
-    fn of_patch(&self, patch: &RowPatch, motion: [f64; 3]) -> RowAnswer {
+    /// The numbers in N and mm, with derivatives if they are wanted.
+    fn of_patch(&self, patch: &RowPatch, motion: [f64; 3], gradients: bool) -> RowAnswer {
         let (limit, c) = (patch.limit, patch.c);
         let creep = &self.creep;
         let force = [
@@ -320,13 +320,20 @@ impl RowCreep {
             limit * c * creep.force[2],
         ];
         let power = motion[0] * force[0] + motion[1] * force[1] + motion[2] * force[2];
-        // Without friction there are neither forces nor derivatives.
-        let unit = if limit > 0.0 {
-            limit * patch.unit()
-        } else {
-            0.0
-        };
-        let arm = |k: usize| if k == 2 { c } else { 1.0 };
+        let mut slopes = [f64::NAN; 9];
+        if gradients {
+            // Without friction there are neither forces nor derivatives.
+            let unit = if limit > 0.0 {
+                limit * patch.unit()
+            } else {
+                0.0
+            };
+            let arm = |k: usize| if k == 2 { c } else { 1.0 };
+            slopes = std::array::from_fn(|place| {
+                let (force, creepage) = (place / 3, place % 3);
+                self.slopes[force][creepage] * unit * arm(force) * arm(creepage)
+            });
+        }
         RowAnswer {
             numbers: [
                 force[0],
@@ -336,10 +343,7 @@ impl RowCreep {
                 power,
                 creep.stick,
             ],
-            gradients: std::array::from_fn(|place| {
-                let (force, creepage) = (place / 3, place % 3);
-                self.slopes[force][creepage] * unit * arm(force) * arm(creepage)
-            }),
+            gradients: slopes,
             status: self.status,
         }
     }

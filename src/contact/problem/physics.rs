@@ -162,8 +162,8 @@ impl Problem {
         }
     }
 
-    /// The question as a plain contact, if it is one; its motions, forces and history are not looked at. Every member of a question is named
-    /// here, so that a new one must be judged.
+    /// The question as a plain contact, if it is one, whatever its motions, forces and history are. The pattern names every member of a question,
+    /// so a new member does not compile before it is judged here.
     pub(crate) fn plain(&self) -> Option<PlainContact> {
         let Problem {
             elasticity: _,

@@ -14,7 +14,7 @@ use crate::jobs::error::JobsError;
 /// The form of heads and chunks that is written.
 const FORM: u32 = 1;
 
-/// The column that tells why a row has no answer.
+/// The column with the reason why a row has no answer.
 pub const REASON: &str = "reason";
 
 /// A column of the rows of a run.
@@ -93,7 +93,7 @@ pub struct RunHead {
     /// Rows start from rows that are like them.
     #[serde(default)]
     pub from_neighbours: bool,
-    /// The answers tell why a row has none; those of older runs do not.
+    /// Answers have the column of reasons; those of older runs do not.
     #[serde(default)]
     pub with_reasons: bool,
     /// Number of rows.

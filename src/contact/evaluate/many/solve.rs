@@ -112,7 +112,7 @@ fn evaluable(task: &ManyTask, checked: &CheckedCase) -> Option<(Rows, MethodName
     Some((rows, checked.run.method_asked))
 }
 
-/// Is a row that was evaluated so left to the solver? It tells the reason of a row without finite numbers.
+/// Is a row that was evaluated so left to the solver? The solver gives the reason of a row without finite numbers.
 fn to_solve(status: RowStatus, method: MethodName) -> bool {
     match status {
         RowStatus::Ok | RowStatus::TargetMissed => false,
