@@ -118,7 +118,7 @@ async fn assert_forms(server: &Server, run: &str, rows: &[Value]) {
     );
     assert_eq!(
         table.column("reason"),
-        Some(&TableColumn::Texts(vec![String::new(); rows.len()]))
+        Some(&TableColumn::Texts(vec![None; rows.len()]))
     );
 }
 
