@@ -24,6 +24,7 @@ use crate::contact::rolling::cubic_law::CubicLaw;
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::resolution::RelativeTo;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
 use crate::contact::wheel_balance::BALANCE;
@@ -331,6 +332,11 @@ impl PullSearch<'_> {
     /// The answer at the forces.
     fn to(&self, first: &FirstEstimate, reach: &Reach) -> Result<(Solution, Fields), SolveError> {
         let target = self.case.run.resolution.target_or_usual();
+        let wanted = self.forces.map(Option::unwrap_or_default);
+        let target = match self.case.run.relative_to {
+            RelativeTo::FrictionLimit => target,
+            RelativeTo::Force => target * (wanted[0].hypot(wanted[1]) / first.limit).min(1.0),
+        };
         let allowed = (MISSED_OF_TARGET * target)
             .max(MISSED_LEAST)
             .max(reach.open / first.limit);

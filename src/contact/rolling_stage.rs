@@ -3,16 +3,20 @@
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
+use crate::contact::method::Method;
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::history;
+use crate::contact::rolling::history::task::HistoryTask;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::lender::may_borrow;
 use crate::contact::rolling::refinement::level_solve::MotionTask;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::refinement::stretch::Stretch;
+use crate::contact::rolling::resolution::{RelativeTo, Resolution, TARGET_LEAST};
+use crate::contact::rolling::task::RollingTask;
 use crate::contact::solution::assemble::Assembly;
 use crate::contact::solution::finish::share_seconds;
 use crate::contact::solution::words::answer::Solution;
@@ -49,28 +53,16 @@ fn solve_motions(
     let mut state = RefinementState::new(&task, operators);
     let mut assembly = Assembly::new(case, solved);
     if let Some(history) = &case.problem.history {
-        let patches = solved.footprint.patches().iter();
-        let extents: Vec<[f64; 4]> = patches.map(|patch| patch.extent).collect();
-        if let Some(reason) = history::solve::too_long(history, &extents, case.run.steps_max) {
-            return Err(SolveError::NotCovered { reason });
-        }
-        let part = watch.of_next(case.problem.motions.len());
-        for mut point in history::solve::solve(&task, history, &mut state, &part)? {
-            add_coupling_error(&mut point, solved.coupling_error);
-            if assembly.is_empty() {
-                point.seconds += solved.report.map_or(0.0, |report| report.seconds);
-            }
-            assembly.add(&state.levels, &point, watch)?;
-            watch.advance();
-        }
+        solve_history(&task, history, &mut state, &mut assembly, watch)?;
         return Ok(assembly.finish());
     }
+    let to_force = case.run.relative_to == RelativeTo::Force;
     let mut before: Option<MotionAnswer> = None;
     let mut stretch = Stretch::default();
     let motions = case.problem.motions.len();
     for index in 0..motions {
         let mut found = match task.target() {
-            Some(target) if may_borrow(&task, index) => {
+            Some(target) if !to_force && may_borrow(&task, index) => {
                 let motion = task.motions[index];
                 let asked = MotionTask { index, motion };
                 let mut found = stretch.solve(&task, &mut state, asked, target, watch)?;
@@ -87,6 +79,20 @@ fn solve_motions(
                 found
             }
         };
+        if to_force {
+            let rounds = ForceRounds {
+                operators,
+                case,
+                solved,
+                index,
+                watch,
+            };
+            for point in found {
+                before = Some(rounds.add(&mut assembly, &task, &state, point, 0)?);
+            }
+            state.trim();
+            continue;
+        }
         for point in &mut found {
             add_coupling_error(point, solved.coupling_error);
             if assembly.is_empty() {
@@ -102,6 +108,107 @@ fn solve_motions(
         before = found.pop().or(before);
     }
     Ok(assembly.finish())
+}
+
+/// Solves the steps of a history.
+fn solve_history<'a>(
+    task: &'a RollingTask<'a>,
+    history: &HistoryTask,
+    state: &mut RefinementState<'a>,
+    assembly: &mut Assembly,
+    watch: &TimeLimit,
+) -> Result<(), SolveError> {
+    let (case, solved) = assembly.of();
+    let patches = solved.footprint.patches().iter();
+    let extents: Vec<[f64; 4]> = patches.map(|patch| patch.extent).collect();
+    if let Some(reason) = history::solve::too_long(history, &extents, case.run.steps_max) {
+        return Err(SolveError::NotCovered { reason });
+    }
+    let part = watch.of_next(case.problem.motions.len());
+    for mut point in history::solve::solve(task, history, state, &part)? {
+        add_coupling_error(&mut point, solved.coupling_error);
+        if assembly.is_empty() {
+            point.seconds += solved.report.map_or(0.0, |report| report.seconds);
+        }
+        assembly.add(&state.levels, &point, watch)?;
+        watch.advance();
+    }
+    Ok(())
+}
+
+/// How often a motion is solved again with a smaller target at most. The force hardly changes between the first and the second answer.
+const ROUNDS_MAX: u32 = 3;
+/// Part of the allowed error that is asked for, since the force may come out smaller.
+const AIMED: f64 = 0.9;
+
+/// Solves a motion to an error relative to its force, in rounds: each asks for the error relative to μN that follows from the force of the round
+/// before.
+struct ForceRounds<'a> {
+    operators: &'a Arc<OperatorStore>,
+    case: &'a CheckedCase,
+    solved: &'a SolvedFootprint,
+    index: usize,
+    watch: &'a TimeLimit<'a>,
+}
+
+impl ForceRounds<'_> {
+    /// Adds the motion to the answer once its error is small enough, or no target makes it smaller.
+    fn add(
+        &self,
+        assembly: &mut Assembly,
+        task: &RollingTask,
+        state: &RefinementState,
+        mut point: MotionAnswer,
+        round: u32,
+    ) -> Result<MotionAnswer, SolveError> {
+        if let Some(target) = self.smaller_target(task, &point)
+            && round < ROUNDS_MAX
+        {
+            let finer = RollingTask {
+                resolution: Resolution::Target(target),
+                ..*task
+            };
+            let mut finer_state = RefinementState::new(&finer, self.operators);
+            let last = Some(&point);
+            let found =
+                force_control::solve(&finer, &mut finer_state, self.index, last, self.watch);
+            match found {
+                Ok(mut found) => {
+                    found.seconds += point.seconds;
+                    let residual = found.work.residual;
+                    found.work.add(point.work);
+                    found.work.residual = residual;
+                    return self.add(assembly, &finer, &finer_state, found, round + 1);
+                }
+                // The answer of the round before stands, with its error.
+                Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        add_coupling_error(&mut point, self.solved.coupling_error);
+        if assembly.is_empty() {
+            point.seconds += self.solved.report.map_or(0.0, |report| report.seconds);
+        }
+        // Levels of other rounds have numbers of their own.
+        assembly.forget_levels();
+        assembly.add(&state.levels, &point, self.watch)?;
+        self.watch.advance();
+        Ok(point)
+    }
+
+    /// The target relative to μN with which the error may be small enough; none if it is, or if no smaller one helps.
+    fn smaller_target(&self, task: &RollingTask, point: &MotionAnswer) -> Option<f64> {
+        let asked = task
+            .target()
+            .filter(|_| task.method == Method::BoundaryElement)?;
+        let limit = task.friction.limit_of_all(task.footprint);
+        let allowed = self.case.run.allowed_error(point, limit)?;
+        let coupling = self.solved.coupling_error;
+        let error = point.error()?.hypot(coupling);
+        let wanted = Resolution::Target((AIMED * allowed).max(TARGET_LEAST));
+        let target = wanted.beside(coupling).target()?.max(TARGET_LEAST);
+        (error > allowed && target < asked).then_some(target)
+    }
 }
 
 /// Adds the error of the pressures (see [`SolvedFootprint`]) to the estimates.

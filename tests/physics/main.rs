@@ -15,8 +15,10 @@ mod cylinders;
 mod damaged;
 #[path = "../../benches/stress/damaged_trials.rs"]
 mod damaged_trials;
+mod en15302;
 mod equations;
 mod fastsim;
+mod force_target;
 mod forces;
 mod forces_reference;
 mod friction;
@@ -98,6 +100,7 @@ mod table_rows;
 mod targets;
 #[path = "../../benches/calibrate/truth.rs"]
 mod truth;
+mod units;
 mod unlike;
 mod unlike_wheels;
 mod watched;

@@ -7,8 +7,9 @@ use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, faults, good, with};
-use crate::profile_cases::generated;
+use crate::profile_cases::{generated, put, wheel_on_rail};
 use crate::profile_shapes::{rail_60e1, s1002};
+use crate::reference;
 
 const RAIL: &str = "/contact/rail/points_mm";
 const WHEEL: &str = "/contact/wheel/points_mm";
@@ -181,6 +182,7 @@ fn members_of_the_contact_are_checked_on_both_sides_of_their_limits() {
     }
     for (name, good) in [
         ("gauge_height_mm", 10.0),
+        ("flange_back_distance_mm", 1360.0),
         ("yaw_rad", 0.0),
         ("roll_rad", 0.0),
     ] {
@@ -214,6 +216,87 @@ fn what_is_left_out_is_the_standard_track() {
     let limits = Limits::default();
     let [full, short] = [generated(), short].map(|case| check(&case, &limits).unwrap());
     assert_eq!(full.label.digest, short.label.digest);
+}
+
+/// Half of a measured rail has no gauge face: it is not placed by the end of its points, but by its origin where that is given.
+#[test]
+fn a_rail_without_a_gauge_face_is_refused_or_placed_by_its_origin() {
+    let head = |from: f64| -> Value {
+        let points = rail_60e1().into_iter().filter(|[y, _]| *y > from);
+        json!({ "points_mm": points.collect::<Vec<_>>(), "mirror_y": false, "mirror_z": false })
+    };
+    let place = |rail: Value, members: Value| {
+        let mut case = wheel_on_rail(rail, json!({ "points_mm": s1002() }), 0.0);
+        let contact = case["contact"].as_object_mut().unwrap();
+        contact.remove("gauge_mm");
+        contact.remove("gauge_height_mm");
+        put(&case, "contact", members)
+    };
+    assert_fault(
+        &place(head(-20.0), json!({})),
+        "/contact/rail",
+        &["14 mm below the top", "rail_origin_mm", "1.0"],
+    );
+    // A gauge measured within the points needs no more of them.
+    assert_eq!(
+        faults(&place(head(-20.0), json!({ "gauge_height_mm": 1 }))),
+        []
+    );
+    for name in ["gauge_mm", "gauge_height_mm"] {
+        let both = place(head(-20.0), json!({ "rail_origin_mm": 750, (name): 10 }));
+        assert_fault(&both, "/contact/rail_origin_mm", &[name]);
+    }
+    assert_fault(
+        &place(head(-20.0), json!({ "rail_origin_mm": -1 })),
+        "/contact/rail_origin_mm",
+        &["-1 given", "from 0"],
+    );
+    let found = |case: &Value| {
+        let (solution, _) = reference::solve(case);
+        let patch = &solution.patches[0];
+        let position = patch.position.as_ref().expect("a position");
+        [patch.pressure_max_mpa, position.rail_mm[0]]
+    };
+    // The place of the gauge face, 14 mm below the top.
+    let points = rail_60e1();
+    let face = points
+        .windows(2)
+        .find(|pair| pair[0][1] >= 14.0 && pair[1][1] < 14.0);
+    let [from, to] = face.map(|pair| [pair[0], pair[1]]).expect("a gauge face");
+    let face = from[0] + (14.0 - from[1]) / (to[1] - from[1]) * (to[0] - from[0]);
+    let origin = json!({ "rail_origin_mm": 717.5 - face });
+    let [pressure, y] = found(&place(head(-50.0), json!({})));
+    for cut in [-50.0, -20.0] {
+        let by_origin = found(&place(head(cut), origin.clone()));
+        assert!(
+            (by_origin[0] / pressure - 1.0).abs() < 1e-3,
+            "{by_origin:?}"
+        );
+        assert!((by_origin[1] - y).abs() < 0.02, "{by_origin:?} {y}");
+    }
+}
+
+/// Both distances may be 0, as a wheel on a roller rig has them: then the origins of both cross-sections lie over each other.
+#[test]
+fn origins_may_lie_on_the_middle_line() {
+    let mut case = wheel_on_rail(
+        json!({ "points_mm": rail_60e1() }),
+        json!({ "points_mm": s1002() }),
+        0.0,
+    );
+    let contact = case["contact"].as_object_mut().unwrap();
+    contact.remove("gauge_mm");
+    contact.remove("gauge_height_mm");
+    let at = |origin: f64, back: f64, position: f64| {
+        let place = json!({
+            "rail_origin_mm": origin, "flange_back_distance_mm": back, "flange_back_position_mm": position,
+        });
+        let (solution, _) = reference::solve(&put(&case, "contact", place));
+        solution.patches[0].pressure_max_mpa
+    };
+    let near = at(0.0, 0.0, 3.0);
+    let apart = at(750.0, 1500.0, 3.0);
+    assert!((near / apart - 1.0).abs() < 1e-3, "{near} {apart}");
 }
 
 #[test]

@@ -199,6 +199,7 @@ fn a_wheel_beside_the_rail_has_no_contact() {
     assert!(
         WheelRail::new(rail, wheel, tiny)
             .unwrap_err()
+            .to_string()
             .contains("axle")
     );
 }

@@ -5,7 +5,7 @@ use railhead::contact::geometry::formats::format as formats;
 use railhead::contact::geometry::formats::format::Format;
 use railhead::contact::geometry::local_gap::{GapSampling, LocalGap};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
-use railhead::contact::geometry::wheel_rail::{Placement, Side, WheelRail};
+use railhead::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
 
 use crate::profile_reference_files::reference_file;
 use crate::profile_shapes::{rail_60e1, s1002};
@@ -15,8 +15,10 @@ pub fn placement() -> Placement {
     Placement {
         side: Side::Right,
         rolling_radius: 460.0,
-        gauge: 1435.0,
-        gauge_height: 14.0,
+        rail: RailPlace::Gauge {
+            gauge: 1435.0,
+            height: 14.0,
+        },
         cant: 0.025,
         flange_back_distance: 1360.0,
         flange_back_position: -70.0,

@@ -116,7 +116,7 @@ fn guide_to_wheelsets_runs_as_it_stands() {
     let output = run(Path::new("bash"), &["-euc", &script], folder.path());
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(
-        said.contains("\"radius_difference_mm\": 0.75") && said.contains("\"conicity\": 0.183"),
+        said.contains("\"radius_difference_mm\": 0.75") && said.contains("\"conicity\": 0.180"),
         "{said}"
     );
 }

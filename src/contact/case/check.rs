@@ -8,8 +8,8 @@ use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
-use crate::contact::case::wheel_task;
 use crate::contact::case::words::question::Case;
+use crate::contact::case::{units, wheel_task};
 use crate::contact::error::CaseError;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::problem::after_tasks::AfterTasks;
@@ -61,10 +61,14 @@ impl CheckedCase {
             speeds,
             history,
         } = motions;
-        let given = given_creepages(&motions, &forces);
         let patches = task.known_patches().unwrap_or_default();
-        let implausible = plausibility::of_case(&case.contact, &patches, given);
-        let remarks = merged(of_case.chain(remarks).chain(implausible));
+        let given = given_creepages(&motions, &forces);
+        let remarks = merged(
+            of_case
+                .chain(remarks)
+                .chain(plausibility::of_case(&case.contact, &patches, given))
+                .chain(units::remarks(case, &patches)),
+        );
         let digest = digest(case, &elasticity, &motions, &forces, &speeds);
         let problem = Problem {
             elasticity,
@@ -131,6 +135,7 @@ fn run(case: &Case, limits: &Limits) -> Run {
         method_asked: case.solver.method,
         traction_bound: case.solver.traction_bound.unwrap_or_default().into(),
         resolution: resolution(&case.solver),
+        relative_to: case.solver.relative_to.unwrap_or_default().into(),
         compares_with_table: true,
         time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
         memory_bytes: limits.memory_bytes,

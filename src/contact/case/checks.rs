@@ -10,7 +10,7 @@ use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
-use crate::contact::case::words::solver::{MethodName, Output, Solver};
+use crate::contact::case::words::solver::{MethodName, Output, RelativeToName, Solver};
 use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::case::{contact_task, history, length_units, motions, wheel_task, wheelsets};
 use crate::contact::error::Fault;
@@ -150,7 +150,15 @@ fn history_faults(
         friction: given.friction,
         patches: &task.and_then(NormalTask::known_patches).unwrap_or_default(),
     };
-    history::faults(history, &beside, limits)
+    let mut faults = history::faults(history, &beside, limits);
+    let of_force = |solver: &&Solver| solver.relative_to == Some(RelativeToName::Force);
+    if given.solver.as_ref().is_some_and(of_force) {
+        faults.push(Fault::new(
+            "/solver/relative_to",
+            "\"force\" given with a history, whose forces pass through 0; \"friction_limit\" is allowed",
+        ));
+    }
+    faults
 }
 
 /// The task of a wheel or a wheelset with its remarks; `None` without faults where something it depends on is not known.

@@ -3,7 +3,9 @@
 use crate::contact::case::words::contact::{FormatName, SideName, UnitName};
 use crate::contact::case::words::friction::{FallName, Friction};
 use crate::contact::case::words::motion::MotionWords;
-use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
+use crate::contact::case::words::solver::{
+    MeshSizeWords, MethodName, Output, RelativeToName, TractionBoundName,
+};
 use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::friction::across::{AcrossLaw, AcrossPlace};
 use crate::contact::friction::along::AlongLaw;
@@ -18,6 +20,7 @@ use crate::contact::mesh::size::MeshSize;
 use crate::contact::method::{Method, TractionBound};
 use crate::contact::post::heat::ThermalTask;
 use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::resolution::RelativeTo;
 
 impl From<SideName> for Side {
     fn from(name: SideName) -> Side {
@@ -189,6 +192,15 @@ impl From<Method> for MethodName {
             Method::LiuHsu => MethodName::LiuHsu,
             Method::Fastsim => MethodName::Fastsim,
             Method::Table => MethodName::Table,
+        }
+    }
+}
+
+impl From<RelativeToName> for RelativeTo {
+    fn from(name: RelativeToName) -> RelativeTo {
+        match name {
+            RelativeToName::FrictionLimit => RelativeTo::FrictionLimit,
+            RelativeToName::Force => RelativeTo::Force,
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::contact::case::resolution::resolution;
 use crate::contact::case::words::canonical::Canonical;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::question::Case;
-use crate::contact::case::words::solver::TractionBoundName;
+use crate::contact::case::words::solver::{RelativeToName, TractionBoundName};
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::resolution::Resolution;
@@ -61,6 +61,10 @@ pub(crate) fn digest(
             .traction_bound
             .filter(|bound| *bound != TractionBoundName::default()),
         target_error,
+        relative_to: case
+            .solver
+            .relative_to
+            .filter(|of| *of != RelativeToName::default()),
         mesh: case.solver.mesh,
         time_limit_s: case.solver.time_limit_s,
         outputs: &case.outputs,

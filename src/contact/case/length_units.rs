@@ -8,6 +8,8 @@ use crate::contact::remark::list::Remark;
 
 /// Usual gauge in mm: standard gauge.
 const GAUGE: f64 = 1435.0;
+/// Usual distance of the middle of a rail from that of the track in mm, on standard gauge.
+const RAIL_ORIGIN: f64 = 752.5;
 /// Usual distance of the backs of the flanges in mm, on standard gauge.
 const FLANGE_BACKS: f64 = 1360.0;
 /// Usual rolling radius in mm (UIC wheels of 920 mm diameter).
@@ -17,12 +19,14 @@ const RADIUS: f64 = 460.0;
 pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
     let (Contact::Profiles {
         gauge_mm,
+        rail_origin_mm,
         flange_back_distance_mm,
         rolling_radius_mm,
         ..
     }
     | Contact::Wheelset {
         gauge_mm,
+        rail_origin_mm,
         flange_back_distance_mm,
         rolling_radius_mm,
         ..
@@ -32,14 +36,20 @@ pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
     };
     let lengths = [
         ("/contact/gauge_mm", *gauge_mm, GAUGE),
+        ("/contact/rail_origin_mm", *rail_origin_mm, RAIL_ORIGIN),
         (
             "/contact/flange_back_distance_mm",
-            *flange_back_distance_mm,
+            Some(*flange_back_distance_mm),
             FLANGE_BACKS,
         ),
-        ("/contact/rolling_radius_mm", *rolling_radius_mm, RADIUS),
+        (
+            "/contact/rolling_radius_mm",
+            Some(*rolling_radius_mm),
+            RADIUS,
+        ),
     ];
-    let remark = |(pointer, length_mm, usual): (&str, f64, f64)| {
+    let remark = |(pointer, length_mm, usual): (&str, Option<f64>, f64)| {
+        let length_mm = length_mm?;
         let unit = LengthUnit::likely(length_mm, usual).filter(|unit| *unit != LengthUnit::Mm)?;
         let unit = unit.symbol();
         Some(Remark::LengthUnusual { length_mm, unit }.at_pointer(pointer))

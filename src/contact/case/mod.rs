@@ -23,6 +23,7 @@ pub mod size_faults;
 pub mod solve_time;
 pub mod subsurface;
 pub mod understood;
+pub(crate) mod units;
 pub mod wheel_task;
 pub mod wheelsets;
 pub mod words;

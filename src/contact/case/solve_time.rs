@@ -22,7 +22,7 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::profile_points;
 use crate::contact::rolling::history::solve::usual_work;
 use crate::contact::rolling::refinement::mesh_policy::CELLS_MAX;
-use crate::contact::rolling::resolution::Resolution;
+use crate::contact::rolling::resolution::{RelativeTo, Resolution};
 use crate::contact::rolling::task::precision_of;
 
 /// The time of a motion within a sweep relative to a single one, because tractions of the motion before are a start: where that is near, for
@@ -346,7 +346,16 @@ impl CheckedCase {
         let motions = problem.motions.iter().enumerate().map(|(k, motion)| {
             let prescribed = self.is_prescribed(k);
             let guess = |patch: &PatchGuess| {
-                patch.seconds(target, &problem.elasticity, friction, motion, prescribed)
+                let to = |target| {
+                    patch.seconds(target, &problem.elasticity, friction, motion, prescribed)
+                };
+                let mut first = to(target);
+                let share = self.force_share(k, &first, friction * patch.force);
+                // A motion with a small force is solved again.
+                if self.run.relative_to == RelativeTo::Force && share < 1.0 {
+                    first.seconds += to(share * target).seconds;
+                }
+                first
             };
             let guesses: Vec<MotionGuess> = patches.iter().map(guess).collect();
             let of_patch = |(at, guess): (usize, &MotionGuess)| {
@@ -372,6 +381,15 @@ impl CheckedCase {
             seconds.max(crowd) + fields
         });
         SECONDS_MIN + motions.sum::<f64>()
+    }
+
+    /// About the force of motion `k` over the friction limit of a patch in N: that prescribed, or that of the linear theory for a circle.
+    fn force_share(&self, k: usize, guess: &MotionGuess, limit: f64) -> f64 {
+        let [x, y] = self.problem.forces[k];
+        if x.or(y).is_some() {
+            return x.unwrap_or(0.0).hypot(y.unwrap_or(0.0)) / limit;
+        }
+        guess.linear_share()
     }
 
     /// Cells whose values are kept of a motion.

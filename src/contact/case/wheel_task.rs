@@ -10,7 +10,7 @@ use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::formats::format as formats;
 use crate::contact::geometry::length_unit::LengthUnit;
 use crate::contact::geometry::profile::{Body, Profile, Reading};
-use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
+use crate::contact::geometry::wheel_rail::{NotPlaced, Placement, RailPlace, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
@@ -124,6 +124,7 @@ fn wheel_rail(contact: &Contact, known: &KnownPair) -> Result<WheelRail, Vec<Fau
         rolling_radius_mm,
         gauge_mm,
         gauge_height_mm,
+        rail_origin_mm,
         cant_rad,
         flange_back_distance_mm,
         flange_back_position_mm,
@@ -141,8 +142,7 @@ fn wheel_rail(contact: &Contact, known: &KnownPair) -> Result<WheelRail, Vec<Fau
     let placement = Placement {
         side: (*side).into(),
         rolling_radius: *rolling_radius_mm,
-        gauge: *gauge_mm,
-        gauge_height: *gauge_height_mm,
+        rail: RailPlace::of(*gauge_mm, *gauge_height_mm, *rail_origin_mm),
         cant: *cant_rad,
         flange_back_distance: *flange_back_distance_mm,
         flange_back_position: *flange_back_position_mm,
@@ -169,10 +169,21 @@ fn wheel_rail(contact: &Contact, known: &KnownPair) -> Result<WheelRail, Vec<Fau
         (Err(faults), Ok(_)) | (Ok(_), Err(faults)) => return Err(faults),
     };
     in_order([&rail, &wheel])?;
-    let geometry = WheelRail::new(rail, wheel, placement)
-        .map_err(|detail| vec![fault("/contact/rolling_radius_mm".to_owned(), detail)])?;
+    let geometry = WheelRail::new(rail, wheel, placement).map_err(|reason| {
+        let pointers = ["/contact/rail", "/contact/rolling_radius_mm"];
+        vec![unplaced(reason, pointers)]
+    })?;
     known.keep(sections, &geometry);
     Ok(geometry)
+}
+
+/// The fault of a pair that cannot be placed, at the pointer of the rail or of the rolling radius.
+pub(crate) fn unplaced(reason: NotPlaced, [rail, radius]: [&str; 2]) -> Fault {
+    let pointer = match reason {
+        NotPlaced::NoGaugeFace { .. } => rail,
+        NotPlaced::ReachesAxle { .. } => radius,
+    };
+    fault(pointer.to_owned(), reason.to_string())
 }
 
 /// Faults of two profiles that both look like the other body's, at the pointers of both; one of them alone may be an unusual shape.

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::swept_values;
-use crate::contact::case::wheel_task::{exchanged, moves, profile_at};
+use crate::contact::case::wheel_task::{exchanged, moves, profile_at, unplaced};
 use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing};
 use crate::contact::case::words::motion::{Combine, Motions, Swept};
 use crate::contact::error::Fault;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
-use crate::contact::geometry::wheel_rail::{Placement, Side, WheelRail};
+use crate::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
 use crate::contact::normal::wheel_height::wheelset_task::{
@@ -211,6 +211,7 @@ fn in_place(
         rolling_radius_mm,
         gauge_mm,
         gauge_height_mm,
+        rail_origin_mm,
         cant_rad,
         flange_back_distance_mm,
         flange_back_position_mm,
@@ -228,8 +229,7 @@ fn in_place(
     let placement = Placement {
         side: [Side::Left, Side::Right][side],
         rolling_radius: own.unwrap_or(*rolling_radius_mm),
-        gauge: *gauge_mm,
-        gauge_height: *gauge_height_mm,
+        rail: RailPlace::of(*gauge_mm, *gauge_height_mm, *rail_origin_mm),
         cant: *cant_rad,
         flange_back_distance: *flange_back_distance_mm,
         flange_back_position: *flange_back_position_mm,
@@ -242,7 +242,7 @@ fn in_place(
         None => "/contact/rolling_radius_mm",
     };
     let geometry = WheelRail::new(rail, wheel, placement)
-        .map_err(|detail| vec![Fault::new(radius, detail)])?;
+        .map_err(|reason| vec![unplaced(reason, [pointers[0], radius])])?;
     if let Err(detail) = ContactLocus::new(&geometry) {
         return Err(vec![Fault::new("/contact", detail)]);
     }

@@ -19,7 +19,7 @@ use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
 use crate::contact::rolling::methods::table::file::table;
 use crate::contact::rolling::methods::table::material::MaterialTable;
 use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
-use crate::contact::rolling::resolution::Resolution;
+use crate::contact::rolling::resolution::{RelativeTo, Resolution};
 
 /// From so many rows on it is worth making the table of their material, which takes about as long as it saves here.
 const MATERIAL_ROWS: usize = 4096;
@@ -38,6 +38,7 @@ pub struct Rows {
     radii: bool,
     method: RowMethod,
     target: Option<f64>,
+    relative_to: RelativeTo,
     gradients: bool,
 }
 
@@ -100,6 +101,7 @@ impl Rows {
                 Resolution::Target(target) => Some(target),
                 Resolution::Mesh(_) => None,
             },
+            relative_to: checked.run.relative_to,
             gradients: checked.run.wants(Output::Gradients),
         })
     }
@@ -195,7 +197,13 @@ impl Rows {
             at(Variable::Spin),
         ];
         let mut found = self.creep(&patch, motion, shapes);
-        let missed = self.target.is_some_and(|target| found.creep.bound > target);
+        let of = match self.relative_to {
+            RelativeTo::FrictionLimit => 1.0,
+            RelativeTo::Force => found.creep.force[0].hypot(found.creep.force[1]),
+        };
+        let missed = self
+            .target
+            .is_some_and(|target| found.creep.bound > target * of);
         if missed {
             found.status = RowStatus::TargetMissed;
             if matches!(self.method, RowMethod::Table { auto: true }) {

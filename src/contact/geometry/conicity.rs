@@ -4,9 +4,11 @@
 //! `Δr = 2 tan γ y` gives `λ = 2π √(e r₀ / (2 tan γ))`). With `S(y) = ∫ Δr dy` from the place at rest, the motion that turns at two
 //! places with `S = E` has the wavelength `λ = 2 ∫ dy / √(2 (E − S) / (e r₀))` between them, and the equivalent conicity is
 //! `tan γ = 2 e r₀ (π / λ)²`: e and r₀ drop out. This is the integration of the differential equation of EN 15302 in closed form over
-//! a Δr that is linear between its samples; the amplitude is half the distance of the turning points.
+//! a Δr that is linear between its samples; the amplitude is half the distance of the turning points. Where Δr is 0 over the whole amplitude,
+//! as of a flat tread, nothing steers and the conicity is 0.
 
 use std::f64::consts::PI;
+use std::fmt;
 
 use crate::contact::numerics::bisection::bisect;
 
@@ -14,6 +16,11 @@ use crate::contact::numerics::bisection::bisect;
 const PLACES: usize = 2000;
 /// Halvings of a bracket; more change nothing.
 const HALVINGS: u32 = 60;
+/// Radii that differ by less than this in mm are equal: at an amplitude of 1 mm it is a conicity of 0.00005, a twentieth of the last digit that
+/// the standard gives.
+const EQUAL: f64 = 1e-4;
+/// A conicity that counts as none, for the same reason.
+const UNNOTICEABLE: f64 = 1e-4;
 
 /// Difference of the rolling radii over the lateral shift of a wheelset, linear between samples.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,12 +34,51 @@ pub struct RadiusDifference {
 /// The conicity at one amplitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conicity {
-    /// tan γ by EN 15302.
+    /// tan γ by EN 15302; 0 where the radii are equal over the whole amplitude.
     pub conicity: f64,
     /// tan γ by harmonic linearisation: the first harmonic of Δr over a sine between the same turning points.
     pub harmonic: f64,
-    /// The turning points in mm.
-    pub turns: [f64; 2],
+    /// The turning points in mm; none where the wheelset is not steered back.
+    pub turns: Option<[f64; 2]>,
+}
+
+/// Why there is no conicity at an amplitude; shifts and amplitudes in mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoConicity {
+    /// Δr does not rise through 0 between these shifts.
+    NoEquilibrium([f64; 2]),
+    /// The turning points lie beyond these shifts.
+    BeyondShifts([f64; 2]),
+    /// No motion about the equilibrium has an amplitude between these two: it passes an unstable equilibrium.
+    PassesUnstable([f64; 2]),
+}
+
+impl fmt::Display for NoConicity {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            NoConicity::NoEquilibrium([from, until]) => write!(
+                to,
+                "there is no stable equilibrium: the radius difference does not rise through 0 at shifts from {from:.2} to {until:.2} mm"
+            ),
+            NoConicity::BeyondShifts([from, until]) => write!(
+                to,
+                "the motion turns beyond the shifts from {from:.2} to {until:.2} mm, where the radius difference is known"
+            ),
+            NoConicity::PassesUnstable([from, until]) => write!(
+                to,
+                "no motion has this amplitude: the one of {from:.2} mm reaches an unstable equilibrium, beyond which the amplitude is \
+                 {until:.2} mm"
+            ),
+        }
+    }
+}
+
+/// Where a wheelset is at rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Rest {
+    shift: f64,
+    /// Integral of the difference there.
+    integral: f64,
 }
 
 impl RadiusDifference {
@@ -51,30 +97,50 @@ impl RadiusDifference {
         }
     }
 
-    /// The same with every second sample, to see what the samples leave open; the sample at the middle is kept.
+    /// First and last shift in mm.
     #[must_use]
-    pub fn coarser(&self) -> RadiusDifference {
-        let phase = self.shift.len() / 2 % 2;
-        let every = |values: &[f64]| values.iter().copied().skip(phase).step_by(2).collect();
-        RadiusDifference::new(every(&self.shift), every(&self.difference))
+    pub fn range(&self) -> [f64; 2] {
+        [self.shift[0], self.shift[self.shift.len() - 1]]
     }
 
-    /// Samples between which the stable place at rest nearest to shift 0 lies: Δr rises through 0 there.
-    fn rest_after(&self) -> Option<usize> {
-        let rises = |k: &usize| self.difference[*k] <= 0.0 && self.difference[k + 1] > 0.0;
-        let middle = |k: &usize| (self.shift[*k] + self.shift[k + 1]).abs();
-        (0..self.shift.len().saturating_sub(1))
-            .filter(rises)
-            .min_by(|a, b| middle(a).total_cmp(&middle(b)))
-    }
-
-    /// The shift in mm at which the radii are equal and to which a free wheelset steers back; none if there is no such shift.
+    /// The shift in mm at which the radii are equal and to which a free wheelset steers back, the nearest to 0; the middle of the shifts with
+    /// equal radii if there are several. None if there is no such shift.
     #[must_use]
     pub fn rest(&self) -> Option<f64> {
-        let k = self.rest_after()?;
-        let [low, high] = [self.difference[k], self.difference[k + 1]];
-        let t = low / (low - high);
-        Some(self.shift[k] + t * (self.shift[k + 1] - self.shift[k]))
+        let sign = |k: usize| {
+            let difference = self.difference[k];
+            f64::from(i8::from(difference > EQUAL) - i8::from(difference < -EQUAL))
+        };
+        let crossing = |k: usize, value: f64| {
+            let [low, high] = [self.difference[k], self.difference[k + 1]];
+            self.shift[k] + (value - low) / (high - low) * (self.shift[k + 1] - self.shift[k])
+        };
+        let mut nearest: Option<[f64; 2]> = None;
+        // Where the radii have been equal since; the beginning of the shifts counts as steered back from outside.
+        let mut since = (sign(0) == 0.0).then_some(self.shift[0]);
+        let mut consider = |[from, to]: [f64; 2]| {
+            let off = |[from, to]: [f64; 2]| from.max(-to).max(0.0);
+            if nearest.is_none_or(|known| off([from, to]) < off(known)) {
+                nearest = Some([from, to]);
+            }
+        };
+        for k in 0..self.shift.len() - 1 {
+            let [before, after] = [sign(k), sign(k + 1)];
+            if before < 0.0 && after >= 0.0 {
+                since = Some(crossing(k, -EQUAL));
+            }
+            if after < 0.0 {
+                since = None;
+            } else if after > 0.0
+                && let Some(from) = since.take()
+            {
+                consider([from, crossing(k, EQUAL)]);
+            }
+        }
+        if let Some(from) = since {
+            consider([from, self.range()[1]]);
+        }
+        nearest.map(|[from, to]| 0.5 * (from + to))
     }
 
     /// Δr and its integral at a shift.
@@ -90,69 +156,100 @@ impl RadiusDifference {
         ]
     }
 
-    /// Shifts left and right of the rest up to which Δr has one sign, so that its integral rises.
-    fn bounds(&self, rest: usize) -> [f64; 2] {
-        let low = (0..=rest).rev().take_while(|k| self.difference[*k] <= 0.0);
-        let high = (rest + 1..self.shift.len()).take_while(|k| self.difference[*k] > 0.0);
-        [
-            self.shift[low.last().unwrap_or(rest)],
-            self.shift[high.last().unwrap_or(rest + 1)],
-        ]
-    }
-
-    /// The place between the rest and a bound where the integral reaches `energy`, if it does.
-    fn turn(&self, rest: f64, bound: f64, energy: f64) -> Option<f64> {
-        if self.at(bound)[1] < energy {
-            return None;
-        }
-        let [_, outside] = bisect([rest, bound], HALVINGS, |at| self.at(at)[1] < energy);
-        Some(outside)
-    }
-
-    /// The turning points of the motion with an amplitude in mm.
-    fn turns(&self, amplitude: f64) -> Option<[f64; 2]> {
-        let after = self.rest_after()?;
-        let (rest, [low, high]) = (self.rest()?, self.bounds(after));
-        let width = |right: f64| {
-            let left = self.turn(rest, low, self.at(right)[1])?;
-            Some([left, right])
+    /// The places on both sides of the rest where the integral first exceeds that of the rest by `energy`; the end of the shifts where it does
+    /// not.
+    fn turns(&self, rest: Rest, energy: f64) -> [f64; 2] {
+        let level = rest.integral + energy;
+        let after = self.shift.partition_point(|shift| *shift <= rest.shift);
+        let turn = |mut beyond: std::vec::IntoIter<usize>| {
+            let mut inside = rest.shift;
+            let outside = beyond.find(|k| {
+                let exceeds = self.integral[*k] >= level;
+                if !exceeds {
+                    inside = self.shift[*k];
+                }
+                exceeds
+            });
+            outside.map_or(inside, |k| {
+                bisect([inside, self.shift[k]], HALVINGS, |y| self.at(y)[1] < level)[1]
+            })
         };
-        // The right turning point is bounded by what both sides can reach.
-        let wide = |[left, right]: [f64; 2]| right - left >= 2.0 * amplitude;
-        if width(high).is_some_and(|turns| !wide(turns)) {
-            return None;
-        }
-        let [inside, _] = bisect([rest, high], HALVINGS, |right| {
-            width(right).is_some_and(|turns| !wide(turns))
-        });
-        let found = width(inside)?;
-        // Where the left side ends first, the width stops short of the amplitude.
-        (found[1] - found[0] > 2.0 * amplitude * (1.0 - 1e-9)).then_some(found)
+        let left: Vec<usize> = (0..after).rev().collect();
+        let right: Vec<usize> = (after..self.shift.len()).collect();
+        [turn(left.into_iter()), turn(right.into_iter())]
     }
 
-    /// The conicity at an amplitude in mm, more than 0; none if there is no stable rest or the samples do not reach as far.
-    #[must_use]
-    pub fn conicity(&self, amplitude: f64) -> Option<Conicity> {
-        let turns = self.turns(amplitude)?;
-        let [left, right] = turns;
+    /// Most that the integral rises above that of the rest on the side where it rises less.
+    fn highest(&self, rest: Rest) -> f64 {
+        let after = self.shift.partition_point(|shift| *shift <= rest.shift);
+        let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let [left, right] = [&self.integral[..after], &self.integral[after..]].map(most);
+        (left.min(right) - rest.integral).max(0.0)
+    }
+
+    /// The conicity at an amplitude in mm, more than 0.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn conicity(&self, amplitude: f64) -> Result<Conicity, NoConicity> {
+        let Some(shift) = self.rest() else {
+            return Err(NoConicity::NoEquilibrium(self.range()));
+        };
+        let rest = Rest {
+            shift,
+            integral: self.at(shift)[1],
+        };
+        let wide = |[left, right]: [f64; 2]| right - left >= 2.0 * amplitude;
+        // The cone of conicity γ has the energy γ A². Rises of the integral up to that of an unnoticeable cone are none.
+        let least = UNNOTICEABLE * amplitude.powi(2);
+        let flat = self.turns(rest, least);
+        if wide(flat) {
+            let middle = shift.max(flat[0] + amplitude).min(flat[1] - amplitude);
+            return Ok(Conicity {
+                conicity: 0.0,
+                harmonic: self.harmonic(middle, amplitude),
+                turns: None,
+            });
+        }
+        let most = self.highest(rest);
+        let reached = self.turns(rest, most);
+        if most <= least || !wide(reached) {
+            return Err(NoConicity::BeyondShifts(self.range()));
+        }
+        let [low, high] = bisect([least, most], HALVINGS, |energy| {
+            !wide(self.turns(rest, energy))
+        });
+        let [inside, outside] = [low, high].map(|energy| self.turns(rest, energy));
+        let amplitudes = [inside, outside].map(|[left, right]| 0.5 * (right - left));
+        if amplitudes[1] - amplitudes[0] > 1e-3 * amplitude {
+            return Err(NoConicity::PassesUnstable(amplitudes));
+        }
+        let [left, right] = outside;
         let (middle, half) = (0.5 * (left + right), 0.5 * (right - left));
-        let energy = self.at(right)[1];
         let step = PI / PLACES as f64;
-        let (mut length, mut first) = (0.0, 0.0);
+        let mut length = 0.0;
         for k in 0..PLACES {
             let (sin, cos) = (step * (k as f64 + 0.5) - 0.5 * PI).sin_cos();
-            let [difference, integral] = self.at(middle + half * sin);
-            length += half * cos * step / (2.0 * (energy - integral)).sqrt();
-            first += difference * sin * step;
+            let integral = self.at(middle + half * sin)[1] - rest.integral;
+            length += half * cos * step / (2.0 * (high - integral)).sqrt();
         }
-        // The wavelength over √(e r₀) is twice this length.
+        // The wavelength over √(e r₀) is twice this length. On top of an unstable equilibrium the motion takes for ever.
         let conicity = 0.5 * (PI / length).powi(2);
-        let found = Conicity {
-            conicity,
-            harmonic: first / (PI * half),
-            turns,
+        Ok(Conicity {
+            conicity: if conicity.is_finite() { conicity } else { 0.0 },
+            harmonic: self.harmonic(middle, half),
+            turns: Some([left, right]),
+        })
+    }
+
+    /// First harmonic of Δr over a sine about `middle`, relative to that of a cone.
+    fn harmonic(&self, middle: f64, half: f64) -> f64 {
+        let step = PI / PLACES as f64;
+        let first = |k: usize| {
+            let sin = (step * (k as f64 + 0.5) - 0.5 * PI).sin();
+            self.at(middle + half * sin)[0] * sin * step
         };
-        found.conicity.is_finite().then_some(found)
+        (0..PLACES).map(first).sum::<f64>() / (PI * half)
     }
 }
 
@@ -174,9 +271,10 @@ mod tests {
             let found = cone.conicity(amplitude).unwrap();
             assert!((found.conicity - 0.025).abs() < 1e-9, "{found:?}");
             assert!((found.harmonic - 0.025).abs() < 1e-7, "{found:?}");
-            assert!((found.turns[0] - (0.7 - amplitude)).abs() < 1e-6);
+            assert!((found.turns.unwrap()[0] - (0.7 - amplitude)).abs() < 1e-6);
         }
-        assert!(cone.conicity(9.5).is_none(), "the samples end before");
+        let missing = cone.conicity(9.5).unwrap_err();
+        assert!(matches!(missing, NoConicity::BeyondShifts(_)), "{missing}");
     }
 
     /// With Δr = y³ the wavelength is `λ = 4 ∫₀¹ du / √((1 − u⁴) / 2) √(e r₀) / A`, and `∫₀¹ du / √(1 − u⁴) = 1.3110287771461`.
@@ -201,16 +299,68 @@ mod tests {
     fn a_wheelset_that_steers_away_has_no_rest_and_no_conicity() {
         let unstable = sampled(|y| -0.1 * y);
         assert_eq!(unstable.rest(), None);
-        assert_eq!(unstable.conicity(3.0), None);
+        let missing = unstable.conicity(3.0).unwrap_err();
+        assert!(matches!(missing, NoConicity::NoEquilibrium(_)), "{missing}");
         // A jump through 0 is a rest, and left and right need not be alike.
         let jump = sampled(|y| if y > 1.05 { 2.0 } else { -1.0 });
         let found = jump.conicity(3.0).unwrap();
         assert!((jump.rest().unwrap() - 1.05).abs() < 0.05);
-        let [left, right] = found.turns;
+        let [left, right] = found.turns.unwrap();
         assert!((right - left - 6.0).abs() < 1e-9);
         assert!(
             ((1.05 - left) / (right - 1.05) - 2.0).abs() < 0.05,
             "{found:?}"
         );
+    }
+
+    /// A flat tread between two flanges: no conicity on the tread, and beyond it that of the flanges.
+    #[test]
+    fn equal_radii_have_the_conicity_zero_until_the_flanges_steer() {
+        let flanges = |y: f64| 0.3 * (y.abs() - 1.7).max(0.0) * y.signum();
+        let noise = |y: f64| 5e-5 * (40.0 * y).sin();
+        for flat in [
+            sampled(flanges),
+            sampled(|y| flanges(y) + noise(y)),
+            sampled(|y| flanges(y - 0.4)),
+        ] {
+            for amplitude in [0.2, 1.0, 1.6] {
+                let found = flat.conicity(amplitude).unwrap();
+                assert_eq!((found.conicity, found.turns), (0.0, None), "{found:?}");
+                assert!(found.harmonic.abs() < 1e-4, "{found:?}");
+            }
+            // With the flat tread of half width w the motion runs π/2 √(1/0.3) mm in each flange and w/v straight on, v = √(0.3) (A − w).
+            for amplitude in [2.0_f64, 4.0, 8.0] {
+                let beyond = amplitude - 1.7;
+                let half = PI / 0.3_f64.sqrt() + 2.0 * 1.7 / (0.3_f64.sqrt() * beyond);
+                let exact = 0.5 * (PI / half).powi(2);
+                let found = flat.conicity(amplitude).unwrap();
+                assert!(
+                    (found.conicity / exact - 1.0).abs() < 0.02,
+                    "{found:?} {exact}"
+                );
+            }
+        }
+        // Cylinders without flanges are flat as far as they are known.
+        let cylinders = sampled(|_| 0.0);
+        assert_eq!(cylinders.rest(), Some(0.0));
+        assert_eq!(cylinders.conicity(5.0).unwrap().conicity, 0.0);
+        assert!(sampled(|_| 0.2).conicity(1.0).is_err());
+    }
+
+    /// Small waves of Δr about 0 do not stop a motion that is larger; a barrier that does is named.
+    #[test]
+    fn a_motion_passes_small_barriers_and_a_missing_amplitude_is_explained() {
+        let wavy = sampled(|y| 0.1 * y + 0.005 * (4.0 * y).sin() * (-y * y).exp());
+        let found = wavy.conicity(4.0).unwrap();
+        assert!((found.conicity / 0.05 - 1.0).abs() < 0.05, "{found:?}");
+        // Stable at ±2, unstable at 0: about 2 the motion cannot have an amplitude between 1.4 and 2.8.
+        let double = sampled(|y| 0.02 * y * (y * y - 4.0));
+        let missing = double.conicity(2.2).unwrap_err();
+        let NoConicity::PassesUnstable([from, until]) = missing else {
+            panic!("{missing}")
+        };
+        assert!((from - 2.0_f64.sqrt()).abs() < 0.02, "{from}");
+        assert!((until - 8.0_f64.sqrt()).abs() < 0.02, "{until}");
+        assert!(double.conicity(1.0).is_ok() && double.conicity(3.5).is_ok());
     }
 }

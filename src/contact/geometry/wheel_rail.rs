@@ -6,6 +6,7 @@
 //! radius `r − z` at the distance `d/2 − p + y` from the centre along the axle, with the flange-back distance d and the
 //! flange-back position p. Conventions of the Manchester contact benchmark (Shackleton and Iwnicki 2008).
 
+use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::contact::geometry::locus_lines::{LocusLines, RailEdge};
@@ -34,6 +35,69 @@ impl Side {
     }
 }
 
+/// How a rail is placed across the track; lengths in mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RailPlace {
+    /// By its gauge face.
+    Gauge {
+        /// Distance of the gauge faces of the two rails.
+        gauge: f64,
+        /// Depth below the highest point of the rail at which the gauge is measured.
+        height: f64,
+    },
+    /// By the distance of the origin of its cross-section from the middle of the track.
+    Origin(f64),
+}
+
+impl RailPlace {
+    /// From the members of a case: the origin if it is given, else gauge and height, 1435 and 14 when left out.
+    pub(crate) fn of(gauge: Option<f64>, height: Option<f64>, origin: Option<f64>) -> RailPlace {
+        origin.map_or(
+            RailPlace::Gauge {
+                gauge: gauge.unwrap_or(1435.0),
+                height: height.unwrap_or(14.0),
+            },
+            RailPlace::Origin,
+        )
+    }
+}
+
+/// Why a wheel and a rail cannot be placed; lengths in mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NotPlaced {
+    /// The rail ends on the gauge side before the depth at which the gauge is measured.
+    NoGaugeFace {
+        /// Depth at which the gauge is measured.
+        height: f64,
+        /// Greatest depth of the rail on the gauge side.
+        deepest: f64,
+    },
+    /// The wheel's profile reaches its axle.
+    ReachesAxle {
+        /// How far the profile reaches toward the axle.
+        reach: f64,
+        /// Radius of the wheel.
+        radius: f64,
+    },
+}
+
+impl fmt::Display for NotPlaced {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            NotPlaced::NoGaugeFace { height, deepest } => write!(
+                to,
+                "the gauge is measured {height} mm below the top of the rail (gauge_height_mm), but on the gauge side the points of the rail \
+                 end {deepest:.2} mm below it: send the points of the gauge face too, or place the rail by rail_origin_mm, the distance of \
+                 the origin of its cross-section from the middle of the track"
+            ),
+            NotPlaced::ReachesAxle { reach, radius } => write!(
+                to,
+                "the wheel's profile reaches {reach:.1} mm toward the axle of a wheel of {radius} mm radius; rolling_radius_mm is in mm"
+            ),
+        }
+    }
+}
+
 /// How wheelset and rail are placed relative to each other; lengths in mm, angles in rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
@@ -41,10 +105,8 @@ pub struct Placement {
     pub side: Side,
     /// Radius of the wheel where z of its profile is 0.
     pub rolling_radius: f64,
-    /// Distance of the rails' gauge faces.
-    pub gauge: f64,
-    /// Depth below the top of the rail at which the gauge is measured.
-    pub gauge_height: f64,
+    /// The place of the rail across the track.
+    pub rail: RailPlace,
     /// Turn of the rail about its profile's origin, positive with its top toward the track centre.
     pub cant: f64,
     /// Distance of the backs of the two flanges.
@@ -65,6 +127,8 @@ pub struct WheelRail {
     /// Their placement.
     pub placement: Placement,
     rail_given: Arc<Profile>,
+    /// Origin `[y, z]` of the rail's profile, y from the middle of the track to the field side.
+    origin: [f64; 2],
     /// The rail in track axes.
     rail: Arc<PlaneCurve>,
     wheel: Arc<Profile>,
@@ -167,38 +231,36 @@ pub(crate) struct WheelCircle {
 }
 
 impl WheelRail {
-    /// Places the rail by its gauge point and its top, the wheel by the wheelset.
+    /// Places the rail by its top and by its gauge point or its origin, the wheel by the wheelset.
     ///
     /// # Errors
-    /// A sentence, if the wheel's profile reaches its axle or is all beyond it.
-    pub fn new(rail: Profile, wheel: Profile, placement: Placement) -> Result<WheelRail, String> {
+    /// The rail has no gauge point; or the wheel's profile reaches its axle or is all beyond it.
+    pub fn new(
+        rail: Profile,
+        wheel: Profile,
+        placement: Placement,
+    ) -> Result<WheelRail, NotPlaced> {
         let lowest = wheel
             .parameters(0.2)
             .into_iter()
             .map(|s| wheel.at(s).at[1])
             .fold(f64::NEG_INFINITY, f64::max);
         if lowest >= 0.9 * placement.rolling_radius {
-            return Err(format!(
-                "the wheel's profile reaches {lowest:.1} mm toward the axle of a wheel of {} mm radius",
-                placement.rolling_radius
-            ));
+            return Err(NotPlaced::ReachesAxle {
+                reach: lowest,
+                radius: placement.rolling_radius,
+            });
         }
-        Ok(WheelRail::placed(rail, Arc::new(wheel), placement))
+        let origin = origin(&rail, &placement)?;
+        Ok(WheelRail::placed(rail, Arc::new(wheel), placement, origin))
     }
 
-    fn placed(rail: Profile, wheel: Arc<Profile>, placement: Placement) -> WheelRail {
-        let canted = rail.curve().placed(placement.cant, [0.0; 2], 1.0);
-        let places: Vec<[f64; 2]> = canted
-            .parameters(0.05)
-            .into_iter()
-            .map(|s| canted.at(s).at)
-            .collect();
-        let top = places
-            .iter()
-            .map(|at| at[1])
-            .fold(f64::NEG_INFINITY, f64::max);
-        let gauge_point = nearest_above(&places, top - placement.gauge_height);
-        let origin = [0.5 * placement.gauge - gauge_point, -top];
+    fn placed(
+        rail: Profile,
+        wheel: Arc<Profile>,
+        placement: Placement,
+        origin: [f64; 2],
+    ) -> WheelRail {
         let axes = AxleAxes::new(&placement);
         WheelRail {
             placement,
@@ -207,6 +269,7 @@ impl WheelRail {
                     .placed(placement.cant, origin, placement.side.sign()),
             ),
             rail_given: Arc::new(rail),
+            origin,
             wheel,
             axes,
             rail_edge: Arc::default(),
@@ -260,8 +323,10 @@ impl WheelRail {
         let reading = self.readings.find_or_make(smoothing, || {
             let rail = self.rail_given.smoothed(smoothing[0]);
             let wheel = Arc::new(self.wheel.smoothed(smoothing[1]));
-            // What a wheel's profile may reach was checked; a smoothed one reaches hardly farther.
-            WheelRail::placed(rail, wheel, self.placement)
+            // What a wheel's profile may reach was checked; a smoothed one reaches hardly farther. A rail whose gauge face is smoothed away
+            // stays where it is.
+            let origin = origin(&rail, &self.placement).unwrap_or(self.origin);
+            WheelRail::placed(rail, wheel, self.placement, origin)
         });
         reading.posed(lateral_shift, yaw, roll)
     }
@@ -386,18 +451,48 @@ impl WheelRail {
     }
 }
 
-/// Least y of a curve above a height, its crossings included.
-fn nearest_above(places: &[[f64; 2]], height: f64) -> f64 {
-    let above = places.iter().filter(|at| at[1] >= height);
-    let crossings = places.windows(2).filter_map(|pair| {
-        let [from, to] = [pair[0], pair[1]];
-        let t = (height - from[1]) / (to[1] - from[1]);
-        (0.0..1.0)
-            .contains(&t)
-            .then(|| from[0] + t * (to[0] - from[0]))
-    });
-    above
-        .map(|at| at[0])
-        .chain(crossings)
-        .fold(f64::INFINITY, f64::min)
+/// The end of the points may lie above the height of the gauge by this much in mm: rounding of a rail measured down to it.
+const GAUGE_ROUNDING: f64 = 1e-6;
+
+/// Where the origin of a rail's profile lies, `[y, z]` in mm, y from the middle of the track to the field side.
+fn origin(rail: &Profile, placement: &Placement) -> Result<[f64; 2], NotPlaced> {
+    let canted = rail.curve().placed(placement.cant, [0.0; 2], 1.0);
+    let places: Vec<[f64; 2]> = canted
+        .parameters(0.05)
+        .into_iter()
+        .map(|s| canted.at(s).at)
+        .collect();
+    let top = places
+        .iter()
+        .map(|at| at[1])
+        .fold(f64::NEG_INFINITY, f64::max);
+    let y = match placement.rail {
+        RailPlace::Origin(y) => y,
+        RailPlace::Gauge { gauge, height } => {
+            let found = gauge_point(&places, top, height);
+            0.5 * gauge - found.map_err(|deepest| NotPlaced::NoGaugeFace { height, deepest })?
+        }
+    };
+    Ok([y, -top])
+}
+
+/// Least y of the head of a rail from its top down to a depth on the gauge side, or the greatest depth there if that is less. Points run from the
+/// gauge side to the field side; what lies beyond the place where the head first falls to the depth is not part of the head.
+fn gauge_point(places: &[[f64; 2]], top: f64, depth: f64) -> Result<f64, f64> {
+    let height = top - depth;
+    let of_top = places.iter().position(|at| at[1] >= top).unwrap_or(0);
+    let below = places[..=of_top].iter().rposition(|at| at[1] < height);
+    let head = &places[below.map_or(0, |below| below + 1)..=of_top];
+    let least = head.iter().map(|at| at[0]).fold(f64::INFINITY, f64::min);
+    let Some(below) = below else {
+        let lowest = head.iter().map(|at| at[1]).fold(f64::INFINITY, f64::min);
+        return if lowest - height <= GAUGE_ROUNDING {
+            Ok(least)
+        } else {
+            Err(top - lowest)
+        };
+    };
+    let [from, to] = [places[below], places[below + 1]];
+    let t = (height - from[1]) / (to[1] - from[1]);
+    Ok(least.min(from[0] + t * (to[0] - from[0])))
 }

@@ -7,6 +7,9 @@ use crate::contact::numerics::monotone_root::{CloseEnough, Course, try_find};
 /// The wheels' heights may differ by so much in mm, 1e-10 rad of roll.
 const LEVEL: f64 = 1e-7;
 
+/// A contact within this distance of the end of a cross-section in mm is at its end.
+const AT_END: f64 = 1e-3;
+
 /// Both wheels over both rails, to be placed again and again.
 #[derive(Debug, Clone)]
 pub struct PairOfRails {
@@ -98,6 +101,27 @@ impl PairOfRails {
             height: touches[0].height.max(touches[1].height),
             touches,
         })
+    }
+
+    /// That neither wheel touches at the end of a cross-section.
+    ///
+    /// # Errors
+    /// A sentence, if the points of a cross-section end where the bodies touch, so that they may touch elsewhere.
+    pub fn not_cut_off(&self, pose: &RigidPose) -> Result<(), String> {
+        for (k, touch) in pose.touches.iter().enumerate() {
+            let ranges = self.sides[k].ranges();
+            let bodies = [("rail", touch.rail), ("wheel", touch.wheel)];
+            for ((body, at), [first, last]) in bodies.into_iter().zip(ranges) {
+                if at <= first + AT_END || at >= last - AT_END {
+                    let side = ["left", "right"][k];
+                    return Err(format!(
+                        "at a lateral shift of {:.2} mm the {side} wheel touches at the end of the {body}'s points; send the points beyond",
+                        pose.lateral_shift
+                    ));
+                }
+            }
+        }
+        Ok(())
     }
 
     fn touches(

@@ -250,7 +250,7 @@ impl CheckedCase {
         let places = |task: &SubsurfaceTask| task.places.count();
         SizeInput {
             method: self.run.method,
-            resolution: self.run.resolution,
+            resolution: self.run.least_resolution(),
             segments: segments(&self.problem.task),
             motions: self.problem.motions.len() * self.problem.task.positions(),
             spinning: if self.problem.is_coupled(&self.run) {

@@ -8,6 +8,9 @@ use crate::contact::rolling::motion::Motion;
 
 /// Beyond this pressure, in MPa, wheel and rail steels yield whatever their hardness (about 3 times a yield stress of 1.6 GPa).
 const PRESSURE_USUAL_MAX: f64 = 5000.0;
+/// Largest pressure in MPa to which rail steel shakes down in pure rolling: 4.7 times the shear yield stress (Johnson, Contact Mechanics, 1985,
+/// section 9.2), 550 MPa over √3 for R260 (EN 13674-1).
+const SHAKEDOWN_LIMIT: f64 = 1500.0;
 /// Load in N above which a mistake of unit is likely: about 60 times that of a heavy wheel.
 const LOAD_USUAL_MAX: f64 = 1e7;
 /// Creepage above which sliding is no longer small compared with the rolling speed.
@@ -86,9 +89,15 @@ fn strained(overlap_mm: f64, half_widths: [f64; 2]) -> Option<Remark> {
 
 /// The remark on a largest pressure in MPa, if it is unusual.
 pub(crate) fn pressure(pressure_max_mpa: f64) -> Option<Remark> {
-    (pressure_max_mpa > PRESSURE_USUAL_MAX).then_some(Remark::PressureImplausible {
+    if pressure_max_mpa > PRESSURE_USUAL_MAX {
+        return Some(Remark::PressureImplausible {
+            pressure_max_mpa,
+            usual_max_mpa: PRESSURE_USUAL_MAX,
+        });
+    }
+    (pressure_max_mpa > SHAKEDOWN_LIMIT).then_some(Remark::PressureAboveShakedown {
         pressure_max_mpa,
-        usual_max_mpa: PRESSURE_USUAL_MAX,
+        shakedown_limit_mpa: SHAKEDOWN_LIMIT,
     })
 }
 

@@ -5,7 +5,8 @@ use std::time::Duration;
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::method::{Method, TractionBound};
 use crate::contact::problem::after_tasks::AfterTasks;
-use crate::contact::rolling::resolution::Resolution;
+use crate::contact::rolling::motion_answer::MotionAnswer;
+use crate::contact::rolling::resolution::{RelativeTo, Resolution, TARGET_LEAST};
 
 /// How a case is to be solved: nothing of it changes what is asked.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +19,8 @@ pub struct Run {
     pub traction_bound: TractionBound,
     /// Target or mesh.
     pub resolution: Resolution,
+    /// What the target is a share of.
+    pub relative_to: RelativeTo,
     /// See [`RollingTask::compares_with_table`](crate::contact::rolling::task::RollingTask::compares_with_table).
     pub compares_with_table: bool,
     /// Time allowed for the whole case.
@@ -43,6 +46,11 @@ impl Run {
                 Resolution::Target(asked) => Resolution::Target(asked.max(target)),
                 mesh @ Resolution::Mesh(_) => mesh,
             },
+            // A coarse look is not refined to a small force.
+            relative_to: match self.resolution {
+                Resolution::Target(asked) if target > asked => RelativeTo::FrictionLimit,
+                _ => self.relative_to,
+            },
             outputs: vec![Output::Resultants],
             after: AfterTasks::default(),
             ..self.clone()
@@ -55,6 +63,25 @@ impl Run {
         match self.resolution {
             Resolution::Target(target) => target,
             Resolution::Mesh(_) => f64::INFINITY,
+        }
+    }
+
+    /// Allowed error of an answer relative to μN, where an error is asked for; `limit` is μN of all patches in N.
+    #[must_use]
+    pub fn allowed_error(&self, answer: &MotionAnswer, limit: f64) -> Option<f64> {
+        let target = self.resolution.target()?;
+        Some(match self.relative_to {
+            RelativeTo::FrictionLimit => target,
+            RelativeTo::Force => target * answer.force_share(limit),
+        })
+    }
+
+    /// The finest resolution that the case may need: that of a force close to 0 where the target is relative to it.
+    #[must_use]
+    pub fn least_resolution(&self) -> Resolution {
+        match (self.resolution, self.relative_to) {
+            (Resolution::Target(_), RelativeTo::Force) => Resolution::Target(TARGET_LEAST),
+            (resolution, _) => resolution,
         }
     }
 

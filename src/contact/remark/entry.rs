@@ -178,9 +178,12 @@ mod tests {
     use super::*;
 
     fn missed(point: usize, estimate: f64) -> RemarkEntry {
-        let target = 0.001;
-        let estimate = Some(estimate);
-        Remark::TargetMissed { estimate, target }.at_point(point)
+        Remark::TargetMissed {
+            relative_to: "μN",
+            estimate: Some(estimate),
+            target: 0.001,
+        }
+        .at_point(point)
     }
 
     #[test]

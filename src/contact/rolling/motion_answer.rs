@@ -75,6 +75,15 @@ pub struct SolvedFields {
 }
 
 impl MotionAnswer {
+    /// Tangential force of all patches over their friction limit in N; 0 without friction.
+    #[must_use]
+    pub fn force_share(&self, limit: f64) -> f64 {
+        let sum = Resultants::default();
+        let sum = self.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
+        let force = sum.force_x.hypot(sum.force_y);
+        if limit > 0.0 { force / limit } else { 0.0 }
+    }
+
     /// Estimated error of the sum over the patches.
     #[must_use]
     pub fn error(&self) -> Option<f64> {

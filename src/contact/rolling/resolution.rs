@@ -7,6 +7,19 @@ const TARGET_OF_MESH: f64 = 0.005;
 /// Part of a target that another error may take up while the rest of it is still sought.
 const ERROR_MAX: f64 = 0.95;
 
+/// Least target of an error relative to μN: no mesh resolves less.
+pub const TARGET_LEAST: f64 = 1e-4;
+
+/// What the target of an error is a share of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum RelativeTo {
+    /// The friction limit μN.
+    #[default]
+    FrictionLimit,
+    /// The tangential force.
+    Force,
+}
+
 /// Mesh chosen by the solver for a target, or given by the client.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Resolution {

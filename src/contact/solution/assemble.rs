@@ -10,7 +10,7 @@ use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{MotionAnswer, SolvedFields};
 use crate::contact::rolling::refinement::levels::Levels;
-use crate::contact::rolling::resolution::Resolution;
+use crate::contact::rolling::resolution::RelativeTo;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -66,6 +66,17 @@ impl<'a> Assembly<'a> {
         }
     }
 
+    /// The case and the footprint that it answers.
+    #[must_use]
+    pub fn of(&self) -> (&'a CheckedCase, &'a SolvedFootprint) {
+        (self.case, self.solved)
+    }
+
+    /// Numbers of levels mean other levels from here on.
+    pub fn forget_levels(&mut self) {
+        self.levels.fill(usize::MAX);
+    }
+
     /// Is no motion in it yet?
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -87,14 +98,20 @@ impl<'a> Assembly<'a> {
         let level = fields.map(|fields| levels.get(fields.level));
         let on_level = level.as_deref().zip(fields);
         let index = self.total.len();
-        self.remarks.extend(remarks(case, index, point));
+        let limit = self.limits.iter().sum();
+        let allowed = case.run.allowed_error(point, limit);
+        let target_met = allowed.map(|allowed| point.error().is_some_and(|error| error <= allowed));
+        self.remarks.extend(remarks(case, index, point, limit));
         // A sweep repeats its remarks motion by motion; merged on the way they never take much memory.
         if self.remarks.len() > REMARKS_AT_ONCE {
             self.remarks = merged(std::mem::take(&mut self.remarks));
         }
         let patches = self.patches.iter().zip(&self.limits).enumerate();
         let mut points: Vec<PointSolution> = patches
-            .map(|(k, (patch, limit))| point_solution(case, on_level, (patch, *limit), k, point))
+            .map(|(k, (patch, limit))| PointSolution {
+                target_met,
+                ..point_solution(case, on_level, (patch, *limit), k, point)
+            })
             .collect();
         let speed = case.problem.speeds[index];
         maintain::add_damage(case, &self.patches, &self.limits, speed, &mut points);
@@ -285,7 +302,7 @@ fn point_solution(
             skipped: skipped(&point.skips),
             seconds: point.seconds,
         },
-        target_met: target_met(case, point),
+        target_met: None,
         saturated: point.saturated,
         history: history.map(|history| HistoryPoint::of(history, index)),
         subsurface: None,
@@ -298,14 +315,6 @@ fn point_solution(
 /// What was skipped, as the client reads it.
 fn skipped(skips: &[Skip]) -> Vec<String> {
     skips.iter().map(|skip| skip.text().to_owned()).collect()
-}
-
-/// Whether the error estimate of the sum over the patches is within the target.
-fn target_met(case: &CheckedCase, point: &MotionAnswer) -> Option<bool> {
-    let Resolution::Target(target) = case.run.resolution else {
-        return None;
-    };
-    Some(point.error().is_some_and(|error| error <= target))
 }
 
 #[derive(Clone, Copy)]
@@ -414,13 +423,16 @@ fn remarks(
     case: &CheckedCase,
     index: usize,
     point: &MotionAnswer,
+    limit: f64,
 ) -> impl Iterator<Item = RemarkEntry> {
     let own = point.remarks.iter().cloned();
-    let missed = target_missed(case, point);
+    let missed = target_missed(case, point, limit);
+    let large = error_large(case, point, limit);
     // Parts of a sweep are numbered through, as the client counts its motions.
     let number = case.problem.part.before + index;
     own.chain(unreachable(case, index, point))
         .chain(missed)
+        .chain(large)
         .map(move |remark| remark.at_point(number))
 }
 
@@ -436,10 +448,43 @@ fn unreachable(case: &CheckedCase, index: usize, point: &MotionAnswer) -> Option
     })
 }
 
-fn target_missed(case: &CheckedCase, point: &MotionAnswer) -> Option<Remark> {
-    let Resolution::Target(target) = case.run.resolution else {
-        return None;
+fn target_missed(case: &CheckedCase, point: &MotionAnswer, limit: f64) -> Option<Remark> {
+    let target = case.run.resolution.target()?;
+    let allowed = case.run.allowed_error(point, limit)?;
+    let error = point.error();
+    let (relative_to, estimate) = match case.run.relative_to {
+        RelativeTo::FrictionLimit => ("μN", error),
+        RelativeTo::Force => ("the force", error_of_force(point, limit)),
     };
-    let estimate = point.error();
-    (target_met(case, point) == Some(false)).then_some(Remark::TargetMissed { estimate, target })
+    error
+        .is_none_or(|error| error > allowed)
+        .then_some(Remark::TargetMissed {
+            relative_to,
+            estimate,
+            target,
+        })
+}
+
+/// Estimated error of the sum over the patches relative to its force; none where either is unknown or there is no force.
+fn error_of_force(point: &MotionAnswer, limit: f64) -> Option<f64> {
+    let share = point.force_share(limit);
+    point
+        .error()
+        .map(|error| error / share)
+        .filter(|relative| relative.is_finite())
+}
+
+/// Most that an error may be of the force without a remark.
+const LARGE_FOR_FORCE: f64 = 0.1;
+
+/// The remark on an error that is within a target relative to μN but not small beside the force itself.
+fn error_large(case: &CheckedCase, point: &MotionAnswer, limit: f64) -> Option<Remark> {
+    let of_limit = case.run.relative_to == RelativeTo::FrictionLimit;
+    let error_over_force =
+        error_of_force(point, limit).filter(|relative| of_limit && *relative > LARGE_FOR_FORCE)?;
+    Some(Remark::ErrorLargeForForce {
+        error_over_force,
+        force_over_limit: point.force_share(limit),
+        usual_max: LARGE_FOR_FORCE,
+    })
 }

@@ -1,11 +1,13 @@
 //! The rigid wheelset over a range of shifts: difference of the rolling radii, equilibrium, equivalent conicity, and what another
 //! reading of the cross-sections would change of them.
+//!
+//! EN 15302 holds the axle level: each wheel touches where it would without the roll. The values with the roll stand beside them.
 
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
 use crate::contact::error::SolveError;
-use crate::contact::geometry::conicity::RadiusDifference;
+use crate::contact::geometry::conicity::{Conicity, NoConicity, RadiusDifference};
 use crate::contact::geometry::profile::Profile;
 use crate::contact::geometry::profile_quality::points::{SMOOTHING_ADVISED, advised_smoothing};
 use crate::contact::geometry::wheel_rail::WheelRail;
@@ -19,7 +21,18 @@ use crate::contact::solution::words::wheelset::{EquivalentConicity, Kinematics, 
 
 /// The other reading of a cross-section has its smoothing times this, or one of so many chords.
 const OTHER_TIMES: f64 = 2.0;
+/// See [`OTHER_TIMES`].
 const OTHER_CHORDS: f64 = 2.0;
+/// Between two shifts the radius difference is known to this in mm, a fifth of the rounding of the standard's tables ...
+const RESOLVED: f64 = 2e-3;
+/// ... or its jump to the distance of the shifts halved this many times, 0.0001 mm for 0.1 mm.
+const HALVINGS: u32 = 10;
+
+/// A radius difference as sampled, and with twice the distance of the shifts.
+struct Sampled {
+    fine: RadiusDifference,
+    coarse: RadiusDifference,
+}
 
 /// The kinematics of a wheelset, with both wheels over their rails also as contacts, for the other reading.
 ///
@@ -31,65 +44,91 @@ pub(crate) fn of(
     asked: &KinematicsTask,
     monitor: &dyn Monitor,
 ) -> Result<Kinematics, SolveError> {
-    let poses = over_shifts(rails, asked, monitor)?;
+    let (level, end) = over_shifts(asked, monitor, |shift, _| {
+        let pose = rails.pose_without_roll(shift, 0.0)?;
+        rails.not_cut_off(&pose).map(|()| pose)
+    })?;
+    let (rolled, rolled_end) = over_shifts(asked, monitor, |shift, roll| {
+        let pose = rails.pose(shift, 0.0, roll)?;
+        rails.not_cut_off(&pose).map(|()| pose)
+    })?;
     let mut other = PairOfRails::new([other_reading(&sides[0]), other_reading(&sides[1])]);
-    let others = over_shifts(&mut other, asked, monitor)?;
-    let level = without_roll(rails, &poses)?;
-    let [radii, other_radii, level_radii] =
-        [&poses, &others, &level].map(|poses| difference(poses));
-    let rest = radii.rest();
-    let middle = rest.unwrap_or(0.0);
-    let near = poses.iter().min_by(|a, b| {
-        let off = |pose: &RigidPose| (pose.lateral_shift - middle).abs();
-        off(a).total_cmp(&off(b))
-    });
+    let (others, _) = over_shifts(asked, monitor, |shift, _| {
+        other.pose_without_roll(shift, 0.0)
+    })?;
+    let radii = sampled(&level, |shift| rails.pose_without_roll(shift, 0.0));
+    let other_radii = sampled(&others, |shift| other.pose_without_roll(shift, 0.0));
+    let rolled_radii = sampled(&rolled, |shift| rails.pose(shift, 0.0, 0.0));
+    let rest = radii.fine.rest();
+    let near = nearest(&level, rest.unwrap_or(0.0));
     let distance = near.map_or(0.0, RigidPose::contact_distance);
     let mean_radius = near.map_or(0.0, |pose| {
         0.5 * (pose.touches[0].radius + pose.touches[1].radius)
     });
     let changed = |pose: &RigidPose| {
-        let same = |other: &&RigidPose| (other.lateral_shift - pose.lateral_shift).abs() < 1e-9;
-        let other = others.iter().find(same);
-        other.map_or(0.0, |other| {
+        at_shift(&others, pose).map_or(0.0, |other| {
             (other.radius_difference() - pose.radius_difference()).abs()
         })
     };
-    let each = |of: fn(&RigidPose) -> f64| poses.iter().map(of).collect::<Vec<f64>>();
+    let with_roll = |of: fn(&RigidPose) -> f64| {
+        let at = |pose: &RigidPose| at_shift(&rolled, pose).map(of);
+        level.iter().map(at).collect::<Vec<Option<f64>>>()
+    };
+    let radius_difference_mm: Vec<f64> = level.iter().map(RigidPose::radius_difference).collect();
+    let conicity = asked.amplitudes.iter().map(|amplitude| {
+        let entry = conicity(*amplitude, [&radii, &other_radii, &rolled_radii]);
+        with_wavelength(entry, distance * mean_radius)
+    });
+    let known = level.iter().all(|pose| at_shift(&rolled, pose).is_some());
+    let unbalanced = NoConicity::NoEquilibrium(radii.fine.range()).to_string();
+    let rolled_end = rolled_end.map(|end| format!("with the roll: {end}"));
+    let reasons = [
+        Some(unbalanced).filter(|_| rest.is_none()),
+        end,
+        rolled_end.filter(|_| !known),
+    ];
+    let reasons: Vec<String> = reasons.into_iter().flatten().collect();
     Ok(Kinematics {
-        lateral_shift_mm: each(|pose| pose.lateral_shift),
-        roll_rad: each(|pose| pose.roll),
-        centre_height_mm: each(|pose| pose.height),
-        radius_difference_mm: each(RigidPose::radius_difference),
-        radius_difference_without_roll_mm: level.iter().map(RigidPose::radius_difference).collect(),
-        profile_uncertainty_mm: poses.iter().map(changed).collect(),
-        left: touch_line(rails, &poses, 0),
-        right: touch_line(rails, &poses, 1),
+        lateral_shift_mm: level.iter().map(|pose| pose.lateral_shift).collect(),
+        roll_rad: with_roll(|pose| pose.roll),
+        centre_height_mm: with_roll(|pose| pose.height),
+        radius_difference_with_roll_mm: with_roll(RigidPose::radius_difference),
+        radius_difference_without_roll_mm: radius_difference_mm.clone(),
+        radius_difference_mm,
+        profile_uncertainty_mm: level.iter().map(changed).collect(),
+        left: touch_line(rails, &level, 0),
+        right: touch_line(rails, &level, 1),
         equilibrium_shift_mm: rest,
         equilibrium_uncertainty_mm: rest
-            .zip(other_radii.rest())
+            .zip(other_radii.fine.rest())
             .map(|(own, other)| (own - other).abs()),
         contact_distance_mm: distance,
-        conicity: asked
-            .amplitudes
-            .iter()
-            .map(|amplitude| {
-                let radii = [&radii, &other_radii, &level_radii];
-                conicity(*amplitude, radii, distance * mean_radius)
-            })
-            .collect(),
+        conicity: conicity.collect(),
+        reason: (!reasons.is_empty()).then(|| reasons.join("; ")),
     })
 }
 
-/// The wheelset at every shift it can have, in order.
+/// The pose at the same shift as another.
+fn at_shift<'p>(poses: &'p [RigidPose], other: &RigidPose) -> Option<&'p RigidPose> {
+    poses
+        .iter()
+        .find(|pose| (pose.lateral_shift - other.lateral_shift).abs() < 1e-9)
+}
+
+fn nearest(poses: &[RigidPose], shift: f64) -> Option<&RigidPose> {
+    let off = |pose: &&RigidPose| (pose.lateral_shift - shift).abs();
+    poses.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
+}
+
+/// The wheelset at every shift it can have, in order, and why they end before the reach. `pose` has the shift and a roll nearby.
 fn over_shifts(
-    rails: &mut PairOfRails,
     asked: &KinematicsTask,
     monitor: &dyn Monitor,
-) -> Result<Vec<RigidPose>, SolveError> {
-    let centred = rails.pose(0.0, 0.0, 0.0);
-    let centred = centred.map_err(|reason| SolveError::NormalProblem { reason })?;
+    mut pose: impl FnMut(f64, f64) -> Result<RigidPose, String>,
+) -> Result<(Vec<RigidPose>, Option<String>), SolveError> {
+    let centred = pose(0.0, 0.0).map_err(|reason| SolveError::NormalProblem { reason })?;
     let steps = (asked.reach / asked.step).round() as i32;
-    let mut poses = vec![centred];
+    let (mut poses, mut end) = (vec![centred], None);
     for sign in [-1.0, 1.0] {
         let mut roll = centred.roll;
         for k in 1..=steps {
@@ -97,32 +136,74 @@ fn over_shifts(
                 return Err(stop.into());
             }
             let shift = sign * asked.reach * f64::from(k) / f64::from(steps);
-            // Farther out a wheel has left its rail.
-            let Ok(pose) = rails.pose(shift, 0.0, roll) else {
-                break;
-            };
-            roll = pose.roll;
-            poses.push(pose);
+            match pose(shift, roll) {
+                Ok(pose) => {
+                    roll = pose.roll;
+                    poses.push(pose);
+                }
+                Err(reason) => {
+                    end.get_or_insert(reason);
+                    break;
+                }
+            }
         }
     }
     poses.sort_by(|a, b| a.lateral_shift.total_cmp(&b.lateral_shift));
-    Ok(poses)
+    Ok((poses, end))
 }
 
-/// The same shifts with the axle held level.
-fn without_roll(
-    rails: &mut PairOfRails,
-    poses: &[RigidPose],
-) -> Result<Vec<RigidPose>, SolveError> {
-    let level = |pose: &RigidPose| rails.pose_without_roll(pose.lateral_shift, pose.yaw);
-    let poses: Result<Vec<RigidPose>, String> = poses.iter().map(level).collect();
-    poses.map_err(|reason| SolveError::NormalProblem { reason })
+/// The radius difference of poses, with more shifts where it bends or jumps.
+fn sampled(poses: &[RigidPose], mut pose: impl FnMut(f64) -> Result<RigidPose, String>) -> Sampled {
+    let known: Vec<[f64; 2]> = poses
+        .iter()
+        .map(|pose| [pose.lateral_shift, pose.radius_difference()])
+        .collect();
+    // The middle of a parabola lies an eighth of its second difference off the chord.
+    let bends = |k: usize| {
+        k > 0
+            && k + 1 < known.len()
+            && (known[k - 1][1] - 2.0 * known[k][1] + known[k + 1][1]).abs() > 8.0 * RESOLVED
+    };
+    let mut between = Vec::new();
+    for k in 1..known.len() {
+        if bends(k - 1) || bends(k) {
+            halve([known[k - 1], known[k]], HALVINGS, &mut pose, &mut between);
+        }
+    }
+    let curve = |every: usize| {
+        let phase = known.len() / 2 % every;
+        let mut all: Vec<[f64; 2]> = known.iter().copied().skip(phase).step_by(every).collect();
+        all.extend(&between);
+        all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let (shifts, differences) = all.into_iter().map(|[y, d]| (y, d)).unzip();
+        RadiusDifference::new(shifts, differences)
+    };
+    Sampled {
+        fine: curve(1),
+        coarse: curve(2),
+    }
 }
 
-fn difference(poses: &[RigidPose]) -> RadiusDifference {
-    let shift = poses.iter().map(|pose| pose.lateral_shift).collect();
-    let difference = poses.iter().map(RigidPose::radius_difference).collect();
-    RadiusDifference::new(shift, difference)
+/// Samples between two, until the difference is linear between them or the jump is narrow.
+fn halve(
+    [from, to]: [[f64; 2]; 2],
+    times: u32,
+    pose: &mut impl FnMut(f64) -> Result<RigidPose, String>,
+    found: &mut Vec<[f64; 2]>,
+) {
+    let shift = 0.5 * (from[0] + to[0]);
+    let Some(middle) = pose(shift)
+        .ok()
+        .map(|pose| [shift, pose.radius_difference()])
+    else {
+        return;
+    };
+    found.push(middle);
+    let off = (middle[1] - 0.5 * (from[1] + to[1])).abs();
+    if times > 1 && off > RESOLVED {
+        halve([from, middle], times - 1, pose, found);
+        halve([middle, to], times - 1, pose, found);
+    }
 }
 
 /// A wheel over its rail with the other reading of both cross-sections: smoother, as their noise and spacing advise at least.
@@ -139,27 +220,49 @@ fn other_reading(side: &WheelTask) -> WheelRail {
         .smoothed([other(0, profiles[0]), other(1, profiles[1])])
 }
 
-/// The conicity at one amplitude, from Δr, that of the other reading and that without roll; `product` is that of contact distance and
-/// radius in mm².
-fn conicity(
-    amplitude: f64,
-    [radii, other, level]: [&RadiusDifference; 3],
-    product: f64,
-) -> EquivalentConicity {
-    let found = radii.conicity(amplitude);
-    let change = |to: &RadiusDifference| {
-        let to = to.conicity(amplitude);
-        found.zip(to).map(|(a, b)| (a.conicity - b.conicity).abs())
+/// The conicity at one amplitude, from Δr, that of the other reading and that with the roll; without the wavelength.
+fn conicity(amplitude: f64, [radii, other, rolled]: [&Sampled; 3]) -> EquivalentConicity {
+    let found = radii.fine.conicity(amplitude);
+    let mut reasons = Vec::new();
+    let mut missing = |what: &str, reason: NoConicity| reasons.push(format!("{what}: {reason}"));
+    let mut known = |what: &str, result: Result<Conicity, NoConicity>| {
+        result.map_err(|reason| missing(what, reason)).ok()
     };
+    let own = known("conicity", found);
+    let with_roll = known("conicity_with_roll", rolled.fine.conicity(amplitude));
+    let mut change = |what: &str, to: &RadiusDifference| {
+        let own = own?;
+        let to = known(what, to.conicity(amplitude))?;
+        Some((own.conicity - to.conicity).abs())
+    };
+    let error_estimate = change("error_estimate, from twice the step", &radii.coarse);
+    let profile_uncertainty = change("profile_uncertainty, from the other reading", &other.fine);
+    if own.is_some_and(|own| own.turns.is_none()) {
+        reasons.push(
+            "wavelength_mm, turns_mm: the radii are equal over the whole amplitude, so that nothing steers"
+                .to_owned(),
+        );
+    }
     EquivalentConicity {
         amplitude_mm: amplitude,
-        conicity: found.map(|found| found.conicity),
-        conicity_without_roll: level.conicity(amplitude).map(|found| found.conicity),
-        conicity_harmonic: found.map(|found| found.harmonic),
-        error_estimate: change(&radii.coarser()),
-        profile_uncertainty: change(other),
-        wavelength_mm: found.map(|found| PI * (2.0 * product / found.conicity).sqrt()),
-        turns_mm: found.map(|found| found.turns),
+        conicity: own.map(|found| found.conicity),
+        conicity_with_roll: with_roll.map(|found| found.conicity),
+        conicity_without_roll: own.map(|found| found.conicity),
+        conicity_harmonic: own.map(|found| found.harmonic),
+        error_estimate,
+        profile_uncertainty,
+        wavelength_mm: None,
+        turns_mm: own.and_then(|found| found.turns),
+        reason: (!reasons.is_empty()).then(|| reasons.join("; ")),
+    }
+}
+
+/// The same with the wavelength; `product` is that of contact distance and radius in mm².
+fn with_wavelength(entry: EquivalentConicity, product: f64) -> EquivalentConicity {
+    let steers = entry.conicity.filter(|_| entry.turns_mm.is_some());
+    EquivalentConicity {
+        wavelength_mm: steers.map(|conicity| PI * (2.0 * product / conicity).sqrt()),
+        ..entry
     }
 }
 

@@ -4,10 +4,11 @@ use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, shown, word};
 use crate::contact::case::resolution::TARGET_ERROR_DEFAULT;
 use crate::contact::case::words::solver::{
-    MeshSizeWords, MethodName, Output, Solver, TractionBoundName,
+    MeshSizeWords, MethodName, Output, RelativeToName, Solver, TractionBoundName,
 };
+use crate::contact::rolling::resolution::TARGET_LEAST;
 
-const TARGET_ERROR: AllowedRange = AllowedRange::closed(1e-4, 0.5, "");
+const TARGET_ERROR: AllowedRange = AllowedRange::closed(TARGET_LEAST, 0.5, "");
 const TIME_LIMIT: AllowedRange = AllowedRange::positive(86_400.0, "s");
 /// Most strips, and cells in one, of an explicit mesh.
 const MESH_SIDE_MAX: u32 = 1000;
@@ -23,6 +24,10 @@ const TRACTION_BOUNDS: [(&str, TractionBoundName); 2] = [
     ("elliptic", TractionBoundName::Elliptic),
     ("parabolic", TractionBoundName::Parabolic),
 ];
+const RELATIVE_TO: [(&str, RelativeToName); 2] = [
+    ("friction_limit", RelativeToName::FrictionLimit),
+    ("force", RelativeToName::Force),
+];
 const OUTPUTS: [(&str, Output); 9] = [
     ("resultants", Output::Resultants),
     ("zones", Output::Zones),
@@ -35,28 +40,29 @@ const OUTPUTS: [(&str, Output); 9] = [
     ("gradients", Output::Gradients),
 ];
 
+const MEMBERS: [&str; 6] = [
+    "method",
+    "target_error",
+    "relative_to",
+    "mesh",
+    "traction_bound",
+    "time_limit_s",
+];
+
 /// Reads the member `solver` of a case; left out, it is `auto` with the default target.
 pub(crate) fn read(case: &mut Object) -> Option<Solver> {
     if !case.has("solver") {
         return Some(Solver {
             method: MethodName::Auto,
             target_error: Some(TARGET_ERROR_DEFAULT),
+            relative_to: None,
             mesh: None,
             traction_bound: None,
             time_limit_s: None,
         });
     }
     let mut block = case.child("solver")?;
-    block.only(
-        &[
-            "method",
-            "target_error",
-            "mesh",
-            "traction_bound",
-            "time_limit_s",
-        ],
-        &[],
-    );
+    block.only(&MEMBERS, &[]);
     let method = block.word("method", &METHODS, &[]);
     let target_error = block.number("target_error", TARGET_ERROR);
     let mesh = if block.has("mesh") {
@@ -65,26 +71,17 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
         None
     };
     let traction_bound = block.word("traction_bound", &TRACTION_BOUNDS, &[]);
-    let another =
-        !block.has("method") || method.is_some_and(|method| method != MethodName::Fastsim);
-    if traction_bound.is_some() && another {
-        block.fault(
-            "traction_bound",
-            "given for a method without a choice of bounds; only \"method\": \"fastsim\" has one",
-        );
-    }
     let time_limit_s = block.number("time_limit_s", TIME_LIMIT);
-    if mesh.is_some() && method == Some(MethodName::Table) {
-        block.fault("mesh", "given for \"method\": \"table\", which has no mesh");
-    }
-    if block.has("target_error") && block.has("mesh") {
-        block.fault(
-            "mesh",
-            "given together with target_error; exactly one of the two is allowed",
-        );
-    }
+    let relative_to = block.word("relative_to", &RELATIVE_TO, &[]);
+    let read = [
+        traction_bound.is_some(),
+        mesh.is_some(),
+        relative_to.is_some(),
+    ];
+    mismatches(&mut block, method, read);
     for (name, read) in [
         ("method", method.is_some()),
+        ("relative_to", relative_to.is_some()),
         ("target_error", target_error.is_some()),
         ("mesh", mesh.is_some()),
         ("traction_bound", traction_bound.is_some()),
@@ -101,10 +98,49 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
     Some(Solver {
         method,
         target_error: target_error.or(default),
+        relative_to,
         mesh,
         traction_bound,
         time_limit_s,
     })
+}
+
+/// Refuses members that do not go together; of three it counts whether they were read.
+fn mismatches(
+    block: &mut Object,
+    method: Option<MethodName>,
+    [traction_bound, mesh, relative_to]: [bool; 3],
+) {
+    let another =
+        !block.has("method") || method.is_some_and(|method| method != MethodName::Fastsim);
+    let targeted =
+        block.has("target_error") || !block.has("mesh") && method != Some(MethodName::Fastsim);
+    for (wrong, name, detail) in [
+        (
+            traction_bound && another,
+            "traction_bound",
+            "given for a method without a choice of bounds; only \"method\": \"fastsim\" has one",
+        ),
+        (
+            mesh && method == Some(MethodName::Table),
+            "mesh",
+            "given for \"method\": \"table\", which has no mesh",
+        ),
+        (
+            block.has("target_error") && block.has("mesh"),
+            "mesh",
+            "given together with target_error; exactly one of the two is allowed",
+        ),
+        (
+            relative_to && !targeted,
+            "relative_to",
+            "given without a target; give target_error, or leave relative_to out",
+        ),
+    ] {
+        if wrong {
+            block.fault(name, detail);
+        }
+    }
 }
 
 /// Reads the member `outputs` of a case: sorted, each once; left out, resultants and zones. A method `without_fields` computes

@@ -22,7 +22,8 @@ const UNITS: [(&str, UnitName); 4] = [
     ("inch", UnitName::Inch),
 ];
 pub(crate) const ROLLING_RADIUS: AllowedRange = AllowedRange::positive(1e5, "mm");
-pub(crate) const DISTANCE: AllowedRange = AllowedRange::positive(1e5, "mm");
+pub(crate) const GAUGE: AllowedRange = AllowedRange::positive(1e5, "mm");
+pub(crate) const DISTANCE: AllowedRange = AllowedRange::closed(0.0, 1e5, "mm");
 pub(crate) const PLACE: AllowedRange = AllowedRange::closed(-1e3, 1e3, "mm");
 pub(crate) const DEPTH: AllowedRange = AllowedRange::closed(0.0, 100.0, "mm");
 pub(crate) const CANT: AllowedRange = AllowedRange::closed(-0.5, 0.5, "rad");
@@ -33,7 +34,7 @@ const SMOOTHING: AllowedRange = AllowedRange::closed(0.0, 50.0, "mm");
 const TEXT_MAX: usize = 4_000_000;
 /// Faulty points of one cross-section that are listed one by one.
 const POINT_FAULTS_MAX: usize = 5;
-const MEMBERS: [&str; 14] = [
+const MEMBERS: [&str; 15] = [
     "type",
     "rail",
     "wheel",
@@ -41,6 +42,7 @@ const MEMBERS: [&str; 14] = [
     "rolling_radius_mm",
     "gauge_mm",
     "gauge_height_mm",
+    "rail_origin_mm",
     "cant_rad",
     "flange_back_distance_mm",
     "flange_back_position_mm",
@@ -67,22 +69,22 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
             Some(default)
         }
     };
-    let gauge_mm = or("gauge_mm", DISTANCE, 1435.0);
-    let gauge_height_mm = or("gauge_height_mm", DEPTH, 14.0);
     let cant_rad = or("cant_rad", CANT, 0.0);
     let flange_back_distance_mm = or("flange_back_distance_mm", DISTANCE, 1360.0);
     let flange_back_position_mm = or("flange_back_position_mm", PLACE, -70.0);
     let lateral_shift_mm = or("lateral_shift_mm", PLACE, 0.0);
     let yaw_rad = or("yaw_rad", ANGLE, 0.0);
     let roll_rad = or("roll_rad", ANGLE, 0.0);
+    let place = rail_place(block);
     let accept_rough_profiles = flag(block, "accept_rough_profiles");
     Some(Contact::Profiles {
         rail: Box::new(rail?),
         wheel: Box::new(wheel?),
         side: side?,
         rolling_radius_mm: rolling_radius_mm?,
-        gauge_mm: gauge_mm?,
-        gauge_height_mm: gauge_height_mm?,
+        gauge_mm: place?.gauge_mm,
+        gauge_height_mm: place?.gauge_height_mm,
+        rail_origin_mm: place?.rail_origin_mm,
         cant_rad: cant_rad?,
         flange_back_distance_mm: flange_back_distance_mm?,
         flange_back_position_mm: flange_back_position_mm?,
@@ -90,6 +92,54 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
         yaw_rad: yaw_rad?,
         roll_rad: roll_rad?,
         accept_rough_profiles: accept_rough_profiles?.unwrap_or(false),
+    })
+}
+
+/// How the rail is placed across the track: by gauge and gauge height, or by its origin.
+#[derive(Clone, Copy)]
+pub(crate) struct RailPlaceWords {
+    pub(crate) gauge_mm: Option<f64>,
+    pub(crate) gauge_height_mm: Option<f64>,
+    pub(crate) rail_origin_mm: Option<f64>,
+}
+
+/// Reads the place of the rail, with the defaults of the gauge where no origin is given.
+pub(crate) fn rail_place(block: &mut Object) -> Option<RailPlaceWords> {
+    const BY_GAUGE: [(&str, AllowedRange, f64); 2] = [
+        ("gauge_mm", GAUGE, 1435.0),
+        ("gauge_height_mm", DEPTH, 14.0),
+    ];
+    if block.has("rail_origin_mm") {
+        let names = BY_GAUGE.iter().map(|(name, ..)| *name);
+        let both: Vec<&str> = names.filter(|name| block.has(name)).collect();
+        if !both.is_empty() {
+            block.fault(
+                "rail_origin_mm",
+                format!(
+                    "given together with {}; give rail_origin_mm alone to place the rail by its origin, or gauge_mm and gauge_height_mm to \
+                     place it by its gauge face",
+                    both.join(" and ")
+                ),
+            );
+            return None;
+        }
+        return Some(RailPlaceWords {
+            gauge_mm: None,
+            gauge_height_mm: None,
+            rail_origin_mm: Some(block.number("rail_origin_mm", DISTANCE)?),
+        });
+    }
+    let [gauge, height] = BY_GAUGE.map(|(name, allowed, default)| {
+        if block.has(name) {
+            block.number(name, allowed)
+        } else {
+            Some(default)
+        }
+    });
+    Some(RailPlaceWords {
+        gauge_mm: Some(gauge?),
+        gauge_height_mm: Some(height?),
+        rail_origin_mm: None,
     })
 }
 

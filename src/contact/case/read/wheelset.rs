@@ -5,7 +5,7 @@ use crate::contact::case::read::motion::swept;
 use crate::contact::case::read::object::{Object, shown};
 use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::read::wheel_rail::{
-    ANGLE, CANT, DEPTH, DISTANCE, PLACE, ROLLING_RADIUS, flag, section,
+    ANGLE, CANT, DISTANCE, PLACE, ROLLING_RADIUS, flag, rail_place, section,
 };
 use crate::contact::case::words::contact::{Contact, KinematicsWords, Load, RightSide};
 use crate::contact::case::words::motion::{Combine, Swept};
@@ -16,7 +16,7 @@ const STEP: AllowedRange = AllowedRange::positive(5.0, "mm");
 /// Most shifts to one side, and most amplitudes.
 const SHIFTS_MAX: f64 = 1000.0;
 const AMPLITUDES_MAX: usize = 100;
-const MEMBERS: [&str; 14] = [
+const MEMBERS: [&str; 15] = [
     "type",
     "rail",
     "wheel",
@@ -24,6 +24,7 @@ const MEMBERS: [&str; 14] = [
     "rolling_radius_mm",
     "gauge_mm",
     "gauge_height_mm",
+    "rail_origin_mm",
     "cant_rad",
     "flange_back_distance_mm",
     "flange_back_position_mm",
@@ -51,11 +52,10 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
             Some(default)
         }
     };
-    let gauge_mm = or("gauge_mm", DISTANCE, 1435.0);
-    let gauge_height_mm = or("gauge_height_mm", DEPTH, 14.0);
     let cant_rad = or("cant_rad", CANT, 0.0);
     let flange_back_distance_mm = or("flange_back_distance_mm", DISTANCE, 1360.0);
     let flange_back_position_mm = or("flange_back_position_mm", PLACE, -70.0);
+    let place = rail_place(block);
     let (shifts, yaws, combine) = poses(block)?;
     let kinematics = kinematics(block);
     let accept_rough_profiles = flag(block, "accept_rough_profiles");
@@ -64,8 +64,9 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
         wheel: Box::new(wheel?),
         right: right?.map(Box::new),
         rolling_radius_mm: rolling_radius_mm?,
-        gauge_mm: gauge_mm?,
-        gauge_height_mm: gauge_height_mm?,
+        gauge_mm: place?.gauge_mm,
+        gauge_height_mm: place?.gauge_height_mm,
+        rail_origin_mm: place?.rail_origin_mm,
         cant_rad: cant_rad?,
         flange_back_distance_mm: flange_back_distance_mm?,
         flange_back_position_mm: flange_back_position_mm?,

@@ -8,7 +8,9 @@ use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::history::{History, HistoryStartName};
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::{MotionWords, Wheelset};
-use crate::contact::case::words::solver::{MeshSizeWords, MethodName, Output, TractionBoundName};
+use crate::contact::case::words::solver::{
+    MeshSizeWords, MethodName, Output, RelativeToName, TractionBoundName,
+};
 use crate::contact::case::words::subsurface::SubsurfaceWords;
 use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::rolling::motion::PrescribedForces;
@@ -38,6 +40,8 @@ pub(crate) struct Canonical<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) traction_bound: Option<TractionBoundName>,
     pub(crate) target_error: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) relative_to: Option<RelativeToName>,
     pub(crate) mesh: Option<MeshSizeWords>,
     pub(crate) time_limit_s: Option<f64>,
     pub(crate) outputs: &'a [Output],

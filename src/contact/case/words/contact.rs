@@ -71,11 +71,17 @@ pub enum Contact {
         #[schema(exclusive_minimum = 0.0)]
         rolling_radius_mm: f64,
         /// Distance of the gauge faces of the two rails, in mm; 1435 when left out.
-        #[schema(required = false)]
-        gauge_mm: f64,
-        /// Depth below the top of the rail at which the gauge is measured, in mm; 14 when left out.
-        #[schema(required = false)]
-        gauge_height_mm: f64,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false)]
+        gauge_mm: Option<f64>,
+        /// Depth at which the gauge is measured, below the highest point of the rail as it lies, in mm; 14 when left out.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false)]
+        gauge_height_mm: Option<f64>,
+        /// Distance of the origin of the rail's cross-section from the middle of the track, in mm. It places the rail instead of the gauge.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false, minimum = 0.0)]
+        rail_origin_mm: Option<f64>,
         /// Turn of the rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
         /// when left out.
         #[schema(required = false)]
@@ -117,11 +123,17 @@ pub enum Contact {
         #[schema(exclusive_minimum = 0.0)]
         rolling_radius_mm: f64,
         /// Distance of the gauge faces of the two rails, in mm; 1435 when left out.
-        #[schema(required = false)]
-        gauge_mm: f64,
-        /// Depth below the top of the rail at which the gauge is measured, in mm; 14 when left out.
-        #[schema(required = false)]
-        gauge_height_mm: f64,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false)]
+        gauge_mm: Option<f64>,
+        /// Depth at which the gauge is measured, below the highest point of the rail as it lies, in mm; 14 when left out.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false)]
+        gauge_height_mm: Option<f64>,
+        /// Distance of the origin of the rail's cross-section from the middle of the track, in mm. It places the rail instead of the gauge.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false, minimum = 0.0)]
+        rail_origin_mm: Option<f64>,
         /// Turn of each rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
         /// when left out.
         #[schema(required = false)]

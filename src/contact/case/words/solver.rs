@@ -16,6 +16,11 @@ pub struct Solver {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, minimum = 0.0001, maximum = 0.5)]
     pub target_error: Option<f64>,
+    /// What the allowed error is relative to; `friction_limit` when left out. With `force` a motion is solved again until its error is
+    /// `target_error` of its own tangential force, but at most to 1e-4 of μN. Not allowed with `mesh` and for histories.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    pub relative_to: Option<RelativeToName>,
     /// An explicit mesh instead of a target.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
@@ -47,6 +52,18 @@ pub enum MethodName {
     /// Interpolates resultants of elliptic patches in a table computed by `boundary_element`, in less than a microsecond, with an error
     /// bound. A patch of another shape is replaced by the ellipse with the same load distribution.
     Table,
+}
+
+/// What an error is relative to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = RelativeTo)]
+pub enum RelativeToName {
+    /// The friction limit μN.
+    #[default]
+    FrictionLimit,
+    /// The tangential force of the motion, of all patches that share a frame.
+    Force,
 }
 
 /// Where `fastsim` lets tractions slip.

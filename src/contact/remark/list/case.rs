@@ -19,6 +19,20 @@ macro_rules! case_remarks {
             advice: "Check `friction.coefficient`: dry steel has about 0.3 to 0.6.",
             detail: format!("the friction coefficient {coefficient} is more than {usual_max}"),
 
+            /// A number is unusual for wheel and rail, but usual in another unit.
+            UnitSuspected {
+                /// The number given.
+                given: f64 = 75.0,
+                /// The unit that it is taken in.
+                unit: String = "N".to_owned(),
+                /// The unit that it is likely given in.
+                likely_unit: String = "kN".to_owned(),
+            }
+            code: "unit-suspected",
+            severity: Warning,
+            advice: "Check the unit of the member that `pointer` names; if the number is meant as it stands, nothing is wrong.",
+            detail: format!("{given} is taken in {unit}, which is unusual for wheel and rail: is it given in {likely_unit}?"),
+
             /// The two bodies differ. Their materials are combined, but pressure and traction are solved one after the other.
             CouplingNeglected {
                 /// Difference parameter K (Kalker 1990, eq. 1.44).

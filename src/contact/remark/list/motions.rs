@@ -62,7 +62,9 @@ macro_rules! motion_remarks {
 
             /// The error is not known to be below the target.
             TargetMissed {
-                /// Estimated error relative to μN; absent if it is unknown.
+                /// What error and target are relative to.
+                relative_to: &'static str = "μN",
+                /// Estimated error; absent if it is unknown.
                 estimate: Option<f64> = Some(2.3e-3),
                 /// The target.
                 target: f64 = 1e-3,
@@ -72,10 +74,27 @@ macro_rules! motion_remarks {
             advice: "Use the numbers with their error estimate, or ask for a larger target.",
             detail: match estimate {
                 Some(estimate) => format!(
-                    "the error relative to μN is estimated at {estimate:.2e}, the target was {target}"
+                    "the error relative to {relative_to} is estimated at {estimate:.2e}, the target was {target}"
                 ),
-                None => format!("the error relative to μN is unknown, the target was {target}"),
+                None => format!("the error relative to {relative_to} is unknown, the target was {target}"),
             },
+
+            /// The error is a large part of the force, although it is a small part of μN.
+            ErrorLargeForForce {
+                /// Estimated error over the tangential force.
+                error_over_force: f64 = 0.25,
+                /// Tangential force over μN.
+                force_over_limit: f64 = 0.02,
+                /// Largest error over the force that passes without a remark.
+                usual_max: f64 = 0.1,
+            }
+            code: "error-large-for-force",
+            severity: Info,
+            advice: "Give `solver.relative_to: \"force\"` to solve to a share of the force, or a smaller `target_error`.",
+            detail: format!(
+                "the force is {force_over_limit:.2e} of μN, and its estimated error is {:.0} % of it; the target counts relative to μN",
+                100.0 * error_over_force
+            ),
 
             /// No creepage gives the prescribed force; the answer has the nearest force found.
             ForceUnreachable {

@@ -140,6 +140,21 @@ macro_rules! normal_remarks {
             advice: "Check its unit: lengths are in mm.",
             detail: format!("{length_mm} mm is unusual here and would be usual in {unit}: lengths are in mm"),
 
+            /// The largest pressure is above the shakedown limit of rail steel.
+            PressureAboveShakedown {
+                /// Largest pressure.
+                pressure_max_mpa: f64 = 1900.0,
+                /// The shakedown limit.
+                shakedown_limit_mpa: f64 = 1500.0,
+            }
+            code: "pressure-above-shakedown",
+            severity: Info,
+            advice: "The answer is elastic. Harder steel has a higher limit; traction lowers it.",
+            detail: format!(
+                "the largest pressure of {pressure_max_mpa:.0} MPa is above {shakedown_limit_mpa} MPa, the shakedown limit of rail steel R260 in \
+                 pure rolling: repeated passages deform the surface plastically"
+            ),
+
             /// The load is larger than any wheel bears.
             LoadImplausible {
                 /// Normal force of all patches.

@@ -61,23 +61,27 @@ pub struct WheelOnRail {
 /// A rigid wheelset without yaw over a range of shifts; lists have one entry per shift.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Kinematics {
-    /// Shifts to the left in mm. They end where a wheel leaves its rail.
+    /// Shifts to the left in mm. They end where a wheel leaves its rail or touches at the end of a cross-section.
     pub lateral_shift_mm: Vec<f64>,
-    /// Roll in rad at which both wheels touch.
-    pub roll_rad: Vec<f64>,
-    /// Height of the wheelset's centre over the top of the rails in mm.
-    pub centre_height_mm: Vec<f64>,
-    /// Δr: rolling radius of the left wheel less that of the right one, in mm.
+    /// Roll in rad at which both wheels touch; null where there is none.
+    pub roll_rad: Vec<Option<f64>>,
+    /// Height of the wheelset's centre over the top of the rails in mm, with the roll; null where there is no roll.
+    pub centre_height_mm: Vec<Option<f64>>,
+    /// Δr of EN 15302, in mm: rolling radius of the left wheel less that of the right one, with the axle held level.
     pub radius_difference_mm: Vec<f64>,
-    /// The same with the axle held level, as some procedures have it: each wheel where it would touch without the roll.
+    /// Δr in mm with the roll; null where there is no roll.
+    #[serde(default)]
+    pub radius_difference_with_roll_mm: Vec<Option<f64>>,
+    /// Deprecated name of `radius_difference_mm`.
     pub radius_difference_without_roll_mm: Vec<f64>,
     /// How much Δr changes with another reading of the cross-sections, in mm.
     pub profile_uncertainty_mm: Vec<f64>,
-    /// Where the left wheel touches.
+    /// Where the left wheel touches, with the axle held level.
     pub left: TouchLine,
-    /// Where the right wheel touches.
+    /// Where the right wheel touches, with the axle held level.
     pub right: TouchLine,
-    /// The shift in mm nearest to 0 at which Δr rises through 0: where a free wheelset runs on straight track. Absent if there is none.
+    /// The shift in mm nearest to 0 at which Δr rises through 0: where a free wheelset runs on straight track. The middle of the shifts at which
+    /// Δr is 0, if there are several. Absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub equilibrium_shift_mm: Option<f64>,
@@ -89,6 +93,10 @@ pub struct Kinematics {
     pub contact_distance_mm: f64,
     /// Equivalent conicity, one entry per amplitude of the case.
     pub conicity: Vec<EquivalentConicity>,
+    /// Why the shifts or values of the lists end early, or why there is no equilibrium.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub reason: Option<String>,
 }
 
 /// Where a rigid wheel touches its rail, shift by shift.
@@ -104,17 +112,21 @@ pub struct TouchLine {
     pub wheel_y_mm: Vec<f64>,
 }
 
-/// The equivalent conicity tan γ at one amplitude. All but the amplitude is absent where there is no stable equilibrium, or where the
-/// shifts do not reach as far.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+/// The equivalent conicity tan γ at one amplitude. `reason` explains every absent member.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EquivalentConicity {
     /// Half the distance of the turning points in mm.
     pub amplitude_mm: f64,
-    /// tan γ after EN 15302, by integration of the wheelset's equation of motion with the Δr above.
+    /// tan γ of EN 15302, by integration of the wheelset's equation of motion with Δr of the level axle. 0 where Δr is 0 over the whole
+    /// amplitude.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub conicity: Option<f64>,
-    /// tan γ from Δr without roll. Of a cone this is the cone's own tangent; the roll adds some percent.
+    /// tan γ from Δr with the roll. Of a cone the roll adds some percent to the cone's own tangent.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub conicity_with_roll: Option<f64>,
+    /// Deprecated name of `conicity`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub conicity_without_roll: Option<f64>,
@@ -138,4 +150,8 @@ pub struct EquivalentConicity {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub turns_mm: Option<[f64; 2]>,
+    /// Why members are absent.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub reason: Option<String>,
 }

@@ -33,7 +33,7 @@ function overShift(kinematics, kind) {
     lines: kind === 'radii'
       ? [
         { label: 'Δr', unit: 'mm', colour: '--c1', y: kinematics.radius_difference_mm, error: kinematics.profile_uncertainty_mm },
-        { label: 'axle held level', unit: 'mm', colour: '--c2', dash: [7, 4], y: kinematics.radius_difference_without_roll_mm, error: none },
+        { label: 'with roll', unit: 'mm', colour: '--c2', dash: [7, 4], y: shifts.map((_, at) => kinematics.radius_difference_with_roll_mm?.[at] ?? NaN), error: none },
       ]
       : [
         { label: 'left', unit: '°', colour: '--c1', y: degrees(left.contact_angle_rad), error: none },
@@ -46,7 +46,7 @@ function overShift(kinematics, kind) {
 /** Amplitudes without a stable equilibrium, or beyond the shifts that were asked for, have no conicity. @param {Kinematics} kinematics @returns {Curve} */
 function conicity(kinematics) {
   const known = kinematics.conicity.filter((of) => typeof of.conicity === 'number');
-  const of = (/** @type {'conicity' | 'conicity_without_roll' | 'conicity_harmonic'} */ name) => known.map((at) => at[name] ?? NaN);
+  const of = (/** @type {'conicity' | 'conicity_with_roll' | 'conicity_harmonic'} */ name) => known.map((at) => at[name] ?? NaN);
   const none = known.map(() => null);
   return {
     xLabel: 'amplitude / mm',
@@ -55,7 +55,7 @@ function conicity(kinematics) {
     order: [...known.keys()],
     lines: [
       { label: 'EN 15302', unit: '', colour: '--c1', y: of('conicity'), error: known.map((at) => Math.hypot(at.error_estimate ?? 0, at.profile_uncertainty ?? 0)) },
-      { label: 'axle held level', unit: '', colour: '--c2', dash: [7, 4], y: of('conicity_without_roll'), error: none },
+      { label: 'with roll', unit: '', colour: '--c2', dash: [7, 4], y: of('conicity_with_roll'), error: none },
       { label: 'harmonic', unit: '', colour: '--c3', dash: [2, 3], y: of('conicity_harmonic'), error: none },
     ],
     bound: NaN,

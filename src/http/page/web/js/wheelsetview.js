@@ -35,7 +35,7 @@ function curvePart(app, looked, wheelset, kinematics, chosen) {
     drawn = { wheelset, kind: looked.wheelset, curve: wheelsetCurve(kinematics, looked.wheelset) };
   }
   const { curve } = drawn;
-  if (!curve) return html`<p class="pad quiet">No amplitude has a conicity: there is no stable equilibrium, or the shifts do not reach as far.</p>`;
+  if (!curve) return html`<p class="pad quiet">No amplitude has a conicity: ${kinematics.conicity[0]?.reason ?? kinematics.reason ?? 'fewer than two were asked for'}.</p>`;
   const overShift = looked.wheelset !== 'conicity';
   const shifts = wheelset.positions.map((position) => position.lateral_shift_mm);
   const pick = (/** @type {number} */ at) => overShift && choosePosition(app, wheelset.positions[nearest(shifts, curve.x[at])]);
@@ -43,7 +43,7 @@ function curvePart(app, looked, wheelset, kinematics, chosen) {
   return html`<creep-curve .shown=${{ curve, chosen: overShift ? nearest(curve.x, shifts[chosen]) : -1, pick }}></creep-curve>
     <p class="pad hint">${typeof balance === 'number'
       ? `Rolls in balance at ${number(balance, 3)} mm; the contacts are ${number(kinematics.contact_distance_mm ?? NaN, 5)} mm apart.`
-      : 'Δr rises through 0 nowhere within reach: no shift is in balance.'}</p>`;
+      : `No shift is in balance: ${kinematics.reason ?? 'Δr rises through 0 nowhere within reach'}.`}</p>`;
 }
 
 /** Goes to the left patch of a position. @param {App} app @param {Wheelset['positions'][number]} position */

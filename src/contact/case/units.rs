@@ -1,0 +1,322 @@
+//! Which numbers of a case look as if they were given in another unit? Nothing is refused here.
+//!
+//! The ranges are those that the number in the likely unit would have for wheels and rails: loads of 1 kN and more, speeds of 0.5 m/s and more,
+//! metals with a shear modulus of 10 to 1000 GPa, angles below 0.05 rad. Lengths of the wheel and the track are looked at in `length_units`.
+
+use crate::contact::case::motions::swept_values;
+use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::history::HistoryCourse;
+use crate::contact::case::words::material::{Elastic, Material};
+use crate::contact::case::words::motion::{AskedMotion, Motions, Swept, Wheelset};
+use crate::contact::case::words::question::Case;
+use crate::contact::normal::patch::Patch;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
+
+/// A wheel carries at least this load in N.
+const LOAD_LEAST: f64 = 1e3;
+/// A rolling radius of a wheel or a relative radius of wheel and rail has at least this length in mm.
+const RADIUS_LEAST: f64 = 250.0;
+/// A wheel rolls at least with this speed in mm/s.
+const SPEED_LEAST: f64 = 500.0;
+/// Numbers of shear moduli that are GPa, and of Young's moduli.
+const SHEAR_GPA: [f64; 2] = [10.0, 1000.0];
+/// See [`SHEAR_GPA`].
+const YOUNG_GPA: [f64; 2] = [25.0, 2500.0];
+/// Metals have a smaller Poisson's ratio; soft plastics, whose moduli have such numbers in MPa, a larger one.
+const POISSON_METAL: f64 = 0.36;
+/// Shear modulus in MPa from which on a body is of metal.
+const SHEAR_METAL: f64 = 1e4;
+/// Creepages that are per cent.
+const CREEPAGE_PERCENT: [f64; 2] = [0.05, 5.0];
+/// Largest yaw and roll of a wheelset in rad.
+const ANGLE_MOST: f64 = 0.05;
+/// Largest inclination of a rail in rad: twice the 1:20 of the steepest.
+const CANT_MOST: f64 = 0.1;
+/// Units of length with their size in mm.
+const LENGTHS: [(&str, f64); 3] = [("m", 1000.0), ("cm", 10.0), ("inch", 25.4)];
+/// Pressures of wheels on rails in MPa.
+const PRESSURES: [f64; 2] = [200.0, 3500.0];
+/// Pressure in MPa above which lengths are doubted where the patch follows from them alone: the static limit of ball bearings (ISO 76).
+const PRESSURE_DOUBTED: f64 = 4200.0;
+
+/// A number that looks as if it were in another unit.
+struct Suspect {
+    pointer: String,
+    value: f64,
+    unit: &'static str,
+    likely: String,
+}
+
+impl Suspect {
+    fn new(pointer: &str, value: f64, unit: &'static str, likely: &str) -> Suspect {
+        Suspect {
+            pointer: pointer.to_owned(),
+            value,
+            unit,
+            likely: likely.to_owned(),
+        }
+    }
+}
+
+fn is_within(value: f64, [low, high]: [f64; 2]) -> bool {
+    (low..=high).contains(&value)
+}
+
+/// The remarks on numbers that are unusual for wheel and rail in their unit but usual in another one.
+pub(crate) fn remarks(case: &Case, patches: &[Patch]) -> Vec<RemarkEntry> {
+    let (contact, load) = (&case.contact, case.load.as_ref());
+    let mut suspects = of_material(&case.material);
+    suspects.extend(of_load(&case.material, contact, load, patches));
+    suspects.extend(lengths_of_patch(contact, patches));
+    suspects.extend(of_place(contact));
+    suspects.extend(of_motion(&case.motion));
+    suspects.into_iter().map(remark).collect()
+}
+
+fn remark(suspect: Suspect) -> RemarkEntry {
+    RemarkEntry {
+        pointer: Some(suspect.pointer),
+        ..Remark::UnitSuspected {
+            given: suspect.value,
+            unit: suspect.unit.to_owned(),
+            likely_unit: suspect.likely,
+        }
+        .into()
+    }
+}
+
+fn bodies(material: &Material) -> Vec<(&'static str, &Elastic)> {
+    match material {
+        Material::Same(both) => vec![("/material", both)],
+        Material::Pair { lower, upper } => {
+            vec![("/material/lower", lower), ("/material/upper", upper)]
+        }
+    }
+}
+
+fn of_material(material: &Material) -> Vec<Suspect> {
+    let mut suspects = Vec::new();
+    for (pointer, body) in bodies(material) {
+        let moduli = [
+            ("shear_modulus_mpa", body.shear_modulus_mpa, SHEAR_GPA),
+            ("young_modulus_mpa", body.young_modulus_mpa, YOUNG_GPA),
+        ];
+        for (name, modulus, range) in moduli {
+            let modulus = modulus.filter(|value| is_within(*value, range));
+            if let Some(value) = modulus.filter(|_| body.poisson_ratio < POISSON_METAL) {
+                suspects.push(Suspect::new(
+                    &format!("{pointer}/{name}"),
+                    value,
+                    "MPa",
+                    "GPa",
+                ));
+            }
+        }
+    }
+    suspects
+}
+
+/// Are both bodies of metal, in MPa or in GPa?
+fn is_metal(material: &Material) -> bool {
+    let suspects = of_material(material);
+    bodies(material).into_iter().all(|(pointer, body)| {
+        let shear = body.shear_modulus_mpa.or_else(|| {
+            let young = body.young_modulus_mpa?;
+            Some(young / (2.0 * (1.0 + body.poisson_ratio)))
+        });
+        shear.is_some_and(|shear| shear >= SHEAR_METAL)
+            || suspects.iter().any(|s| s.pointer.starts_with(pointer))
+    })
+}
+
+fn of_load(
+    material: &Material,
+    contact: &Contact,
+    load: Option<&Load>,
+    patches: &[Patch],
+) -> Option<Suspect> {
+    let load = load?;
+    let given = [
+        ("/load/normal_force_n", load.normal_force_n),
+        ("/load/vertical_force_n", load.vertical_force_n),
+    ];
+    let (pointer, force) = given
+        .into_iter()
+        .find_map(|(at, force)| Some((at, force?)))?;
+    let wheels = match contact {
+        Contact::Wheelset { .. } => 2.0,
+        _ => 1.0,
+    };
+    let of_wheel = match *contact {
+        Contact::Radii { rolling_mm, .. } | Contact::GapProfile { rolling_mm, .. } => {
+            rolling_mm >= RADIUS_LEAST
+        }
+        Contact::Profiles {
+            rolling_radius_mm, ..
+        }
+        | Contact::Wheelset {
+            rolling_radius_mm, ..
+        } => rolling_radius_mm >= RADIUS_LEAST,
+        // The pressure of a given ellipse grows with its load.
+        Contact::Ellipse { .. } => patches
+            .iter()
+            .any(|patch| is_within(1e3 * patch.pressure_max, PRESSURES)),
+        Contact::GapGrid { .. } | Contact::PressureGrid { .. } => false,
+    };
+    (of_wheel && force < wheels * LOAD_LEAST && is_metal(material))
+        .then(|| Suspect::new(pointer, force, "N", "kN"))
+}
+
+/// Units in which a length would make the pressure of a patch usual, which falls with this power of the length.
+fn units_by_pressure(patches: &[Patch], power: f64) -> Option<String> {
+    let pressure = patches.first()?.pressure_max;
+    let usual = |(_, size): &&(&str, f64)| is_within(pressure / size.powf(power), PRESSURES);
+    let units: Vec<&str> = LENGTHS
+        .iter()
+        .filter(usual)
+        .map(|(name, _)| *name)
+        .collect();
+    (pressure > PRESSURE_DOUBTED && !units.is_empty()).then(|| units.join(" or "))
+}
+
+fn lengths_of_patch(contact: &Contact, patches: &[Patch]) -> Option<Suspect> {
+    match *contact {
+        Contact::Radii { rolling_mm, .. } if rolling_mm < RADIUS_LEAST => {
+            // Hertz: p grows with R to the power −2/3.
+            let units = units_by_pressure(patches, 2.0 / 3.0)?;
+            Some(Suspect::new(
+                "/contact/rolling_mm",
+                rolling_mm,
+                "mm",
+                &units,
+            ))
+        }
+        Contact::Ellipse { a_mm, .. } => {
+            let units = units_by_pressure(patches, 2.0)?;
+            Some(Suspect::new("/contact/a_mm", a_mm, "mm", &units))
+        }
+        _ => None,
+    }
+}
+
+/// Angles of the place of wheel and rail.
+fn of_place(contact: &Contact) -> Vec<Suspect> {
+    let angles = match contact {
+        Contact::Profiles {
+            cant_rad,
+            yaw_rad,
+            roll_rad,
+            ..
+        } => [*cant_rad, *yaw_rad, *roll_rad],
+        Contact::Wheelset {
+            cant_rad, yaw_rad, ..
+        } => [*cant_rad, largest(&swept_values_of(yaw_rad)), 0.0],
+        _ => return Vec::new(),
+    };
+    let names = [
+        ("cant_rad", CANT_MOST),
+        ("yaw_rad", ANGLE_MOST),
+        ("roll_rad", ANGLE_MOST),
+    ];
+    let large = names.into_iter().zip(angles);
+    large
+        .filter(|((_, most), angle)| angle.abs() > *most)
+        .map(|((name, _), angle)| {
+            Suspect::new(&format!("/contact/{name}"), angle, "rad", "degrees")
+        })
+        .collect()
+}
+
+/// The value of the largest size; 0 of none.
+fn largest(values: &[f64]) -> f64 {
+    let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
+    values.iter().fold(0.0, larger)
+}
+
+fn swept_values_of(swept: &Swept) -> Vec<f64> {
+    match swept {
+        // The ends have the largest size.
+        Swept::Range(range) => vec![range.from, range.to],
+        swept => swept_values(swept),
+    }
+}
+
+fn course_values(course: &HistoryCourse) -> Vec<f64> {
+    match course {
+        HistoryCourse::Constant(value) => vec![*value],
+        HistoryCourse::Range(range) => vec![range.from, range.to],
+        HistoryCourse::Values(values) => values.clone(),
+    }
+}
+
+/// Creepages along and across, and the speed, with the pointer to the object that has them.
+type MotionNumbers = (String, [Option<f64>; 3]);
+
+/// The numbers of all motions; of a sweep and a history those of the largest size.
+fn numbers_of(motion: &Motions) -> Vec<MotionNumbers> {
+    let swept = |swept: &Option<Swept>| swept.as_ref().map(|s| largest(&swept_values_of(s)));
+    let course = |c: &Option<HistoryCourse>| c.as_ref().map(|c| largest(&course_values(c)));
+    let speed_alone = |of: String, speed: f64| (of, [None, None, Some(speed)]);
+    match motion {
+        Motions::One(one) => vec![(
+            "/motion".to_owned(),
+            [one.creepage_x, one.creepage_y, one.speed_mm_per_s],
+        )],
+        Motions::Many(all) => {
+            let one = |(k, one): (usize, &AskedMotion)| {
+                let numbers = [one.creepage_x, one.creepage_y, one.speed_mm_per_s];
+                (format!("/motion/{k}"), numbers)
+            };
+            all.iter().enumerate().map(one).collect()
+        }
+        Motions::Sweep { sweep } => vec![(
+            "/motion/sweep".to_owned(),
+            [
+                swept(&sweep.creepage_x),
+                swept(&sweep.creepage_y),
+                sweep.speed_mm_per_s,
+            ],
+        )],
+        Motions::History { history, .. } => vec![(
+            "/motion/history".to_owned(),
+            [
+                course(&history.creepage_x),
+                course(&history.creepage_y),
+                history.speed_mm_per_s,
+            ],
+        )],
+        Motions::Wheelset { wheelset } => {
+            vec![speed_alone(
+                "/motion/wheelset".to_owned(),
+                wheelset.speed_mm_per_s,
+            )]
+        }
+        Motions::Wheelsets { wheelset } => {
+            let one = |(k, one): (usize, &Wheelset)| {
+                speed_alone(format!("/motion/wheelset/{k}"), one.speed_mm_per_s)
+            };
+            wheelset.iter().enumerate().map(one).collect()
+        }
+    }
+}
+
+/// Creepages and speeds; of several motions the first that is unusual.
+fn of_motion(motion: &Motions) -> Vec<Suspect> {
+    let all = numbers_of(motion);
+    let names = ["creepage_x", "creepage_y", "speed_mm_per_s"];
+    let first = |(k, name): (usize, &str)| {
+        all.iter().find_map(|(of, numbers)| {
+            let value = numbers[k]?;
+            let pointer = format!("{of}/{name}");
+            if name == "speed_mm_per_s" {
+                (0.0 < value && value < SPEED_LEAST)
+                    .then(|| Suspect::new(&pointer, value, "mm/s", "m/s or km/h"))
+            } else {
+                is_within(value.abs(), CREEPAGE_PERCENT)
+                    .then(|| Suspect::new(&pointer, value, "as a ratio", "per cent"))
+            }
+        })
+    };
+    names.into_iter().enumerate().filter_map(first).collect()
+}
