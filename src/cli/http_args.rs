@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::cli::values::address;
-use crate::http::HttpOptions;
+use crate::http::{AddressRange, HttpOptions};
 
 /// Limits of requests and connections.
 #[derive(Debug, Clone, Args)]
@@ -69,7 +69,7 @@ pub(super) struct HttpArgs {
     #[arg(long, env = "RAILHEAD_HEAD_TIMEOUT_S", default_value_t = 75, value_name = "SECONDS",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub head_timeout_s: u32,
-    /// Seconds for the body of a case, or between two pieces of that of a batch.
+    /// Seconds for the body of a case, or between two pieces of that of a batch, a run or an evaluation.
     #[arg(long, env = "RAILHEAD_BODY_TIMEOUT_S", default_value_t = 60, value_name = "SECONDS",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub body_timeout_s: u32,
@@ -132,6 +132,16 @@ pub(super) struct HttpArgs {
     #[arg(long, env = "RAILHEAD_RUN_MAX_ROWS", default_value_t = 10_000_000, value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     pub run_max_rows: u64,
+    /// Addresses of proxies, separated by commas, such as `10.0.0.0/8`, that are believed when they name the addresses of their clients
+    /// in `Forwarded` or `X-Forwarded-For`. Wrong keys and requests without a key are then counted by these addresses, and
+    /// `--address-connections-max` does not hold for the proxies.
+    #[arg(
+        long,
+        env = "RAILHEAD_TRUSTED_PROXIES",
+        value_delimiter = ',',
+        value_name = "ADDRESSES"
+    )]
+    pub trusted_proxies: Vec<AddressRange>,
     /// Names of the service, separated by commas, by which it may be asked without a key; addresses and `localhost` always
     /// may. Others are refused, as a web page could make its own name lead here.
     #[arg(
@@ -179,6 +189,7 @@ impl HttpArgs {
             evaluate_max_rows: count(self.evaluate_max_rows),
             run_max_bytes: u64::from(self.run_max_mib) << 20,
             run_max_rows: self.run_max_rows,
+            trusted_proxies: self.trusted_proxies.as_slice().into(),
             allowed_hosts: self.allowed_host.as_slice().into(),
             page_dir: self.page_dir.as_deref().map(Into::into),
             ..default

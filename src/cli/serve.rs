@@ -122,6 +122,13 @@ async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     if role == Role::Serve && anonymous && !address.ip().is_loopback() {
         tracing::warn!(%address, "whoever reaches this address may use the service without a key");
     }
+    let loopback = anonymous && args.anonymous == Anonymous::Loopback;
+    if role == Role::Serve && loopback && jobs.any_key().await? {
+        // A proxy that adds no header about its client looks like a client of this machine.
+        tracing::warn!(
+            "there are keys, and requests from this machine need none; behind a proxy use `--anonymous never`"
+        );
+    }
     let workers = args.worker_count();
     tracing::info!(%address, workers, data_dir = %args.data_dir.display(), "listening");
 

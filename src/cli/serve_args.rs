@@ -55,7 +55,7 @@ pub(super) struct ServeArgs {
     #[arg(long, env = "RAILHEAD_CACHE", default_value_t = true, value_name = "BOOL",
           action = clap::ArgAction::Set)]
     pub cache: bool,
-    /// How long ended jobs and their results are kept, such as `30d` or `12h`; `forever`: until they are deleted.
+    /// How long ended jobs and their results are kept, such as `30d`, `30days` or `12h`; `forever`: until they are deleted.
     #[arg(long, env = "RAILHEAD_RETENTION", default_value = "forever", value_name = "TIME", value_parser = retention)]
     pub retention: Retention,
     /// Seconds a running job may go on after the service was told to stop; then it goes back to the queue.

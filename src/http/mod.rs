@@ -5,8 +5,8 @@
 //!
 //! 1. [`server::listener`] accepts the connection and gives it a [place](server::places); [`server::connection`] passes its
 //!    requests on. A client that sends nothing, or does not read its answer, is disconnected ([`server::write_timeout`]).
-//! 2. The [`layers`] around all routes, from the outside inward: [`security_headers`], [`drain_body`], [`request_id`],
-//!    [`request_log`], [`otel`], [`metrics`], [`etag::complete`], [`compression`], [`final_newline`], the path in problems
+//! 2. The [`layers`] around all routes, from the outside inward: [`security_headers`], the client behind a trusted proxy
+//!    ([`client_address`]), [`drain_body`], [`request_id`], [`request_log`], [`otel`], [`metrics`], [`etag::complete`], [`compression`], [`final_newline`], the path in problems
 //!    ([`error::name_instance`]), [`origin_guard`], what is left of the rate ([`rate_limit::tell_left`]), what the request holds
 //!    until its answer is sent ([`holding_body`]), [`catch_panic`], [`admission`] of compressed bodies and their decompression.
 //! 3. The layers of a group of routes: whether JSON is accepted ([`accept::require_json`]) and what clients may keep
@@ -49,8 +49,8 @@ use crate::http::contract::Document;
 use crate::http::extract::{accept, query};
 use crate::http::layers::metrics::Metrics;
 use crate::http::layers::{
-    admission, catch_panic, compression, etag, final_newline, metrics, origin_guard, otel,
-    rate_limit, request_id, request_log, security_headers,
+    admission, catch_panic, client_address, compression, etag, final_newline, metrics,
+    origin_guard, otel, rate_limit, request_id, request_log, security_headers,
 };
 use crate::http::limits::holding_body;
 use crate::http::page::answers;
@@ -70,7 +70,7 @@ use crate::http::state::AppState;
 use crate::jobs::Jobs;
 
 pub use crate::http::layers::cors::allow_origins;
-pub use crate::http::options::HttpOptions;
+pub use crate::http::options::{AddressRange, HttpOptions};
 pub use crate::http::server::connection::Peer;
 pub use crate::http::server::listener::serve;
 
@@ -153,6 +153,7 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
         .layer(request_log::span_layer())
         .layer(from_fn(request_id::carry_request_id))
         .layer(from_fn(drain_body::drain_body))
+        .layer(from_fn_with_state(options.clone(), client_address::resolve))
         .with_state(AppState::new(jobs, options, metrics, DOCUMENT));
     security_headers::secure(router)
 }

@@ -1,9 +1,12 @@
 //! What requests and connections may cost, and who may send them.
 
-use crate::jobs::runtime_probe::USUAL_LIMIT;
+use std::net::IpAddr;
 use std::path::Path;
+use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Duration;
+
+use crate::jobs::runtime_probe::USUAL_LIMIT;
 
 /// The limits of a service; every one is a flag of `serve`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,7 +17,7 @@ pub struct HttpOptions {
     pub first_head_timeout: Duration,
     /// Time for the next request's head to arrive on a connection, idle time included.
     pub head_timeout: Duration,
-    /// Time for a body to arrive whole; for a batch, time between two pieces, and the head start over its lowest rate.
+    /// Time for the body of a case to arrive whole; for a larger body, time between two pieces, and the head start over its lowest rate.
     pub body_timeout: Duration,
     /// How long a client may take nothing of its answer.
     pub write_timeout: Duration,
@@ -62,6 +65,8 @@ pub struct HttpOptions {
     pub anonymous: bool,
     /// The same for those that came through a proxy.
     pub anonymous_proxied: bool,
+    /// Addresses of proxies that are believed when they name the addresses of their clients.
+    pub trusted_proxies: Arc<[AddressRange]>,
     /// Names of the service for requests without a key, besides addresses and `localhost`.
     pub allowed_hosts: Arc<[String]>,
     /// Origins of web pages that may read answers and change things.
@@ -104,10 +109,95 @@ impl Default for HttpOptions {
             run_max_rows: 10_000_000,
             anonymous: true,
             anonymous_proxied: false,
+            trusted_proxies: Arc::default(),
             allowed_hosts: Arc::default(),
             origins: Arc::default(),
             requests_per_second: 0,
             page_dir: None,
+        }
+    }
+}
+
+/// Addresses that begin with the same bits, written as `10.0.0.0/8`; an address alone is a range by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AddressRange {
+    first: IpAddr,
+    bits: u32,
+}
+
+impl AddressRange {
+    /// Is this one of the addresses? IPv4 addresses written as IPv6 ones count as IPv4.
+    #[must_use]
+    pub fn contains(&self, address: IpAddr) -> bool {
+        match (self.first, address.to_canonical()) {
+            (IpAddr::V4(first), IpAddr::V4(address)) => {
+                let differs = first.to_bits() ^ address.to_bits();
+                differs.leading_zeros() >= self.bits
+            }
+            (IpAddr::V6(first), IpAddr::V6(address)) => {
+                let differs = first.to_bits() ^ address.to_bits();
+                differs.leading_zeros() >= self.bits
+            }
+            _ => false,
+        }
+    }
+}
+
+impl FromStr for AddressRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<AddressRange, String> {
+        let (address, bits) = match text.split_once('/') {
+            Some((address, bits)) => (address, Some(bits)),
+            None => (text, None),
+        };
+        let read = || {
+            let first = address.parse::<IpAddr>().ok()?.to_canonical();
+            let most = if first.is_ipv4() { 32 } else { 128 };
+            let bits = match bits {
+                Some(bits) => bits.parse().ok().filter(|bits| *bits <= most)?,
+                None => most,
+            };
+            Some(AddressRange { first, bits })
+        };
+        read().ok_or_else(|| {
+            "allowed is an address or a range of addresses, such as `10.0.0.0/8`, `192.0.2.7` or `fd00::/8`; names are not looked up"
+                .to_owned()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_holds_the_addresses_that_begin_with_its_bits() {
+        let holds = |range: &str, address: &str| {
+            let range: AddressRange = range.parse().unwrap();
+            range.contains(address.parse().unwrap())
+        };
+        for (range, inside, outside) in [
+            ("10.0.0.0/8", "10.255.0.1", "11.0.0.0"),
+            ("10.0.0.0/8", "::ffff:10.0.0.1", "::10.0.0.1"),
+            ("192.0.2.7", "192.0.2.7", "192.0.2.6"),
+            ("192.0.2.128/25", "192.0.2.200", "192.0.2.127"),
+            ("0.0.0.0/0", "203.0.113.1", "2001:db8::1"),
+            ("2001:db8::/32", "2001:db8:ffff::1", "2001:db9::1"),
+            ("::1", "::1", "127.0.0.1"),
+        ] {
+            assert!(holds(range, inside), "{range} {inside}");
+            assert!(!holds(range, outside), "{range} {outside}");
+        }
+        for wrong in [
+            "",
+            "10.0.0.0/33",
+            "fd00::/129",
+            "proxy.example",
+            "10.0.0.0/",
+            "10.0.0.0/-1",
+        ] {
+            assert!(wrong.parse::<AddressRange>().is_err(), "{wrong:?}");
         }
     }
 }

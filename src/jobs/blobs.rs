@@ -244,6 +244,17 @@ impl Blobs {
             .map_err(damaged)
     }
 
+    /// Writes so many bytes and removes them again.
+    ///
+    /// # Errors
+    /// They could not be written.
+    pub(crate) async fn try_write(&self, bytes: usize) -> Result<(), JobsError> {
+        let path = Path::from(ROOT).join(format!("probe-{}", Uuid::now_v7()));
+        let written = self.objects.put(&path, vec![0; bytes].into()).await;
+        written?;
+        Ok(self.objects.delete(&path).await?)
+    }
+
     /// Copies the result under a key to another place, where it has the same key; its bytes, or `None` if it is not there.
     ///
     /// # Errors

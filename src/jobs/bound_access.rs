@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::contact::error::{Fault, FaultCode};
+use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::labels::Labels;
 
@@ -26,6 +27,24 @@ impl Jobs {
     pub(crate) fn sees(&self, labels: &Labels) -> bool {
         let mut bound = self.bound.iter();
         bound.all(|(key, value)| labels.get(key) == Some(value))
+    }
+
+    /// Refuses what concerns the whole tenant to a handle that is bound to labels.
+    ///
+    /// # Errors
+    /// [`JobsError::BoundKey`].
+    pub(crate) fn require_unbound(&self, action: &'static str) -> Result<(), JobsError> {
+        if self.bound.is_empty() {
+            return Ok(());
+        }
+        let labels = self.bound.iter();
+        let labels: Vec<String> = labels
+            .map(|(key, value)| format!("`{key}:{value}`"))
+            .collect();
+        Err(JobsError::BoundKey {
+            labels: labels.join(", "),
+            action,
+        })
     }
 
     /// Adds the labels of the key to those of something new.

@@ -1,4 +1,5 @@
-//! A file that reserves room for a start on a full disk: the job table cannot be opened without a new file beside it.
+//! Files of the data folder besides the table and the results: a reserve of room for a start on a full disk, because the job table
+//! cannot be opened without a new file beside it; and nameless files for bodies that are being received.
 
 use std::fs::{DirBuilder, File};
 use std::io::{Result, Write};
@@ -37,6 +38,24 @@ fn write(path: &Path) -> Result<()> {
         .open(path)?;
     file.write_all(&vec![0; BYTES])?;
     file.sync_all()
+}
+
+/// Writes as many bytes into a nameless file of the folder.
+pub(crate) fn try_write(data_dir: &Path) -> Result<()> {
+    nameless(data_dir)?.write_all(&vec![0; BYTES])
+}
+
+/// An empty file without a name on the file system of a folder.
+pub(crate) fn nameless(folder: &Path) -> Result<File> {
+    let path = folder.join(format!("spool-{}", uuid::Uuid::now_v7()));
+    let file = File::options()
+        .read(true)
+        .write(true)
+        .create_new(true)
+        .mode(0o600)
+        .open(&path)?;
+    std::fs::remove_file(&path)?;
+    Ok(file)
 }
 
 /// Gives the room back; `false` if none was kept.

@@ -65,6 +65,14 @@ pub enum JobsError {
     /// There is no such run.
     #[error("there is no such run")]
     RunNotFound,
+    /// The key is bound to labels, and this concerns the whole tenant.
+    #[error("this key is bound to {labels}; it may not {action}, use a key without labels")]
+    BoundKey {
+        /// The labels of the key.
+        labels: String,
+        /// What it may not do.
+        action: &'static str,
+    },
     /// There is no such profile.
     #[error("there is no such profile")]
     ProfileNotFound,

@@ -147,15 +147,16 @@ impl Jobs {
         cursor: Option<&str>,
         limit: u32,
     ) -> Result<Page<Job>, JobsError> {
+        // The store makes cursors for the filter that it is asked, so the labels of the key come first.
+        let filter = &Filter {
+            labels: self.narrowed(&filter.labels),
+            ..filter.clone()
+        };
         let after = match cursor {
             Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
             None => None,
         };
         let store = &self.shared.store;
-        let filter = &Filter {
-            labels: self.narrowed(&filter.labels),
-            ..filter.clone()
-        };
         let mut page = store
             .list(&self.tenant, filter, after, limit.clamp(1, PAGE_MAX))
             .await?;
@@ -186,16 +187,16 @@ impl Jobs {
         cursor: Option<&str>,
         limit: u32,
     ) -> Result<Page<Batch>, JobsError> {
+        let filter = &BatchFilter {
+            labels: self.narrowed(&filter.labels),
+            ..filter.clone()
+        };
         let after = match cursor {
             Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
             None => None,
         };
         let limit = limit.clamp(1, BATCH_PAGE_MAX);
         let store = &self.shared.store;
-        let filter = &BatchFilter {
-            labels: self.narrowed(&filter.labels),
-            ..filter.clone()
-        };
         Ok(store.batches(&self.tenant, filter, after, limit).await?)
     }
 

@@ -3,7 +3,7 @@
 use std::fs::{File, TryLockError};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicUsize};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::available_parallelism;
 use std::time::Duration;
@@ -32,6 +32,7 @@ use crate::jobs::recent_reads::RecentReads;
 use crate::jobs::result_place::settle::settle;
 use crate::jobs::shared::{Shared, UnfinishedBatches};
 use crate::jobs::staged_bytes::StagedBytes;
+use crate::jobs::storage_fault::StorageFaults;
 use crate::jobs::store::Store;
 use crate::jobs::store::cluster::Node;
 use crate::jobs::worker::pool::Worker;
@@ -92,8 +93,7 @@ impl Jobs {
                 stopping: CancellationToken::new(),
                 tasks: TaskTracker::new(),
                 metrics,
-                storage_failing: AtomicBool::new(false),
-                storage_damaged: AtomicBool::new(false),
+                storage: StorageFaults::default(),
                 trusted: Mutex::default(),
                 checks: Semaphore::new(available_parallelism().map_or(1, usize::from)),
                 staged: StagedBytes::default(),
@@ -194,8 +194,7 @@ impl Jobs {
             let _ = timeout(STOPPED_WITHIN, cluster.leave(self.shared.node.id)).await;
         }
         self.shared.store.close().await;
-        let damaged = self.shared.storage_damaged.load(Ordering::Relaxed);
-        if self.shared.options.database.is_none() && !damaged {
+        if self.shared.options.database.is_none() && !self.shared.storage.damaged() {
             note_closed(&self.shared.options.data_dir);
         }
         drop(

@@ -8,6 +8,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::metrics::state_label;
 use crate::jobs::model::job::State;
+use crate::jobs::storage_fault::StoragePlace;
 
 impl Jobs {
     /// Adds what this room counts to a registry.
@@ -25,12 +26,14 @@ impl Jobs {
         metrics.parked.set(count(self.shared.turns.parked().0));
         let abandoned = self.shared.abandoned.load(Ordering::Acquire);
         metrics.abandoned.set(count(abandoned));
-        let stats = match self.shared.store.stats().await {
-            Err(error) if error.storage_fault().is_some() => {
-                // The alert for this must not fail with it.
-                self.shared.observe_storage::<()>(&Err(error.into()));
-                return Ok(());
-            }
+        let stats = self.shared.store.stats().await.map_err(JobsError::from);
+        if stats.is_err() {
+            self.shared.observe_storage(StoragePlace::Table, &stats);
+        }
+        metrics.storage_failing(self.shared.storage.any());
+        let stats = match stats {
+            // The alert for this must not fail with it.
+            Err(error) if error.storage_fault().is_some() => return Ok(()),
             stats => stats?,
         };
         let queued = stats.jobs.get(&State::Queued).copied().unwrap_or(0);

@@ -74,8 +74,9 @@ impl Jobs {
     /// Digests, sizes and times of what is kept, newest first, at most [`PROFILES_MAX`].
     ///
     /// # Errors
-    /// The database failed.
+    /// [`JobsError::BoundKey`], or a failed database.
     pub async fn profiles(&self) -> Result<Vec<(String, u64, i64)>, JobsError> {
+        self.require_unbound("list the profiles of the tenant")?;
         let store = &self.shared.store;
         Ok(store.profiles(&self.own_tenant(), PROFILES_MAX).await?)
     }
@@ -83,8 +84,9 @@ impl Jobs {
     /// Removes a kept cross-section. Jobs and runs that named it have it.
     ///
     /// # Errors
-    /// [`JobsError::ProfileNotFound`], or a failed database.
+    /// [`JobsError::BoundKey`], [`JobsError::ProfileNotFound`], or a failed database.
     pub async fn delete_profile(&self, digest: &str) -> Result<(), JobsError> {
+        self.require_unbound("delete profiles of the tenant")?;
         let store = &self.shared.store;
         match store.delete_profile(&self.own_tenant(), digest).await? {
             true => Ok(()),

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 use std::fs::File;
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -23,6 +23,7 @@ use crate::jobs::model::key::Trusted;
 use crate::jobs::options::Options;
 use crate::jobs::recent_reads::RecentReads;
 use crate::jobs::staged_bytes::StagedBytes;
+use crate::jobs::storage_fault::StorageFaults;
 use crate::jobs::store::Store;
 use crate::jobs::store::claim::Lease;
 use crate::jobs::store::cluster::{Bell, Node};
@@ -55,11 +56,8 @@ pub(crate) struct Shared {
     pub(crate) stopping: CancellationToken,
     pub(crate) tasks: TaskTracker,
     pub(crate) metrics: Metrics,
-    /// The last write failed because of the disk.
-    pub(crate) storage_failing: AtomicBool,
-    /// Something read or written was damaged. Writes that meet no damage succeed still, so only a start, which looks through
-    /// everything, ends this.
-    pub(crate) storage_damaged: AtomicBool,
+    /// Which of the places that it writes to fail.
+    pub(crate) storage: StorageFaults,
     /// Keys found good a moment ago.
     pub(crate) trusted: Mutex<Trusted>,
     /// Cases of single jobs that may be checked at the same time.

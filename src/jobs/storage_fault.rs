@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::io;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store_error::StorageFault;
@@ -49,9 +50,142 @@ pub(crate) fn of_io(error: &io::Error) -> Option<StorageFault> {
     }
 }
 
+/// A place that the service writes to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum StoragePlace {
+    /// The job table.
+    Table,
+    /// The results that are too large for the table.
+    Results,
+    /// The files of bodies that are being received.
+    Spool,
+}
+
+impl StoragePlace {
+    /// All of them.
+    pub(crate) const ALL: [StoragePlace; 3] = [
+        StoragePlace::Table,
+        StoragePlace::Results,
+        StoragePlace::Spool,
+    ];
+}
+
+/// Which places fail at present.
+#[derive(Debug, Default)]
+pub(crate) struct StorageFaults(Mutex<[PlaceState; StoragePlace::ALL.len()]>);
+
+#[derive(Debug, Clone, Copy, Default)]
+struct PlaceState {
+    fault: Option<StorageFault>,
+    /// Writers that repeat their write until it succeeds.
+    waiting: usize,
+}
+
+/// What the outcome of a write changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum FaultChange {
+    /// The place fails from now on.
+    Begun,
+    /// No place fails any more.
+    AllOver,
+    /// Nothing.
+    None,
+}
+
+/// A writer that repeats its write until it succeeds; it stops waiting when dropped.
+#[derive(Debug)]
+pub(crate) struct WaitingWriter<'a>(&'a StorageFaults, StoragePlace);
+
+impl StorageFaults {
+    /// Notes the outcome of a write to a place. Damage stays until the next start, which examines everything.
+    pub(crate) fn note(&self, place: StoragePlace, fault: Option<StorageFault>) -> FaultChange {
+        let mut places = self.places();
+        let fails = |places: &[PlaceState]| places.iter().any(|state| state.fault.is_some());
+        let before = fails(&*places);
+        let state = &mut places[place as usize];
+        let begun = state.fault.is_none() && fault.is_some();
+        let stays =
+            state.fault == Some(StorageFault::Damaged) || (fault.is_none() && state.waiting > 0);
+        if !stays {
+            state.fault = fault;
+        }
+        match begun {
+            true => FaultChange::Begun,
+            false if before && !fails(&*places) => FaultChange::AllOver,
+            false => FaultChange::None,
+        }
+    }
+
+    /// The fault of a place, and whether a writer waits for it.
+    pub(crate) fn fault(&self, place: StoragePlace) -> Option<(StorageFault, bool)> {
+        let state = self.places()[place as usize];
+        state.fault.map(|fault| (fault, state.waiting > 0))
+    }
+
+    /// Does any place fail?
+    pub(crate) fn any(&self) -> bool {
+        self.places().iter().any(|state| state.fault.is_some())
+    }
+
+    /// Is the table damaged?
+    pub(crate) fn damaged(&self) -> bool {
+        let fault = self.fault(StoragePlace::Table);
+        fault.is_some_and(|(fault, _)| fault == StorageFault::Damaged)
+    }
+
+    /// Counts a writer that waits for a place.
+    pub(crate) fn wait(&self, place: StoragePlace) -> WaitingWriter<'_> {
+        self.places()[place as usize].waiting += 1;
+        WaitingWriter(self, place)
+    }
+
+    fn places(&self) -> MutexGuard<'_, [PlaceState; StoragePlace::ALL.len()]> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for WaitingWriter<'_> {
+    fn drop(&mut self) {
+        self.0.places()[self.1 as usize].waiting -= 1;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn places_fail_and_recover_one_by_one() {
+        let faults = StorageFaults::default();
+        let full = Some(StorageFault::Full);
+        assert_eq!(faults.note(StoragePlace::Results, full), FaultChange::Begun);
+        assert_eq!(faults.note(StoragePlace::Results, full), FaultChange::None);
+        // A write to another place says nothing about this one.
+        assert_eq!(faults.note(StoragePlace::Table, None), FaultChange::None);
+        assert!(faults.any());
+        let waiting = faults.wait(StoragePlace::Results);
+        faults.note(StoragePlace::Results, None);
+        assert_eq!(
+            faults.fault(StoragePlace::Results),
+            Some((StorageFault::Full, true)),
+            "a smaller write does not end what a writer waits for"
+        );
+        drop(waiting);
+        assert_eq!(
+            faults.note(StoragePlace::Results, None),
+            FaultChange::AllOver
+        );
+        assert!(!faults.any());
+    }
+
+    #[test]
+    fn damage_stays() {
+        let faults = StorageFaults::default();
+        faults.note(StoragePlace::Table, Some(StorageFault::Damaged));
+        faults.note(StoragePlace::Table, Some(StorageFault::Full));
+        faults.note(StoragePlace::Table, None);
+        assert!(faults.damaged() && faults.any());
+    }
 
     #[test]
     fn wrapped_causes_are_recognised() {

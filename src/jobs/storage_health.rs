@@ -1,14 +1,18 @@
-//! Jobs while the disk is full or cannot be written: nothing new is accepted, and nothing that was accepted is lost.
+//! Jobs while a disk is full or cannot be written: nothing that was accepted is lost, and the service says that it is not ready.
 //!
-//! A result that cannot be stored stays in memory, its worker waits with it and tries again.
+//! A result that cannot be stored stays in memory; its worker waits and repeats the write.
+//!
+//! Each [`StoragePlace`] fails by itself. Its fault ends with the next write there that succeeds. While a writer waits, only its own
+//! write ends the fault: smaller ones may find room on a disk that is full for it.
 
 use std::future::Future;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use crate::jobs::disk_reserve;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::shared::Shared;
+use crate::jobs::storage_fault::{FaultChange, StoragePlace};
 use crate::jobs::store_error::{StorageFault, StoreError};
 
 /// Tries to write where the cause is not the disk, with pauses that double from [`FIRST_PAUSE`].
@@ -20,53 +24,67 @@ const FIRST_PAUSE: Duration = Duration::from_millis(50);
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
 impl Jobs {
-    /// Passes the outcome of a write on. After a fault of the storage the service is not ready until a write succeeds.
+    /// Passes the outcome of a write to the job table on. After a fault of the storage the service is not ready until a write succeeds.
     pub(crate) fn observe_write<T, E: Into<JobsError>>(
         &self,
         written: Result<T, E>,
     ) -> Result<T, JobsError> {
         let written = written.map_err(Into::into);
-        self.shared.observe_storage(&written);
+        self.shared.observe_storage(StoragePlace::Table, &written);
         written
+    }
+
+    /// The error of a file for a body that is being received.
+    pub(crate) fn staging_failed(&self, source: std::io::Error) -> JobsError {
+        let path = self.shared.options.data_dir.clone();
+        let error = JobsError::DataDir { path, source };
+        if let Some(fault) = error.storage_fault() {
+            self.shared.note_fault(StoragePlace::Spool, Some(fault));
+        }
+        error
     }
 }
 
 impl Shared {
-    /// Remembers whether the disk takes what is written.
-    pub(crate) fn observe_storage<T>(&self, written: &Result<T, JobsError>) {
-        let trouble = match written {
-            Ok(_) if self.storage_damaged.load(Ordering::Relaxed) => return,
-            Ok(_) => None,
-            Err(error) => match error.storage_fault() {
-                Some(trouble) => Some(trouble),
-                // It was not about the disk.
-                None => return,
-            },
-        };
-        if trouble == Some(StorageFault::Damaged) {
-            self.storage_damaged.store(true, Ordering::Relaxed);
-        }
-        let before = self
-            .storage_failing
-            .swap(trouble.is_some(), Ordering::Relaxed);
-        self.metrics.storage_failing(trouble.is_some());
-        match trouble {
-            Some(StorageFault::Unreachable) if !before => {
-                tracing::error!("the database or the store of results cannot be reached");
+    /// Notes whether a place takes what is written.
+    pub(crate) fn observe_storage<T>(&self, place: StoragePlace, written: &Result<T, JobsError>) {
+        match written {
+            Ok(_) => self.note_fault(place, None),
+            // Filling a batch reads its file too, whose faults are noted where they arise.
+            Err(error) if place == StoragePlace::Table && !matches!(error, JobsError::Store(_)) => {
             }
-            Some(trouble) if !before => tracing::error!(?trouble, "the disk takes nothing"),
-            None if before && self.store.cluster().is_some() => {
+            Err(error) => {
+                if let Some(fault) = error.storage_fault() {
+                    self.note_fault(place, Some(fault));
+                }
+            }
+        }
+    }
+
+    fn note_fault(&self, place: StoragePlace, fault: Option<StorageFault>) {
+        match (self.storage.note(place, fault), fault) {
+            (FaultChange::Begun, Some(StorageFault::Unreachable)) => {
+                tracing::error!(
+                    ?place,
+                    "the database or the store of results cannot be reached"
+                );
+            }
+            (FaultChange::Begun, Some(fault)) => {
+                tracing::error!(?place, ?fault, "the disk takes nothing");
+            }
+            (FaultChange::AllOver, _) if self.store.cluster().is_some() => {
                 tracing::info!("the database takes data again");
             }
-            None if before => tracing::info!("the disk takes data again"),
+            (FaultChange::AllOver, _) => tracing::info!("the disk takes data again"),
             _ => {}
         }
     }
 
-    /// Writes, again and again: a few times if the database fails for a moment, for as long as it takes if the disk is
+    /// Writes to a place, again and again: a few times if the database fails for a moment, for as long as it takes if the disk is
     /// full or cannot be written. Gives up when the service stops.
     pub(crate) async fn write_with_retries<T, E, F>(
         &self,
+        place: StoragePlace,
         mut write: impl FnMut() -> F,
     ) -> Result<T, JobsError>
     where
@@ -74,16 +92,23 @@ impl Shared {
         E: Into<JobsError>,
     {
         let (mut pause, mut tries) = (FIRST_PAUSE, 1);
+        let mut waiting = None;
         loop {
             let written = write().await.map_err(Into::into);
-            self.observe_storage(&written);
+            if written.is_ok() {
+                drop(waiting.take());
+            }
+            self.observe_storage(place, &written);
             let Err(error) = &written else { return written };
             let waits = error.storage_fault().is_some() && !self.stopping.is_cancelled();
             let again = matches!(error, JobsError::Store(_)) && tries < WRITE_TRIES;
             if !waits && !again {
                 return written;
             }
-            tracing::warn!(%error, "could not be written yet");
+            if waits && waiting.is_none() {
+                waiting = Some(self.storage.wait(place));
+            }
+            tracing::warn!(?place, %error, "could not be written yet");
             tokio::select! {
                 () = tokio::time::sleep(pause) => {}
                 () = self.stopping.cancelled(), if waits => {}
@@ -103,16 +128,43 @@ impl Shared {
         }
     }
 
-    /// Does the disk take data? Writes only if it did not the last time.
+    /// Do all places take data? Writes only to those that did not the last time.
     pub(crate) async fn require_storage(&self) -> Result<(), JobsError> {
-        if !self.storage_failing.load(Ordering::Relaxed) {
-            return Ok(());
+        for place in StoragePlace::ALL {
+            let Some((fault, waited_for)) = self.storage.fault(place) else {
+                continue;
+            };
+            if fault == StorageFault::Damaged {
+                return Err(StoreError::damaged().into());
+            }
+            if waited_for {
+                return Err(StoreError::waited_for(fault).into());
+            }
+            let written = self.try_write(place).await;
+            self.observe_storage(place, &written);
+            written?;
         }
-        if self.storage_damaged.load(Ordering::Relaxed) {
-            return Err(StoreError::damaged().into());
+        Ok(())
+    }
+
+    /// Writes to a place and leaves nothing there.
+    async fn try_write(&self, place: StoragePlace) -> Result<(), JobsError> {
+        match place {
+            StoragePlace::Table => Ok(self.store.ready(true).await?),
+            StoragePlace::Results => {
+                // No result there is smaller.
+                let bytes = self.options.small_result_max_bytes;
+                self.blobs.try_write(bytes).await
+            }
+            StoragePlace::Spool => {
+                let path = self.options.data_dir.clone();
+                let folder = path.clone();
+                let written = tokio::task::spawn_blocking(move || disk_reserve::try_write(&folder));
+                let written = written
+                    .await
+                    .map_err(|error| JobsError::Damaged(error.to_string()))?;
+                written.map_err(|source| JobsError::DataDir { path, source })
+            }
         }
-        let written = self.store.ready(true).await.map_err(JobsError::from);
-        self.observe_storage(&written);
-        written
     }
 }

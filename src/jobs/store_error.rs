@@ -52,6 +52,13 @@ impl StoreError {
         StoreError::Away(StorageFault::Damaged, Arc::new(cause))
     }
 
+    /// A writer waits for the storage.
+    #[must_use]
+    pub fn waited_for(fault: StorageFault) -> StoreError {
+        let cause = std::io::Error::other("a write to the storage is repeated until it succeeds");
+        StoreError::Away(fault, Arc::new(cause))
+    }
+
     /// The store did not answer in time.
     #[must_use]
     pub fn timed_out() -> StoreError {

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use crate::errors::assert_problem;
 use crate::results::path_of;
 use crate::server::{Answer, Server, Setup, example, example_text, unpacked};
+use crate::support::{Service, case};
 
 async fn get_with(server: &Server, path: &str, name: &str, value: &str) -> Answer {
     let send = server.send(Method::GET, path, |request| request.header(name, value));
@@ -280,4 +281,43 @@ async fn limits_hold_before_and_after_unpacking() {
             .body(body)
     });
     assert_problem(&send.await, 413, "body-too-large", "20000");
+}
+
+/// The tag of the result of a job, and the status of the answer to who has this tag.
+async fn tag_and_status(service: &Service, result: &str, known: &str) -> (String, u16) {
+    let request = service.request(Method::GET, result);
+    let answer = request.header("if-none-match", known).send().await;
+    let answer = answer.expect("an answer");
+    let tag = answer.headers().get("etag").expect("a tag");
+    let tag = tag.to_str().expect("ASCII").to_owned();
+    (tag, answer.status().as_u16())
+}
+
+#[tokio::test]
+async fn tags_of_results_end_with_the_build_that_made_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let service = Service::start(folder.path(), &[]);
+    let job = service.submit(&case("kept by clients")).await;
+    service.until(&job, "succeeded").await;
+    let result = format!("/v1/jobs/{job}/resultants");
+    let (tag, _) = tag_and_status(&service, &result, "\"none\"").await;
+    service.kill();
+    // The same build, started again or on another node.
+    let service = Service::start(folder.path(), &[]);
+    assert_eq!(
+        tag_and_status(&service, &result, &tag).await,
+        (tag.clone(), 304)
+    );
+    service.kill();
+    // Another build: what stands behind the end of a program does not change what it does.
+    let other = folder.path().join("another-build");
+    std::fs::copy(env!("CARGO_BIN_EXE_railhead"), &other).expect("a copy");
+    let file = std::fs::File::options().append(true).open(&other);
+    file.and_then(|mut file| std::io::Write::write_all(&mut file, b"another"))
+        .expect("another build");
+    let mut program = std::process::Command::new(&other);
+    let service = Service::start_as(&mut program, "serve", folder.path(), &[]);
+    let (new, status) = tag_and_status(&service, &result, &tag).await;
+    assert_eq!(status, 200);
+    assert_ne!(new, tag);
 }

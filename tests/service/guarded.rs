@@ -10,12 +10,14 @@ use serde_json::{Value, json};
 use crate::server::{Answer, Server, Setup};
 use crate::support::{case, pause};
 
-/// A service with keys of two tenants and of the operator.
+/// A service with keys of two tenants and of the operator, and one that is bound to a label.
 pub struct Guarded {
     pub server: Server,
     pub north: String,
     pub south: String,
     pub operator: String,
+    /// A key of the north that is bound to `line:7`.
+    pub line_7: String,
 }
 
 impl Guarded {
@@ -31,12 +33,15 @@ impl Guarded {
         };
         let (north, south) = (make("north").await, make("south").await);
         let operator = make("operator").await;
+        let labels = BTreeMap::from([("line".to_owned(), "7".to_owned())]);
+        let (_, line_7) = keys.create("north", None, false, labels).await.unwrap();
         let server = setup.start().await;
         Guarded {
             server,
             north,
             south,
             operator,
+            line_7,
         }
     }
 

@@ -278,11 +278,12 @@ async fn a_revoked_key_ends_the_streams_that_it_opened() {
     }
     let revoked = keys(folder.path(), &["revoke", key.split('_').nth(1).unwrap()]);
     assert!(revoked.status.success(), "{revoked:?}");
-    for answer in open {
+    // The stream of events ends, lines of results break off.
+    for (answer, complete) in open.into_iter().zip([true, false]) {
         assert_eq!(answer.status(), 200);
-        // The stream of events ends, lines of results break off.
         let ended = tokio::time::timeout(Duration::from_secs(15), answer.bytes());
-        ended.await.expect("the end of the stream").ok();
+        let ended = ended.await.expect("the end of the stream");
+        assert_eq!(ended.is_ok(), complete);
     }
 }
 
@@ -336,8 +337,19 @@ async fn a_service_that_nobody_or_everybody_could_use_says_so_at_the_start() {
     );
     service.kill();
 
+    let open = "there are keys, and requests from this machine need none; behind a proxy use `--anonymous never`";
+    let service = Service::start(folder.path(), &[]);
+    assert_eq!(service.logged(open), 0);
+    service.kill();
     let key = make_key(folder.path(), "north");
+    let service = Service::start(folder.path(), &[]);
+    assert_eq!(service.logged(open), 1);
+    let proxied = service.request(Method::GET, "/v1/jobs");
+    let proxied = proxied.header("via", "1.1 proxy").send().await.unwrap();
+    assert_eq!(proxied.status(), 401);
+    service.kill();
     let service = Service::start(folder.path(), &["--listen", "0.0.0.0:0"]);
+    assert_eq!(service.logged(open), 0);
     let request = || service.request(Method::GET, "/v1/jobs");
     assert_eq!(request().send().await.unwrap().status(), 401);
     let known = request().bearer_auth(&key).send().await.unwrap();

@@ -313,3 +313,29 @@ async fn answers_that_exclude_json_are_refused() {
         200
     );
 }
+
+#[tokio::test]
+async fn a_body_that_is_refused_early_may_be_sent_to_its_end() {
+    // Larger than every buffer on the way, so the client still writes when it is refused.
+    const BYTES: usize = 40 << 20;
+    let server = Server::idle().await;
+    for path in ["/v1/jobs", "/v1/evaluate", "/v1/runs"] {
+        let mut stream = tokio::net::TcpStream::connect(server.address)
+            .await
+            .expect("a connection");
+        let head = format!(
+            "POST {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: text/plain\r\ncontent-length: {BYTES}\r\n\r\n"
+        );
+        stream.write_all(head.as_bytes()).await.expect("sent");
+        for piece in vec![b' '; BYTES].chunks(1 << 20) {
+            stream.write_all(piece).await.expect("the service reads on");
+        }
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).await.expect("an answer");
+        let answer = String::from_utf8_lossy(&answer);
+        assert!(
+            answer.starts_with("HTTP/1.1 4") && answer.contains("/problems/"),
+            "{path}: {answer:.300}"
+        );
+    }
+}

@@ -369,3 +369,40 @@ async fn a_key_gives_the_run_again_and_a_cancelled_run_keeps_what_it_has() {
             .all(|row| row["status"] == "cancelled" && row["section"].is_string())
     );
 }
+
+/// The files of answers below a folder.
+fn answer_files(folder: &std::path::Path) -> Vec<std::path::PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("a folder");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    paths
+        .flat_map(|path| match path.is_dir() {
+            true => answer_files(&path),
+            false => vec![path],
+        })
+        .filter(|path| path.ends_with("rows.parquet"))
+        .collect()
+}
+
+#[tokio::test]
+async fn answers_that_are_damaged_or_missing_are_an_error_and_no_broken_answer() {
+    let setup = Setup::new();
+    let folder = setup.options.data_dir.clone();
+    let server = setup.start().await;
+    let body = json!({ "template": template("table"), "columns": columns(3) });
+    let run = submit(&server, &body).await;
+    ended(&server, &run).await;
+    let files = answer_files(&folder);
+    assert_eq!(files.len(), 1, "{files:?}");
+    let damages: [fn(&std::path::Path); 3] = [
+        |file| std::fs::write(file, "PAR1 damaged PAR1").expect("written"),
+        |file| std::fs::write(file, "").expect("written"),
+        |file| std::fs::remove_file(file).expect("removed"),
+    ];
+    for damage in damages {
+        damage(&files[0]);
+        for format in ["ndjson", "csv", "arrow", "parquet"] {
+            let path = format!("{run}/results?format={format}");
+            assert_problem(&server.get(&path).await, 500, "internal", "");
+        }
+    }
+}

@@ -1,6 +1,8 @@
 //! How much of the service may one client take? Rates, quotas, turns.
 
-use railhead::http::{HttpOptions, Peer};
+use std::str::FromStr;
+
+use railhead::http::{AddressRange, HttpOptions, Peer};
 use railhead::jobs::{Jobs, Options};
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -67,28 +69,83 @@ async fn an_address_without_a_key_may_ask_so_often_and_no_more() {
     }
 }
 
+/// The status of an answer to a request from this address with this key.
+async fn with_key(router: &axum::Router, address: &str, key: &str) -> u16 {
+    let mut request = axum::http::Request::get("/v1/jobs")
+        .header("host", "localhost")
+        .header("authorization", format!("Bearer {key}"))
+        .body(axum::body::Body::empty())
+        .unwrap();
+    let peer = Peer(address.parse().unwrap());
+    request.extensions_mut().insert(peer);
+    let answer = router.clone().oneshot(request).await.unwrap();
+    answer.status().as_u16()
+}
+
+/// A key that no service knows.
+const WRONG: &str = "rh_0123456789ab_0";
+
 #[tokio::test]
 async fn an_address_may_try_so_many_wrong_keys_and_no_more() {
     let folder = tempfile::tempdir().unwrap();
     let jobs = Jobs::open(Options::new(folder.path())).await.unwrap();
     let router = railhead::http::router(jobs, HttpOptions::default());
-    let ask = async |address: &str| {
-        let mut request = axum::http::Request::get("/v1/jobs")
-            .header("host", "localhost")
-            .header("authorization", "Bearer rh_0123456789ab_0")
-            .body(axum::body::Body::empty())
-            .unwrap();
-        let peer = Peer(address.parse().unwrap());
-        request.extensions_mut().insert(peer);
-        let answer = router.clone().oneshot(request).await.unwrap();
-        answer.status().as_u16()
-    };
     let mut statuses = Vec::new();
     for _ in 0..30 {
-        statuses.push(ask("192.0.2.1").await);
+        statuses.push(with_key(&router, "192.0.2.1", WRONG).await);
     }
     assert_eq!((statuses[0], statuses[29]), (401, 429), "{statuses:?}");
-    assert_eq!(ask("192.0.2.2").await, 401, "somebody else");
+    assert_eq!(with_key(&router, "192.0.2.2", WRONG).await, 401, "another");
+}
+
+#[tokio::test]
+async fn wrong_keys_lock_no_good_key_of_the_same_address_out() {
+    let guarded = Guarded::start(Setup::new(), |_| {}).await;
+    let router = railhead::http::router(guarded.server.jobs.clone(), HttpOptions::default());
+    let mut last = 0;
+    for round in 0..100 {
+        last = with_key(&router, "192.0.2.1", WRONG).await;
+        let good = [&guarded.north, &guarded.south][round % 2];
+        assert_eq!(with_key(&router, "192.0.2.1", good).await, 200, "{round}");
+    }
+    assert_eq!(last, 429);
+    // Also a key that was not used before, and with many look-ups at once.
+    let wrong = (0..50).map(|_| with_key(&router, "192.0.2.1", WRONG));
+    let wrong = futures_util::future::join_all(wrong);
+    let good = with_key(&router, "192.0.2.1", &guarded.operator);
+    let (wrong, good) = tokio::join!(wrong, good);
+    assert_eq!((wrong, good), (vec![429; 50], 200));
+}
+
+#[tokio::test]
+async fn clients_behind_a_trusted_proxy_are_counted_one_by_one() {
+    let mut setup = Setup::new();
+    setup.http.trusted_proxies = [AddressRange::from_str("127.0.0.0/8").unwrap()].into();
+    setup.http.requests_per_second = 1;
+    let proxied = Guarded::start(setup, |_| {}).await;
+    let ask = async |guarded: &Guarded, header: (&'static str, &'static str), key: &str| {
+        let shape =
+            |request: reqwest::RequestBuilder| request.bearer_auth(key).header(header.0, header.1);
+        let answer = guarded.server.send(Method::GET, "/v1/me", shape).await;
+        answer.status
+    };
+    let told = ("x-forwarded-for", "192.0.2.1");
+    let mut statuses = Vec::new();
+    for _ in 0..25 {
+        statuses.push(ask(&proxied, told, WRONG).await);
+    }
+    assert_eq!((statuses[0], statuses[24]), (401, 429), "{statuses:?}");
+    let same = ("forwarded", "for=192.0.2.1;proto=https");
+    assert_eq!(ask(&proxied, same, WRONG).await, 429);
+    let other = ("x-forwarded-for", "192.0.2.1, 192.0.2.2");
+    assert_eq!(ask(&proxied, other, WRONG).await, 401);
+    assert_eq!(ask(&proxied, told, &proxied.north).await, 200);
+
+    // Nobody else is believed.
+    let direct = Guarded::start(Setup::new(), |_| {}).await;
+    for _ in 0..25 {
+        assert_eq!(ask(&direct, told, WRONG).await, 401);
+    }
 }
 
 #[tokio::test]

@@ -77,7 +77,7 @@ async fn bodies_that_come_byte_by_byte_are_cut_off() {
     let mut setup = Setup::new();
     setup.http.body_timeout = Duration::from_millis(300);
     let server = setup.start().await;
-    for path in ["/v1/jobs", "/v1/batches"] {
+    for path in ["/v1/jobs", "/v1/batches", "/v1/evaluate", "/v1/runs"] {
         let mut stream = connect(&server).await;
         let head = format!(
             "POST {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-type: application/json\r\ncontent-length: 1000000\r\n\r\n["
@@ -89,6 +89,37 @@ async fn bodies_that_come_byte_by_byte_are_cut_off() {
             answer.starts_with("HTTP/1.1 408") && answer.contains("/problems/body-timeout"),
             "{path}: {answer}"
         );
+    }
+}
+
+#[tokio::test]
+async fn rows_that_keep_coming_may_take_longer_than_a_piece_of_them() {
+    let mut setup = Setup::new();
+    setup.http.body_timeout = Duration::from_secs(2);
+    let server = setup.start().await;
+    let template = crate::runs::template("fastsim");
+    let rows: Vec<f64> = (0..4000).map(|row| 1e-6 * f64::from(row)).collect();
+    let body = json!({ "template": template, "columns": { "/motion/creepage_x": rows } });
+    let body = body.to_string();
+    for (path, status) in [
+        ("/v1/evaluate", "HTTP/1.1 200"),
+        ("/v1/runs", "HTTP/1.1 202"),
+    ] {
+        let mut stream = connect(&server).await;
+        let head = format!(
+            "POST {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n",
+            body.len()
+        );
+        stream.write_all(head.as_bytes()).await.expect("sent");
+        // 3 s in all; no pause is near the 2 s that it may take.
+        for piece in body.as_bytes().chunks(body.len() / 60) {
+            stream.write_all(piece).await.expect("sent");
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).await.expect("an answer");
+        let answer = String::from_utf8_lossy(&answer);
+        assert!(answer.starts_with(status), "{path}: {answer:.300}");
     }
 }
 

@@ -331,6 +331,73 @@ fn a_read_only_disk_is_named_at_the_start() {
     assert!(text.contains(&folder), "{text}");
 }
 
+/// Does the service say that its storage fails?
+async fn failing(service: &Service) -> bool {
+    let metrics = answer(service.request(Method::GET, "/metrics")).await.text;
+    metrics.contains("\nrailhead_storage_failing 1\n")
+}
+
+#[tokio::test]
+async fn results_without_room_are_told_although_the_table_takes_data() {
+    let Some(disk) = Disk::mount("size=64k") else {
+        skip("this process may not mount a file system");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let results = folder.path().join("results");
+    std::os::unix::fs::symlink(disk.folder.path(), results).unwrap();
+    let service = Service::start(folder.path(), &["--cache", "false", "--workers", "1"]);
+    let large = service.submit(&large_case()).await;
+    while service.logged("could not be written yet") < 2 {
+        pause().await;
+    }
+    let mut accepted = vec![large];
+    for number in 0..10 {
+        let small = submit(&service, &case(&format!("small {number}"))).await;
+        assert_eq!(small.status, 202, "the table has room: {}", small.text);
+        accepted.push(small.json["id"].as_str().unwrap().to_owned());
+        assert_problem(&ready(&service).await, 507, "storage-full", "");
+        assert!(failing(&service).await);
+    }
+    let grown = Command::new("mount")
+        .args(["-o", "remount,size=16m"])
+        .arg(disk.folder.path())
+        .status();
+    assert!(grown.unwrap().success());
+    until_ready(&service).await;
+    assert!(!failing(&service).await);
+    all_succeed(&service, &accepted).await;
+}
+
+#[tokio::test]
+async fn a_body_that_fills_the_disk_is_told_until_there_is_room() {
+    let Some(disk) = Disk::mount("size=32m") else {
+        skip("this process may not mount a file system");
+        return;
+    };
+    let service = Service::start(&disk.data_dir(), &["--workers", "1"]);
+    let job = service.submit(&small("the template")).await;
+    service.until(&job, "succeeded").await;
+    let rows: String = (0..200_000)
+        .map(|row| format!("{}\n", 50_000 + row))
+        .collect();
+    let table = format!("/load/normal_force_n\n{rows}");
+    let send = async || {
+        let request = service.request(Method::POST, &format!("/v1/runs?template={job}"));
+        let request = request.header("Content-Type", "text/csv");
+        answer(request.body(table.clone())).await
+    };
+    let ballast = disk.fill_but(256 << 10);
+    assert_problem(&send().await, 507, "storage-full", "");
+    for _ in 0..10 {
+        assert_problem(&ready(&service).await, 507, "storage-full", "");
+        assert!(failing(&service).await);
+    }
+    std::fs::remove_file(ballast).unwrap();
+    until_ready(&service).await;
+    assert!(!failing(&service).await);
+}
+
 /// Lets a process write no file any more, or lets it again.
 fn limit_files(service: &Service, limit: &str) {
     let limited = Command::new("prlimit")

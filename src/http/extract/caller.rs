@@ -3,11 +3,14 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::BoxError;
+use axum::body::Bytes;
 use axum::extract::{FromRef, FromRequestParts};
 use axum::http::header;
 use axum::http::request::Parts;
+use futures_util::stream::{Stream, TryStreamExt, try_unfold};
 
-use crate::http::layers::auth::{Access, bearer};
+use crate::http::layers::auth::{Access, bearer, unauthorized};
 use crate::http::limits::concurrency::ConcurrencyLimits;
 use crate::http::limits::holding_body::HeldShares;
 use crate::http::problem::error::ApiError;
@@ -38,6 +41,29 @@ pub async fn revoked(jobs: Jobs, credential: Option<Credential>) {
             return;
         }
     }
+}
+
+/// The pieces of an answer. They break off once `revoked` ends, so that no client takes what was sent for all there is.
+pub fn until_revoked<E: Into<BoxError>>(
+    pieces: impl Stream<Item = Result<Bytes, E>> + Send,
+    revoked: impl Future<Output = ()> + Send,
+) -> impl Stream<Item = Result<Bytes, BoxError>> + Send {
+    let state = (Box::pin(pieces), Box::pin(revoked));
+    try_unfold(state, |(mut pieces, mut revoked)| async move {
+        tokio::select! {
+            biased;
+            () = &mut revoked => Err("the key of the request was revoked".into()),
+            piece = pieces.try_next() => {
+                let piece = piece.map_err(Into::into)?;
+                Ok(piece.map(|piece| (piece, (pieces, revoked))))
+            }
+        }
+    })
+}
+
+/// The answer to a waiting request whose key was revoked.
+pub(crate) fn revoked_meanwhile() -> ApiError {
+    unauthorized("the key was revoked while the request waited")
 }
 
 /// The jobs that the client may see: those of its tenant. Every handler that touches jobs takes this.

@@ -4,10 +4,9 @@ use std::collections::HashSet;
 use std::fmt;
 use std::io::Cursor;
 
-use axum::body::{Body, Bytes};
+use axum::body::Bytes;
 use axum::extract::Request;
 use axum::http::header;
-use http_body_util::{BodyExt, Limited};
 use serde::de::{
     Deserialize, DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor,
 };
@@ -15,11 +14,11 @@ use serde_json::Value;
 
 use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::varied::Values;
-use crate::http::extract::json::{Strict, unreadable};
+use crate::http::extract::arriving::Arriving;
+use crate::http::extract::json::Strict;
 use crate::http::extract::titles::{
     Place, delimiter, faulty, is_line_of_units, number, places, require_few,
 };
-use crate::http::layers::admission::too_long;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
@@ -38,30 +37,25 @@ pub fn declared_bytes(request: &Request, options: &HttpOptions) -> usize {
         .unwrap_or(options.evaluate_max_bytes)
 }
 
-/// The whole body.
+/// The whole body. It may take long as long as it keeps to the lowest rate of large bodies.
 ///
 /// # Errors
 /// It is too large, too slow, or breaks off.
 pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes, ApiError> {
     let max_bytes = options.evaluate_max_bytes;
-    let body: Limited<Body> = Limited::new(request.into_body(), max_bytes);
-    match tokio::time::timeout(options.body_timeout, body.collect()).await {
-        Ok(Ok(read)) => Ok(read.to_bytes()),
-        Ok(Err(error)) if too_long(error.as_ref()) => Err(ApiError::new(
-            ProblemKind::BodyTooLarge,
-            format!(
-                "the rows are larger than the {max_bytes} bytes that are allowed (`--evaluate-max-mib`)"
-            ),
-        )),
-        Ok(Err(error)) => Err(unreadable(error.as_ref())),
-        Err(_) => Err(ApiError::new(
-            ProblemKind::BodyTimeout,
-            format!(
-                "the body did not arrive within {} s",
-                options.body_timeout.as_secs_f64()
-            ),
-        )),
+    let declared = declared_bytes(&request, options);
+    let mut arriving = Arriving::new(
+        options.body_timeout,
+        max_bytes as u64,
+        "rows (`--evaluate-max-mib`)",
+        request,
+    )?;
+    // A body that does not say its length grows.
+    let mut text = Vec::with_capacity(if declared < max_bytes { declared } else { 0 });
+    while let Some(piece) = arriving.next().await? {
+        text.extend_from_slice(&piece);
     }
+    Ok(text.into())
 }
 
 /// A template and columns from JSON, `{"template": …, "columns": {"<JSON pointer>": […], …}}`.

@@ -4,12 +4,16 @@
 //! of what it is asked by. Compressed forms of a body have tags of their own:
 //! the same digest with the coding behind it.
 
+use std::env::current_exe;
+use std::fs::File;
+
 use axum::body::Body;
 use axum::extract::{Query as Pairs, Request};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use http_body_util::BodyExt;
+use tokio::sync::OnceCell;
 use uuid::Uuid;
 
 use crate::http::problem::error::ApiError;
@@ -70,7 +74,7 @@ pub(crate) enum Known {
 
 impl Known {
     /// Compares the tags that a client has with the tag of what it asks for, before anything is loaded or computed. Results never
-    /// change, so job, path, query, format and version of the program determine the tag. `If-None-Match: *` is left to
+    /// change, so job, path, query, format and the program that writes the answer determine the tag. `If-None-Match: *` is left to
     /// [`immutable`], since only the work itself shows whether there is an answer.
     ///
     /// # Errors
@@ -87,7 +91,7 @@ impl Known {
         let mut query = query.map_or_else(|_| Vec::new(), |Pairs(pairs)| pairs);
         query.sort();
         let parts = (id, job.version, uri.path(), query, format.name());
-        let text = format!("{} {parts:?}", env!("CARGO_PKG_VERSION"));
+        let text = format!("{} {parts:?}", program_digest().await);
         let digest = digest(text.as_bytes());
         if job.state != State::Succeeded {
             return Ok(Known::Tag(digest));
@@ -104,6 +108,32 @@ impl Known {
             (StatusCode::NOT_MODIFIED, head).into_response(),
         ))
     }
+}
+
+/// The digest of the program's own file. Every build has another one, so what one build wrote is not taken for what the next one
+/// writes; nodes that run the same build have the same.
+async fn program_digest() -> &'static str {
+    static DIGEST: OnceCell<String> = OnceCell::const_new();
+    let read = || async {
+        let read = tokio::task::spawn_blocking(|| {
+            // This is the running program, also where a new one has been put into its place.
+            let file = File::open("/proc/self/exe").or_else(|_| File::open(current_exe()?))?;
+            let mut hasher = blake3::Hasher::new();
+            hasher.update_reader(file)?;
+            Ok::<_, std::io::Error>(hasher.finalize().to_hex().to_string())
+        });
+        match read.await {
+            Ok(Ok(digest)) => digest,
+            unread => {
+                tracing::warn!(
+                    ?unread,
+                    "the file of the program cannot be read; entity tags end with the process"
+                );
+                Uuid::now_v7().to_string()
+            }
+        }
+    };
+    DIGEST.get_or_init(read).await
 }
 
 /// The answer with its tag.

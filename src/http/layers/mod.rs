@@ -3,6 +3,7 @@
 pub(super) mod admission;
 pub(super) mod auth;
 pub(super) mod catch_panic;
+pub(super) mod client_address;
 pub(super) mod compression;
 pub(super) mod cors;
 pub(super) mod etag;

@@ -19,9 +19,10 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::server::connection::ProbesOnly;
 
-/// Headers that proxies add about their clients.
-static FORWARDED: [HeaderName; 5] = [
+/// Headers that proxies add, about their clients or about themselves.
+static FORWARDED: [HeaderName; 6] = [
     header::FORWARDED,
+    header::VIA,
     HeaderName::from_static("x-forwarded-for"),
     HeaderName::from_static("x-forwarded-host"),
     HeaderName::from_static("x-forwarded-proto"),

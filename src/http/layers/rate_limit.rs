@@ -14,6 +14,7 @@ use governor::clock::{Clock, DefaultClock};
 use governor::middleware::StateInformationMiddleware;
 use governor::state::keyed::HashMapStateStore;
 use governor::{Quota, RateLimiter};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
@@ -29,7 +30,8 @@ const SENDERS_KEPT: usize = 10_000;
 /// Shortest time between two clean-ups, which visit all senders.
 const FORGET_EVERY: Duration = Duration::from_secs(10);
 
-/// Wrong keys that one address may send within [`FAILURES_WITHIN`]; each costs a query of the key table.
+/// Wrong keys of one address within [`FAILURES_WITHIN`] that are answered `401`, further ones `429`. Chosen by judgement: more than
+/// anybody mistypes.
 const FAILURES_MAX: u32 = 20;
 const FAILURES_WITHIN: Duration = Duration::from_secs(10);
 
@@ -96,6 +98,8 @@ pub(crate) struct RateLimit {
     limiter: Option<Arc<Limiter>>,
     forgotten: Arc<Mutex<Instant>>,
     failures: Arc<Mutex<HashMap<IpAddr, Failures>>>,
+    /// One turn, for look-ups of addresses that sent many wrong keys.
+    lookups: Arc<Semaphore>,
 }
 
 /// Wrong keys from one address.
@@ -120,6 +124,7 @@ impl RateLimit {
             limiter,
             forgotten: Arc::new(Mutex::new(Instant::now())),
             failures: Arc::default(),
+            lookups: Arc::new(Semaphore::new(1)),
         }
     }
 
@@ -174,52 +179,60 @@ impl RateLimit {
         due
     }
 
-    /// Has this address sent few enough wrong keys?
-    ///
-    /// # Errors
-    /// `too-many-requests`, with the seconds after which to try again.
-    pub(crate) fn require_few_failures(&self, address: Option<IpAddr>) -> Result<(), ApiError> {
-        let failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
-        let of_address = address.and_then(|address| failures.get(&address));
-        let left = of_address
-            .filter(|failures| failures.count >= FAILURES_MAX)
-            .and_then(|failures| FAILURES_WITHIN.checked_sub(failures.since.elapsed()));
-        match left {
-            Some(left) => Err(ApiError::new(
-                ProblemKind::TooManyRequests,
-                format!(
-                    "this address sent {FAILURES_MAX} wrong keys within {} s",
-                    FAILURES_WITHIN.as_secs()
-                ),
-            )
-            .after(
-                u32::try_from(left.as_secs())
-                    .unwrap_or(u32::MAX)
-                    .saturating_add(1),
-            )),
-            None => Ok(()),
+    /// Waits for the turn of an address to look a key up that is not remembered. Addresses that sent many wrong keys take turns, so that
+    /// together they keep one connection of the database busy at most.
+    pub(crate) async fn lookup_turn(
+        &self,
+        address: Option<IpAddr>,
+    ) -> Option<OwnedSemaphorePermit> {
+        let many = {
+            let failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
+            let of_address = address.and_then(|address| failures.get(&address));
+            of_address.is_some_and(|failures| {
+                failures.count >= FAILURES_MAX && failures.since.elapsed() < FAILURES_WITHIN
+            })
+        };
+        match many {
+            // It is never closed.
+            true => self.lookups.clone().acquire_owned().await.ok(),
+            false => None,
         }
     }
 
     /// Counts a wrong key.
-    pub(crate) fn count_failure(&self, address: Option<IpAddr>) {
-        let Some(address) = address else { return };
+    ///
+    /// # Errors
+    /// `too-many-requests`, with the seconds after which to try again: the address has sent too many of them.
+    pub(crate) fn count_failure(&self, address: Option<IpAddr>) -> Result<(), ApiError> {
+        let Some(address) = address else {
+            return Ok(());
+        };
         let mut failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
         if failures.len() > SENDERS_KEPT {
             failures.retain(|_, failures| failures.since.elapsed() < FAILURES_WITHIN);
         }
-        let now = Instant::now();
-        let own = failures.entry(address).or_insert(Failures {
-            since: now,
+        let new = Failures {
+            since: Instant::now(),
             count: 0,
-        });
+        };
+        let own = failures.entry(address).or_insert(new);
         if own.since.elapsed() >= FAILURES_WITHIN {
-            *own = Failures {
-                since: now,
-                count: 0,
-            };
+            *own = new;
         }
-        own.count += 1;
+        own.count = own.count.saturating_add(1);
+        if own.count <= FAILURES_MAX {
+            return Ok(());
+        }
+        let left = FAILURES_WITHIN.saturating_sub(own.since.elapsed());
+        let seconds = u32::try_from(left.as_secs()).unwrap_or(u32::MAX);
+        Err(ApiError::new(
+            ProblemKind::TooManyRequests,
+            format!(
+                "the key is not known, and this address sent more than {FAILURES_MAX} wrong keys within {} s",
+                FAILURES_WITHIN.as_secs()
+            ),
+        )
+        .after(seconds.saturating_add(1)))
     }
 }
 

@@ -10,6 +10,7 @@ use tower_http::trace::{DefaultOnFailure, DefaultOnRequest, MakeSpan, OnResponse
 use tracing::{Span, field};
 
 use crate::http::layers::request_id::REQUEST_ID;
+use crate::http::server::connection::Peer;
 
 /// One span per request, closed by one line with status and time.
 pub(crate) fn span_layer()
@@ -35,7 +36,7 @@ impl MakeSpan<Body> for RequestSpan {
             .extensions()
             .get::<MatchedPath>()
             .map(MatchedPath::as_str);
-        tracing::info_span!(
+        let span = tracing::info_span!(
             "request",
             request_id = id.unwrap_or_default(),
             method = %request.method(),
@@ -45,7 +46,12 @@ impl MakeSpan<Body> for RequestSpan {
             tenant = field::Empty,
             key = field::Empty,
             trace_id = field::Empty,
-        )
+            client = field::Empty,
+        );
+        if let Some(Peer(client)) = request.extensions().get() {
+            span.record("client", field::display(client));
+        }
+        span
     }
 }
 

@@ -258,6 +258,7 @@ fn of_rows(error: JobsError) -> ApiError {
         JobsError::ProfileNotFound => {
             ApiError::new(ProblemKind::ProfileNotFound, "no profile has this digest")
         }
+        JobsError::BoundKey { .. } => ApiError::new(ProblemKind::Forbidden, error.to_string()),
         JobsError::ProfilesFull(_) => ApiError::new(ProblemKind::ProfilesFull, error.to_string()),
         JobsError::TooManyRows(_) => ApiError::new(ProblemKind::BodyTooLarge, error.to_string()),
         other => match other.storage_fault() {

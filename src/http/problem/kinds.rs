@@ -36,7 +36,7 @@ kinds! {
     BadHeader 400 "bad-header" "A header is not understood" "A request header has a value that is not allowed; `errors` names it."
     UnreadableBody 400 "unreadable-body" "The body could not be read" "The connection ended or broke before the whole body had arrived."
     Unauthorized 401 "unauthorized" "A key is needed" "The service is asked with `Authorization: Bearer` and an API key; there was none, or it is unknown or revoked. Keys come from the operator of the service."
-    Forbidden 403 "forbidden" "This key may not do that" "The key is good, but belongs to a tenant that has no business here, or it may only read."
+    Forbidden 403 "forbidden" "This key may not do that" "The key is good, but it may only read, or it is bound to labels and this concerns the whole tenant, or only the tenant `operator` may do this."
     CrossSite 403 "cross-site" "A foreign page may not change anything" "Without a key nothing is changed on behalf of a web page of another origin; the operator names origins that may with `--cors-origin`."
     HostNotAllowed 403 "host-not-allowed" "The service has another name" "Without a key the service is asked by an address, as `localhost`, or by a name that its operator gave with `--allowed-host`; `Host` was another."
     UnknownRoute 404 "unknown-route" "There is nothing at this address" "The path names no resource of this service; `/openapi.json` lists all of them."

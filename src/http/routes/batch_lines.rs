@@ -63,18 +63,9 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    /// The pieces. They break off once `revoked` ends, so that what was sent is not taken for all there is.
-    pub(crate) fn until(
-        self,
-        revoked: impl Future<Output = ()> + Send,
-    ) -> impl Stream<Item = Result<Bytes, BoxError>> + Send {
-        let revoked = Box::pin(revoked);
-        try_unfold((self, revoked), |(lines, mut revoked)| async move {
-            tokio::select! {
-                piece = lines.next() => Ok(piece?.map(|(piece, lines)| (piece, (lines, revoked)))),
-                () = &mut revoked => Err(JobsError::BatchNotFound.into()),
-            }
-        })
+    /// The pieces.
+    pub(crate) fn pieces(self) -> impl Stream<Item = Result<Bytes, BoxError>> + Send {
+        try_unfold(self, Lines::next)
     }
 
     async fn next(mut self) -> Result<Option<(Bytes, Lines)>, BoxError> {

@@ -17,7 +17,7 @@ use uuid::Uuid;
 
 use crate::http::dto::result::JobResult;
 use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::caller::{Caller, Credential, revoked};
+use crate::http::extract::caller::{Caller, Credential, revoked, until_revoked};
 use crate::http::extract::ids::BatchId;
 use crate::http::extract::query::{Parameters, Repeated, id, query, reader, seconds};
 use crate::http::layers::compression::StreamedUnbuffered;
@@ -161,7 +161,7 @@ pub(crate) async fn results(
     };
     let revoked = revoked(jobs, key.map(|Extension(key)| key));
     let head = stream::iter(head.map(Ok));
-    let body = Body::from_stream(head.chain(lines.until(revoked)));
+    let body = Body::from_stream(until_revoked(head.chain(lines.pieces()), revoked));
     let headers = [
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),

@@ -10,12 +10,11 @@ use axum::{Extension, Json};
 
 use crate::contact::case::words::question::Case;
 use crate::http::dto::job::JobAnswer;
-use crate::http::extract::caller::Caller;
+use crate::http::extract::caller::{Caller, Credential, revoked};
 use crate::http::extract::ids::JobId;
 use crate::http::extract::json::JsonBody;
 use crate::http::extract::query::Parameters;
 use crate::http::extract::submit_options::SubmitQuery;
-use crate::http::limits::concurrency::ConcurrencyLimits;
 use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
 use crate::http::limits::memory::Memory;
 use crate::http::limits::shares::Share;
@@ -24,6 +23,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
 use crate::http::routes::prefer_wait::{Awaited, preferred_wait, say_applied};
 use crate::http::routes::results::result_text;
+use crate::http::state::AppState;
 use crate::jobs::Jobs;
 use crate::jobs::model::job::{Job, State as JobState};
 
@@ -75,9 +75,9 @@ problems! {
 pub(crate) async fn submit(
     Caller(jobs): Caller,
     uri: Uri,
-    State(crowds): State<ConcurrencyLimits>,
-    State(memory): State<Memory>,
+    State(AppState { crowds, memory, .. }): State<AppState>,
     Extension(held): Extension<HeldShares>,
+    credential: Option<Extension<Credential>>,
     headers: HeaderMap,
     JsonBody { value, room }: JsonBody,
 ) -> Result<Response, ApiError> {
@@ -93,9 +93,12 @@ pub(crate) async fn submit(
         // From here on the request only waits, which is counted apart.
         held.release();
         // The job is stored: whatever ends the wait early, the client must learn its id.
-        match jobs.wait(job.id, Duration::from_secs(seconds.into())).await {
-            Ok(later) => job = later,
-            Err(reason) => tracing::debug!(%reason, job = %job.id, "the wait ended early"),
+        tokio::select! {
+            later = jobs.wait(job.id, Duration::from_secs(seconds.into())) => match later {
+                Ok(later) => job = later,
+                Err(reason) => tracing::debug!(%reason, job = %job.id, "the wait ended early"),
+            },
+            () = revoked(jobs.clone(), credential.map(|Extension(key)| key)) => {}
         }
     }
     let in_time = wait.is_some() && job.state.ended();

@@ -8,7 +8,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use axum::response::Response;
 use uuid::Uuid;
 
-use crate::http::extract::caller::Caller;
+use crate::http::extract::caller::{Caller, revoked, revoked_meanwhile};
 use crate::http::extract::ids::JobId;
 use crate::http::layers::auth::Access;
 use crate::http::limits::concurrency::ConcurrencyLimits;
@@ -69,7 +69,11 @@ where
             if let Some(held) = parts.extensions.get::<HeldShares>() {
                 held.release();
             }
-            jobs.wait(id, Duration::from_secs(seconds.into())).await?;
+            let key = parts.extensions.get().cloned();
+            tokio::select! {
+                ended = jobs.wait(id, Duration::from_secs(seconds.into())) => drop(ended?),
+                () = revoked(jobs.clone(), key) => return Err(revoked_meanwhile()),
+            }
             applied = Some(seconds);
         }
         Ok(Awaited { jobs, id, applied })

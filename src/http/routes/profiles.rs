@@ -15,7 +15,7 @@ use crate::contact::solution::words::profile_quality::SectionQuality;
 use crate::http::dto::job::rfc3339;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
-use crate::http::problem::catalogue::{PlainProblems, problems};
+use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 
@@ -117,13 +117,20 @@ pub(crate) struct ProfileList {
     bytes_max: u64,
 }
 
+problems! {
+    /// What listing profiles can fail with.
+    ListProfilesProblems: BadQuery, Forbidden
+}
+
 /// Lists what is kept, newest first.
+///
+/// A key that is bound to labels may not list profiles.
 #[utoipa::path(
     get,
     path = "/v1/profiles",
     tag = "profiles",
     operation_id = "list_profiles",
-    responses((status = 200, description = "What is kept", body = ProfileList), PlainProblems)
+    responses((status = 200, description = "What is kept", body = ProfileList), ListProfilesProblems)
 )]
 pub(crate) async fn list(Caller(jobs): Caller) -> Result<Json<ProfileList>, ApiError> {
     let entries = jobs.profiles().await?.into_iter();
@@ -162,6 +169,8 @@ pub(crate) async fn get(
 }
 
 /// Removes a kept cross-section. Jobs and runs that named it are not touched.
+///
+/// A key that is bound to labels may not remove profiles.
 #[utoipa::path(
     delete,
     path = "/v1/profiles/{digest}",

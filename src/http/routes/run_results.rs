@@ -8,14 +8,14 @@ use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
-use futures_util::{StreamExt, stream};
+use futures_util::stream::{self, StreamExt, try_unfold};
 use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::http::dto::run::{AnswerColumn, answer_columns};
 use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::caller::{Caller, Credential, revoked};
+use crate::http::extract::caller::{Caller, Credential, revoked, until_revoked};
 use crate::http::extract::ids::RunId;
 use crate::http::extract::query::{Parameters, query, reader};
 use crate::http::limits::holding_body::hold_while_sent;
@@ -121,31 +121,40 @@ pub(crate) async fn results(
     let mut writer = writer(format, &columns).map_err(|error| ApiError::internal(&error))?;
     let head = writer.head().map_err(|error| ApiError::internal(&error))?;
     let rows = query.rows.unwrap_or(0..u64::MAX);
-    let answers = Answers {
+    let mut answers = Answers {
         rows: rows.start..rows.end.min(run.head.rows),
         wanted: columns.into_iter().map(|(name, _)| name).collect(),
         source: ChunkSource::new(jobs.clone(), run),
     };
-    let state = Some((answers, writer));
-    let pieces = stream::unfold(state, |state| async move {
-        let (mut answers, writer) = state?;
-        Some(match answers.next(writer).await {
-            Ok((piece, Some(writer))) => (Ok(piece), Some((answers, writer))),
-            Ok((piece, None)) => (Ok(piece), None),
-            Err(error) => {
-                tracing::error!(%error, run = %answers.source.run.chunks.id, "answers of a run cannot be read");
-                (Err(error), None)
-            }
-        })
+    // Answers that cannot be read are an error as long as the head has not been sent.
+    let (first, writer) = answers.next(writer).await.map_err(unreadable)?;
+    let rest = writer.map(|writer| (answers, writer));
+    let rest = try_unfold(rest, |state| async move {
+        let Some((mut answers, writer)) = state else {
+            return Ok(None);
+        };
+        let next = answers.next(writer).await.inspect_err(|error| {
+            tracing::error!(%error, run = %answers.source.run.chunks.id, "answers of a run cannot be read");
+        });
+        let (piece, writer) = next?;
+        Ok(Some((piece, writer.map(|writer| (answers, writer)))))
     });
+    let begin = stream::iter([Ok::<_, WriteError>(Bytes::from(head)), Ok(first)]);
     let revoked = revoked(jobs, key.map(|Extension(key)| key));
-    let head = stream::iter([Ok::<_, WriteError>(Bytes::from(head))]);
-    let body = Body::from_stream(head.chain(pieces).take_until(revoked));
+    let body = Body::from_stream(until_revoked(begin.chain(rest), revoked));
     let headers = [
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
     ];
     Ok(hold_while_sent((headers, body).into_response(), share))
+}
+
+/// Why answers cannot be read.
+fn unreadable(error: WriteError) -> ApiError {
+    match error.downcast::<JobsError>() {
+        Ok(error) => ApiError::from(*error),
+        Err(error) => ApiError::internal(&error),
+    }
 }
 
 /// A run has answers once it has ended.

@@ -15,7 +15,7 @@ use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::server::places::Place;
 use crate::http::server::unread::Unread;
 
-/// The address that a request comes from; in its extensions.
+/// The address that a request comes from, its client's if a trusted proxy passes it on; in its extensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Peer(pub IpAddr);
 

@@ -1,8 +1,9 @@
 //! Reads the rest of a body whose request has been answered already.
 //!
 //! A faulty batch is refused at its first fault, while the rest of it is on the way. The connection cannot be used again
-//! before that rest has been read, and closing it silently breaks the client's next request. So a short rest is read and
-//! discarded; if more follows, the answer says that the connection closes.
+//! before that rest has been read, and closing it at once can lose the answer: the client fails while it writes, and never reads.
+//! So a short rest is read before the answer is sent. If more follows, the answer says that the connection closes, and more of the
+//! rest is read and discarded meanwhile.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -18,10 +19,15 @@ use http_body_util::{BodyExt, Limited};
 use hyper::body::{Frame, SizeHint};
 use tokio::time::timeout;
 
-/// Longest rest that is read and discarded, in bytes.
+/// Longest rest that is read before the answer is sent, in bytes.
 const REST_BYTES: usize = 1 << 20;
 /// How long the client may take to send it.
 const REST_WITHIN: Duration = Duration::from_millis(500);
+
+/// Longest rest that is read after that, in bytes: as much as the largest body that is held in memory by default.
+const LATE_BYTES: usize = 64 << 20;
+/// How long the client may take to send it. Chosen by judgement: a client that writes without reading needs 6 MB/s for all of it.
+const LATE_WITHIN: Duration = Duration::from_secs(10);
 
 type BodySlot = Arc<Mutex<Option<Body>>>;
 
@@ -37,18 +43,24 @@ pub(crate) async fn drain_body(request: Request, next: Next) -> Response {
     let request = request.map(|body| Body::new(DrainableBody(Some(body), kept)));
     let mut response = next.run(request).await;
     let rest = slot.lock().unwrap_or_else(PoisonError::into_inner).take();
-    if let Some(rest) = rest
-        && (asks || timeout(REST_WITHIN, ends(rest)).await != Ok(true))
+    if let Some(mut rest) = rest
+        && (asks || timeout(REST_WITHIN, ends(&mut rest, REST_BYTES)).await != Ok(true))
     {
         let close = HeaderValue::from_static("close");
         response.headers_mut().insert(header::CONNECTION, close);
+        if !asks {
+            // The connection stays open until this ends, so that the client can send on and then read its answer.
+            tokio::spawn(timeout(LATE_WITHIN, async move {
+                ends(&mut rest, LATE_BYTES).await
+            }));
+        }
     }
     response
 }
 
 /// Reads a body to its end; `false` if it breaks or is longer than allowed.
-async fn ends(body: Body) -> bool {
-    let mut body = Limited::new(body, REST_BYTES);
+async fn ends(body: &mut Body, most: usize) -> bool {
+    let mut body = Limited::new(body, most);
     while let Some(frame) = body.frame().await {
         if frame.is_err() {
             return false;

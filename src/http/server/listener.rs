@@ -60,7 +60,10 @@ pub async fn serve(
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "a connection sends in large pieces only");
         }
-        let place = places.enter(address.ip());
+        // A trusted proxy connects for many clients.
+        let mut proxies = options.trusted_proxies.iter();
+        let proxy = proxies.any(|range| range.contains(address.ip()));
+        let place = places.enter(address.ip(), !proxy);
         let stream = WriteTimeout::new(stream, options.write_timeout);
         let unread = Unread::default();
         let (router, peer, own) = (router.clone(), Peer(address.ip()), place.clone());

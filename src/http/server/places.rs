@@ -102,13 +102,14 @@ impl Places {
         }
     }
 
-    /// Takes a place for a connection from this address; another one makes way if there is none.
+    /// Takes a place for a connection from this address; another one makes way if there is none. `limited`: the address may have
+    /// only so many.
     #[must_use]
-    pub(crate) fn enter(&self, address: IpAddr) -> Arc<Place> {
+    pub(crate) fn enter(&self, address: IpAddr, limited: bool) -> Arc<Place> {
         let network = network(address);
         let mut register = self.shared.register();
         let own = register.networks.get(&network);
-        let own_full = own.is_some_and(|own| own.open >= self.shared.of_address_max);
+        let own_full = limited && own.is_some_and(|own| own.open >= self.shared.of_address_max);
         let mut probes_only = false;
         if own_full {
             let oldest = own.and_then(|own| own.waiting.first_key_value());
@@ -281,33 +282,40 @@ mod tests {
     #[test]
     fn the_oldest_without_a_head_makes_way_and_the_new_one_comes_in() {
         let places = Places::new(3, 3);
-        let silent = places.enter(address(1));
-        let kept = places.enter(address(1));
+        let silent = places.enter(address(1), true);
+        let kept = places.enter(address(1), true);
         drop(kept.begin());
-        let asking = places.enter(address(1));
+        let asking = places.enter(address(1), true);
         let busy = asking.begin();
-        let late = [places.enter(address(1)), places.enter(address(1))];
+        let late = [
+            places.enter(address(1), true),
+            places.enter(address(1), true),
+        ];
         assert!(silent.close.is_cancelled());
         // What was said nothing on makes way before what was used.
         assert!(late[0].close.is_cancelled() && !kept.close.is_cancelled());
         let last = late[1].begin();
-        let next = places.enter(address(1)).begin();
+        let next = places.enter(address(1), true).begin();
         assert!(kept.close.is_cancelled() && !asking.close.is_cancelled());
         assert_eq!(places.open(), 3);
         // All three are busy: the next may ask for the probes only.
-        assert!(places.enter(address(1)).probes_only);
+        assert!(places.enter(address(1), true).probes_only);
         drop((busy, last, next));
-        assert!(!places.enter(address(1)).probes_only);
+        assert!(!places.enter(address(1), true).probes_only);
     }
 
     #[test]
     fn one_address_does_not_push_out_another() {
         let places = Places::new(10, 2);
-        let other = places.enter(address(2));
-        let many: Vec<_> = (0..50).map(|_| places.enter(address(1))).collect();
+        let other = places.enter(address(2), true);
+        let many: Vec<_> = (0..50).map(|_| places.enter(address(1), true)).collect();
         assert!(!other.close.is_cancelled());
         let left = many.iter().filter(|place| !place.close.is_cancelled());
         assert_eq!((left.count(), places.open()), (2, 3));
+        let proxied: Vec<_> = (0..7).map(|_| places.enter(address(3), false)).collect();
+        let left = proxied.iter().filter(|place| !place.close.is_cancelled());
+        assert_eq!(left.count(), 7, "a proxy connects for many");
+        drop(proxied);
         drop(many);
         assert_eq!(places.open(), 1);
     }
@@ -315,13 +323,13 @@ mod tests {
     #[test]
     fn a_connection_with_several_requests_waits_when_the_last_one_ends() {
         let places = Places::new(1, 1);
-        let several = places.enter(address(1));
+        let several = places.enter(address(1), true);
         let (first, second) = (several.begin(), several.begin());
         drop(first);
-        assert!(places.enter(address(1)).probes_only);
+        assert!(places.enter(address(1), true).probes_only);
         assert!(!several.close.is_cancelled());
         drop(second);
-        assert!(!places.enter(address(1)).probes_only);
+        assert!(!places.enter(address(1), true).probes_only);
         assert!(several.close.is_cancelled());
     }
 
@@ -329,7 +337,7 @@ mod tests {
     async fn beyond_the_reserve_a_connection_waits_until_one_ends() {
         let places = Places::new(1, 100);
         let busy: Vec<_> = (0..=RESERVE)
-            .map(|_| places.enter(address(1)).begin())
+            .map(|_| places.enter(address(1), true).begin())
             .collect();
         let room = places.room();
         tokio::pin!(room);

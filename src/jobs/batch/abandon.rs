@@ -5,6 +5,7 @@ use uuid::Uuid;
 use crate::jobs::batch::control::DELETED_AT_ONCE;
 use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
+use crate::jobs::storage_fault::StoragePlace;
 
 impl Shared {
     /// From now on this batch is not filled, its jobs are not shown, and no worker takes one.
@@ -24,7 +25,7 @@ impl Shared {
             .collect();
         for id in abandoned {
             let dropped = self.drop_batch(id).await;
-            self.observe_storage(&dropped);
+            self.observe_storage(StoragePlace::Table, &dropped);
             match dropped {
                 Ok(()) => {
                     self.unfinished_batches().abandoned.remove(&id);

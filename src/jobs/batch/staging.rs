@@ -4,11 +4,11 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Result, Seek, SeekFrom, Write};
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::jobs::disk_reserve::nameless;
 use crate::jobs::model::submit_options::CaseOptions;
 
 /// What the job table needs to know of a case besides its text.
@@ -25,19 +25,6 @@ pub(crate) struct StagedCase {
     pub(crate) slice_us: u32,
     pub(crate) digest: String,
     pub(crate) own: CaseOptions,
-}
-
-/// An empty file without a name on the file system of a folder.
-pub(crate) fn nameless(folder: &Path) -> Result<File> {
-    let path = folder.join(format!("spool-{}", uuid::Uuid::now_v7()));
-    let file = File::options()
-        .read(true)
-        .write(true)
-        .create_new(true)
-        .mode(0o600)
-        .open(&path)?;
-    std::fs::remove_file(&path)?;
-    Ok(file)
 }
 
 /// Staged cases, first in, first out.

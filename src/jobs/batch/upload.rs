@@ -465,11 +465,4 @@ impl Jobs {
             in_table: false,
         })
     }
-
-    pub(crate) fn staging_failed(&self, source: std::io::Error) -> JobsError {
-        JobsError::DataDir {
-            path: self.shared.options.data_dir.clone(),
-            source,
-        }
-    }
 }

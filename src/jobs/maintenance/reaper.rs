@@ -1,10 +1,10 @@
 //! Takes jobs from workers whose lease has run out.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use crate::jobs::model::job::{FailureKind, State};
 use crate::jobs::shared::{Shared, heartbeat};
+use crate::jobs::storage_fault::StoragePlace;
 use crate::jobs::store::claim::Reap;
 
 /// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
@@ -22,7 +22,7 @@ pub(crate) async fn reap_expired(shared: Arc<Shared>) {
         .is_some()
     {
         // While nothing can be written no lease can be renewed either, which is no silence of the workers.
-        if shared.storage_failing.load(Ordering::Relaxed) {
+        if shared.storage.fault(StoragePlace::Table).is_some() {
             quiet_until = shared.lease_until();
         }
         let now = shared.steady_ms();

@@ -1,12 +1,12 @@
 //! Takes back what a dead process left, for as long as the disk does not allow it.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use crate::jobs::disk_reserve;
 use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
+use crate::jobs::storage_fault::StoragePlace;
 use crate::jobs::store::claim::Reap;
 
 /// Time between two tries to do what a full disk did not allow.
@@ -34,7 +34,11 @@ pub(crate) async fn recover(shared: Arc<Shared>) {
         if !shared.unfinished_batches().abandoned.is_empty() {
             shared.drop_abandoned().await;
         }
-        if reserved.elapsed() >= RESERVE_EVERY && !shared.storage_failing.load(Ordering::Relaxed) {
+        if shared.storage.any() {
+            // The outcome is noted; what fails is tried again at the next time.
+            let tried = shared.require_storage();
+            let _ = shared.draining.run_until_cancelled(tried).await;
+        } else if reserved.elapsed() >= RESERVE_EVERY {
             reserved = tokio::time::Instant::now();
             let data_dir = shared.options.data_dir.clone();
             // It is tried again at the next time.
@@ -60,7 +64,7 @@ impl Shared {
             .reap(Reap::Dead, self.now_ms(), attempts_max)
             .await;
         let taken = taken.map_err(JobsError::from);
-        self.observe_storage(&taken);
+        self.observe_storage(StoragePlace::Table, &taken);
         for (id, state) in taken? {
             tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");
         }

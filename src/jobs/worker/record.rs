@@ -10,6 +10,7 @@ use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::job::{Failure, FailureKind, State};
+use crate::jobs::storage_fault::StoragePlace;
 use crate::jobs::store::claim::{Claim, ReleaseReason};
 use crate::jobs::store::ending::{Ending, StoredResult};
 use crate::jobs::worker::judge::{Verdict, judge};
@@ -50,7 +51,9 @@ impl Worker {
             .map(|(claim, source)| (claim.clone(), Ending::Cached { source: *source }))
             .collect();
         let ended = shared
-            .write_with_retries(|| shared.store.finish(&ends, shared.now_ms()))
+            .write_with_retries(StoragePlace::Table, || {
+                shared.store.finish(&ends, shared.now_ms())
+            })
             .await?;
         let ids: Vec<_> = ended.iter().copied().collect();
         shared.metrics.cache_lookup(ids.len() as u64, 0);
@@ -173,7 +176,9 @@ impl Worker {
         let shared = &self.shared;
         // A database that fails for a while does not cost the results.
         let ended = shared
-            .write_with_retries(|| shared.store.finish(&ends, shared.now_ms()))
+            .write_with_retries(StoragePlace::Table, || {
+                shared.store.finish(&ends, shared.now_ms())
+            })
             .await?;
         for (claim, ending) in &ends {
             if ended.contains(&claim.id) {
@@ -251,7 +256,9 @@ impl Worker {
         }
         let bytes = result.bytes() as u64;
         let key = shared
-            .write_with_retries(|| shared.blobs.put(claim, result.clone()))
+            .write_with_retries(StoragePlace::Results, || {
+                shared.blobs.put(claim, result.clone())
+            })
             .await?;
         Ok(StoredResult::Blob(key, bytes))
     }
@@ -269,7 +276,9 @@ impl Worker {
         let shared = &self.shared;
         // While the store is away the jobs stay claimed: a lease that ran out would count as an attempt.
         let released = shared
-            .write_with_retries(|| shared.store.release(claims, why, shared.now_ms()))
+            .write_with_retries(StoragePlace::Table, || {
+                shared.store.release(claims, why, shared.now_ms())
+            })
             .await?;
         for (id, state) in &released {
             if state.ended() {

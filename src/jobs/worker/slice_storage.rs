@@ -7,6 +7,7 @@ use crate::jobs::attempts::outcome::Work;
 use crate::jobs::attempts::slices::SlicedCase;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
+use crate::jobs::storage_fault::StoragePlace;
 use crate::jobs::store::ending::{NewSlice, SliceRecord, StoredResult};
 use crate::jobs::submit::microseconds;
 use crate::jobs::worker::pool::Worker;
@@ -38,7 +39,12 @@ impl Worker {
                 false => {
                     let bytes = part.bytes() as u64;
                     let put = || shared.blobs.put_slice(claim, number, part.clone());
-                    StoredResult::Blob(shared.write_with_retries(put).await?, bytes)
+                    StoredResult::Blob(
+                        shared
+                            .write_with_retries(StoragePlace::Results, put)
+                            .await?,
+                        bytes,
+                    )
                 }
             };
             let slice = NewSlice {
@@ -48,7 +54,9 @@ impl Worker {
                 done,
             };
             let added = shared
-                .write_with_retries(|| shared.store.add_slice(claim, &slice))
+                .write_with_retries(StoragePlace::Table, || {
+                    shared.store.add_slice(claim, &slice)
+                })
                 .await?;
             if !added {
                 if let StoredResult::Blob(key, _) = &slice.result {

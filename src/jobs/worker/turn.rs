@@ -17,6 +17,7 @@ use crate::jobs::attempts::outcome::Work;
 use crate::jobs::attempts::solver_thread::{Counted, SolverThread};
 use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
+use crate::jobs::storage_fault::StoragePlace;
 use crate::jobs::store::claim::ReleaseReason;
 use crate::jobs::worker::begin;
 use crate::jobs::worker::pool::{StepReport, Turn, Worker};
@@ -89,7 +90,9 @@ impl Worker {
         if attempt.begun() || attempt.suspect {
             let solving = attempt.claims(|phase| matches!(phase, Phase::Solving));
             shared
-                .write_with_retries(|| shared.store.set_solving(&solving, true))
+                .write_with_retries(StoragePlace::Table, || {
+                    shared.store.set_solving(&solving, true)
+                })
                 .await?;
         }
         if !attempt.begun() {
@@ -104,7 +107,9 @@ impl Worker {
             attempt.close();
             let held = attempt.claims(|phase| matches!(phase, Phase::Solving));
             shared
-                .write_with_retries(|| shared.store.set_solving(&held, false))
+                .write_with_retries(StoragePlace::Table, || {
+                    shared.store.set_solving(&held, false)
+                })
                 .await?;
         }
         Ok(turn)
