@@ -21,7 +21,6 @@ use crate::http::extract::titles::{
 };
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::codec::arrow;
 use crate::jobs::codec::table::{COLUMNS_MAX, TableColumn};
 use crate::jobs::run::head::converted;
