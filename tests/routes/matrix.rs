@@ -332,7 +332,7 @@ fn answers(solution: &Solution) -> Vec<Answer> {
                 remarks: solution
                     .remarks
                     .iter()
-                    .map(|remark| remark.code.to_owned())
+                    .map(|remark| remark.code.clone())
                     .collect(),
             }
         })
