@@ -93,10 +93,10 @@ fn rest(problem: &CheckedCase) -> u32 {
         friction_share: 0.0,
         accuracy: Accuracy::For(problem.run.target()),
     };
-    let search = contact.search().expect("a wheel over a rail");
+    let mut search = contact.search().expect("a wheel over a rail");
     let workspace = &mut GridWorkspace::default();
     let start = HeightStart::default();
-    let found = contact.find_height(&search, wanted, start, workspace, &Unmonitored);
+    let found = contact.find_height(&mut search, wanted, start, workspace, &Unmonitored);
     found.expect("a rest").heights
 }
 

@@ -136,7 +136,7 @@ impl<'a> WheelSolve<'a> {
         let began = self.monitor.elapsed();
         let wheel = self
             .contact
-            .find_height(&self.search, wanted, start, workspace, &watch);
+            .find_height(&mut self.search, wanted, start, workspace, &watch);
         let wheel = wheel.map_err(|failure| watch.explained(failure.into(), self.case))?;
         if matches!(wanted.accuracy, Accuracy::For(_)) {
             self.judge.before(&wheel)?;

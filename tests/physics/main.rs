@@ -80,6 +80,7 @@ mod profile_robustness;
 mod profile_shapes;
 mod profile_solutions;
 mod profile_trust;
+mod profile_verdicts;
 mod profile_worn;
 #[path = "../../benches/stress/random.rs"]
 mod random;

@@ -11,8 +11,12 @@ use serde_json::{Value, json};
 use crate::profile_cases::{generated, put};
 use crate::profile_worn::{solved, worn};
 
-/// Where the wheel comes nearest to the rail, from the middle of the rail in mm, and the radius in mm of the clearance there.
-const LOBES: [(f64, f64); 2] = [(-12.0, 500.0), (-29.3, 30.0)];
+/// Where a worn wheel comes nearest to the rail, from the middle of the rail in mm, the radius of the clearance there and its least value, in
+/// mm.
+type Lobe = (f64, f64, f64);
+
+/// Tread and gauge corner, 17 mm apart.
+const LOBES: [Lobe; 2] = [(-12.0, 500.0, 0.0), (-29.3, 30.0, 0.0)];
 /// Clearances of two lobes blend where they differ by less than this, in mm.
 const BLEND: f64 = 0.01;
 /// Half of the rail's head that the wheel follows, from its middle in mm: beyond, the gauge face is too steep for a height over y.
@@ -22,15 +26,11 @@ const TIP: f64 = 28.0;
 const FLANGE_SLOPE: f64 = 2.5;
 
 /// Height in mm of the worn wheel over the rail, `y` mm from the middle of the rail.
-fn clearance(y: f64) -> f64 {
-    let near =
-        |(middle, radius): (f64, f64)| (-(y - middle).powi(2) / (2.0 * radius * BLEND)).exp();
-    let sum: f64 = LOBES.into_iter().map(near).sum();
-    // Far from both lobes the sum vanishes, and the nearest lobe is what is left of it.
-    let least = LOBES
-        .into_iter()
-        .map(|(middle, radius)| (y - middle).powi(2) / (2.0 * radius))
-        .fold(f64::INFINITY, f64::min);
+fn clearance(lobes: &[Lobe], y: f64) -> f64 {
+    let of = |(middle, radius, least): &Lobe| (y - middle).powi(2) / (2.0 * radius) + least;
+    let sum: f64 = lobes.iter().map(|lobe| (-of(lobe) / BLEND).exp()).sum();
+    // Far from all lobes the sum vanishes, and the nearest lobe is what is left of it.
+    let least = lobes.iter().map(of).fold(f64::INFINITY, f64::min);
     if sum > 1e-200 {
         -BLEND * sum.ln()
     } else {
@@ -48,7 +48,7 @@ fn geometry(case: &Value) -> WheelRail {
 }
 
 /// Points of the wheel, z down: the rail's own shape with the clearance, then a straight flange with its tip.
-fn worn_wheel(case: &Value) -> Vec<[f64; 2]> {
+fn worn_wheel(case: &Value, lobes: &[Lobe]) -> Vec<[f64; 2]> {
     let geometry = geometry(case);
     let sign = geometry.placement.side.sign();
     let [rail, wheel] = geometry.parameters(0.1);
@@ -68,7 +68,7 @@ fn worn_wheel(case: &Value) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = head
         .into_iter()
         .filter(|[y, _]| (FOLLOWED[0]..=FOLLOWED[1]).contains(&(y - centre)))
-        .map(|[y, z]| [y - shift[0], -(z + clearance(y - centre) - shift[1])])
+        .map(|[y, z]| [y - shift[0], -(z + clearance(lobes, y - centre) - shift[1])])
         .collect();
     points.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let level = points[points.len() / 2][1];
@@ -91,8 +91,12 @@ fn worn_wheel(case: &Value) -> Vec<[f64; 2]> {
 
 /// The worn wheel on a new rail 60E1, as it was worn.
 pub fn conforming() -> Value {
+    worn_with(&LOBES)
+}
+
+fn worn_with(lobes: &[Lobe]) -> Value {
     let case = generated();
-    let wheel = worn_wheel(&case);
+    let wheel = worn_wheel(&case, lobes);
     let back = wheel[0][0];
     put(
         &case,
@@ -220,4 +224,137 @@ fn patches_in_gaps_of_their_own_are_told_with_what_they_would_exchange() {
     assert!(text.contains("% of the load"), "{text}");
     let one = put(&generated(), "contact", json!({ "lateral_shift_mm": -1.0 }));
     assert_eq!(told(&solved(&one).expect("an answer")), None);
+}
+
+/// Places of a patch across the track: its ends along the rail in mm, and the inclination of the rail there in rad.
+struct Place {
+    /// The load centre of its gap.
+    origin: [f64; 3],
+    ends: [f64; 2],
+    angle: f64,
+    own_angle: f64,
+    force: f64,
+}
+
+fn places(case: &Value, solution: &Solution) -> Vec<Place> {
+    let geometry = geometry(case);
+    let [rail, _] = geometry.parameters(0.02);
+    let inclination = |y: f64, z: f64| {
+        let apart = |s: &f64| {
+            let at = geometry.rail_at(*s).at;
+            (at[0] - y).hypot(at[1] - z)
+        };
+        let nearest = rail.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        let [dy, dz] = geometry.rail_at(*nearest.expect("a rail")).slope;
+        (dz / dy).atan()
+    };
+    let place = |patch: &railhead::contact::solution::words::answer::PatchSolution| {
+        let position = patch.position.expect("a place");
+        let [.., low, high] = patch.extent_mm;
+        let [_, y, z] = position.track_mm;
+        Place {
+            origin: position.origin_track_mm,
+            ends: [low, high],
+            angle: position.contact_angle_rad,
+            own_angle: inclination(y, z),
+            force: patch.normal_force_n,
+        }
+    };
+    solution.patches.iter().map(place).collect()
+}
+
+/// Tread and flange 32 mm apart and inclined to each other by 0.6 rad, with a gap of about 70 µm all the way between them, in which nothing
+/// carries pressure.
+#[test]
+fn a_thin_overlap_between_two_places_does_not_put_them_into_one_plane() {
+    let lateral: Vec<f64> = [0.0, 0.005, 0.02]
+        .into_iter()
+        .map(|lift| {
+            let lobes = [
+                (1.5, 600.0, 0.0),
+                (-30.6, 40.0, 0.045),
+                (-14.0, 2000.0, 0.066 + lift),
+            ];
+            let mut case = put(
+                &worn_with(&lobes),
+                "contact",
+                json!({ "accept_rough_profiles": true }),
+            );
+            case["load"] = json!({ "vertical_force_n": 100e3 });
+            let solution = solved(&case).expect("an answer");
+            let places = places(&case, &solution);
+            let total: f64 = places.iter().map(|place| place.force).sum();
+            for place in places.iter().filter(|place| place.force > 0.05 * total) {
+                assert!(
+                    (place.angle - place.own_angle).abs() < 0.03,
+                    "{lift}: {} on a rail at {}",
+                    place.angle,
+                    place.own_angle
+                );
+            }
+            assert!(places.iter().any(|place| place.own_angle.abs() > 0.45));
+            solution.total[0].force_y_n
+        })
+        .collect();
+    for other in &lateral[1..] {
+        assert!((other / lateral[0] - 1.0).abs() < 0.04, "{lateral:?}");
+    }
+}
+
+/// Whatever the pair and its place: neighbours in one plane are no more than 8 mm apart, and no two differ by more than half a radian.
+#[test]
+fn patches_far_apart_or_inclined_to_each_other_never_share_a_plane() {
+    let mut random = crate::random::Random(17);
+    let mut shared = 0;
+    for round in 0..24 {
+        let base = if round % 2 == 0 {
+            generated()
+        } else {
+            let lobes = [
+                (random.between(-8.0, 6.0), random.decades(200.0, 900.0), 0.0),
+                (
+                    random.between(-32.0, -26.0),
+                    random.decades(20.0, 60.0),
+                    random.between(0.0, 0.06),
+                ),
+                (
+                    random.between(-22.0, -10.0),
+                    random.decades(100.0, 3000.0),
+                    random.between(0.02, 0.12),
+                ),
+            ];
+            worn_with(&lobes)
+        };
+        let shift = if round % 2 == 0 {
+            random.between(-6.5, 1.0)
+        } else {
+            random.between(-0.3, 0.1)
+        };
+        let mut case = put(
+            &base,
+            "contact",
+            json!({ "lateral_shift_mm": shift, "yaw_rad": random.between(-0.004, 0.004), "accept_rough_profiles": true }),
+        );
+        case["load"] = json!({ "vertical_force_n": random.decades(2e4, 1.5e5) });
+        case["solver"] = json!({ "target_error": 0.02, "method": "fastsim" });
+        let Ok(solution) = solved(&case) else {
+            continue;
+        };
+        let places = places(&case, &solution);
+        for pair in places.chunk_by(|a, b| a.origin == b.origin) {
+            shared += usize::from(pair.len() > 1);
+            for (k, one) in pair.iter().enumerate() {
+                let reached = pair[..=k].iter().map(|p| p.ends[1]).fold(f64::MIN, f64::max);
+                if let Some(next) = pair.get(k + 1) {
+                    assert!(next.ends[0] - reached < 8.3, "{round}");
+                }
+                for other in &pair[k + 1..] {
+                    let turned = (one.own_angle - other.own_angle).abs();
+                    // Mean inclinations under the pressure decide, not those at the load centres.
+                    assert!(turned < 0.55, "{round}: {turned}");
+                }
+            }
+        }
+    }
+    assert!(shared > 0);
 }

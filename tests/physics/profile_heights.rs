@@ -35,7 +35,7 @@ fn wheel_at(shift: f64) -> Arc<WheelTask> {
 }
 
 fn rest(wheel: &WheelTask, from: Option<&WheelContact>) -> WheelContact {
-    let search = wheel.search().expect("a wheel over a rail");
+    let mut search = wheel.search().expect("a wheel over a rail");
     let start = from.map(|known| HeightStart::of_other_profiles(known, search.touch));
     let wanted = NormalPass {
         friction_share: 0.0,
@@ -43,7 +43,7 @@ fn rest(wheel: &WheelTask, from: Option<&WheelContact>) -> WheelContact {
     };
     let workspace = &mut GridWorkspace::default();
     let start = start.unwrap_or_default();
-    let found = wheel.find_height(&search, wanted, start, workspace, &Unmonitored);
+    let found = wheel.find_height(&mut search, wanted, start, workspace, &Unmonitored);
     found.expect("a rest")
 }
 

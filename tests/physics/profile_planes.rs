@@ -141,6 +141,39 @@ fn a_cone_leaves_nothing_open_and_a_hollow_wheel_does() {
     assert_eq!(told(&solve(&cone).0), None);
     let share = told(&solve(&hollow).0).expect("a remark");
     assert!((0.02..0.06).contains(&share), "{share}");
-    hollow["motion"] = json!({ "creepage_x": 0.001 });
-    assert_eq!(told(&solve(&hollow).0), None, "these are the plane's own");
+}
+
+/// A figure of the remark on the plane.
+fn figure(solution: &Solution, name: &str) -> f64 {
+    let remark = solution.remarks.iter().find(|remark| remark.code == "plane-of-contact");
+    match remark.and_then(|remark| remark.figures.get(name).cloned()) {
+        Some(Figure::Number(value)) => value,
+        _ => 0.0,
+    }
+}
+
+/// Creepages that the case gives are those of the plane, but its normals are not those of a gauge corner.
+#[test]
+fn the_normals_are_open_where_creepages_are_given_as_well() {
+    let corner = put(
+        &generated(),
+        "contact",
+        json!({ "lateral_shift_mm": -5.9, "roll_rad": -0.0006 }),
+    );
+    let mut given = corner.clone();
+    given["motion"] = json!({ "creepage_x": 0.001 });
+    let found = solve(&given).0;
+    assert_eq!(figure(&found, "share"), figure(&found, "of_normals"));
+    assert!(figure(&found, "share") > 0.02, "{:?}", found.remarks);
+    // The same normals as with the motion of the wheelset.
+    let mut moving = corner;
+    moving["motion"] =
+        json!({ "wheelset": { "speed_mm_per_s": 2000, "free_rolling_radius_mm": 461 } });
+    let found_moving = solve(&moving).0;
+    let share = figure(&found_moving, "of_normals");
+    assert!((share / figure(&found, "of_normals") - 1.0).abs() < 0.3, "{share}");
+    // On the tread nothing is open.
+    let mut tread = put(&generated(), "contact", json!({ "lateral_shift_mm": 3.0 }));
+    tread["motion"] = json!({ "creepage_x": 0.001 });
+    assert_eq!(told(&solve(&tread).0), None);
 }

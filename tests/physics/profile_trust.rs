@@ -85,6 +85,61 @@ fn a_hole_of_50_mm_at_the_crown_is_no_contact() {
     assert!(!blamed(&found).is_empty());
 }
 
+/// A straight face of the head needs no points between its ends, whatever the load.
+#[test]
+fn a_straight_face_far_from_the_wheel_is_no_hole() {
+    for (field, length) in [(true, 12.7), (true, 25.0), (false, 12.7)] {
+        let mut rail: Vec<[f64; 2]> = rail_60e1();
+        rail.retain(|at| at[1] < 14.0);
+        if !field {
+            rail.reverse();
+        }
+        let [y, z] = rail[rail.len() - 1];
+        let outward = if field { 1.0 } else { -1.0 };
+        rail.extend((0..6).map(|k| {
+            let further = f64::from(k);
+            [y + outward * (0.04 + 0.02 * further), z + length + 0.3 * further]
+        }));
+        for force in [5e3, 20e3, 75e3] {
+            let mut case = on_rail(&rail);
+            case["load"] = json!({ "vertical_force_n": force });
+            let found = solved(&case);
+            assert!(!has(&found, "profile-hole"), "{:?}", found.remarks);
+        }
+    }
+}
+
+/// A face that ends the head next to the contact makes no bump on it.
+#[test]
+fn a_sharp_corner_beside_the_contact_changes_no_pressure() {
+    let sound = solved(&on_rail(&rail_60e1()));
+    let edge = sound.patches[0].quality.clone().expect("a quality").rail.y_mm[1] + 1.5;
+    let mut rail: Vec<[f64; 2]> = rail_60e1();
+    rail.retain(|at| at[0] < edge);
+    let [y, z] = rail[rail.len() - 1];
+    rail.extend((1..8).map(|k| [y + 0.01 * f64::from(k), z + 3.0 * f64::from(k)]));
+    let found = solved(&on_rail(&rail));
+    let change = pressure_max(&found) / pressure_max(&sound) - 1.0;
+    assert!(change.abs() < 1e-3, "{change}");
+    assert!(!has(&found, "profile-waves"), "{:?}", found.remarks);
+}
+
+/// The row of a measurement that was taken out by hand and came back.
+#[test]
+fn a_point_far_off_among_coarse_points_is_named_with_its_place() {
+    let points = resampled(&rail_60e1(), 1.2);
+    let middle = points.partition_point(|at| at[0] < -3.0);
+    for off in [0.3, -0.3] {
+        let mut rail = points.clone();
+        rail[middle][1] += off;
+        let found = solved(&accepted(&on_rail(&rail)));
+        let told = found.remarks.iter().find(|r| r.code == "profile-outlier");
+        let told = told.unwrap_or_else(|| panic!("{:?}", found.remarks));
+        let at = serde_json::to_value(told).expect("JSON")["at_y_mm"].as_f64();
+        assert!((at.expect("a place") - points[middle][0]).abs() < 1e-3, "{told:?}");
+    }
+}
+
 #[test]
 fn a_hole_of_8_mm_and_every_tenth_point_are_told_or_refused() {
     let sound = pressure_max(&solved(&on_rail(&rail_60e1())));

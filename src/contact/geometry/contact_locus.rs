@@ -210,7 +210,7 @@ impl<'g> ContactLocus<'g> {
     pub fn frames(&self, lowering: f64) -> Result<Vec<Frame>, String> {
         self.overlaps(lowering)?
             .into_iter()
-            .map(|overlap| Ok(self.frame(self.around(overlap.ends), lowering)))
+            .map(|overlap| Ok(self.frame_of(overlap, lowering)))
             .collect()
     }
 
@@ -313,11 +313,6 @@ impl<'g> ContactLocus<'g> {
         }
     }
 
-    /// Clearance on a line along the rail's normal, with the wheel lowered below first touch; in mm.
-    pub(crate) fn clearance(&self, line: &LocusPoint, lowering: f64) -> f64 {
-        (line.clearance - lowering) * self.inclination(line).cos
-    }
-
     /// The inclination of the rail's surface on a line.
     pub(crate) fn inclination(&self, line: &LocusPoint) -> Inclination {
         *self.rail.inclinations[line.of_rail].get_or_make(|| inclination(self.geometry, line.rail))
@@ -330,7 +325,7 @@ impl<'g> ContactLocus<'g> {
         detail: GapSampling,
     ) -> Result<LocalGap, String> {
         let lines = self.around(overlap.ends);
-        let frame = self.frame(lines, lowering);
+        let frame = self.frame_of(overlap, lowering);
         let plane = frame.plane();
         let v_of = |line: &LocusPoint| plane.across(self.geometry.rail_at(line.rail).at)[0];
         let mut across = [f64::INFINITY, f64::NEG_INFINITY];

@@ -3,15 +3,16 @@
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::Body;
 
-/// Length in mm below which a chord is not a hole.
+/// Length in mm below which a chord is not a hole, and over which the direction of the profile at the end of a hole is taken.
 const LENGTH_MIN: f64 = 1.0;
 /// Length relative to the width of the contact below which a chord is not a hole.
 const WIDTH_MIN: f64 = 1.0;
 /// Length relative to the width of the contact above which a chord may hold the whole contact.
 const WIDE: f64 = 1.5;
-/// Radius R in mm that a surface is assumed to have between two points, so that a chord c may hide a height of `c²/(8 R)`. Gauge corners
-/// and flange roots have radii of 10 to 20 mm.
-const RADIUS_HIDDEN: f64 = 20.0;
+/// Distance in mm of the places at which the other body is compared with a chord.
+const STEP: f64 = 0.1;
+/// Largest slope of a tangent at the end of a chord; a steeper one bounds nothing.
+const SLOPE_MAX: f64 = 1e3;
 
 /// A chord without points over which the bodies may touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,28 +33,44 @@ impl Hole {
     }
 }
 
-/// The chords that may hide a height larger than the clearance of the bodies over them, with the wheel lowered by `lowering` mm below first
-/// touch; `width` in mm is that of the widest patch.
+/// The chords over which the other body comes within the largest bulge that the tangents at their ends allow, with the wheel lowered by
+/// `lowering` mm below first touch; `width` in mm is that of the widest patch.
 #[must_use]
 pub fn holes(search: &ContactLocus, lowering: f64, width: f64) -> Vec<Hole> {
+    let geometry = search.geometry;
+    let sign = geometry.placement.side.sign();
+    let height = search.touch - lowering;
+    let rail = |s: f64| Some(geometry.rail_at(s).at);
+    let wheel = |s: f64| geometry.lowest(s).map(|[_, y, z]| [y, z + height]);
+    let of: [&dyn Fn(f64) -> Option<[f64; 2]>; 2] = [&rail, &wheel];
+    let places = geometry.parameters(STEP);
     let mut found = Vec::new();
-    let profiles = search.geometry.profiles();
-    for (body, profile) in [Body::Rail, Body::Wheel].into_iter().zip(profiles) {
-        for pair in profile.points().along.windows(2) {
+    for (k, body) in [Body::Rail, Body::Wheel].into_iter().enumerate() {
+        let mut other: Option<Vec<[f64; 2]>> = None;
+        let along = geometry.profiles()[k].points().along;
+        // A rail bulges upward and a wheel downward.
+        let outward = [sign, -sign][k];
+        for (from, pair) in along.windows(2).enumerate() {
             let length = pair[1] - pair[0];
             if length < Hole::least(width) {
                 continue;
             }
-            let over = search.lines.iter().filter(|line| {
-                let place = match body {
-                    Body::Rail => line.rail,
-                    Body::Wheel => line.wheel,
-                };
-                (pair[0]..=pair[1]).contains(&place)
+            let before = along[..from]
+                .iter()
+                .rfind(|s| pair[0] - **s >= LENGTH_MIN);
+            let after = along[from + 2..]
+                .iter()
+                .find(|s| **s - pair[1] >= LENGTH_MIN);
+            let [before, after] = [before, after].map(|s| of[k](*s?));
+            let (Some(start), Some(end)) = (of[k](pair[0]), of[k](pair[1])) else {
+                continue;
+            };
+            let bulge = Bulge::new([start, end], [before, after], outward);
+            let other = other.get_or_insert_with(|| {
+                let places = places[1 - k].iter();
+                places.filter_map(|s| of[1 - k](*s)).collect()
             });
-            let clearance = |line: &_| -> f64 { search.clearance(line, lowering) };
-            let least = over.map(clearance).fold(f64::INFINITY, f64::min);
-            if least < length * length / (8.0 * RADIUS_HIDDEN) {
+            if other.iter().any(|at| bulge.holds(*at, lowering)) {
                 found.push(Hole {
                     body,
                     chord: [pair[0], pair[1]],
@@ -63,4 +80,98 @@ pub fn holes(search: &ContactLocus, lowering: f64, width: f64) -> Vec<Hole> {
         }
     }
     found
+}
+
+/// The region between a chord and the tangents at its ends: whatever the surface is between two points, it lies there if its curvature has
+/// one sign.
+struct Bulge {
+    start: [f64; 2],
+    /// Unit vectors along the chord and away from the body.
+    axes: [[f64; 2]; 2],
+    length: f64,
+    /// Slopes of the tangents away from the body, seen from both ends of the chord.
+    slopes: [f64; 2],
+}
+
+impl Bulge {
+    /// The bulge of a chord, with the points before and after it where there are any. The tangents are those of the chords before and after,
+    /// which are steeper than the surface itself.
+    fn new(
+        [start, end]: [[f64; 2]; 2],
+        [before, after]: [Option<[f64; 2]>; 2],
+        outward: f64,
+    ) -> Bulge {
+        let [y, z] = [end[0] - start[0], end[1] - start[1]];
+        let length = y.hypot(z);
+        let axis = [y / length, z / length];
+        let axes = [axis, [-outward * axis[1], outward * axis[0]]];
+        let slope = |from: [f64; 2], to: [f64; 2]| {
+            let step = [to[0] - from[0], to[1] - from[1]];
+            let [along, up] = axes.map(|axis| axis[0] * step[0] + axis[1] * step[1]);
+            if along > 0.0 {
+                (up / along).clamp(-SLOPE_MAX, SLOPE_MAX)
+            } else {
+                SLOPE_MAX.copysign(up)
+            }
+        };
+        Bulge {
+            start,
+            axes,
+            length,
+            slopes: [
+                before.map_or(0.0, |before| slope(before, start)),
+                after.map_or(0.0, |after| -slope(end, after)),
+            ],
+        }
+    }
+
+    /// Height in mm that the surface may have over a place `t` from 0 to 1 of the chord. Where only one tangent leads away from the body, it
+    /// is that of the cubic that leaves along this tangent and arrives along the chord.
+    fn height(&self, t: f64) -> f64 {
+        let [start, end] = self.slopes.map(|slope| slope * self.length);
+        if start > 0.0 && end > 0.0 {
+            (start * t).min(end * (1.0 - t))
+        } else {
+            start.max(0.0) * t * (1.0 - t).powi(2) + end.max(0.0) * t.powi(2) * (1.0 - t)
+        }
+    }
+
+    /// Whether a point of the other body lies in the bulge, or overlaps the chord by no more than `overlap` mm.
+    fn holds(&self, at: [f64; 2], overlap: f64) -> bool {
+        let from = [at[0] - self.start[0], at[1] - self.start[1]];
+        let [along, up] = self.axes.map(|axis| axis[0] * from[0] + axis[1] * from[1]);
+        let t = along / self.length;
+        (0.0..=1.0).contains(&t) && -overlap <= up && up < self.height(t)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A point of a circle of 20 mm about the origin.
+    fn arc(angle: f64) -> [f64; 2] {
+        [20.0 * angle.sin(), 20.0 * angle.cos()]
+    }
+
+    #[test]
+    fn an_arc_lies_in_its_bulge_and_twice_its_height_does_not() {
+        let ends = [arc(-0.3), arc(0.3)];
+        let bulge = Bulge::new(ends, [Some(arc(-0.4)), Some(arc(0.4))], 1.0);
+        for k in -9..=9 {
+            assert!(bulge.holds(arc(0.03 * f64::from(k)), 0.0), "{k}");
+        }
+        let sagitta = 20.0 - ends[0][1];
+        assert!(!bulge.holds([0.0, 20.0 + 2.0 * sagitta], 0.0));
+        // Seen from the other side of the chord the arc is hollow.
+        let hollow = Bulge::new(ends, [Some(arc(-0.4)), Some(arc(0.4))], -1.0);
+        assert!(!hollow.holds([0.0, ends[0][1] - 0.01], 0.0));
+    }
+
+    #[test]
+    fn a_straight_stretch_bulges_nowhere() {
+        let bulge = Bulge::new([[0.0, 0.0], [0.0, -12.0]], [Some([0.0, 1.0]), None], 1.0);
+        assert!(!bulge.holds([1e-6, -6.0], 0.0));
+        assert!(bulge.holds([-1e-6, -6.0], 0.1));
+    }
 }

@@ -2,6 +2,7 @@
 
 pub mod conicity;
 pub mod contact_locus;
+pub mod corner;
 pub mod crossing;
 pub mod envelope;
 mod estimated_force;

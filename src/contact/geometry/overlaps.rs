@@ -2,14 +2,16 @@
 //!
 //! Whether neighbouring overlaps share a gap is a matter of thresholds, and the force changes where one is crossed. So that no force
 //! jumps while a height is sought, this is decided once, for a lowering near the one that is expected ([`ContactLocus::grouped_near`]), and
-//! holds for every height.
+//! holds for every height. The pressure found at rest may show patches of one gap that must not share a frame
+//! ([`ContactLocus::regrouped`]); the height is then sought once more with a cut between them.
 
 use crate::contact::geometry::contact_locus::{ContactLocus, STEP};
-use crate::contact::geometry::grouping::{Grouping, Overlap, SHARED_GAP_DISTANCE};
+use crate::contact::geometry::frame::Frame;
+use crate::contact::geometry::grouping::{
+    Group, Grouping, LoadedLines, LoadedPatch, Overlap, SHARED_GAP_ANGLE, SHARED_GAP_DISTANCE,
+    group_of, sharing_a_frame,
+};
 use crate::contact::geometry::locus_lines::LocusPoint;
-
-/// Overlaps nearer than [`SHARED_GAP_DISTANCE`] share a gap if their mean inclinations differ by less than this, in rad.
-const SHARED_GAP_ANGLE: f64 = 0.5;
 
 /// An overlap is cut where it is thinner than this fraction of the lobes on both sides. By Hertz's law two bodies touch where they
 /// overlap by more than half of the deepest overlap, so that a lobe may be cut where it is thin. 0.25 and 0.5 change none
@@ -26,6 +28,8 @@ const GROUPED_RATIO: f64 = 4.0;
 /// Groups merge where the overlap between them is deeper than this fraction of the lobes on both sides. 0.4 and 0.8 change none of
 /// the same states.
 const MERGED: f64 = 0.6;
+/// A frame that was inclined as the rail under the load is inclined anew if that has changed by more than this, in rad: it turns forces by 0.5 %.
+const LOADED_ANGLE: f64 = 0.005;
 
 impl ContactLocus<'_> {
     /// The same with the overlaps divided among gaps, at every height, as near the lowering that is given in mm.
@@ -37,13 +41,51 @@ impl ContactLocus<'_> {
         let start = GROUPED_AT * GROUPED_RATIO.powf(rung);
         let at = |halvings: i32| start * 0.5_f64.powi(halvings);
         let found = (0..HALVINGS).find_map(|k| self.divided(at(k), None).ok());
-        let groups = |found: Vec<Overlap>| found.iter().map(|overlap| overlap.ends).collect();
         ContactLocus {
-            grouping: found.map(|found| Grouping {
-                groups: groups(found),
-            }),
+            grouping: found.map(|found| grouping_of(&found)),
             ..self
         }
+    }
+
+    /// A grouping in which the patches of every gap may share a frame, and every gap that was cut for that has the inclination of the rail
+    /// where it carries its load; `None` if that is so already. `loaded` are the patches under pressure, gap by gap, and `lowering` the
+    /// height in mm at which they were found.
+    pub(crate) fn regrouped(
+        &self,
+        loaded: &[Vec<LoadedPatch>],
+        lowering: f64,
+    ) -> Option<Grouping> {
+        let mut grouping = match &self.grouping {
+            Some(known) => known.clone(),
+            None => grouping_of(&self.overlaps(lowering).ok()?),
+        };
+        let mut changed = false;
+        for patches in loaded {
+            let parts = sharing_a_frame(patches);
+            let whole = group_of(patches);
+            let Some(k) = grouping.of(whole.lines) else {
+                continue;
+            };
+            let angles = grouping.groups[k].loaded.zip(whole.loaded);
+            let turned = angles.is_some_and(|(known, found)| {
+                (known.angle - found.angle).abs() > LOADED_ANGLE
+            });
+            if parts.len() > 1 || turned {
+                let groups = parts.into_iter().map(group_of);
+                grouping.groups.splice(k..=k, groups);
+                changed = true;
+            }
+        }
+        changed.then_some(grouping)
+    }
+
+    /// The number of the line nearest to a parameter of the rail in mm.
+    pub(crate) fn line_at(&self, rail: f64) -> usize {
+        let apart = |k: &usize| (self.lines[*k].rail - rail).abs();
+        let lines = 0..self.lines.len();
+        lines
+            .min_by(|a, b| apart(a).total_cmp(&apart(b)))
+            .unwrap_or(0)
     }
 
     /// The lines that overlap, gap by gap.
@@ -68,6 +110,7 @@ impl ContactLocus<'_> {
                 ends: [first, last],
                 cut: [false; 2],
                 near: [false; 2],
+                loaded: None,
             };
             let lobes = match grouping {
                 None => self.lobes(whole, lowering),
@@ -87,6 +130,9 @@ impl ContactLocus<'_> {
             found[k - 1].near[1] = true;
             found[k].near[0] = true;
         }
+        for overlap in &mut found {
+            overlap.loaded = grouping.and_then(|grouping| grouping.loaded(overlap.ends));
+        }
         Ok(found)
     }
 
@@ -96,7 +142,9 @@ impl ContactLocus<'_> {
         let (depths, _) = self.depths(whole, lowering);
         let mut lobes = vec![whole];
         for pair in grouping.groups.windows(2) {
-            let (low, high) = (pair[0][1].min(pair[1][0]), pair[0][1].max(pair[1][0]));
+            let ends = [pair[0].lines[1], pair[1].lines[0]];
+            let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+            let apart = pair[0].loaded.is_some() && pair[1].loaded.is_some();
             // Beside an overlap nothing is cut: groups end there by themselves.
             if low <= first || high >= last {
                 continue;
@@ -105,8 +153,13 @@ impl ContactLocus<'_> {
                 .min_by(|a, b| depths[a - first].total_cmp(&depths[b - first]))
                 .unwrap_or(low);
             let deepest = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
+            let [from, to] = lobes[lobes.len() - 1].ends;
+            if thinnest <= from || thinnest >= to {
+                continue;
+            }
             let sides = depths.split_at(thinnest - first);
-            if depths[thinnest - first] > MERGED * deepest(sides.0).min(deepest(sides.1)) {
+            if !apart && depths[thinnest - first] > MERGED * deepest(sides.0).min(deepest(sides.1))
+            {
                 continue;
             }
             if let Some(rest) = lobes.pop() {
@@ -185,6 +238,23 @@ impl ContactLocus<'_> {
         &self.lines[first - 1..=last + 1]
     }
 
+    /// The frame of an overlap: where it carries pressure, if that is known.
+    pub(crate) fn frame_of(&self, overlap: Overlap, lowering: f64) -> Frame {
+        let [first, last] = overlap.ends;
+        let lines = |loaded: &LoadedLines| [loaded.lines[0].max(first), loaded.lines[1].min(last)];
+        let overlaps = |loaded: &LoadedLines| {
+            let [low, high] = lines(loaded);
+            (low..=high).any(|k| self.lines[k].clearance < lowering)
+        };
+        match overlap.loaded.filter(overlaps) {
+            None => self.frame(self.around(overlap.ends), lowering),
+            Some(loaded) => Frame {
+                angle: loaded.angle,
+                ..self.frame(self.around(lines(&loaded)), lowering)
+            },
+        }
+    }
+
     /// How deep the bodies overlap along the normal, line by line, and where most.
     fn depths(&self, overlap: Overlap, lowering: f64) -> (Vec<f64>, usize) {
         let [first, last] = overlap.ends;
@@ -196,8 +266,17 @@ impl ContactLocus<'_> {
     }
 
     /// The lines beyond which an overlap touches nothing that belongs to its gap, toward another gap; none where there is no
-    /// other gap. A cut overlap gets thin before its end, a whole one ends where the bodies do not overlap any more.
+    /// other gap. A cut overlap gets thin before its end, a whole one ends where the bodies do not overlap any more. One whose patches are known ends
+    /// next to them.
     pub(crate) fn limits(&self, overlap: Overlap, lowering: f64) -> [Option<LocusPoint>; 2] {
+        if let Some(loaded) = overlap.loaded {
+            let [low, high] = loaded.limits();
+            let limits = [low.max(overlap.ends[0]), high.min(overlap.ends[1])];
+            let limit = |side: usize| self.lines[limits[side]];
+            return [0, 1].map(|side| {
+                (overlap.cut[side] || overlap.near[side]).then(|| limit(side))
+            });
+        }
         let (depths, main) = self.depths(overlap, lowering);
         let thin = |k: &usize| depths[*k] <= THIN_OVERLAP * depths[main];
         let thin_ends = [
@@ -222,5 +301,15 @@ impl ContactLocus<'_> {
     fn cut_off(&self, line: usize) -> String {
         let line = self.lines[line];
         self.geometry.cut_off([line.rail, line.wheel])
+    }
+}
+
+fn grouping_of(overlaps: &[Overlap]) -> Grouping {
+    let group = |overlap: &Overlap| Group {
+        lines: overlap.ends,
+        loaded: None,
+    };
+    Grouping {
+        groups: overlaps.iter().map(group).collect(),
     }
 }

@@ -1,8 +1,9 @@
 //! A plane curve whose coordinates are cubics between common knots, prepared for many evaluations.
 
+use crate::contact::geometry::corner::is_corner;
 use crate::contact::numerics::spline::Spline;
 
-/// A curve `[y, z]` in mm over a parameter in mm, twice continuously differentiable, straight beyond its ends.
+/// A curve `[y, z]` in mm over a parameter in mm, twice continuously differentiable except at sharp corners, straight beyond its ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlaneCurve {
     /// First and last parameter.
@@ -50,31 +51,53 @@ impl CurvePoint {
 }
 
 impl PlaneCurve {
-    /// The curve of two splines with the same knots.
+    /// The curve through points `at` in mm, whose parameters are `along`: splines that end at sharp corners. Waves shorter than about
+    /// `cut_wavelength` mm are smoothed away, 0 for interpolation.
     #[must_use]
-    pub fn new(y: &Spline, z: &Spline) -> PlaneCurve {
-        let knots = y.knots();
-        let intervals = knots.len() - 1;
-        let between = |i: usize| {
-            let (y, z) = (y.cubic(i), z.cubic(i));
-            CurveInterval {
-                ends: [knots[i], knots[i + 1]],
-                cubic: [0, 1, 2, 3].map(|power| [y[power], z[power]]),
-            }
+    pub fn through(at: &[[f64; 2]], along: &[f64], cut_wavelength: f64) -> PlaneCurve {
+        let last = at.len() - 1;
+        let corners = (1..last).filter(|k| is_corner(at, *k));
+        let ends: Vec<usize> = std::iter::once(0).chain(corners).chain([last]).collect();
+        let piece = |pair: &[usize]| {
+            let (from, to) = (pair[0], pair[1]);
+            [0, 1].map(|part| {
+                let values: Vec<f64> = at[from..=to].iter().map(|at| at[part]).collect();
+                let pinned = [from > 0, to < last];
+                Spline::pinned(&along[from..=to], &values, cut_wavelength, pinned)
+            })
         };
+        let pieces: Vec<[Spline; 2]> = ends.windows(2).map(piece).collect();
+        PlaneCurve::new(&pieces)
+    }
+
+    /// The curve of pieces, each two splines with the same knots, one after the other.
+    fn new(pieces: &[[Spline; 2]]) -> PlaneCurve {
+        let cubics = |[y, z]: &[Spline; 2]| {
+            let knots = y.knots().windows(2).enumerate();
+            let between = |(i, ends): (usize, &[f64])| {
+                let (y, z) = (y.cubic(i), z.cubic(i));
+                CurveInterval {
+                    ends: [ends[0], ends[1]],
+                    cubic: [0, 1, 2, 3].map(|power| [y[power], z[power]]),
+                }
+            };
+            knots.map(between).collect::<Vec<CurveInterval>>()
+        };
+        let intervals: Vec<CurveInterval> = pieces.iter().flat_map(cubics).collect();
         // Two cells an interval: on evenly spaced knots hardly any place is more than one interval beyond that of its cell.
-        let count = 2 * intervals;
-        let length = knots[intervals] - knots[0];
+        let count = 2 * intervals.len();
+        let range = [intervals[0].ends[0], intervals[intervals.len() - 1].ends[1]];
+        let length = range[1] - range[0];
         let begins = |cell: usize| {
-            let place = knots[0] + length * cell as f64 / count as f64;
-            let after = knots.partition_point(|knot| *knot <= place);
-            (after.clamp(1, intervals) - 1) as u32
+            let place = range[0] + length * cell as f64 / count as f64;
+            let after = intervals.partition_point(|interval| interval.ends[0] <= place);
+            (after.max(1) - 1) as u32
         };
         PlaneCurve {
             cells: (0..count).map(begins).collect(),
             cells_per_mm: count as f64 / length,
-            intervals: (0..intervals).map(between).collect(),
-            range: [knots[0], knots[intervals]],
+            intervals,
+            range,
         }
     }
 
@@ -169,7 +192,7 @@ mod tests {
     #[test]
     fn the_curve_is_that_of_its_splines_everywhere_and_straight_beyond() {
         let [y, z] = uneven();
-        let curve = PlaneCurve::new(&y, &z);
+        let curve = PlaneCurve::new(&[[y.clone(), z.clone()]]);
         for k in -50..=460 {
             let s = 0.1 * f64::from(k);
             let point = curve.at(s);
@@ -182,10 +205,34 @@ mod tests {
         }
     }
 
+    /// A tread of 500 mm radius that ends at a face, as a wheel's does.
+    #[test]
+    fn a_curve_does_not_overshoot_beside_a_corner() {
+        let tread = |k: i32| [0.25 * f64::from(k), -(0.25 * f64::from(k)).powi(2) / 1000.0];
+        let mut at: Vec<[f64; 2]> = (-40..=40).map(tread).collect();
+        let edge = at[80];
+        at.extend((1..=5).map(|k| [edge[0], edge[1] + 4.0 * f64::from(k)]));
+        let mut along = vec![0.0];
+        for pair in at.windows(2) {
+            let chord = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+            along.push(along[along.len() - 1] + chord);
+        }
+        for smoothing in [0.0, 3.0] {
+            let curve = PlaneCurve::through(&at, &along, smoothing);
+            let corner = curve.at(along[80]).at;
+            assert!((corner[0] - edge[0]).hypot(corner[1] - edge[1]) < 1e-9);
+            for s in curve.parameters(0.01) {
+                let [y, z] = curve.at(s).at;
+                let off = if s < along[80] { z + y * y / 1000.0 } else { y - edge[0] };
+                assert!(off.abs() < 1e-4, "{smoothing}: {off} at {s}");
+            }
+        }
+    }
+
     #[test]
     fn a_placed_curve_is_turned_moved_and_mirrored() {
         let [y, z] = uneven();
-        let curve = PlaneCurve::new(&y, &z);
+        let curve = PlaneCurve::new(&[[y.clone(), z.clone()]]);
         let placed = curve.placed(0.4, [3.0, -2.0], -1.0);
         let (sin, cos) = 0.4_f64.sin_cos();
         for s in [-1.0, 0.0, 3.3, 17.99, 39.0] {

@@ -12,7 +12,6 @@ use crate::contact::geometry::profile_quality::readings::{KnownStretches, Points
 use crate::contact::geometry::profile_quality::samples::{KnownPoints, Points};
 use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::geometry::profile_quality::{noise, shape};
-use crate::contact::numerics::spline::Spline;
 use crate::contact::once::Once;
 use crate::contact::remark::list::Remark;
 
@@ -66,7 +65,7 @@ pub struct Reading {
     pub smoothing: f64,
 }
 
-/// A cross-section as a curve, twice continuously differentiable in its chord length.
+/// A cross-section as a curve, twice continuously differentiable in its chord length except at sharp corners.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
     curve: PlaneCurve,
@@ -85,8 +84,10 @@ struct MeasuredCurve {
     along: Vec<f64>,
     /// Cut wavelength of the smoothing in mm.
     smoothing: f64,
-    /// Step of which the given coordinates are multiples, in mm.
+    /// Step of which the given heights are multiples, in mm.
     rounding: Option<f64>,
+    /// Step of which all given coordinates are multiples, in mm.
+    digits: f64,
     likely: Once<Option<LikelyBody>>,
     known: KnownPoints,
 }
@@ -102,7 +103,7 @@ impl Profile {
     /// of the points running back, or a shape that does not tell what is up and was not stated.
     pub fn new(body: Body, points: &[[f64; 2]], reading: Reading) -> Result<Profile, String> {
         let mut remarks = Vec::new();
-        let rounding = noise::rounding(points);
+        let (rounding, digits) = (noise::rounding(points), noise::digits(points));
         let mut points = checked(points)?;
         let length = arc_length(&points);
         let [shortest, longest] = ARC_LENGTH;
@@ -158,18 +159,15 @@ impl Profile {
             along,
             smoothing: reading.smoothing,
             rounding,
+            digits,
             likely: Once::default(),
         };
         Ok(Profile::of(measured, remarks))
     }
 
     fn of(measured: MeasuredCurve, remarks: Vec<Remark>) -> Profile {
-        let part = |k: usize| {
-            let values: Vec<f64> = measured.points.iter().map(|point| point[k]).collect();
-            Spline::new(&measured.along, &values, measured.smoothing)
-        };
         Profile {
-            curve: PlaneCurve::new(&part(0), &part(1)),
+            curve: PlaneCurve::through(&measured.points, &measured.along, measured.smoothing),
             measured: Arc::new(measured),
             stretches: Arc::default(),
             remarks,
@@ -212,6 +210,8 @@ impl Profile {
             points: self.points(),
             curve: &self.curve,
             smoothing: self.smoothing(),
+            digits: self.measured.digits,
+            rounding: self.measured.rounding,
         }
     }
 

@@ -29,6 +29,17 @@ impl Spline {
     /// (same unit as the knots) are smoothed away, 0 for interpolation.
     #[must_use]
     pub fn new(knots: &[f64], values: &[f64], cut_wavelength: f64) -> Spline {
+        Spline::pinned(knots, values, cut_wavelength, [false; 2])
+    }
+
+    /// Like [`Spline::new`]. A smoothed spline passes exactly through the first and the last value where `ends` says so.
+    #[must_use]
+    pub fn pinned(
+        knots: &[f64],
+        values: &[f64],
+        cut_wavelength: f64,
+        ends: [bool; 2],
+    ) -> Spline {
         let n = knots.len();
         let lambda = (cut_wavelength / std::f64::consts::TAU).powi(4);
         let mut spline = Spline {
@@ -41,6 +52,9 @@ impl Spline {
         }
         let step: Vec<f64> = knots.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let stiffness = |i: usize| {
+            if i == 0 && ends[0] || i == n - 1 && ends[1] {
+                return 0.0;
+            }
             let before = if i > 0 { step[i - 1] } else { 0.0 };
             let after = if i < n - 1 { step[i] } else { 0.0 };
             2.0 * lambda / (before + after)
@@ -217,6 +231,19 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_pinned_end_stays_where_its_sample_is() {
+        let (knots, values) = sampled(0.1, |s| (3.0 * s).sin() + 0.1 * (40.0 * s).cos());
+        let last = knots.len() - 1;
+        let spline = Spline::pinned(&knots, &values, 3.0, [true, false]);
+        assert!((spline.at(0.0).value - values[0]).abs() < 1e-12);
+        assert!((spline.at(knots[last]).value - values[last]).abs() > 1e-3);
+        let free = Spline::new(&knots, &values, 3.0);
+        assert!((free.at(0.0).value - values[0]).abs() > 1e-3);
+        // Far from the ends both are the same.
+        assert!((free.at(20.0).value - spline.at(20.0).value).abs() < 1e-9);
     }
 
     #[test]

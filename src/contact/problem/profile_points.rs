@@ -1,8 +1,9 @@
 //! The quality of profiles as far as their points alone show it, before the contact is known.
 
 use crate::contact::geometry::profile::{Body, Profile};
-use crate::contact::geometry::profile_quality::noise;
-use crate::contact::geometry::profile_quality::points::{Grain, advised_smoothing};
+use crate::contact::geometry::profile_quality::points::{
+    Grain, advised_smoothing, noise_of, polygon_of,
+};
 use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::task::WheelTask;
@@ -15,20 +16,20 @@ pub(crate) const PRESSURE_USUAL: f64 = 1200.0;
 
 /// Noise and spacing of a whole profile.
 pub fn grain(profile: &Profile) -> Grain {
-    let points = profile.points();
-    let whole = [0, points.at.len()];
+    let reading = profile.read();
+    let whole = [0, reading.points.at.len()];
     Grain {
-        noise: noise::noise(points, whole).unwrap_or(0.0),
+        noise: noise_of(&reading, whole).unwrap_or(0.0),
         spacing: profile.usual_chord(),
-        polygon: noise::polygon(points, whole),
+        polygon: polygon_of(&reading, whole),
     }
 }
 
 /// Whether the points of a profile suffice to determine their noise, or lie on a polygon.
 pub fn tells_noise(profile: &Profile) -> bool {
-    let points = profile.points();
-    let whole = [0, points.at.len()];
-    noise::noise(points, whole).is_some() || noise::polygon(points, whole).is_some()
+    let reading = profile.read();
+    let whole = [0, reading.points.at.len()];
+    noise_of(&reading, whole).is_some() || polygon_of(&reading, whole).is_some()
 }
 
 /// The quality of both profiles as far as it is known before the solve, with the contact modulus in MPa.
@@ -69,7 +70,7 @@ pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
         spacing_mm: profile.usual_chord(),
         hole_mm: points.along[longest + 1] - points.along[longest],
         y_mm: [points.at[longest][0], points.at[longest + 1][0]],
-        noise_um: noise::noise(points, [0, points.at.len()]).map(|noise| 1e3 * noise),
+        noise_um: noise_of(&profile.read(), [0, points.at.len()]).map(|noise| 1e3 * noise),
         rounding_mm: profile.rounding(),
         smoothing_mm: profile.smoothing(),
         smoothing_suggested_mm: advised,

@@ -49,7 +49,7 @@ pub struct Finding {
     pub over_width: f64,
     /// Smoothing in use, in mm.
     pub smoothing: f64,
-    /// Smoothing advised, in mm; 0 for none.
+    /// Smoothing advised, in mm; 0 if no more is advised than is in use, or if the smoothing is chosen automatically.
     pub advised: f64,
     /// Whether the answer would mislead, so that the job fails unless rough profiles are accepted.
     pub refused: bool,
@@ -60,12 +60,16 @@ pub struct Finding {
 /// A kind of defect of a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
-    /// A single point is displaced.
-    Outlier {
-        /// y of the point in mm.
+    /// One point or a few neighbours are displaced.
+    Outliers {
+        /// y of the point farthest off, in mm.
         y: f64,
-        /// Displacement in mm.
+        /// Displacement of that point in mm.
         distance: f64,
+        /// y of the first and of the last of them, in mm.
+        between: [f64; 2],
+        /// How many there are.
+        count: usize,
     },
     /// The profile jumps between two points.
     Step {
@@ -110,7 +114,7 @@ impl Finding {
     pub fn of_roughness(&self) -> bool {
         matches!(
             self.cause,
-            Cause::Outlier { .. }
+            Cause::Outliers { .. }
                 | Cause::Step { .. }
                 | Cause::Polygon { .. }
                 | Cause::Noise { .. }
@@ -122,7 +126,7 @@ impl Finding {
     /// Whether it exceeds what the shape of a sound profile, such as two arcs that meet, can cause.
     pub fn has_evidence(&self) -> bool {
         match self.cause {
-            Cause::Outlier { .. }
+            Cause::Outliers { .. }
             | Cause::Step { .. }
             | Cause::Polygon { .. }
             | Cause::Noise { .. } => true,
@@ -182,10 +186,17 @@ impl Finding {
         let (y_mm, waviness_mpa, share) = (self.y, self.pressure, self.share);
         let smoothing_mm = (self.advised > 0.0).then(|| (10.0 * self.advised).round() / 10.0);
         match self.cause {
-            Cause::Outlier { y, distance } => Remark::ProfileOutlier {
+            Cause::Outliers {
+                y,
+                distance,
+                between,
+                count,
+            } => Remark::ProfileOutlier {
                 profile,
                 at_y_mm: y,
                 distance_um: 1e3 * distance,
+                points: count,
+                y_mm: between,
                 waviness_mpa,
                 share,
             },

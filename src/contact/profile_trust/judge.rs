@@ -2,7 +2,7 @@
 
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
-use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
+use crate::contact::geometry::profile_quality::noise::Oddity;
 use crate::contact::geometry::profile_quality::points::{
     Grain, UnderContact, advised_smoothing, under_contact,
 };
@@ -86,6 +86,37 @@ impl<'a> Under<'a> {
         found.waviness.hypot(found.ambiguity)
     }
 
+    fn cause(&self, harmful: bool) -> Cause {
+        let found = &self.found;
+        if let Some(chord) = found.polygon {
+            return Cause::Polygon { chord };
+        }
+        match found.oddity {
+            Some(Oddity::Outliers {
+                points,
+                count,
+                farthest,
+                distance,
+            }) => Cause::Outliers {
+                y: self.y_of_point(farthest),
+                distance,
+                between: points.map(|point| self.y_of_point(point)),
+                count,
+            },
+            Some(Oddity::Step { point, height }) => Cause::Step {
+                y: self.y_of_point(point),
+                height,
+            },
+            None if harmful && found.noisy => Cause::Noise {
+                noise: found.noise.unwrap_or(0.0),
+                spacing: found.spacing,
+                rounding: found.rounding,
+            },
+            None if found.roughness.ambiguity > found.roughness.waviness => Cause::Coarse,
+            None => Cause::Waves,
+        }
+    }
+
     /// The noise that remains after smoothing, as a pressure in MPa.
     fn noise_left(&self, modulus: f64) -> f64 {
         let smoothing = self.profile.smoothing();
@@ -106,7 +137,12 @@ impl<'a> Under<'a> {
     }
 }
 
-/// The quality of both profiles under a patch, and the findings. Roughness is always among them, however small.
+fn sorted([a, b]: [f64; 2]) -> [f64; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// The quality of both profiles under a patch, and the findings. Roughness is always among them, however small. `auto` says whose smoothing
+/// is chosen automatically.
 ///
 /// # Errors
 /// The wheel's surface was not found over an end of the patch.
@@ -114,10 +150,10 @@ pub fn judge(
     geometry: &WheelRail,
     patch: FoundPatch,
     modulus: f64,
+    auto: [bool; 2],
 ) -> Result<(PatchQuality, Vec<Finding>), SurfaceMissed> {
     let over = |y: f64| geometry.moved(&patch.gap.frame, [0.0, y], patch.centre);
     let ends = [over(patch.across[0])?, over(patch.across[1])?];
-    let sorted = |[a, b]: [f64; 2]| [a.min(b), a.max(b)];
     let contacts = [
         sorted(ends.map(|end| end.rail)),
         sorted(ends.map(|end| end.wheel)),
@@ -132,9 +168,9 @@ pub fn judge(
     let advised = advised_smoothing([both[0].grain(), both[1].grain()], modulus, pressure);
     let mut findings = Vec::new();
     let rough = both[0].rough().hypot(both[1].rough());
-    for (own, advised) in both.iter().zip(advised) {
+    for (k, own) in both.iter().enumerate() {
         if own.rough() >= BLAMED * rough {
-            findings.push(roughness(own, rough, advised, modulus, patch));
+            findings.push(roughness(own, rough, advised[k], auto[k], patch, modulus));
         }
         findings.extend(spacing(own, patch));
         findings.extend(place(own, patch));
@@ -157,32 +193,21 @@ pub fn judge(
     Ok((quality, findings))
 }
 
-/// The cause of a profile's roughness: outlier, step, chords, noise, waves, or points too coarse to determine the curve.
-fn roughness(own: &Under, both: f64, advised: f64, modulus: f64, patch: FoundPatch) -> Finding {
+/// The roughness of a profile with its cause.
+fn roughness(
+    own: &Under,
+    both: f64,
+    advised: f64,
+    auto: bool,
+    patch: FoundPatch,
+    modulus: f64,
+) -> Finding {
     let smoothing = own.profile.smoothing();
     let found = &own.found;
-    let cause = if let Some(Outlier { point, distance }) = found.outlier {
-        Cause::Outlier {
-            y: own.y_of_point(point),
-            distance,
-        }
-    } else if let Some(Step { point, height }) = found.step {
-        Cause::Step {
-            y: own.y_of_point(point),
-            height,
-        }
-    } else if let Some(chord) = found.polygon {
-        Cause::Polygon { chord }
-    } else if found.roughness.ambiguity > found.roughness.waviness && advised <= smoothing {
-        Cause::Coarse
-    } else if advised > smoothing {
-        Cause::Noise {
-            noise: found.noise.unwrap_or(0.0),
-            spacing: found.spacing,
-            rounding: own.profile.rounding(),
-        }
+    let more = if auto || advised <= smoothing {
+        0.0
     } else {
-        Cause::Waves
+        advised
     };
     Finding {
         body: own.body,
@@ -197,9 +222,9 @@ fn roughness(own: &Under, both: f64, advised: f64, modulus: f64, patch: FoundPat
         chord_length: found.chord[1] - found.chord[0],
         over_width: found.over_width,
         smoothing,
-        advised,
+        advised: more,
         refused: found.roughness.ambiguity > AMBIGUOUS_MAX * patch.pressure.max(PRESSURE_LIGHT),
-        cause,
+        cause: own.cause(advised > 0.0),
     }
 }
 

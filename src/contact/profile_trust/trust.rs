@@ -224,7 +224,8 @@ impl<'a> Judgement<'a> {
                     load_share: patch.normal_force / load,
                     number: qualities.len(),
                 };
-                let (quality, own) = judge(&contact.geometry, place, contact.contact_modulus)?;
+                let (modulus, auto) = (contact.contact_modulus, contact.trust.auto);
+                let (quality, own) = judge(&contact.geometry, place, modulus, auto)?;
                 width = width.max(to - from);
                 qualities.push(quality);
                 findings.extend(own);

@@ -42,8 +42,7 @@ pub fn in_track(
     let total = totals(&parts, origin, &answers);
     let mut remarks = case.remarks.clone();
     remarks.extend_from_slice(&wheel.remarks);
-    let of_plane = plane.and_then(|plane| plane.remark(case));
-    remarks.extend(of_plane.map(RemarkEntry::from));
+    remarks.extend(plane.remark(case).map(RemarkEntry::from));
     let alone = answers.len() == 1;
     let mut whole: Option<(Solution, Fields)> = None;
     for (gap, (mut solution, fields)) in wheel.patches.iter().zip(answers) {

@@ -1,5 +1,6 @@
 //! Detects measurement artefacts in the points of a profile: noise, outliers, steps, polygons, rounding.
 
+use crate::contact::geometry::corner::{is_corner, turn};
 use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::numerics::least_squares::first_coefficient;
 
@@ -36,35 +37,56 @@ const ODD_SPACING: f64 = 0.25;
 const ODD_WINDOW: usize = 15;
 /// Longest stretch in mm over which a cubic is fitted to six neighbours.
 const ODD_SPAN_MAX: f64 = 3.5;
-/// Two neighbours that deviate to opposite sides are a step if the smaller deviation is at least this share of the larger one.
-const STEP_PAIR: f64 = 0.7;
-/// Least share of the total turning that lies at the corners, single points or pairs, of a polygon.
-const TURNING: f64 = 0.9;
-/// Corner points are at most this fraction of all points.
-const POLYGON_SHARE_MAX: f64 = 0.5;
-/// Fewest points for which a polygon can be recognised.
-const POLYGON_POINTS_MIN: usize = 24;
-/// Fewest corners of a polygon.
-const POLYGON_CORNERS_MIN: usize = 4;
-/// Largest average number of successive points that form one corner.
-const POLYGON_PAIR_MAX: f64 = 2.3;
+/// Longest chord in a window of seven points, in mean chords: next to a hole the cubic says nothing.
+const ODD_CHORD_MAX: f64 = 2.0;
+/// Part of the largest deviation of a group from which a point belongs to it.
+const ODD_PART: f64 = 0.3;
+/// Most points in a group of displaced points, with those next to them; more are waves.
+const ODD_POINTS_MAX: usize = 12;
+/// Points on either side of a group that its deviations are measured from.
+const ODD_SOUND: usize = 4;
+/// Fewest kinks of a polygon.
+const KINKS_MIN: usize = 4;
+/// Least ratio of the sum of the turns at kinks to the sum of their magnitudes: a rail or a wheel bends to one side over many chords.
+const KINKS_ONE_WAY: f64 = 0.8;
+/// Most decimals that are looked for; with more the arithmetic of readers leaves none, and coordinates count as exact to the step after it.
+const DIGITS_MAX: i32 = 7;
+const DIGITS_LEAST: f64 = 1e-9;
+/// Share of neighbouring fourth differences with opposite signs above which they are those of white noise, for which it is 0.8: their
+/// correlation is −56/70. Of waves longer than four points it is 0.5 and less.
+const WHITE: f64 = 0.65;
 
-/// A single point off the curve through its neighbours.
+/// A defect of few points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outlier {
-    /// Index of the point.
-    pub point: usize,
-    /// Distance from the cubic of its neighbours in mm.
-    pub distance: f64,
+pub enum Oddity {
+    /// Points off the curve through their neighbours.
+    Outliers {
+        /// Index of the first and of the last one.
+        points: [usize; 2],
+        /// How many of these are off.
+        count: usize,
+        /// Index of the farthest one.
+        farthest: usize,
+        /// Its distance from the cubic through the sound points on both sides, in mm.
+        distance: f64,
+    },
+    /// A jump of the profile between two points.
+    Step {
+        /// Index of the point before the jump.
+        point: usize,
+        /// Height in mm, positive upward.
+        height: f64,
+    },
 }
 
-/// A jump of the profile between two points.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
-    /// Index of the point before the jump.
-    pub point: usize,
-    /// Height in mm, positive upward.
-    pub height: f64,
+impl Oddity {
+    /// How far a point is from where it belongs, in mm.
+    fn size(&self) -> f64 {
+        match self {
+            Oddity::Outliers { distance, .. } => *distance,
+            Oddity::Step { height, .. } => 0.5 * height.abs(),
+        }
+    }
 }
 
 /// Standard deviation in mm of white noise along the normal, over the points of a range; `None` if too few of them are close enough
@@ -86,9 +108,9 @@ pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
             continue;
         };
         if span <= NOISE_SPAN_MAX {
-            fine.push(difference);
+            fine.push(difference.abs());
         } else if span <= COARSE_SPAN_MAX {
-            coarse.push(difference);
+            coarse.push(difference.abs());
             length += span;
         }
     }
@@ -105,7 +127,22 @@ pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
     (spacing <= COARSE_TELLS || found > COARSE_SHAPE * spacing.powi(4)).then_some(found)
 }
 
-/// Length of the chord over five points in mm, and the size of their normalised fourth divided difference in mm.
+/// Whether the fourth differences of the points of a range are those of white noise, whose signs alternate, and not of waves.
+#[must_use]
+pub fn is_white(points: Points, range: [usize; 2]) -> bool {
+    let differences: Vec<f64> = (range[0]..range[1].saturating_sub(NOISE_CHORDS))
+        .filter_map(|k| {
+            let found = || window_at(points, k).and_then(fourth_difference);
+            points.known(k, |known| &known.difference, found)
+        })
+        .map(|(_, difference)| difference)
+        .collect();
+    let pairs = differences.windows(2);
+    let opposite = pairs.clone().filter(|pair| pair[0] * pair[1] < 0.0);
+    opposite.count() as f64 > WHITE * pairs.len() as f64
+}
+
+/// Length of the chord over five points in mm, and their normalised fourth divided difference in mm.
 fn fourth_difference(window: &[[f64; 2]; NOISE_CHORDS + 1]) -> Option<(f64, f64)> {
     let local = in_chord(window);
     let span = local[NOISE_CHORDS][0] - local[0][0];
@@ -117,18 +154,19 @@ fn fourth_difference(window: &[[f64; 2]; NOISE_CHORDS + 1]) -> Option<(f64, f64)
     });
     let length = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
     let sum: f64 = weights.iter().zip(&local).map(|(w, at)| w * at[1]).sum();
-    let difference = (sum / length).abs();
+    let difference = sum / length;
     (span > 0.0 && difference.is_finite()).then_some((span, difference))
 }
 
-/// The worst outlier and the largest step of a range: points that deviate from the least-squares cubic of their six neighbours by more
-/// than 12 local medians, by at least 1.2 µm (more where points are coarse), and by more than the adjacent points.
+/// The worst defect of few points in a range: points that deviate from the least-squares cubic of their six neighbours by more than 12 local
+/// medians and by at least 1.2 µm (more where points are coarse), with those next to them that do so too.
 ///
-/// A step of height h makes the points on both sides deviate by h/2 in opposite directions; an outlier makes its neighbours deviate by
-/// 0.43 of its own displacement. Where two arcs meet, the curvature jumps by some 0.06/mm, which makes points 0.25 mm apart deviate by
-/// 0.2 µm; for points farther apart the deviation grows with the square of the distance.
+/// A displaced point makes its neighbours deviate by 0.43 of its own displacement, and several displaced points disturb each other. The
+/// points of such a group are therefore compared with the cubic through the sound points on both sides of it. If that cubic and a step between
+/// two points fit all of them, it is a step. Where two arcs meet, the curvature jumps by some 0.06/mm, which makes points 0.25 mm apart
+/// deviate by 0.2 µm; for points farther apart the deviation grows with the square of the distance.
 #[must_use]
-pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<Step>) {
+pub fn oddity(points: Points, range: [usize; 2]) -> Option<Oddity> {
     let around = [
         range[0].saturating_sub(ODD_WINDOW),
         (range[1] + ODD_WINDOW).min(points.at.len()),
@@ -138,7 +176,7 @@ pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<S
         .map(Option::unwrap_or_default)
         .collect();
     let size = |j: usize| off[j].abs();
-    let (mut outlier, mut step): (Option<Outlier>, Option<Step>) = (None, None);
+    let mut worst: Option<Oddity> = None;
     for here in range[0] - around[0]..range[1] - around[0] {
         let own = size(here);
         let near = here.saturating_sub(3)..(here + 4).min(off.len());
@@ -153,32 +191,99 @@ pub fn oddities(points: Points, range: [usize; 2]) -> (Option<Outlier>, Option<S
         if own <= ODD_MEDIANS * median(&mut usual) {
             continue;
         }
-        let other = [
-            here.checked_sub(1),
-            Some(here + 1).filter(|j| *j < off.len()),
-        ];
-        let pair = other
-            .into_iter()
-            .flatten()
-            .find(|j| -off[*j] * off[here].signum() > STEP_PAIR * own);
-        match pair {
-            Some(pair) if step.is_none_or(|found| found.height.abs() < 2.0 * own) => {
-                let (low, high) = (here.min(pair), here.max(pair));
-                step = Some(Step {
-                    point: around[0] + low,
-                    height: off[high] - off[low],
-                });
-            }
-            None if outlier.is_none_or(|found| found.distance < own) => {
-                outlier = Some(Outlier {
-                    point: around[0] + here,
-                    distance: own,
-                });
-            }
-            _ => {}
+        let belongs = |j: &usize| size(*j) > ODD_PART * own;
+        let first = (0..=here).rev().take_while(belongs).last().unwrap_or(here);
+        let last = (here..off.len()).take_while(belongs).last().unwrap_or(here);
+        let found = explained(points, [around[0] + first, around[0] + last]);
+        let larger = |known: &Oddity, found: &Oddity| found.size() > known.size();
+        if let Some(found) = found
+            && worst.is_none_or(|known| larger(&known, &found))
+        {
+            worst = Some(found);
         }
     }
-    (outlier, step)
+    worst
+}
+
+/// What displaces the points of a group, first and last included.
+fn explained(points: Points, [first, last]: [usize; 2]) -> Option<Oddity> {
+    if last + 1 - first > ODD_POINTS_MAX {
+        return None;
+    }
+    let from = first.saturating_sub(ODD_SOUND);
+    let to = (last + ODD_SOUND + 1).min(points.at.len());
+    let (start, end) = (points.at[from], points.at[to - 1]);
+    let chord = [end[0] - start[0], end[1] - start[1]];
+    let length = chord[0].hypot(chord[1]).max(f64::MIN_POSITIVE);
+    let axis = chord.map(|part| part / length);
+    let local: Vec<[f64; 2]> = points.at[from..to]
+        .iter()
+        .map(|at| {
+            let [y, z] = [at[0] - start[0], at[1] - start[1]];
+            [axis[0] * y + axis[1] * z, axis[0] * z - axis[1] * y]
+        })
+        .collect();
+    let inside = |k: usize| (first..=last).contains(&(from + k));
+    let off = |k: usize| {
+        let t = local[k][0];
+        let powers = |at: &[f64; 2]| {
+            let x = (at[0] - t) / length;
+            ([1.0, x, x * x, x * x * x], at[1])
+        };
+        let sound = local.iter().enumerate().filter(|(j, _)| !inside(*j));
+        let sound: Vec<_> = sound.map(|(_, at)| powers(at)).collect();
+        Some(local[k][1] - first_coefficient(&sound)?)
+    };
+    let deviations: Option<Vec<f64>> = (first - from..=last - from).map(off).collect();
+    let deviations = deviations?;
+    let largest = deviations.iter().fold(0.0_f64, |most, off| most.max(off.abs()));
+    // A cubic and a step after each point of the group in turn.
+    let steps = (first.saturating_sub(1).max(from)..=last).filter_map(|point| {
+        let [height, left] = step_after(&local, point - from, length)?;
+        Some((point, height, left))
+    });
+    let best = steps.min_by(|a, b| a.2.total_cmp(&b.2));
+    if let Some((point, height, left)) = best
+        && left < ODD_PART * largest
+        && left < ODD_PART * height.abs()
+    {
+        return Some(Oddity::Step { point, height });
+    }
+    let is_off = |k: &usize| deviations[*k].abs() > ODD_PART * largest;
+    let displaced: Vec<usize> = (0..deviations.len()).filter(is_off).collect();
+    let farthest = (0..deviations.len())
+        .max_by(|a, b| deviations[*a].abs().total_cmp(&deviations[*b].abs()))?;
+    Some(Oddity::Outliers {
+        points: [first + displaced[0], first + displaced[displaced.len() - 1]],
+        count: displaced.len(),
+        farthest: first + farthest,
+        distance: largest,
+    })
+}
+
+/// Height of a step after a point in mm and the largest distance of a point from the cubic with this step, both in mm.
+fn step_after(local: &[[f64; 2]], point: usize, length: f64) -> Option<[f64; 2]> {
+    let after = |k: usize| if k > point { 1.0 } else { 0.0 };
+    let middle = 0.5 * length;
+    // The step first, so that its height is the first coefficient.
+    let rows: Vec<([f64; 5], f64)> = (local.iter().enumerate())
+        .map(|(k, at)| {
+            let x = (at[0] - middle) / length;
+            ([after(k), 1.0, x, x * x, x * x * x], at[1])
+        })
+        .collect();
+    let height = first_coefficient(&rows)?;
+    let left = |k: usize| {
+        let t = local[k][0];
+        let row = |(j, at): (usize, &[f64; 2])| {
+            let x = (at[0] - t) / length;
+            ([1.0, x, x * x, x * x * x], at[1] - height * after(j))
+        };
+        let rows: Vec<_> = local.iter().enumerate().map(row).collect();
+        Some((local[k][1] - height * after(k) - first_coefficient(&rows)?).abs())
+    };
+    let left: Option<Vec<f64>> = (0..local.len()).map(left).collect();
+    Some([height, left?.into_iter().fold(0.0, f64::max)])
 }
 
 /// Mean distance in mm of the seven points around a point, fewer at the ends.
@@ -187,55 +292,82 @@ fn spacing_around(points: Points, k: usize) -> f64 {
     (points.along[last] - points.along[first]) / (last - first).max(1) as f64
 }
 
-/// Height in mm of a point above the least-squares cubic of its six neighbours.
+/// Height in mm of a point above the least-squares cubic of its six neighbours; `None` where these are too far away or uneven, or a corner
+/// lies between them.
 fn off_neighbours(points: Points, k: usize) -> Option<f64> {
-    let local = in_chord(window_at::<7>(points, k.checked_sub(3)?)?);
-    if local[6][0] - local[0][0] > ODD_SPAN_MAX {
+    let first = k.checked_sub(3)?;
+    let local = in_chord(window_at::<7>(points, first)?);
+    let span = local[6][0] - local[0][0];
+    let longest = (first..first + 6).map(|k| points.chord(k)).fold(0.0, f64::max);
+    let uneven = span > ODD_SPAN_MAX && longest > ODD_CHORD_MAX * span / 6.0;
+    if span > COARSE_SPAN_MAX || uneven || (first + 1..first + 6).any(|k| is_corner(points.at, k)) {
         return None;
     }
     let others = [0, 1, 2, 4, 5, 6].map(|j| local[j]);
     Some(local[3][1] - fitted::<4, 6>(others, local[3][0])?)
 }
 
-/// Length in mm of the chords if the points of a range lie on a polygon, that is, were interpolated linearly between fewer points. Such
-/// points change direction only at the corners (or, if no point lies on a corner, at the two beside it).
+/// Mean length in mm of the chords if the points of a range lie on a polygon, that is, were interpolated linearly between fewer points.
+///
+/// Such points lie on straight lines to the digits they are given with, and turn at the corners (or, where no point lies on a corner, at the
+/// two next to it). `digits` is the step in mm of which all coordinates are multiples: it moves a point by up to `digits/√2` and changes a
+/// turn by up to `√2 digits (1/a + 1/b)` between chords of lengths a and b. A kink turns by more than three times this, and has points
+/// that turn by no more than this on both sides. On a smooth curve the turn cannot be both.
 #[must_use]
-pub fn polygon(points: Points, range: [usize; 2]) -> Option<f64> {
-    let window = &points.at[range[0]..range[1]];
-    if window.len() < POLYGON_POINTS_MIN {
-        return None;
-    }
-    let turn = |at: &[[f64; 2]]| {
-        let [a, b] = [[0, 1], [1, 2]].map(|[i, j]| {
-            let [y, z] = [0, 1].map(|part| at[j][part] - at[i][part]);
-            z.atan2(y)
-        });
-        (b - a).abs()
+pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
+    let bound = |k: usize| {
+        let [before, after] = [points.chord(k - 1), points.chord(k)];
+        2.0_f64.sqrt() * digits * (1.0 / before + 1.0 / after)
     };
-    let turns: Vec<f64> = (window.windows(3).enumerate())
-        .map(|(k, at)| points.known(range[0] + k, |known| &known.turn, || turn(at)))
-        .collect();
-    let total: f64 = turns.iter().sum();
-    let mut sorted = turns.clone();
-    sorted.sort_by(|a, b| b.total_cmp(a));
-    let mut carried = 0.0;
-    let corners = sorted
-        .iter()
-        .take_while(|turn| {
-            let before = carried;
-            carried += **turn;
-            before < TURNING * total
-        })
-        .count();
-    if total <= 0.0 || corners as f64 > POLYGON_SHARE_MAX * turns.len() as f64 {
+    let last = range[1].min(points.at.len()).saturating_sub(1);
+    let (mut kinks, mut others): (Vec<[f64; 2]>, usize) = (Vec::new(), 0);
+    // The points since the last straight one, and their turns.
+    let mut open: Option<Vec<(usize, f64)>> = None;
+    for k in range[0].max(1)..last {
+        let turned = points.known(k, |known| &known.turn, || turn(points.at, k));
+        if turned.abs() <= bound(k) {
+            match open.replace(Vec::new()).as_deref() {
+                Some([(at, turned)]) => kinks.push([points.along[*at], *turned]),
+                Some([(at, one), (_, two)]) => {
+                    kinks.push([points.along[*at] + 0.5 * points.chord(*at), one + two]);
+                }
+                Some([]) | None => {}
+                Some(_) => others += 1,
+            }
+        } else if turned.abs() > 3.0 * bound(k) {
+            if let Some(open) = &mut open {
+                open.push((k, turned));
+            }
+        } else {
+            open = None;
+        }
+    }
+    let (sum, sizes) = kinks.iter().fold((0.0_f64, 0.0), |(sum, sizes), [_, turned]| {
+        (sum + turned, sizes + turned.abs())
+    });
+    let one_way = sum.abs() >= KINKS_ONE_WAY * sizes;
+    if kinks.len() < KINKS_MIN.max(others) || !one_way {
         return None;
     }
-    let least = sorted[corners - 1];
-    let runs = turns.chunk_by(|a, b| (*a >= least) == (*b >= least));
-    let groups = runs.filter(|run| run[0] >= least).count();
-    let alone = corners as f64 <= POLYGON_PAIR_MAX * groups as f64;
-    let length = points.along[range[1] - 1] - points.along[range[0]];
-    (alone && groups >= POLYGON_CORNERS_MIN).then(|| length / groups as f64)
+    let chords = kinks.windows(2).map(|pair| pair[1][0] - pair[0][0]);
+    Some(median(&mut chords.collect::<Vec<f64>>()))
+}
+
+/// The step in mm of which all coordinates are multiples, and at least 1e-9 mm: the digits that the points were given with.
+#[must_use]
+pub fn digits(given: &[[f64; 2]]) -> f64 {
+    let of = |part: usize| {
+        let multiples = |places: f64| {
+            given.iter().all(|at| {
+                let scaled = at[part] * places;
+                (scaled - scaled.round()).abs() < 1e-4
+            })
+        };
+        let places = (1..=DIGITS_MAX).map(|places| 10.0_f64.powi(places));
+        let found = places.into_iter().find(|places| multiples(*places));
+        found.map_or(DIGITS_LEAST, f64::recip)
+    };
+    of(0).max(of(1))
 }
 
 /// The step in mm of which every height is a multiple (0.1, 0.01 or 0.001), if there is one.
@@ -393,39 +525,134 @@ mod tests {
     fn one_point_off_is_an_outlier_of_its_distance_and_not_noise() {
         let mut points = arc(200);
         points[90][1] += 0.02;
-        let (outlier, step) = with(&points, oddities);
-        let outlier = outlier.expect("an outlier");
-        assert_eq!(outlier.point, 90);
-        assert!((outlier.distance / 0.02 - 1.0).abs() < 0.01, "{outlier:?}");
-        assert_eq!(step, None);
+        let Some(Oddity::Outliers {
+            points: [90, 90],
+            count: 1,
+            farthest: 90,
+            distance,
+        }) = with(&points, oddity)
+        else {
+            panic!("{:?}", with(&points, oddity))
+        };
+        assert!((distance / 0.02 - 1.0).abs() < 0.01, "{distance}");
         assert!(with(&points, noise).expect("enough points") < 1e-6);
+    }
+
+    #[test]
+    fn few_points_off_are_found_together_whatever_their_signs() {
+        for signs in [
+            vec![1.0, -1.0],
+            vec![-1.0, 1.0, -1.0, 1.0],
+            vec![1.0, 1.0],
+            vec![1.0, 0.9, 1.1],
+        ] {
+            for noisy in [0.0, 0.0005] {
+                let mut points = arc(200);
+                for (at, noise) in points.iter_mut().zip(normal(200)) {
+                    at[1] += noisy * noise;
+                }
+                for (at, sign) in points[90..].iter_mut().zip(&signs) {
+                    at[1] += 0.03 * sign;
+                }
+                let found = with(&points, oddity);
+                let Some(Oddity::Outliers {
+                    points: [first, last],
+                    count,
+                    distance,
+                    ..
+                }) = found
+                else {
+                    panic!("{signs:?}: {found:?}")
+                };
+                assert_eq!([first, last], [90, 89 + signs.len()], "{signs:?}");
+                assert_eq!(count, signs.len());
+                assert!((distance / 0.03 - 1.0).abs() < 0.2, "{signs:?}: {distance}");
+            }
+        }
     }
 
     #[test]
     fn a_jump_between_two_points_is_a_step_of_its_height() {
         let mut points = arc(200);
         points.iter_mut().skip(101).for_each(|at| at[1] -= 0.03);
-        let (outlier, step) = with(&points, oddities);
-        assert_eq!(outlier, None);
-        let step = step.expect("a step");
-        assert_eq!(step.point, 100);
-        assert!((step.height / -0.03 - 1.0).abs() < 0.2, "{step:?}");
+        let Some(Oddity::Step { point, height }) = with(&points, oddity) else {
+            panic!("{:?}", with(&points, oddity))
+        };
+        assert_eq!(point, 100);
+        assert!((height / -0.03 - 1.0).abs() < 0.05, "{height}");
     }
 
     #[test]
-    fn points_on_chords_are_a_polygon_of_that_chord_and_points_on_an_arc_are_none() {
-        let corners: Vec<[f64; 2]> = arc(400).into_iter().step_by(8).collect();
-        let mut points = Vec::new();
-        for pair in corners.windows(2) {
-            points.extend((0..10).map(|k| {
-                let t = 0.1 * f64::from(k);
-                [0, 1].map(|part| pair[0][part] + t * (pair[1][part] - pair[0][part]))
-            }));
+    fn points_on_chords_are_a_polygon_wherever_they_lie_on_them() {
+        for step in [4, 8, 16] {
+            let corners: Vec<[f64; 2]> = arc(600).into_iter().step_by(step).collect();
+            let length = 0.3 * step as f64;
+            for spacing in [0.1, 0.23, 0.31] {
+                let along = |k: u32| 0.07 + spacing * f64::from(k);
+                let places = (0..).map(along);
+                let last = length * (corners.len() - 1) as f64;
+                let points: Vec<[f64; 2]> = places
+                    .take_while(|s| *s < last)
+                    .map(|s| {
+                        let k = (s / length) as usize;
+                        let t = s / length - k as f64;
+                        [0, 1].map(|part| {
+                            corners[k][part] + t * (corners[k + 1][part] - corners[k][part])
+                        })
+                    })
+                    .collect();
+                let rounded = |step: f64| -> Vec<[f64; 2]> {
+                    let round = |part: f64| (part / step).round() * step;
+                    points.iter().map(|at| at.map(round)).collect()
+                };
+                for (points, digits) in [(points.clone(), 1e-9), (rounded(1e-5), 1e-5)] {
+                    let found = with(&points, |points, range| polygon(points, range, digits));
+                    let chord = found.unwrap_or_else(|| panic!("{length} {spacing} {digits}"));
+                    assert!((chord / length - 1.0).abs() < 0.1, "{length}: {chord}");
+                }
+            }
         }
-        // Corners that carry nine tenths of the turning are counted; here all turn alike.
-        let chord = with(&points, polygon).expect("a polygon");
-        assert!((chord * TURNING / 2.4 - 1.0).abs() < 0.05, "{chord}");
-        assert_eq!(with(&arc(400), polygon), None);
+    }
+
+    #[test]
+    fn smooth_rounded_and_noisy_points_are_no_polygon() {
+        for step in [1e-9, 1e-5, 1e-4, 1e-3, 1e-2] {
+            let round = |part: f64| (part / step).round() * step;
+            for noisy in [0.0, 1e-4, 1e-3, 1e-2] {
+                let mut points = arc(400);
+                for (at, noise) in points.iter_mut().zip(normal(400)) {
+                    at[1] += noisy * noise;
+                    *at = at.map(round);
+                }
+                let found = with(&points, |points, range| polygon(points, range, step));
+                assert_eq!(found, None, "{step} {noisy}");
+            }
+        }
+    }
+
+    #[test]
+    fn noise_is_white_and_waves_are_not() {
+        let mut points = arc(400);
+        for (at, noise) in points.iter_mut().zip(normal(400)) {
+            at[1] += 0.002 * noise;
+        }
+        assert!(with(&points, is_white));
+        for length in [4.0, 7.0, 12.0] {
+            let mut points = arc(400);
+            for (k, at) in points.iter_mut().enumerate() {
+                at[1] += 0.002 * (6.28 * k as f64 / length).sin();
+            }
+            assert!(!with(&points, is_white), "{length}");
+        }
+    }
+
+    #[test]
+    fn the_digits_are_the_finest_of_both_coordinates() {
+        assert_eq!(digits(&[[0.25, 1.5], [-1.0, 3.125]]), 1e-3);
+        assert_eq!(digits(&[[0.1, 1.0], [-1.0, 3.0]]), 0.1);
+        let third = 1.0 / 3.0;
+        assert_eq!(digits(&[[0.1, third], [0.2, 1.0]]), 0.1);
+        assert_eq!(digits(&[[third, third], [third, 1.0]]), DIGITS_LEAST);
     }
 
     #[test]

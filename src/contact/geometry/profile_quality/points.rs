@@ -2,8 +2,10 @@
 
 use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise;
-use crate::contact::geometry::profile_quality::noise::{Outlier, Step};
-use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead, Roughness};
+use crate::contact::geometry::profile_quality::noise::Oddity;
+use crate::contact::geometry::profile_quality::readings::{
+    KnownStretches, PointsRead, REFERENCE_MIN, Roughness,
+};
 
 /// Range of smoothing lengths that are advised, in mm. Shorter ones do not remove the noise of neighbouring points, longer ones distort
 /// gauge corners and flange roots (radii of 13 to 20 mm; 5 mm changes the largest pressure by 2 %, 10 mm by 27 % in one of ten cases).
@@ -15,8 +17,11 @@ const NOISE_LEFT: f64 = 0.07;
 const NOISE_HARMLESS: f64 = 0.01;
 /// Smoothing length, in chords, that turns a polygon into a smooth curve.
 const CHORDS: f64 = 2.0;
-/// Distance from the contact, in its half widths, up to which outliers and steps are considered.
-const NEAR: f64 = 2.0;
+/// Noise in steps of rounding: the deviation of an even distribution of width 1 is 1/√12. Up to twice this it is due to the rounding.
+const ROUNDED: f64 = 0.289;
+const ROUNDED_MAX: f64 = 2.0 * ROUNDED;
+/// Waviness over that which the noise explains, up to which noise is its cause: estimates from few points scatter by a factor of 2.
+const EXPLAINED: f64 = 3.0;
 /// Additional distance in mm over which noise is measured.
 const AROUND: f64 = 10.0;
 
@@ -35,10 +40,26 @@ pub struct UnderContact {
     pub roughness: Roughness,
     /// Length of the chords, if the points lie on those of a polygon.
     pub polygon: Option<f64>,
-    /// The farthest outlier near the contact.
-    pub outlier: Option<Outlier>,
-    /// The largest step near the contact.
-    pub step: Option<Step>,
+    /// The worst defect of few points near the contact.
+    pub oddity: Option<Oddity>,
+    /// Whether noise or rounding explain the waviness.
+    pub noisy: bool,
+    /// Step in mm to which the heights were rounded, if the noise is due to that.
+    pub rounding: Option<f64>,
+}
+
+/// Standard deviation in mm of the noise of the points in a range, along the normal; `None` if too few of them are close enough together to
+/// determine it. Heights that were rounded have at least the noise of the rounding: where a profile is level, neighbours are equal.
+#[must_use]
+pub fn noise_of(reading: &PointsRead, range: [usize; 2]) -> Option<f64> {
+    let least = ROUNDED * reading.rounding.unwrap_or(0.0);
+    Some(noise::noise(reading.points, range)?.max(least))
+}
+
+/// Length in mm of the chords if the points of a range were interpolated linearly between fewer points.
+#[must_use]
+pub fn polygon_of(reading: &PointsRead, range: [usize; 2]) -> Option<f64> {
+    noise::polygon(reading.points, range, reading.digits)
 }
 
 /// Quality of the points of a body under the contact `[low, high]` (mm along the profile); the contact modulus is in MPa.
@@ -67,22 +88,26 @@ pub fn under_contact(
         points.chord(widest)
     };
     let whole = [0, points.at.len()];
-    let near = points.numbers([middle(contact) - NEAR * half, middle(contact) + NEAR * half]);
-    let (outlier, step) = noise::oddities(points, near);
+    let near = half.max(REFERENCE_MIN);
+    let near = points.numbers([low - near, high + near]);
+    let noise = noise_of(reading, around).or_else(|| noise_of(reading, whole));
+    let roughness = known.about(reading, contact).roughness(contact, modulus);
+    let rounding = reading.rounding;
+    let rounding = rounding.filter(|step| noise.is_some_and(|noise| noise <= ROUNDED_MAX * step));
+    let white = rounding.is_some() || noise::is_white(points, around);
+    let cut = reading.smoothing.max(2.0 * spacing);
+    let explained = noise_pressure(modulus, noise.unwrap_or(0.0), spacing, cut);
     UnderContact {
         chord: [points.along[widest], points.along[widest + 1]],
         over_width: points.chord(widest) / (high - low),
         spacing,
-        noise: noise::noise(points, around).or_else(|| noise::noise(points, whole)),
-        roughness: known.about(reading, contact).roughness(contact, modulus),
-        polygon: noise::polygon(points, around),
-        outlier,
-        step,
+        noise,
+        roughness,
+        polygon: polygon_of(reading, around),
+        oddity: noise::oddity(points, near),
+        noisy: white && roughness.waviness <= EXPLAINED * explained,
+        rounding,
     }
-}
-
-fn middle([low, high]: [f64; 2]) -> f64 {
-    0.5 * (low + high)
 }
 
 /// Noise and spacing of one body, in mm.

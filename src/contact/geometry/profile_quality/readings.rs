@@ -7,7 +7,6 @@ use crate::contact::geometry::profile_quality::flattening::flattening;
 use crate::contact::geometry::profile_quality::noise::{MEDIAN_OF_NORMAL, median};
 use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::numerics::hermite::{akima_slopes, value};
-use crate::contact::numerics::spline::Spline;
 
 /// Bounds of the spacing of the comparison in mm. With 0.1 as the upper one and five places from point to point rows of a pair take some per
 /// cent more time; it was not measured how the readings differ beyond the tests, and the class *damaged profile* of `docs/stability.md`.
@@ -18,8 +17,8 @@ const PLACES: f64 = 4.0;
 const BEYOND: f64 = 10.0;
 /// Distance, in cut wavelengths, beyond which points do not affect a smoothed curve.
 const SUPPORT: f64 = 3.0;
-/// Least smoothing of the reference in mm; otherwise it is twice the length in use.
-const REFERENCE_MIN: f64 = 3.0;
+/// Least smoothing of the reference in mm; otherwise it is twice the length in use. A point changes the reference up to this far away.
+pub const REFERENCE_MIN: f64 = 3.0;
 /// Most places at which curves are compared, however wide the contact.
 const SAMPLES_MAX: usize = 4000;
 
@@ -93,6 +92,10 @@ pub struct PointsRead<'a> {
     pub curve: &'a PlaneCurve,
     /// Cut wavelength of its smoothing in mm; 0 for none.
     pub smoothing: f64,
+    /// Step in mm of which all coordinates are multiples.
+    pub digits: f64,
+    /// Step in mm of which all heights are multiples, if it is 0.001 mm or more.
+    pub rounding: Option<f64>,
 }
 
 /// Both ends of the stretch that the roughness at a contact is taken from, in mm along the profile.
@@ -112,6 +115,7 @@ impl ProfileStretch {
             points,
             curve,
             smoothing,
+            ..
         } = *reading;
         let reference = REFERENCE_MIN.max(2.0 * smoothing);
         let part = points.within([
@@ -131,7 +135,7 @@ impl ProfileStretch {
                 .collect();
             flattening(&heights, step, 1.0)
         };
-        let smoother = spline(part, reference);
+        let smoother = PlaneCurve::through(part.at, part.along, reference);
         let waves = pressures(&|s| smoother.at(s).at);
         let ambiguity = if smoothing > 0.0 {
             Vec::new()
@@ -172,15 +176,6 @@ impl ProfileStretch {
     }
 }
 
-/// The spline near points, without waves below `cut` mm.
-fn spline(points: Points, cut: f64) -> PlaneCurve {
-    let [y, z] = [0, 1].map(|part| {
-        let values: Vec<f64> = points.at.iter().map(|at| at[part]).collect();
-        Spline::new(points.along, &values, cut)
-    });
-    PlaneCurve::new(&y, &z)
-}
-
 /// Distance from a point of a spline to that of another curve along its normal, positive if the spline is above.
 fn above(CurvePoint { at, slope, .. }: &CurvePoint, [other_y, other_z]: [f64; 2]) -> f64 {
     let length = slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE);
@@ -217,8 +212,10 @@ mod tests {
         };
         let reading = PointsRead {
             points,
-            curve: &spline(points, smoothing),
+            curve: &PlaneCurve::through(at, along, smoothing),
             smoothing,
+            digits: 0.0,
+            rounding: None,
         };
         let stretch = KnownStretches::default().about(&reading, CONTACT);
         stretch.roughness(CONTACT, MODULUS)

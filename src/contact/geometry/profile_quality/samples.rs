@@ -22,9 +22,9 @@ pub struct KnownPoints(Vec<KnownPoint>);
 pub(crate) struct KnownPoint {
     /// Height in mm above the cubic of its six neighbours, if there are as many near.
     pub(crate) off: Once<Option<f64>>,
-    /// Length of the chord over it and the next four in mm, and the size of their normalised fourth divided difference in mm.
+    /// Length of the chord over it and the next four in mm, and their normalised fourth divided difference in mm.
     pub(crate) difference: Once<Option<(f64, f64)>>,
-    /// The angle in rad between the chord to the next point and the one after that.
+    /// The angle in rad between the chords before and after it, positive to the left.
     pub(crate) turn: Once<f64>,
 }
 

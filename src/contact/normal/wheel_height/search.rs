@@ -6,18 +6,25 @@
 //! and solved coarsely.
 
 use crate::contact::geometry::contact_locus::ContactLocus;
+use crate::contact::geometry::grouping::LoadedPatch;
+use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::neighbours::{Neighbour, neglected};
+use crate::contact::normal::patch::Patch;
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
 use crate::contact::normal::wheel_height::lowered::Fineness;
 use crate::contact::normal::wheel_height::task::{Accuracy, NormalPass, WheelLoad, WheelTask};
-use crate::contact::normal::wheel_height::wheel_contact::WheelContact;
+use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::remark::list::Remark;
 
 /// Heights after which the search is given up. Keeps the numbers safe; not tuned.
 const HEIGHTS_MAX: u32 = 40;
+/// Times that gaps are divided further at most. Keeps the work bounded; each time at least one gap is divided, and most cases need none.
+const REGROUPINGS_MAX: usize = 8;
+/// Strips of a patch over which the inclination of the rail is averaged.
+const STRIPS: usize = 24;
 /// Tells from a wheel at some height what friction will carry, see [`NormalPass::friction_share`]; nothing where it cannot be told.
 pub type ShareForecast<'a> = dyn Fn(&WheelContact) -> Option<f64> + 'a;
 
@@ -115,11 +122,72 @@ impl WheelTask {
         }
     }
 
-    /// Brings the wheel to rest.
+    /// Brings the wheel to rest. If a gap then holds patches that must not share a frame, `search` is divided further and the height sought
+    /// again.
     ///
     /// # Errors
     /// A reason why there is no answer; or the monitor stopped the work.
     pub fn find_height(
+        &self,
+        search: &mut ContactLocus,
+        wanted: NormalPass,
+        start: HeightStart,
+        workspace: &mut GridWorkspace<f32>,
+        monitor: &dyn Monitor,
+    ) -> Result<WheelContact, NormalError> {
+        let mut wheel = self.height_as_divided(search, wanted, start, workspace, monitor)?;
+        for _ in 0..REGROUPINGS_MAX {
+            let loaded = self.loaded_patches(search, &wheel);
+            let loaded = loaded.map_err(|miss| NormalError::NoAnswer(miss.to_string()))?;
+            let Some(grouping) = search.regrouped(&loaded, wheel.lowering) else {
+                break;
+            };
+            search.grouping = Some(grouping);
+            // Its force is that of other gaps, so that it must not be scaled to the load.
+            wheel.met = false;
+            let again = HeightStart {
+                before: Some(&wheel),
+                lowering: None,
+                ..start
+            };
+            wheel = self.height_as_divided(search, wanted, again, workspace, monitor)?;
+        }
+        Ok(wheel)
+    }
+
+    /// The patches under pressure, gap by gap.
+    fn loaded_patches(
+        &self,
+        search: &ContactLocus,
+        wheel: &WheelContact,
+    ) -> Result<Vec<Vec<LoadedPatch>>, SurfaceMissed> {
+        let of_patch = |gap: &GapContact, k: usize, patch: &Patch| {
+            let [.., low, high] = patch.extent;
+            let over = |y: f64| self.geometry.rail_over(&gap.frame, y);
+            let rail = [over(low)?, over(high)?];
+            let (mut force, mut turned) = (0.0, 0.0);
+            for [y, own] in gap.strip_loads(k, STRIPS) {
+                let [dy, dz] = self.geometry.rail_at(over(y)?).slope;
+                force += own;
+                turned += own * (dz / dy).atan();
+            }
+            Ok(LoadedPatch {
+                rail,
+                lines: rail.map(|rail| search.line_at(rail)),
+                angle: if force > 0.0 { turned / force } else { gap.frame.angle },
+                force: patch.normal_force,
+            })
+        };
+        let of_gap = |gap: &GapContact| {
+            let patches = gap.field.patches();
+            let patches = patches.iter().enumerate();
+            patches.map(|(k, patch)| of_patch(gap, k, patch)).collect()
+        };
+        wheel.patches.iter().map(of_gap).collect()
+    }
+
+    /// The wheel at rest with the overlaps divided among gaps as they are.
+    fn height_as_divided(
         &self,
         search: &ContactLocus,
         wanted: NormalPass,

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::local_gap::LocalGap;
+use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::gap::answer::NormalWork;
 use crate::contact::normal::gap::start::GapStart;
 use crate::contact::normal::gap::tile::Tile;
@@ -80,6 +81,22 @@ impl GapContact {
             && (self.frame.angle - gap.frame.angle).abs() < TURN_MAX;
         let start = self.start.as_ref().filter(|_| same)?;
         Some(start.at([along, across], depth))
+    }
+
+    /// Middle of equally wide strips across a patch in mm, each with its part of the normal force in N.
+    pub(crate) fn strip_loads(&self, patch: usize, count: usize) -> Vec<[f64; 2]> {
+        let [.., low, high] = self.field.patches()[patch].extent;
+        let dy = (high - low) / count as f64;
+        let strips: Vec<(f64, f64)> = (0..count)
+            .map(|k| (low + dy * (k as f64 + 0.5), dy))
+            .collect();
+        let chords = self.field.chords(patch, &strips);
+        let load = |chord: &Chord| {
+            let length = chord.right - chord.left;
+            let pressure = self.field.mean_pressure(chord, chord.left, chord.right);
+            [chord.y, pressure * length * chord.dy]
+        };
+        chords.iter().map(load).collect()
     }
 
     /// Sum of the normal forces in N.

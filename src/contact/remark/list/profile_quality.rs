@@ -165,14 +165,18 @@ macro_rules! profile_remarks {
                 "{profile}: with points {spacing_mm:.1} mm apart noise cannot be told from shape, so no smoothing was chosen and none is used"
             ),
 
-            /// One point of a profile near the contact is off the curve of its neighbours.
+            /// One point of a profile near the contact, or a few neighbours, are off the curve of the points on both sides.
             ProfileOutlier {
                 /// Whose.
                 profile: &'static str = "rail",
-                /// Where on the profile.
+                /// Place on the profile of the point farthest off.
                 at_y_mm: f64 = -3.2,
-                /// Distance from the curve.
+                /// Distance of this point from the curve.
                 distance_um: f64 = 200.0,
+                /// Number of points that are off.
+                points: usize = 1,
+                /// Places of the first and of the last of them.
+                y_mm: [f64; 2] = [-3.2, -3.2],
                 /// Roughness of this profile as the pressure that flattens it.
                 waviness_mpa: f64 = 900.0,
                 /// That of both profiles over the largest pressure.
@@ -180,11 +184,18 @@ macro_rules! profile_remarks {
             }
             code: "profile-outlier",
             severity: Warning,
-            advice: "Remove or correct the point; smoothing only spreads its error.",
-            detail: format!(
-                "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um:.1} µm off the curve of its neighbours, equivalent to \
-                 {waviness_mpa:.0} MPa of contact pressure: remove or correct it"
-            ),
+            advice: "Remove or correct the points; smoothing only spreads their error.",
+            detail: if *points == 1 {
+                format!(
+                    "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um:.1} µm off the curve of its neighbours, equivalent to \
+                     {waviness_mpa:.0} MPa of contact pressure: remove or correct it"
+                )
+            } else {
+                format!(
+                    "the {profile}'s points jump at y = {at_y_mm:.2} mm: {points} points from y {:.2} to {:.2} mm are up to {distance_um:.1} µm off the \
+                     curve of their neighbours, equivalent to {waviness_mpa:.0} MPa of contact pressure: remove or correct them", y_mm[0], y_mm[1]
+                )
+            },
 
             /// A profile jumps between two points near the contact.
             ProfileStep {

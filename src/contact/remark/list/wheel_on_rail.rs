@@ -81,8 +81,10 @@ macro_rules! wheel_remarks {
 
             /// The rail bends so much under the patches of one plane of contact that forces depend on it by some percent.
             PlaneOfContact {
-                /// What the plane leaves open of the forces, relative to μN.
+                /// Error of the forces due to the plane, relative to μN.
                 share: f64 = 0.02,
+                /// The part of it due to the direction of the normals; the rest is due to the creepages.
+                of_normals: f64 = 0.01,
                 /// Largest inclination of the rail under a patch to the plane of contact.
                 turn_rad: f64 = 0.2,
             }
@@ -90,7 +92,7 @@ macro_rules! wheel_remarks {
             severity: Info,
             advice: "Take this share of μN as a further error of the forces; `error_estimate` does not have it.",
             detail: format!(
-                "the rail is inclined to the plane of contact by up to {turn_rad:.2} rad under the patches, which leaves forces uncertain by {:.1} % of μN", 100.0 * share
+                "the rail is inclined to the plane of contact by up to {turn_rad:.2} rad under the patches, which leaves forces uncertain by {:.1} % of μN ({:.1} % by the direction of the normals)", 100.0 * share, 100.0 * of_normals
             ),
 
             /// The force jumps at the height of the wheel that carries the load, where patches merge; forces were scaled to the load.
