@@ -344,7 +344,10 @@ fn patches_far_apart_or_inclined_to_each_other_never_share_a_plane() {
         for pair in places.chunk_by(|a, b| a.origin == b.origin) {
             shared += usize::from(pair.len() > 1);
             for (k, one) in pair.iter().enumerate() {
-                let reached = pair[..=k].iter().map(|p| p.ends[1]).fold(f64::MIN, f64::max);
+                let reached = pair[..=k]
+                    .iter()
+                    .map(|p| p.ends[1])
+                    .fold(f64::MIN, f64::max);
                 if let Some(next) = pair.get(k + 1) {
                     assert!(next.ends[0] - reached < 8.3, "{round}");
                 }

@@ -145,7 +145,10 @@ fn a_cone_leaves_nothing_open_and_a_hollow_wheel_does() {
 
 /// A figure of the remark on the plane.
 fn figure(solution: &Solution, name: &str) -> f64 {
-    let remark = solution.remarks.iter().find(|remark| remark.code == "plane-of-contact");
+    let remark = solution
+        .remarks
+        .iter()
+        .find(|remark| remark.code == "plane-of-contact");
     match remark.and_then(|remark| remark.figures.get(name).cloned()) {
         Some(Figure::Number(value)) => value,
         _ => 0.0,
@@ -171,7 +174,10 @@ fn the_normals_are_open_where_creepages_are_given_as_well() {
         json!({ "wheelset": { "speed_mm_per_s": 2000, "free_rolling_radius_mm": 461 } });
     let found_moving = solve(&moving).0;
     let share = figure(&found_moving, "of_normals");
-    assert!((share / figure(&found, "of_normals") - 1.0).abs() < 0.3, "{share}");
+    assert!(
+        (share / figure(&found, "of_normals") - 1.0).abs() < 0.3,
+        "{share}"
+    );
     // On the tread nothing is open.
     let mut tread = put(&generated(), "contact", json!({ "lateral_shift_mm": 3.0 }));
     tread["motion"] = json!({ "creepage_x": 0.001 });

@@ -98,7 +98,10 @@ fn a_straight_face_far_from_the_wheel_is_no_hole() {
         let outward = if field { 1.0 } else { -1.0 };
         rail.extend((0..6).map(|k| {
             let further = f64::from(k);
-            [y + outward * (0.04 + 0.02 * further), z + length + 0.3 * further]
+            [
+                y + outward * (0.04 + 0.02 * further),
+                z + length + 0.3 * further,
+            ]
         }));
         for force in [5e3, 20e3, 75e3] {
             let mut case = on_rail(&rail);
@@ -113,7 +116,13 @@ fn a_straight_face_far_from_the_wheel_is_no_hole() {
 #[test]
 fn a_sharp_corner_beside_the_contact_changes_no_pressure() {
     let sound = solved(&on_rail(&rail_60e1()));
-    let edge = sound.patches[0].quality.clone().expect("a quality").rail.y_mm[1] + 1.5;
+    let edge = sound.patches[0]
+        .quality
+        .clone()
+        .expect("a quality")
+        .rail
+        .y_mm[1]
+        + 1.5;
     let mut rail: Vec<[f64; 2]> = rail_60e1();
     rail.retain(|at| at[0] < edge);
     let [y, z] = rail[rail.len() - 1];
@@ -136,7 +145,10 @@ fn a_point_far_off_among_coarse_points_is_named_with_its_place() {
         let told = found.remarks.iter().find(|r| r.code == "profile-outlier");
         let told = told.unwrap_or_else(|| panic!("{:?}", found.remarks));
         let at = serde_json::to_value(told).expect("JSON")["at_y_mm"].as_f64();
-        assert!((at.expect("a place") - points[middle][0]).abs() < 1e-3, "{told:?}");
+        assert!(
+            (at.expect("a place") - points[middle][0]).abs() < 1e-3,
+            "{told:?}"
+        );
     }
 }
 

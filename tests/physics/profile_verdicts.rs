@@ -104,7 +104,9 @@ fn on_chords(random: &mut Random) -> Points {
     let start = random.between(0.0, spacing);
     let at = |k: usize| {
         let s = start + spacing * k as f64;
-        let i = along.partition_point(|knot| *knot <= s).clamp(1, corners.len() - 1);
+        let i = along
+            .partition_point(|knot| *knot <= s)
+            .clamp(1, corners.len() - 1);
         let t = (s - along[i - 1]) / (along[i] - along[i - 1]);
         [0, 1].map(|part| {
             let value = corners[i - 1][part] * (1.0 - t) + corners[i][part] * t;

@@ -45,7 +45,9 @@ mod tests {
     use super::*;
 
     fn corners(points: &[[f64; 2]]) -> Vec<usize> {
-        (0..points.len()).filter(|k| is_corner(points, *k)).collect()
+        (0..points.len())
+            .filter(|k| is_corner(points, *k))
+            .collect()
     }
 
     /// Points of a circle of 13 mm, each turned by `step` rad from the one before.

@@ -55,9 +55,7 @@ pub fn holes(search: &ContactLocus, lowering: f64, width: f64) -> Vec<Hole> {
             if length < Hole::least(width) {
                 continue;
             }
-            let before = along[..from]
-                .iter()
-                .rfind(|s| pair[0] - **s >= LENGTH_MIN);
+            let before = along[..from].iter().rfind(|s| pair[0] - **s >= LENGTH_MIN);
             let after = along[from + 2..]
                 .iter()
                 .find(|s| **s - pair[1] >= LENGTH_MIN);

@@ -50,11 +50,7 @@ impl ContactLocus<'_> {
     /// A grouping in which the patches of every gap may share a frame, and every gap that was cut for that has the inclination of the rail
     /// where it carries its load; `None` if that is so already. `loaded` are the patches under pressure, gap by gap, and `lowering` the
     /// height in mm at which they were found.
-    pub(crate) fn regrouped(
-        &self,
-        loaded: &[Vec<LoadedPatch>],
-        lowering: f64,
-    ) -> Option<Grouping> {
+    pub(crate) fn regrouped(&self, loaded: &[Vec<LoadedPatch>], lowering: f64) -> Option<Grouping> {
         let mut grouping = match &self.grouping {
             Some(known) => known.clone(),
             None => grouping_of(&self.overlaps(lowering).ok()?),
@@ -67,9 +63,8 @@ impl ContactLocus<'_> {
                 continue;
             };
             let angles = grouping.groups[k].loaded.zip(whole.loaded);
-            let turned = angles.is_some_and(|(known, found)| {
-                (known.angle - found.angle).abs() > LOADED_ANGLE
-            });
+            let turned = angles
+                .is_some_and(|(known, found)| (known.angle - found.angle).abs() > LOADED_ANGLE);
             if parts.len() > 1 || turned {
                 let groups = parts.into_iter().map(group_of);
                 grouping.groups.splice(k..=k, groups);
@@ -273,9 +268,8 @@ impl ContactLocus<'_> {
             let [low, high] = loaded.limits();
             let limits = [low.max(overlap.ends[0]), high.min(overlap.ends[1])];
             let limit = |side: usize| self.lines[limits[side]];
-            return [0, 1].map(|side| {
-                (overlap.cut[side] || overlap.near[side]).then(|| limit(side))
-            });
+            return [0, 1]
+                .map(|side| (overlap.cut[side] || overlap.near[side]).then(|| limit(side)));
         }
         let (depths, main) = self.depths(overlap, lowering);
         let thin = |k: &usize| depths[*k] <= THIN_OVERLAP * depths[main];

@@ -223,7 +223,11 @@ mod tests {
             assert!((corner[0] - edge[0]).hypot(corner[1] - edge[1]) < 1e-9);
             for s in curve.parameters(0.01) {
                 let [y, z] = curve.at(s).at;
-                let off = if s < along[80] { z + y * y / 1000.0 } else { y - edge[0] };
+                let off = if s < along[80] {
+                    z + y * y / 1000.0
+                } else {
+                    y - edge[0]
+                };
                 assert!(off.abs() < 1e-4, "{smoothing}: {off} at {s}");
             }
         }

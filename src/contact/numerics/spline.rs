@@ -34,12 +34,7 @@ impl Spline {
 
     /// Like [`Spline::new`]. A smoothed spline passes exactly through the first and the last value where `ends` says so.
     #[must_use]
-    pub fn pinned(
-        knots: &[f64],
-        values: &[f64],
-        cut_wavelength: f64,
-        ends: [bool; 2],
-    ) -> Spline {
+    pub fn pinned(knots: &[f64], values: &[f64], cut_wavelength: f64, ends: [bool; 2]) -> Spline {
         let n = knots.len();
         let lambda = (cut_wavelength / std::f64::consts::TAU).powi(4);
         let mut spline = Spline {

@@ -236,7 +236,9 @@ fn explained(points: Points, [first, last]: [usize; 2]) -> Option<Oddity> {
     };
     let deviations: Option<Vec<f64>> = (first - from..=last - from).map(off).collect();
     let deviations = deviations?;
-    let largest = deviations.iter().fold(0.0_f64, |most, off| most.max(off.abs()));
+    let largest = deviations
+        .iter()
+        .fold(0.0_f64, |most, off| most.max(off.abs()));
     // A cubic and a step after each point of the group in turn.
     let steps = (first.saturating_sub(1).max(from)..=last).filter_map(|point| {
         let [height, left] = step_after(&local, point - from, length)?;
@@ -298,7 +300,9 @@ fn off_neighbours(points: Points, k: usize) -> Option<f64> {
     let first = k.checked_sub(3)?;
     let local = in_chord(window_at::<7>(points, first)?);
     let span = local[6][0] - local[0][0];
-    let longest = (first..first + 6).map(|k| points.chord(k)).fold(0.0, f64::max);
+    let longest = (first..first + 6)
+        .map(|k| points.chord(k))
+        .fold(0.0, f64::max);
     let uneven = span > ODD_SPAN_MAX && longest > ODD_CHORD_MAX * span / 6.0;
     if span > COARSE_SPAN_MAX || uneven || (first + 1..first + 6).any(|k| is_corner(points.at, k)) {
         return None;
@@ -342,9 +346,11 @@ pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
             open = None;
         }
     }
-    let (sum, sizes) = kinks.iter().fold((0.0_f64, 0.0), |(sum, sizes), [_, turned]| {
-        (sum + turned, sizes + turned.abs())
-    });
+    let (sum, sizes) = kinks
+        .iter()
+        .fold((0.0_f64, 0.0), |(sum, sizes), [_, turned]| {
+            (sum + turned, sizes + turned.abs())
+        });
     let one_way = sum.abs() >= KINKS_ONE_WAY * sizes;
     if kinks.len() < KINKS_MIN.max(others) || !one_way {
         return None;

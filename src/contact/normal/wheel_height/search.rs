@@ -174,7 +174,11 @@ impl WheelTask {
             Ok(LoadedPatch {
                 rail,
                 lines: rail.map(|rail| search.line_at(rail)),
-                angle: if force > 0.0 { turned / force } else { gap.frame.angle },
+                angle: if force > 0.0 {
+                    turned / force
+                } else {
+                    gap.frame.angle
+                },
                 force: patch.normal_force,
             })
         };
