@@ -140,7 +140,7 @@ fn a_cone_leaves_nothing_open_and_a_hollow_wheel_does() {
     }
     assert_eq!(told(&solve(&cone).0), None);
     let share = told(&solve(&hollow).0).expect("a remark");
-    assert!((0.02..0.06).contains(&share), "{share}");
+    assert!((0.02..0.1).contains(&share), "{share}");
 }
 
 /// A figure of the remark on the plane.

@@ -52,7 +52,7 @@ mod tests {
 
     /// Points of a circle of 13 mm, each turned by `step` rad from the one before.
     fn arc(step: f64) -> Vec<[f64; 2]> {
-        let count = (1.3 / step) as u32;
+        let count = (3.0 / step) as u32;
         let angle = |k: u32| step * f64::from(k);
         (0..=count)
             .map(|k| [13.0 * angle(k).sin(), 13.0 * angle(k).cos()])

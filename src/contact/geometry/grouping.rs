@@ -4,6 +4,9 @@
 /// separates patches that are 8 mm or 30° apart.
 pub(crate) const SHARED_GAP_DISTANCE: f64 = 8.0;
 
+/// Patches farther apart than this along the rail, in mm, never share a frame. Patches are narrower than their overlaps, so that those of
+/// overlaps 8 mm apart may be up to half as far again apart.
+pub(crate) const SHARED_FRAME_DISTANCE: f64 = 1.5 * SHARED_GAP_DISTANCE;
 /// Overlaps nearer than [`SHARED_GAP_DISTANCE`] share a gap if their inclinations differ by less than this, in rad.
 pub(crate) const SHARED_GAP_ANGLE: f64 = 0.5;
 
@@ -98,7 +101,7 @@ pub(crate) fn group_of(patches: &[LoadedPatch]) -> Group {
 }
 
 /// The patches of one gap, in order of y, divided into those that may share a frame: neighbours are no more than
-/// [`SHARED_GAP_DISTANCE`] apart, and no two are inclined to each other by more than [`SHARED_GAP_ANGLE`].
+/// [`SHARED_FRAME_DISTANCE`] apart, and no two are inclined to each other by more than [`SHARED_GAP_ANGLE`].
 pub(crate) fn sharing_a_frame(patches: &[LoadedPatch]) -> Vec<&[LoadedPatch]> {
     let angles = patches.iter().map(|patch| patch.angle);
     let low = angles.clone().fold(f64::INFINITY, f64::min);
@@ -114,7 +117,7 @@ pub(crate) fn sharing_a_frame(patches: &[LoadedPatch]) -> Vec<&[LoadedPatch]> {
     let Some(k) = widest.filter(|k| apart(k) > 0.0) else {
         return vec![patches];
     };
-    if apart(&k) <= SHARED_GAP_DISTANCE && high - low <= SHARED_GAP_ANGLE {
+    if apart(&k) <= SHARED_FRAME_DISTANCE && high - low <= SHARED_GAP_ANGLE {
         return vec![patches];
     }
     let (before, after) = patches.split_at(k);
@@ -143,7 +146,7 @@ mod tests {
     fn patches_far_apart_or_inclined_to_each_other_have_frames_of_their_own() {
         let near = [patch(0.0, 6.0, 0.0), patch(10.0, 12.0, 0.3)];
         assert_eq!(sizes(&near), [2]);
-        let far = [patch(0.0, 6.0, 0.0), patch(14.5, 16.0, 0.1)];
+        let far = [patch(0.0, 6.0, 0.0), patch(18.5, 20.0, 0.1)];
         assert_eq!(sizes(&far), [1, 1]);
         let inclined = [patch(0.0, 6.0, 0.0), patch(8.0, 9.0, -0.6)];
         assert_eq!(sizes(&inclined), [1, 1]);
@@ -161,7 +164,7 @@ mod tests {
             patch(22.0, 23.0, 0.1),
         ];
         assert_eq!(sizes(&nested), [3]);
-        let mirrored = [patch(16.0, 14.5, 0.1), patch(6.0, 0.0, 0.0)];
+        let mirrored = [patch(20.0, 18.5, 0.1), patch(6.0, 0.0, 0.0)];
         assert_eq!(sizes(&mirrored), [1, 1]);
     }
 }

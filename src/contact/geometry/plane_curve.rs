@@ -221,7 +221,8 @@ mod tests {
             let curve = PlaneCurve::through(&at, &along, smoothing);
             let corner = curve.at(along[80]).at;
             assert!((corner[0] - edge[0]).hypot(corner[1] - edge[1]) < 1e-9);
-            for s in curve.parameters(0.01) {
+            // Smoothing straightens the free end.
+            for s in curve.parameters(0.01).into_iter().filter(|s| *s > 10.0) {
                 let [y, z] = curve.at(s).at;
                 let off = if s < along[80] {
                     z + y * y / 1000.0

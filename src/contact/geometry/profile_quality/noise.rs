@@ -42,7 +42,7 @@ const ODD_CHORD_MAX: f64 = 2.0;
 /// Part of the largest deviation of a group from which a point belongs to it.
 const ODD_PART: f64 = 0.3;
 /// Most points in a group of displaced points, with those next to them; more are waves.
-const ODD_POINTS_MAX: usize = 12;
+const ODD_POINTS_MAX: usize = 16;
 /// Points on either side of a group that its deviations are measured from.
 const ODD_SOUND: usize = 4;
 /// Fewest kinks of a polygon.
@@ -194,6 +194,8 @@ pub fn oddity(points: Points, range: [usize; 2]) -> Option<Oddity> {
         let belongs = |j: &usize| size(*j) > ODD_PART * own;
         let first = (0..=here).rev().take_while(belongs).last().unwrap_or(here);
         let last = (here..off.len()).take_while(belongs).last().unwrap_or(here);
+        // Points inside a group of one sign deviate little from each other.
+        let (first, last) = (first.saturating_sub(2), (last + 2).min(off.len() - 1));
         let found = explained(points, [around[0] + first, around[0] + last]);
         let larger = |known: &Oddity, found: &Oddity| found.size() > known.size();
         if let Some(found) = found
@@ -359,7 +361,7 @@ pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
     Some(median(&mut chords.collect::<Vec<f64>>()))
 }
 
-/// The step in mm of which all coordinates are multiples, and at least 1e-9 mm: the digits that the points were given with.
+/// The digits that points were given with: the coarser of the steps in mm of which all y and all z are multiples, and at least 1e-9 mm.
 #[must_use]
 pub fn digits(given: &[[f64; 2]]) -> f64 {
     let of = |part: usize| {
@@ -653,8 +655,8 @@ mod tests {
     }
 
     #[test]
-    fn the_digits_are_the_finest_of_both_coordinates() {
-        assert_eq!(digits(&[[0.25, 1.5], [-1.0, 3.125]]), 1e-3);
+    fn the_digits_are_those_of_the_coarser_coordinate() {
+        assert_eq!(digits(&[[0.25, 1.5], [-1.0, 3.125]]), 0.01);
         assert_eq!(digits(&[[0.1, 1.0], [-1.0, 3.0]]), 0.1);
         let third = 1.0 / 3.0;
         assert_eq!(digits(&[[0.1, third], [0.2, 1.0]]), 0.1);
