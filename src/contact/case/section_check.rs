@@ -12,6 +12,7 @@ use crate::contact::geometry::profile_quality::points::advised_smoothing;
 use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::profile_quality::SectionQuality;
 
 /// Contact modulus G/(1 − ν) of steel on steel in MPa, for the smoothing that is suggested.
@@ -41,6 +42,11 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
         return Err(CaseError(listed));
     };
     let read = [Body::Rail, Body::Wheel].map(|body| (body, profile(body, &section)));
+    // A shape in another unit may show the other body, so that the sizes of both are judged.
+    let is_size = |remark: &&Remark| matches!(remark, Remark::ProfileSizeUnusual { .. });
+    let profiles = read.iter().filter_map(|(_, profile)| profile.as_ref().ok());
+    let sizes = profiles.flat_map(|profile| profile.remarks.iter().filter(is_size));
+    let sizes: Vec<Remark> = sizes.cloned().collect();
     let (body, profile) = match read {
         [(_, Ok(rail)), (_, Ok(wheel))] => match rail.looks_like() {
             Some(LikelyBody::Wheel) => (Body::Wheel, wheel),
@@ -61,6 +67,8 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
         remarks: profile
             .remarks
             .iter()
+            .filter(|remark| !is_size(remark))
+            .chain(&sizes)
             .map(|remark| remark.clone().at_pointer(""))
             .collect(),
     })
