@@ -77,9 +77,11 @@ mod profile_reference;
 mod profile_reference_files;
 mod profile_remarks;
 mod profile_robustness;
+mod profile_senses;
 mod profile_shapes;
 mod profile_solutions;
 mod profile_trust;
+mod profile_variants;
 mod profile_verdicts;
 mod profile_worn;
 #[path = "../../benches/stress/random.rs"]

@@ -205,12 +205,7 @@ fn members_of_the_contact_are_checked_on_both_sides_of_their_limits() {
 fn what_is_left_out_is_the_standard_track() {
     let mut short = generated();
     let contact = short["contact"].as_object_mut().unwrap();
-    for name in [
-        "gauge_mm",
-        "gauge_height_mm",
-        "flange_back_distance_mm",
-        "flange_back_position_mm",
-    ] {
+    for name in ["gauge_mm", "gauge_height_mm", "flange_back_distance_mm"] {
         contact.remove(name);
     }
     let limits = Limits::default();

@@ -14,15 +14,18 @@ pub struct KnownPair(RefCell<Option<PairRead>>);
 #[derive(Debug)]
 struct PairRead {
     sections: [CrossSection; 2],
+    /// y of the back of the flange, if the case states it.
+    flange_back: Option<f64>,
     geometry: WheelRail,
 }
 
-/// The same place of the rail, wherever the wheelset is.
+/// Whether the track is the same, wherever the wheelset is. The back of the flange is compared as it was stated.
 fn on_same_track(one: &Placement, other: &Placement) -> bool {
     let track = |placement: &Placement| Placement {
         lateral_shift: 0.0,
         yaw: 0.0,
         roll: 0.0,
+        flange_back_position: 0.0,
         ..*placement
     };
     track(one) == track(other)
@@ -33,11 +36,17 @@ impl KnownPair {
     pub(crate) fn placed(
         &self,
         [rail, wheel]: [&CrossSection; 2],
+        flange_back: Option<f64>,
         placement: &Placement,
     ) -> Option<WheelRail> {
         let known = self.0.borrow();
-        let PairRead { sections, geometry } = known.as_ref()?;
-        let same = on_same_track(&geometry.placement, placement)
+        let PairRead {
+            sections,
+            flange_back: back_before,
+            geometry,
+        } = known.as_ref()?;
+        let same = *back_before == flange_back
+            && on_same_track(&geometry.placement, placement)
             && sections[0] == *rail
             && sections[1] == *wheel;
         let Placement {
@@ -50,9 +59,15 @@ impl KnownPair {
     }
 
     /// Keeps a pair that was read without faults.
-    pub(crate) fn keep(&self, sections: [&CrossSection; 2], geometry: &WheelRail) {
+    pub(crate) fn keep(
+        &self,
+        sections: [&CrossSection; 2],
+        flange_back: Option<f64>,
+        geometry: &WheelRail,
+    ) {
         *self.0.borrow_mut() = Some(PairRead {
             sections: sections.map(CrossSection::clone),
+            flange_back,
             geometry: geometry.clone(),
         });
     }

@@ -9,6 +9,7 @@ pub mod conversions;
 pub mod cost;
 pub mod digest;
 pub mod elasticity;
+pub mod flange_back;
 pub mod history;
 pub mod known_pair;
 pub mod length_units;

@@ -7,9 +7,9 @@ use crate::contact::case::read::object::Object;
 use crate::contact::case::read::wheel_rail::section_of;
 use crate::contact::case::wheel_task::profile;
 use crate::contact::error::{CaseError, Fault};
+use crate::contact::geometry::orientation::SureBody;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
-use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -21,7 +21,7 @@ const STEEL_MPA: f64 = 82_000.0 / (1.0 - 0.28);
 /// What a cross-section was taken for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SectionReport {
-    /// `rail` or `wheel`: what the file says, or what the points look like.
+    /// `rail` or `wheel`: the body that the file states, or that the points show.
     pub body: &'static str,
     /// Its points, and the smoothing that suits them on steel beside another profile of this kind.
     pub quality: SectionQuality,
@@ -48,8 +48,8 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
     let sizes = profiles.flat_map(|profile| profile.remarks.iter().filter(is_size));
     let sizes: Vec<Remark> = sizes.cloned().collect();
     let (body, profile) = match read {
-        [(_, Ok(rail)), (_, Ok(wheel))] => match rail.looks_like() {
-            Some(LikelyBody::Wheel) => (Body::Wheel, wheel),
+        [(_, Ok(rail)), (_, Ok(wheel))] => match rail.sure_body() {
+            Some(SureBody::Wheel) => (Body::Wheel, wheel),
             _ => (Body::Rail, rail),
         },
         [(body, Ok(only)), _] | [_, (body, Ok(only))] => (body, only),

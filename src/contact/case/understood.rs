@@ -7,6 +7,8 @@ use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::remark::entry::{RemarkEntry, merged};
+use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::understanding::{
     FirstTouch, KnownPatch, PlacedProfiles, Understanding,
 };
@@ -15,6 +17,8 @@ use crate::contact::solution::words::understanding::{
 const STEP: f64 = 0.25;
 /// Digits of a coordinate in mm that are kept.
 const ROUNDED: f64 = 1e4;
+/// Length in mm of profile needed beyond a contact.
+const BEYOND: f64 = 5.0;
 
 impl CheckedCase {
     /// What can be said of the contact without solving it.
@@ -38,6 +42,50 @@ impl CheckedCase {
             placement,
         })
     }
+}
+
+impl CheckedCase {
+    /// Remarks on the place of first touch: on the tip of the flange, or near the end of a profile. The solve judges every patch anew.
+    #[must_use]
+    pub fn touch_remarks(&self) -> Vec<RemarkEntry> {
+        let sides = match &self.problem.task {
+            NormalTask::Wheel(task) => vec![&task.geometry],
+            NormalTask::Wheelset(task) => task.sides.iter().map(|side| &side.geometry).collect(),
+            _ => Vec::new(),
+        };
+        merged(sides.into_iter().flat_map(touch_remarks))
+    }
+}
+
+fn touch_remarks(geometry: &WheelRail) -> Vec<RemarkEntry> {
+    let Ok(locus) = ContactLocus::new(geometry) else {
+        return Vec::new();
+    };
+    let places = locus.first_touch();
+    let names = ["rail", "wheel"];
+    let judged = geometry.profiles().into_iter().zip(places).zip(names);
+    let judged = judged.filter_map(|((profile, s), name)| {
+        let y = profile.at(s).at[0];
+        let tip = profile.flange().and_then(|flange| flange.tip);
+        let [first, last] = profile.range();
+        let left_mm = (s - first).min(last - s).max(0.0);
+        let remark = if tip.is_some_and(|[from, to]| (from..=to).contains(&y)) {
+            Remark::ContactOnFlangeTip {
+                profile: name,
+                y_mm: [y; 2],
+            }
+        } else if left_mm < BEYOND {
+            Remark::ContactAtProfileEnd {
+                profile: name,
+                y_mm: [y; 2],
+                left_mm,
+            }
+        } else {
+            return None;
+        };
+        Some(remark.at_pointer(&format!("/contact/{name}")))
+    });
+    judged.collect()
 }
 
 fn known_patch(patch: &Patch) -> KnownPatch {

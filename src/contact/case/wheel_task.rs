@@ -2,13 +2,18 @@
 
 use std::sync::Arc;
 
+use crate::contact::case::flange_back;
 use crate::contact::case::known_pair::KnownPair;
-use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing, SmoothingWord};
+use crate::contact::case::words::contact::{
+    Contact, CrossSection, FormatName, Load, Smoothing, SmoothingWord,
+};
 use crate::contact::case::words::motion::{Motions, Wheelset};
 use crate::contact::error::Fault;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::formats::format as formats;
+use crate::contact::geometry::formats::profile_file::ProfileFile;
 use crate::contact::geometry::length_unit::LengthUnit;
+use crate::contact::geometry::orientation::{FormatSenses, Senses, StatedSenses};
 use crate::contact::geometry::profile::{Body, Profile, Reading};
 use crate::contact::geometry::wheel_rail::{NotPlaced, Placement, RailPlace, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
@@ -31,11 +36,13 @@ pub(crate) fn task(
     contact_modulus: Option<f64>,
     known: &KnownPair,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
-    let geometry = wheel_rail(contact, known)?;
+    let (geometry, flange_back) = wheel_rail(contact, known)?;
     if let Err(detail) = ContactLocus::new(&geometry) {
+        let detail = with_contradiction(detail, &geometry);
         return Err(vec![fault("/contact".to_owned(), detail)]);
     }
     let mut remarks = geometry.remarks();
+    remarks.extend(flange_back);
     let [rail, wheel] = geometry.profiles();
     remarks.extend(profile_points::misplaced(rail, Body::Rail));
     remarks.extend(profile_points::misplaced(wheel, Body::Wheel));
@@ -116,7 +123,36 @@ fn loading(load: &Load) -> Option<WheelLoad> {
     }
 }
 
-fn wheel_rail(contact: &Contact, known: &KnownPair) -> Result<WheelRail, Vec<Fault>> {
+/// The sentence, with the statements on the senses of the profiles that contradict their shapes.
+pub(crate) fn with_contradiction(detail: String, geometry: &WheelRail) -> String {
+    let remarks = geometry.profiles().map(|profile| &profile.remarks);
+    let contradicted = |remark: &Remark| match remark {
+        Remark::ProfileSenseContradicted {
+            profile,
+            member,
+            given,
+        } => Some(format!("{member}: {given} of the {profile}")),
+        _ => None,
+    };
+    let stated: Vec<String> = remarks
+        .into_iter()
+        .flatten()
+        .filter_map(contradicted)
+        .collect();
+    if stated.is_empty() {
+        return detail;
+    }
+    format!(
+        "{detail}; {} contradicts the shape of the points, try the opposite or leave it out",
+        stated.join(", ")
+    )
+}
+
+/// Rail and wheel in place, with a remark on the back of the flange.
+fn wheel_rail(
+    contact: &Contact,
+    known: &KnownPair,
+) -> Result<(WheelRail, Option<RemarkEntry>), Vec<Fault>> {
     let Contact::Profiles {
         rail,
         wheel,
@@ -139,13 +175,13 @@ fn wheel_rail(contact: &Contact, known: &KnownPair) -> Result<WheelRail, Vec<Fau
             "no profiles".to_owned(),
         )]);
     };
-    let placement = Placement {
+    let mut placement = Placement {
         side: (*side).into(),
         rolling_radius: *rolling_radius_mm,
         rail: RailPlace::of(*gauge_mm, *gauge_height_mm, *rail_origin_mm),
         cant: *cant_rad,
         flange_back_distance: *flange_back_distance_mm,
-        flange_back_position: *flange_back_position_mm,
+        flange_back_position: 0.0,
         lateral_shift: *lateral_shift_mm,
         yaw: *yaw_rad,
         roll: *roll_rad,
@@ -157,24 +193,57 @@ fn wheel_rail(contact: &Contact, known: &KnownPair) -> Result<WheelRail, Vec<Fau
         exchanged(profiles, ["/contact/rail", "/contact/wheel"])
     };
     let sections: [&CrossSection; 2] = [rail, wheel];
-    if let Some(geometry) = known.placed(sections, &placement) {
-        in_order(geometry.profiles())?;
-        return Ok(geometry);
-    }
-    let rail = profile(Body::Rail, rail).map_err(|fault| vec![fault]);
-    let wheel = profile(Body::Wheel, wheel).map_err(|fault| vec![fault]);
-    let (rail, wheel) = match (rail, wheel) {
-        (Ok(rail), Ok(wheel)) => (rail, wheel),
-        (Err(rail), Err(wheel)) => return Err([rail, wheel].concat()),
-        (Err(faults), Ok(_)) | (Ok(_), Err(faults)) => return Err(faults),
+    let stated = *flange_back_position_mm;
+    let back_of = |wheel: &Profile| {
+        flange_back::position(
+            wheel,
+            "/contact/wheel",
+            stated,
+            placement.flange_back_distance,
+        )
+        .map_err(|fault| vec![fault])
     };
+    if let Some(geometry) = known.placed(sections, stated, &placement) {
+        in_order(geometry.profiles())?;
+        let (_, remark) = back_of(geometry.profiles()[1])?;
+        return Ok((geometry, remark));
+    }
+    let pointers = ["/contact/rail", "/contact/wheel"];
+    let read = (profile(Body::Rail, rail), profile(Body::Wheel, wheel));
+    let [rail, wheel] = both(read, pointers)?;
     in_order([&rail, &wheel])?;
+    let (position, remark) = back_of(&wheel)?;
+    placement.flange_back_position = position;
     let geometry = WheelRail::new(rail, wheel, placement).map_err(|reason| {
         let pointers = ["/contact/rail", "/contact/rolling_radius_mm"];
         vec![unplaced(reason, pointers)]
     })?;
-    known.keep(sections, &geometry);
-    Ok(geometry)
+    known.keep(sections, stated, &geometry);
+    Ok((geometry, remark))
+}
+
+/// Both profiles, or the faults of both. If one is not read, the other is named as well where it is that of the other body.
+pub(crate) fn both(
+    read: (Result<Profile, Fault>, Result<Profile, Fault>),
+    pointers: [&str; 2],
+) -> Result<[Profile; 2], Vec<Fault>> {
+    let misplaced = |profile: &Profile, body: Body, pointer: &str| {
+        let remark = profile_points::misplaced(profile, body)?;
+        Some(fault(pointer.to_owned(), remark.detail))
+    };
+    let faults = match read {
+        (Ok(rail), Ok(wheel)) => return Ok([rail, wheel]),
+        (Err(rail), Err(wheel)) => vec![rail, wheel],
+        (Ok(rail), Err(own)) => {
+            let other = misplaced(&rail, Body::Rail, pointers[0]);
+            other.into_iter().chain([own]).collect()
+        }
+        (Err(own), Ok(wheel)) => {
+            let other = misplaced(&wheel, Body::Wheel, pointers[1]);
+            [own].into_iter().chain(other).collect()
+        }
+    };
+    Err(faults)
 }
 
 /// The fault of a pair that cannot be placed, at the pointer of the rail or of the rolling radius.
@@ -243,7 +312,7 @@ pub(crate) fn profile_at(
     section: &CrossSection,
 ) -> Result<Profile, Fault> {
     let name = body.name();
-    let mut reading = Reading {
+    let reading = Reading {
         mirror_y: section.mirror_y,
         mirror_z: section.mirror_z,
         smoothing: match section.smoothing_mm {
@@ -273,13 +342,13 @@ pub(crate) fn profile_at(
             "the file says that it belongs to a {other}; that of a {name} is needed"
         )));
     }
-    reading.mirror_y = reading.mirror_y.or(contents.mirror_y);
-    reading.mirror_z = reading.mirror_z.or(contents.mirror_z);
+    let senses = senses_of(body, format, &contents);
     let file_mm = contents.unit_mm.unwrap_or(1.0);
     if let Some(mm) = stated_mm.filter(|mm| *mm != file_mm) {
         contents.points = scaled(&contents.points, mm / file_mm);
     }
-    let mut profile = Profile::new(body, &contents.points, reading).map_err(refuse)?;
+    let mut profile =
+        Profile::in_format(body, &contents.points, reading, senses).map_err(refuse)?;
     let differs = stated_mm.zip(contents.unit_mm);
     if let Some((stated_mm, file_mm)) = differs.filter(|(stated, file)| stated != file) {
         profile.remarks.push(Remark::ProfileUnitDiffers {
@@ -303,6 +372,22 @@ pub(crate) fn profile_at(
         });
     }
     Ok(profile)
+}
+
+/// What the format of a file specifies about the senses of its points.
+fn senses_of(body: Body, format: FormatName, contents: &ProfileFile) -> FormatSenses {
+    // MiniProf instruments differ in the sense of a wheel's X.
+    let varies = body == Body::Wheel && format == FormatName::Miniprof;
+    FormatSenses {
+        usual: Senses {
+            mirror_y: contents.mirror_y.unwrap_or(false),
+            mirror_z: contents.mirror_z.unwrap_or(false),
+        },
+        fixed: StatedSenses {
+            mirror_y: contents.mirror_y.filter(|_| !varies),
+            mirror_z: contents.mirror_z,
+        },
+    }
 }
 
 fn fault(pointer: String, detail: String) -> Fault {

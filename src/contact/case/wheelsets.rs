@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
+use crate::contact::case::flange_back;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::swept_values;
-use crate::contact::case::wheel_task::{exchanged, moves, profile_at, unplaced};
+use crate::contact::case::wheel_task::{
+    both, exchanged, moves, profile_at, unplaced, with_contradiction,
+};
 use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing};
 use crate::contact::case::words::motion::{Combine, Motions, Swept};
 use crate::contact::error::Fault;
@@ -51,13 +54,15 @@ pub(crate) fn task(
         let rail = profile_at(rail.0, Body::Rail, rail.1);
         (rail, profile_at(wheel.0, Body::Wheel, wheel.1))
     });
+    let pointers = sections.map(|side| side.map(|(pointer, _)| pointer));
     let [left, right_profiles] = profiles;
-    let sides = [both(left)?, both(right_profiles)?];
+    let sides = [both(left, pointers[0])?, both(right_profiles, pointers[1])?];
     let (mut geometries, mut remarks) = (Vec::with_capacity(2), Vec::new());
     for (k, profiles) in sides.into_iter().enumerate() {
-        let pointers = sections[k].map(|(pointer, _)| pointer);
-        let geometry = in_place(contact, k, profiles, pointers, poses[0])?;
+        let pointers = pointers[k];
+        let (geometry, flange_back) = in_place(contact, k, profiles, pointers, poses[0])?;
         remarks.extend(remarks_of(&geometry, pointers));
+        remarks.extend(flange_back);
         geometries.push(geometry);
     }
     let force = load.and_then(|load| load.vertical_force_n);
@@ -189,23 +194,14 @@ fn sections(contact: &Contact) -> Sections<'_> {
     [left, [of_right(0), of_right(1)]]
 }
 
-type Read = (Result<Profile, Fault>, Result<Profile, Fault>);
-
-fn both((rail, wheel): Read) -> Result<[Profile; 2], Vec<Fault>> {
-    match (rail, wheel) {
-        (Ok(rail), Ok(wheel)) => Ok([rail, wheel]),
-        (rail, wheel) => Err([rail.err(), wheel.err()].into_iter().flatten().collect()),
-    }
-}
-
-/// A wheel over its rail in the first position, without roll.
+/// A wheel over its rail in the first position, without roll, with a remark on the back of its flange.
 fn in_place(
     contact: &Contact,
     side: usize,
     [rail, wheel]: [Profile; 2],
     pointers: [&str; 2],
     [lateral_shift, yaw]: [f64; 2],
-) -> Result<WheelRail, Vec<Fault>> {
+) -> Result<(WheelRail, Option<RemarkEntry>), Vec<Fault>> {
     let Contact::Wheelset {
         right,
         rolling_radius_mm,
@@ -224,6 +220,13 @@ fn in_place(
     if !accept_rough_profiles {
         exchanged([&rail, &wheel], pointers)?;
     }
+    let (flange_back_position, remark) = flange_back::position(
+        &wheel,
+        pointers[1],
+        *flange_back_position_mm,
+        *flange_back_distance_mm,
+    )
+    .map_err(|fault| vec![fault])?;
     let own = right.as_ref().and_then(|right| right.rolling_radius_mm);
     let own = own.filter(|_| side == 1);
     let placement = Placement {
@@ -232,7 +235,7 @@ fn in_place(
         rail: RailPlace::of(*gauge_mm, *gauge_height_mm, *rail_origin_mm),
         cant: *cant_rad,
         flange_back_distance: *flange_back_distance_mm,
-        flange_back_position: *flange_back_position_mm,
+        flange_back_position,
         lateral_shift,
         yaw,
         roll: 0.0,
@@ -244,9 +247,10 @@ fn in_place(
     let geometry = WheelRail::new(rail, wheel, placement)
         .map_err(|reason| vec![unplaced(reason, [pointers[0], radius])])?;
     if let Err(detail) = ContactLocus::new(&geometry) {
+        let detail = with_contradiction(detail, &geometry);
         return Err(vec![Fault::new("/contact", detail)]);
     }
-    Ok(geometry)
+    Ok((geometry, remark))
 }
 
 /// Remarks on two profiles, at their pointers.

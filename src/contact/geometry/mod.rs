@@ -13,6 +13,7 @@ pub mod holes;
 pub mod length_unit;
 pub mod local_gap;
 pub mod locus_lines;
+pub mod orientation;
 pub mod overlaps;
 pub mod plane_curve;
 pub mod profile;

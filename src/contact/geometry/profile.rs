@@ -7,10 +7,12 @@ use std::sync::Arc;
 
 use crate::contact::geometry::crossing;
 use crate::contact::geometry::length_unit::LengthUnit;
+use crate::contact::geometry::orientation::{
+    self, Flange, FormatSenses, FoundSenses, StatedSenses, SureBody,
+};
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead};
 use crate::contact::geometry::profile_quality::samples::{KnownPoints, Points};
-use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::geometry::profile_quality::{noise, shape};
 use crate::contact::once::Once;
 use crate::contact::remark::list::Remark;
@@ -57,9 +59,9 @@ impl Body {
 /// How the points of a profile are to be read.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reading {
-    /// The y of the points is positive to the track centre; for a wheel without a statement the flange tells.
+    /// The y of the points is positive to the track centre. Without a statement the flange of a wheel decides.
     pub mirror_y: Option<bool>,
-    /// The z of the points is positive up; without a statement the shape tells.
+    /// The z of the points is positive up. Without a statement the shape decides.
     pub mirror_z: Option<bool>,
     /// Cut wavelength of the smoothing in mm; 0 for none.
     pub smoothing: f64,
@@ -88,7 +90,8 @@ struct MeasuredCurve {
     rounding: Option<f64>,
     /// Step of which all given coordinates are multiples, in mm.
     digits: f64,
-    likely: Once<Option<LikelyBody>>,
+    flange: Option<Flange>,
+    sure_body: Once<Option<SureBody>>,
     known: KnownPoints,
 }
 
@@ -100,8 +103,21 @@ impl Profile {
     ///
     /// # Errors
     /// A sentence: too few or too many points, numbers that are not finite, a total arc length outside 5 to 500 mm, loops, more than 5 %
-    /// of the points running back, or a shape that does not tell what is up and was not stated.
+    /// of the points running back, or senses that are neither stated nor shown by the shape.
     pub fn new(body: Body, points: &[[f64; 2]], reading: Reading) -> Result<Profile, String> {
+        Profile::in_format(body, points, reading, FormatSenses::default())
+    }
+
+    /// The curve through points of a format that specifies their senses.
+    ///
+    /// # Errors
+    /// As [`Profile::new`].
+    pub fn in_format(
+        body: Body,
+        points: &[[f64; 2]],
+        reading: Reading,
+        format: FormatSenses,
+    ) -> Result<Profile, String> {
         let mut remarks = Vec::new();
         let (rounding, digits) = (noise::rounding(points), noise::digits(points));
         let mut points = checked(points)?;
@@ -125,7 +141,7 @@ impl Profile {
                 unit,
             });
         }
-        orient(body, &mut points, reading, &mut remarks)?;
+        let flange = orient(body, &mut points, reading, format, &mut remarks)?;
         straighten(body, &mut points, &mut remarks)?;
         cut_stray_ends(body, &mut points, &mut remarks);
         let given = points.len();
@@ -160,7 +176,8 @@ impl Profile {
             smoothing: reading.smoothing,
             rounding,
             digits,
-            likely: Once::default(),
+            flange,
+            sure_body: Once::default(),
         };
         Ok(Profile::of(measured, remarks))
     }
@@ -184,13 +201,27 @@ impl Profile {
         Profile::of(measured, self.remarks.clone())
     }
 
-    /// The body that its points resemble.
-    pub(crate) fn looks_like(&self) -> Option<LikelyBody> {
+    /// The body that its points show without doubt.
+    pub(crate) fn sure_body(&self) -> Option<SureBody> {
         let points = &self.measured.points;
         *self
             .measured
-            .likely
-            .get_or_make(|| shape::looks_like(points))
+            .sure_body
+            .get_or_make(|| orientation::sure_body(points))
+    }
+
+    /// The flange of a wheel, if the points show one at the side of the track centre.
+    pub(crate) fn flange(&self) -> Option<Flange> {
+        self.measured.flange
+    }
+
+    /// Least and largest y of the points in mm.
+    pub(crate) fn width(&self) -> [f64; 2] {
+        let y = || self.measured.points.iter().map(|at| at[0]);
+        [
+            y().fold(f64::INFINITY, f64::min),
+            y().fold(f64::NEG_INFINITY, f64::max),
+        ]
     }
 
     /// The points the curve was made from, z up, by increasing parameter of the curve.
@@ -302,49 +333,55 @@ fn arc_length(points: &[[f64; 2]]) -> f64 {
         .sum()
 }
 
-/// Brings the points to y toward the field side, z up, and increasing y from the first to the last.
+/// Brings the points to y toward the field side, z up, and increasing y from the first to the last. Returns the flange of a wheel.
 fn orient(
     body: Body,
-    points: &mut [[f64; 2]],
+    points: &mut Vec<[f64; 2]>,
     reading: Reading,
+    format: FormatSenses,
     remarks: &mut Vec<Remark>,
-) -> Result<(), String> {
-    let up = match reading.mirror_z {
-        Some(up) => up,
-        None => {
-            let up = points_up(body, points).ok_or_else(|| {
-                "the shape does not tell whether z is positive up or down; state mirror_z"
-                    .to_owned()
-            })?;
-            if up {
-                let profile = body.name();
-                remarks.push(Remark::ProfileZMirrored { profile });
-            }
-            up
-        }
+) -> Result<Option<Flange>, String> {
+    let stated = StatedSenses {
+        mirror_y: reading.mirror_y,
+        mirror_z: reading.mirror_z,
     };
-    if !up {
-        points.iter_mut().for_each(|point| point[1] = -point[1]);
-    }
-    let mirrored = match (reading.mirror_y, body) {
-        (Some(mirrored), _) => mirrored,
-        (None, Body::Rail) => false,
-        (None, Body::Wheel) => {
-            let mirrored = flange(points)[0] > middle(points);
-            if mirrored {
-                let profile = body.name();
-                remarks.push(Remark::ProfileYMirrored { profile });
-            }
-            mirrored
-        }
+    let [first, last] = shape::stray_ends(points).map(|stray| stray.map_or(0, |(count, _)| count));
+    let shown = &points[first..points.len() - last];
+    let FoundSenses {
+        senses,
+        contradicted,
+    } = match body {
+        Body::Rail => orientation::orient_rail(shown, stated, format.fixed)?,
+        Body::Wheel => orientation::orient_wheel(shown, stated, format.fixed)?,
     };
-    if mirrored {
-        points.iter_mut().for_each(|point| point[0] = -point[0]);
+    let profile = body.name();
+    if stated.mirror_z.is_none() && senses.mirror_z != format.usual.mirror_z {
+        remarks.push(Remark::ProfileZMirrored { profile });
     }
-    if points[0][0] > points[points.len() - 1][0] {
-        points.reverse();
+    if body == Body::Wheel && stated.mirror_y.is_none() && senses.mirror_y != format.usual.mirror_y
+    {
+        let flange = if senses.mirror_y {
+            "positive"
+        } else {
+            "negative"
+        };
+        remarks.push(Remark::ProfileYMirrored { profile, flange });
     }
-    Ok(())
+    let given = [("mirror_y", senses.mirror_y), ("mirror_z", senses.mirror_z)];
+    let refuted = given.into_iter().zip(contradicted);
+    remarks.extend(refuted.filter(|(_, contradicted)| *contradicted).map(
+        |((member, given), _)| Remark::ProfileSenseContradicted {
+            profile,
+            member,
+            given: if given { "true" } else { "false" },
+        },
+    ));
+    let flange = match body {
+        Body::Rail => None,
+        Body::Wheel => orientation::flange(&orientation::in_senses(shown, senses)),
+    };
+    *points = orientation::in_senses(points, senses);
+    Ok(flange)
 }
 
 /// The width of a section, and the unit in which it would be that of a usual rail head or wheel, if that is not mm.
@@ -357,37 +394,6 @@ fn likely_unit(body: Body, points: &[[f64; 2]]) -> Option<(f64, &'static str)> {
     let width = y().fold(f64::NEG_INFINITY, f64::max) - y().fold(f64::INFINITY, f64::min);
     let unit = LengthUnit::likely(width, usual)?;
     (unit != LengthUnit::Mm).then(|| (width, unit.symbol()))
-}
-
-fn middle(points: &[[f64; 2]]) -> f64 {
-    let y = || points.iter().map(|point| point[0]);
-    0.5 * (y().fold(f64::INFINITY, f64::min) + y().fold(f64::NEG_INFINITY, f64::max))
-}
-
-/// The lowest point, z up.
-fn flange(points: &[[f64; 2]]) -> [f64; 2] {
-    points
-        .iter()
-        .copied()
-        .fold([0.0, f64::INFINITY], |low, point| {
-            if point[1] < low[1] { point } else { low }
-        })
-}
-
-/// Is z of these points positive up? A rail falls off toward its sides, a wheel's flange stands out downward.
-fn points_up(body: Body, points: &[[f64; 2]]) -> Option<bool> {
-    let z: Vec<f64> = points.iter().map(|point| point[1]).collect();
-    let mut sorted = z.clone();
-    sorted.sort_by(f64::total_cmp);
-    let (low, median, high) = (sorted[0], sorted[z.len() / 2], sorted[z.len() - 1]);
-    let departure = match body {
-        Body::Rail => {
-            let ends = 0.5 * (z[0] + z[z.len() - 1]);
-            0.5 * (low + high) - ends
-        }
-        Body::Wheel => 2.0 * median - low - high,
-    };
-    (departure.abs() > 0.02 * (high - low)).then_some(departure > 0.0)
 }
 
 /// Drops points that run back between their neighbours, as they occur where measurements were stitched.

@@ -1,10 +1,10 @@
 //! The quality of profiles as far as their points alone show it, before the contact is known.
 
+use crate::contact::geometry::orientation::SureBody;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::points::{
     Grain, advised_smoothing, noise_of, polygon_of,
 };
-use crate::contact::geometry::profile_quality::shape::LikelyBody;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
@@ -77,20 +77,16 @@ pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
     }
 }
 
-/// The remark on a profile that looks like the other body's.
+/// The remark on a profile whose shape can only be that of the other body.
 #[must_use]
 pub fn misplaced(profile: &Profile, body: Body) -> Option<RemarkEntry> {
     let (looks, like, pointer) = match body {
-        Body::Rail => (
-            LikelyBody::Wheel,
-            "a wheel with its flange",
-            "/contact/rail",
-        ),
-        Body::Wheel => (LikelyBody::Rail, "the head of a rail", "/contact/wheel"),
+        Body::Rail => (SureBody::Wheel, "a wheel with its flange", "/contact/rail"),
+        Body::Wheel => (SureBody::Rail, "the head of a rail", "/contact/wheel"),
     };
     let remark = Remark::ProfileOfOtherBody {
         profile: body.name(),
         like,
     };
-    (profile.looks_like() == Some(looks)).then(|| remark.at_pointer(pointer))
+    (profile.sure_body() == Some(looks)).then(|| remark.at_pointer(pointer))
 }

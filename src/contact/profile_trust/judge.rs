@@ -6,7 +6,6 @@ use crate::contact::geometry::profile_quality::noise::Oddity;
 use crate::contact::geometry::profile_quality::points::{
     Grain, UnderContact, advised_smoothing, under_contact,
 };
-use crate::contact::geometry::profile_quality::shape;
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::wheel_contact::GapContact;
@@ -268,7 +267,7 @@ fn place(own: &Under, patch: FoundPatch) -> Option<Finding> {
     let middle = own.y(0.5 * (low + high));
     let tip = match own.body {
         Body::Rail => None,
-        Body::Wheel => shape::flange_tip(own.profile.points()),
+        Body::Wheel => own.profile.flange().and_then(|flange| flange.tip),
     };
     let on_tip = tip.is_some_and(|[from, to]| (from..=to).contains(&middle));
     let cause = if on_tip {

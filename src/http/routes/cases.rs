@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::solution::words::found_by::FoundBy;
 use crate::contact::solution::words::profile_quality::PairQuality;
 use crate::contact::solution::words::understanding::Understanding;
@@ -133,6 +133,12 @@ fn report(checked: &CheckedCase) -> CheckReport {
         // What a wheel that lies nowhere above its rail is told when it is solved.
         understood: checked.understood().ok(),
         quality: checked.quality(),
-        remarks: checked.remarks.clone(),
+        remarks: merged(
+            checked
+                .remarks
+                .iter()
+                .cloned()
+                .chain(checked.touch_remarks()),
+        ),
     }
 }

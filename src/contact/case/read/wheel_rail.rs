@@ -71,10 +71,10 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
     };
     let cant_rad = or("cant_rad", CANT, 0.0);
     let flange_back_distance_mm = or("flange_back_distance_mm", DISTANCE, 1360.0);
-    let flange_back_position_mm = or("flange_back_position_mm", PLACE, -70.0);
     let lateral_shift_mm = or("lateral_shift_mm", PLACE, 0.0);
     let yaw_rad = or("yaw_rad", ANGLE, 0.0);
     let roll_rad = or("roll_rad", ANGLE, 0.0);
+    let flange_back_position_mm = optional_place(block, "flange_back_position_mm");
     let place = rail_place(block);
     let accept_rough_profiles = flag(block, "accept_rough_profiles");
     Some(Contact::Profiles {
@@ -141,6 +141,14 @@ pub(crate) fn rail_place(block: &mut Object) -> Option<RailPlaceWords> {
         gauge_height_mm: Some(height?),
         rail_origin_mm: None,
     })
+}
+
+/// A place in mm that may be left out; the outer `None` is a fault.
+pub(crate) fn optional_place(block: &mut Object, name: &str) -> Option<Option<f64>> {
+    match block.has(name) {
+        true => block.number(name, PLACE).map(Some),
+        false => Some(None),
+    }
 }
 
 /// Reads a cross-section that is needed.

@@ -5,7 +5,7 @@ use crate::contact::case::read::motion::swept;
 use crate::contact::case::read::object::{Object, shown};
 use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::read::wheel_rail::{
-    ANGLE, CANT, DISTANCE, PLACE, ROLLING_RADIUS, flag, rail_place, section,
+    ANGLE, CANT, DISTANCE, PLACE, ROLLING_RADIUS, flag, optional_place, rail_place, section,
 };
 use crate::contact::case::words::contact::{Contact, KinematicsWords, Load, RightSide};
 use crate::contact::case::words::motion::{Combine, Swept};
@@ -54,7 +54,7 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
     };
     let cant_rad = or("cant_rad", CANT, 0.0);
     let flange_back_distance_mm = or("flange_back_distance_mm", DISTANCE, 1360.0);
-    let flange_back_position_mm = or("flange_back_position_mm", PLACE, -70.0);
+    let flange_back_position_mm = optional_place(block, "flange_back_position_mm");
     let place = rail_place(block);
     let (shifts, yaws, combine) = poses(block)?;
     let kinematics = kinematics(block);

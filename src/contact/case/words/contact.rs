@@ -89,9 +89,11 @@ pub enum Contact {
         /// Distance of the backs of the two flanges, in mm; 1360 when left out.
         #[schema(required = false)]
         flange_back_distance_mm: f64,
-        /// y of the back of the flange in the wheel's cross-section, in mm; -70 when left out.
-        #[schema(required = false)]
-        flange_back_position_mm: f64,
+        /// y of the back of the flange in the wheel's cross-section, in mm. When left out it is found from the points; -70 where they agree with
+        /// that or show no flange.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false)]
+        flange_back_position_mm: Option<f64>,
         /// Shift of the wheelset to the left, in mm; 0 when left out.
         #[schema(required = false)]
         lateral_shift_mm: f64,
@@ -141,9 +143,11 @@ pub enum Contact {
         /// Distance of the backs of the two flanges, in mm; 1360 when left out.
         #[schema(required = false)]
         flange_back_distance_mm: f64,
-        /// y of the back of the flange in the wheels' cross-section, in mm; -70 when left out.
-        #[schema(required = false)]
-        flange_back_position_mm: f64,
+        /// y of the back of the flange in the wheels' cross-section, in mm. When left out it is found from the points of each wheel; -70 where they
+        /// agree with that or show no flange.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false)]
+        flange_back_position_mm: Option<f64>,
         /// Shift of the wheelset to the left, in mm: a number, or several; 0 when left out. A shift and a yaw make a position, and every
         /// position has its own patches.
         #[schema(required = false, inline = false)]
@@ -171,7 +175,7 @@ fn is_false(value: &bool) -> bool {
 
 /// A cross-section of a rail or a wheel, as points or as the text of a file; exactly one of the two.
 ///
-/// y is positive to the field side and z positive down unless `mirror_y` and `mirror_z`, the file or the shape itself say otherwise.
+/// y is positive to the field side and z positive down, unless `mirror_y` and `mirror_z`, the shape or the format specify another sense.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct CrossSection {
     /// Points `[y, z]` in order along the cross-section, in mm or in `unit`.
@@ -194,12 +198,13 @@ pub struct CrossSection {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub unit: Option<UnitName>,
-    /// `true` if y of the points is positive toward the track centre. When left out, the file decides; if it does not say, the place of the
-    /// flange decides for a wheel, and y of a rail is taken as positive to the field side.
+    /// `true` if y of the points is positive toward the track centre. When left out, the side of the flange decides for a wheel, and the
+    /// format for a rail (points: `false`, MiniProf: `true`). A wheel without a flange needs it, except in Simpack files.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub mirror_y: Option<bool>,
-    /// `true` if z of the points is positive upward. When left out, the file decides; if it does not say, the shape does.
+    /// `true` if z of the points is positive upward. When left out, the flange of a wheel or the head of a rail decides. Where the shape does
+    /// not show it, the case is refused, except for Simpack files.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     pub mirror_z: Option<bool>,

@@ -17,15 +17,71 @@ macro_rules! profile_remarks {
             advice: "Give `mirror_z` to decide this yourself.",
             detail: format!("{profile}: z was recognised as positive upward and has been mirrored"),
 
-            /// The flange of a wheel was found at positive y; y was mirrored.
+            /// The flange of a wheel lies at the other end of its y than usual for the format; the sense of y was taken from the flange.
             ProfileYMirrored {
                 /// Whose.
                 profile: &'static str = "wheel",
+                /// Whether y grows toward the flange (`positive`) or away from it (`negative`).
+                flange: &'static str = "positive",
             }
             code: "profile-y-mirrored",
             severity: Info,
             advice: "Give `mirror_y` to decide this yourself.",
-            detail: format!("{profile}: the flange was found at positive y, so y has been mirrored"),
+            detail: if *flange == "positive" {
+                format!("{profile}: the flange was found at the positive end of y, so y has been mirrored (mirror_y: true)")
+            } else {
+                format!(
+                    "{profile}: the flange was found at the negative end of y, so y has not been mirrored as is usual for this format \
+                     (mirror_y: false)"
+                )
+            },
+
+            /// A stated sense of y or z contradicts the shape of the profile.
+            ProfileSenseContradicted {
+                /// Whose.
+                profile: &'static str = "wheel",
+                /// The member that states it.
+                member: &'static str = "mirror_y",
+                /// Its value.
+                given: &'static str = "true",
+            }
+            code: "profile-sense-contradicted",
+            severity: Warning,
+            advice: "Leave out `mirror_y` or `mirror_z`, or check what was measured. The case is solved as stated.",
+            detail: format!(
+                "{profile}: {member}: {given} is stated, but the shape of the points shows the opposite; the case is solved as stated"
+            ),
+
+            /// `flange_back_position_mm` was left out, and the back of the flange was found in the points of the wheel.
+            FlangeBackFound {
+                /// Whose.
+                profile: &'static str = "wheel",
+                /// y of the back.
+                position_mm: f64 = 0.0,
+            }
+            code: "flange-back-found",
+            severity: Info,
+            advice: "Give `flange_back_position_mm` to decide this yourself.",
+            detail: format!(
+                "{profile}: flange_back_position_mm was left out; the back of the flange was found at y = {position_mm:.2} mm and has been used"
+            ),
+
+            /// The stated position of the back of a flange differs from that in the points of the wheel.
+            FlangeBackContradicted {
+                /// Whose.
+                profile: &'static str = "wheel",
+                /// The stated position.
+                given_mm: f64 = -50.0,
+                /// y of the back in the points.
+                found_mm: f64 = -70.0,
+            }
+            code: "flange-back-contradicted",
+            severity: Warning,
+            advice: "Leave out `flange_back_position_mm`, or check it. The case is solved as stated.",
+            detail: format!(
+                "{profile}: flange_back_position_mm: {given_mm} is stated, but the back of the flange was found at y = {found_mm:.2} mm; the case is \
+                 solved as stated"
+            ),
 
             /// The header of a profile file states another number of points than the file has, commented-out rows included.
             ProfileCountDiffers {

@@ -1,0 +1,646 @@
+//! Recognises how the points of a cross-section lie: the senses of y and z, the flange of a wheel and its back, the head of a rail.
+//!
+//! A section is compared in all four senses with the shape of its body. A wheel has a flange: a lobe of 15 to 45 mm height on one side of its
+//! tread. A rail has a head: a convex crown whose sides fall off. Extremes decide nothing, since the face of a rim, the back of a flange, a groove
+//! or a foot may reach farther than flange or head.
+
+use std::f64::consts::FRAC_PI_2;
+
+/// How the points of a section are given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Senses {
+    /// y is positive to the track centre.
+    pub mirror_y: bool,
+    /// z is positive up.
+    pub mirror_z: bool,
+}
+
+/// Senses as far as they are stated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct StatedSenses {
+    /// Whether y is positive to the track centre.
+    pub mirror_y: Option<bool>,
+    /// Whether z is positive up.
+    pub mirror_z: Option<bool>,
+}
+
+/// What the format of the points specifies about their senses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FormatSenses {
+    /// The senses that the format usually has.
+    pub usual: Senses,
+    /// The senses that hold where the shape shows none.
+    pub fixed: StatedSenses,
+}
+
+/// The senses of a section, and how they were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct FoundSenses {
+    pub(crate) senses: Senses,
+    /// Whether the statements for y and for z contradict the shape.
+    pub(crate) contradicted: [bool; 2],
+}
+
+/// The senses of the points of a wheel.
+///
+/// # Errors
+/// A sentence that names the members to state, if neither the shape nor a statement shows the senses.
+pub(crate) fn orient_wheel(
+    points: &[[f64; 2]],
+    stated: StatedSenses,
+    fixed: StatedSenses,
+) -> Result<FoundSenses, String> {
+    let (mut found, whole) = wheel_senses(points);
+    let agree = |senses: &Senses, with: StatedSenses| {
+        with.mirror_y.is_none_or(|y| y == senses.mirror_y)
+            && with.mirror_z.is_none_or(|z| z == senses.mirror_z)
+    };
+    let agreeing = |with: StatedSenses, among: &[Senses]| -> Vec<Senses> {
+        among.iter().copied().filter(|s| agree(s, with)).collect()
+    };
+    // A part of a flange does not refute a format.
+    if !whole && agreeing(fixed, &found).is_empty() {
+        found.clear();
+    }
+    let mut left = agreeing(stated, &found);
+    if left.len() > 1 {
+        left = agreeing(fixed, &left);
+    }
+    if let [senses] = left[..] {
+        return Ok(FoundSenses {
+            senses,
+            contradicted: [false; 2],
+        });
+    }
+    if let Some(shown) = found.first().filter(|_| left.is_empty()) {
+        let senses = Senses {
+            mirror_y: stated.mirror_y.unwrap_or(shown.mirror_y),
+            mirror_z: stated.mirror_z.unwrap_or(shown.mirror_z),
+        };
+        return Ok(FoundSenses {
+            senses,
+            contradicted: [
+                senses.mirror_y != shown.mirror_y,
+                senses.mirror_z != shown.mirror_z,
+            ],
+        });
+    }
+    let y = stated.mirror_y.or(fixed.mirror_y);
+    let z = stated.mirror_z.or(fixed.mirror_z);
+    match (y, z) {
+        (Some(mirror_y), Some(mirror_z)) => Ok(FoundSenses {
+            senses: Senses { mirror_y, mirror_z },
+            contradicted: [false; 2],
+        }),
+        _ => Err(wheel_unclear(points, !found.is_empty(), y, z)),
+    }
+}
+
+fn wheel_unclear(points: &[[f64; 2]], several: bool, y: Option<bool>, z: Option<bool>) -> String {
+    let reason = if sure_body(points) == Some(SureBody::Rail) {
+        "the points look like the head of a rail (were rail and wheel exchanged?)"
+    } else if several {
+        "the shape has a flange in more than one sense of y and z"
+    } else {
+        "no flange beside a tread was found, so the shape does not show the senses of y and z"
+    };
+    let members = match (y, z) {
+        (None, None) => {
+            "mirror_y (true: y is positive to the track centre) and mirror_z (true: z is positive up)"
+        }
+        (None, Some(_)) => "mirror_y (true: y is positive to the track centre)",
+        _ => "mirror_z (true: z is positive up)",
+    };
+    format!("{reason}; state {members}")
+}
+
+/// The senses of the points of a rail. Its y is never found from the shape, since most heads are nearly symmetric.
+///
+/// # Errors
+/// A sentence that names the member to state, if neither the shape nor a statement shows the sense of z.
+pub(crate) fn orient_rail(
+    points: &[[f64; 2]],
+    stated: StatedSenses,
+    fixed: StatedSenses,
+) -> Result<FoundSenses, String> {
+    let sure = sure_rail_mirror_z(points);
+    let shown = match fixed.mirror_z {
+        // Grooves and other sections of test rigs are no reason to doubt a format.
+        Some(usual) => Some(sure.unwrap_or(usual)),
+        None => rail_mirror_z(points),
+    };
+    let mirror_z = stated.mirror_z.or(shown).ok_or_else(|| {
+        let reason = if sure_body(points) == Some(SureBody::Wheel) {
+            "the points look like a wheel with its flange (were rail and wheel exchanged?)"
+        } else {
+            "no head of a rail was found, so the shape does not show whether z is positive up or down"
+        };
+        format!("{reason}; state mirror_z (true: z is positive up)")
+    })?;
+    let mirror_y = stated.mirror_y.or(fixed.mirror_y).unwrap_or(false);
+    Ok(FoundSenses {
+        senses: Senses { mirror_y, mirror_z },
+        contradicted: [false, sure.is_some_and(|sure| sure != mirror_z)],
+    })
+}
+
+/// All senses, the documented one first.
+const ALL: [Senses; 4] = [
+    Senses {
+        mirror_y: false,
+        mirror_z: false,
+    },
+    Senses {
+        mirror_y: true,
+        mirror_z: false,
+    },
+    Senses {
+        mirror_y: false,
+        mirror_z: true,
+    },
+    Senses {
+        mirror_y: true,
+        mirror_z: true,
+    },
+];
+
+/// Spacing in mm at which a section is sampled along its length.
+const STEP: f64 = 0.5;
+/// Samples to either side of a place from which its inclination is taken: 3 mm of the section, so that noise of 50 µm turns it by 1°.
+const SIDE: usize = 3;
+/// Largest inclination in rad of treads and crowns (20°). Wheels of standards stay below 0.2 up to the flange root, flanges exceed 1.
+const FLAT: f64 = 0.35;
+/// Inclination in rad of the back of a flange, of a rim and of the faces of a head (75°).
+const STEEP: f64 = 1.3;
+/// Height in mm by which a section may rise again within one descent: lips and steps of worn profiles.
+const RISE: f64 = 1.0;
+/// Depth in mm of the piece that is taken as the tip of a flange.
+const TIP_DEPTH: f64 = 2.0;
+/// Least and largest width in mm of that piece. Flanges of EN 13715 and AAR have 12 to 18 mm; the edge of a rim has less than 1 mm.
+const TIP_WIDTH: [f64; 2] = [4.0, 25.0];
+/// Least and largest height of a flange above its tread in mm: trams have 18 mm, worn wheels up to 40 mm.
+const FLANGE_HEIGHT: [f64; 2] = [15.0, 45.0];
+/// Least and largest distance in mm from the beginning of the flange's root to its tip. Wheels of EN 13715 have 24 mm.
+const ROOT_TO_TIP: [f64; 2] = [8.0, 45.0];
+/// Largest distance in mm from the tip of a flange to its back: 15 mm in EN 13715. In a groove beside a second rail the section continues farther.
+const TIP_TO_BACK: f64 = 25.0;
+/// Least length in mm of a tread.
+const TREAD: f64 = 20.0;
+/// Least height in mm of a flange that ends before its tip.
+const PART_HEIGHT: f64 = 12.0;
+/// Steepest place in rad of a flange that ends before its tip. Flange faces have 60 to 78°; the face of a rim is steeper.
+const PART_SLOPE: [f64; 2] = [0.87, 1.38];
+/// Least length in mm of the crown of a head: the nose of a crossing has 15 mm where wheels reach it.
+const CROWN: f64 = 15.0;
+/// Least fall in mm at one side of a head, and at its other side.
+const FALL: [f64; 2] = [6.0, 1.0];
+/// Inclination in rad toward a cut end that a crown may have (6°): rails are canted by up to 0.05, feet of rails slope by 0.25.
+const CUT_SLOPE: f64 = 0.1;
+/// Least turn in rad of a crown that is measured without either side: 35 mm of a radius of 300 mm turn by 0.12.
+const CROWN_TURN: f64 = 0.05;
+/// Factor by which the crowns of one sense must exceed those of the other in length.
+const CLEARLY_LONGER: f64 = 2.0;
+/// Least length in mm of the crown, least fall in mm of both faces, and range of the width in mm of a section that can only be a rail. Heads
+/// of EN 13674 are 65 to 75 mm wide.
+const SURE_CROWN: f64 = 30.0;
+/// Least fall of each face of such a section in mm.
+const SURE_FALL: f64 = 10.0;
+/// Largest turn of such a section within 2 mm beside its crown, in rad: corners of rails have radii of 9 mm or more, edges of rollers are sharp.
+const SURE_CORNER: f64 = 0.3;
+/// Width of such a section over its faces in mm.
+const SURE_WIDTH: [f64; 2] = [50.0, 90.0];
+/// Angle in rad from the vertical within which a stretch is the back of a flange (6°), and its least length in mm. Of a rounding of 20.5 mm,
+/// 2 mm lie within this angle.
+const VERTICAL: f64 = 0.1;
+/// Least length of the back of a flange in mm.
+const BACK: f64 = 3.0;
+/// Distance in mm between the three points at a steep end that the rounding of the back is continued from.
+const ROUNDING_STEP: f64 = 3.0;
+/// Largest radius in mm of that rounding; it is 20.5 mm in EN 13715.
+const ROUNDING_MAX: f64 = 50.0;
+/// Least inclination in rad at such an end (72°): the rounding of 20.5 mm is continued by at most 1.0 mm.
+const ROUNDING_SLOPE: f64 = 1.25;
+
+/// The flange of a wheel, in the sense in which it was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Flange {
+    /// Least and largest y of the tip, within 2 mm of its height; `None` if the points end before the tip.
+    pub tip: Option<[f64; 2]>,
+    /// y of the back, if it was measured or at least its rounding.
+    pub back: Option<f64>,
+    /// y of the last point on the flange's side.
+    pub end: f64,
+}
+
+/// The body that a shape shows without doubt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SureBody {
+    /// A head of a rail with both of its faces.
+    Rail,
+    /// A wheel with its whole flange.
+    Wheel,
+}
+
+/// The points with y to the field side, z up, in order from the track centre to the field side.
+#[must_use]
+pub fn in_senses(points: &[[f64; 2]], senses: Senses) -> Vec<[f64; 2]> {
+    let y_sign = if senses.mirror_y { -1.0 } else { 1.0 };
+    let z_sign = if senses.mirror_z { 1.0 } else { -1.0 };
+    let mut turned: Vec<[f64; 2]> = points
+        .iter()
+        .map(|[y, z]| [y_sign * y, z_sign * z])
+        .collect();
+    if let [first, .., last] = turned[..]
+        && first[0] > last[0]
+    {
+        turned.reverse();
+    }
+    turned
+}
+
+/// The senses in which points of a wheel show a flange, and whether it is a whole one. Whole flanges count before parts of one.
+#[must_use]
+pub fn wheel_senses(points: &[[f64; 2]]) -> (Vec<Senses>, bool) {
+    let found = ALL.map(|senses| flange(&in_senses(points, senses)).map(|flange| (senses, flange)));
+    let found: Vec<(Senses, Flange)> = found.into_iter().flatten().collect();
+    let whole = found.iter().any(|(_, flange)| flange.tip.is_some());
+    let counted = found
+        .into_iter()
+        .filter(|(_, flange)| flange.tip.is_some() || !whole);
+    (counted.map(|(senses, _)| senses).collect(), whole)
+}
+
+/// Whether z of points of a rail is positive up; `None` if the shape does not show it.
+#[must_use]
+pub fn rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
+    let crowns = |mirror_z: bool| -> f64 {
+        let senses = Senses {
+            mirror_y: false,
+            mirror_z,
+        };
+        let points = in_senses(points, senses);
+        let heads = Section::new(&points).heads();
+        heads.iter().map(|head| head.crown).sum()
+    };
+    let [down, up] = [false, true].map(crowns);
+    if up > CLEARLY_LONGER * down {
+        return Some(true);
+    }
+    (down > CLEARLY_LONGER * up).then_some(false)
+}
+
+/// Whether z of points is positive up, if they can only be those of a rail with at least one of its faces.
+#[must_use]
+pub fn sure_rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
+    let mirror_z = rail_mirror_z(points)?;
+    let senses = Senses {
+        mirror_y: false,
+        mirror_z,
+    };
+    let heads = Section::new(&in_senses(points, senses)).heads();
+    let sure = |head: &Head| {
+        let faces = head.falls.iter().flatten();
+        head.crown >= SURE_CROWN && faces.clone().any(Fall::is_face)
+    };
+    heads.iter().any(sure).then_some(mirror_z)
+}
+
+/// The body that the points show in any sense; `None` where another body may have the shape.
+#[must_use]
+pub fn sure_body(points: &[[f64; 2]]) -> Option<SureBody> {
+    let rail = ALL.iter().any(|senses| {
+        let points = in_senses(points, *senses);
+        let heads = Section::new(&points).heads();
+        heads.iter().any(Head::has_both_faces)
+    });
+    let whole =
+        |senses: &Senses| flange(&in_senses(points, *senses)).is_some_and(|f| f.tip.is_some());
+    match (rail, ALL.iter().any(whole)) {
+        (true, false) => Some(SureBody::Rail),
+        (false, true) => Some(SureBody::Wheel),
+        _ => None,
+    }
+}
+
+/// The flange of a wheel whose points run from the track centre to the field side, z up.
+#[must_use]
+pub fn flange(points: &[[f64; 2]]) -> Option<Flange> {
+    let section = Section::new(points);
+    let mut treads = section.flat_runs(TREAD);
+    treads.sort_by_key(|[first, last]| first.abs_diff(*last));
+    treads.iter().rev().find_map(|tread| section.flange(*tread))
+}
+
+/// A section at even spacing, with its inclination.
+struct Section<'p> {
+    given: &'p [[f64; 2]],
+    points: Vec<[f64; 2]>,
+    /// Angle in rad from y to the direction of the section.
+    angles: Vec<f64>,
+}
+
+/// A descent from the end of a flat run.
+#[derive(Debug, Clone, Copy)]
+struct Fall {
+    depth: f64,
+    /// Where it is deepest.
+    lowest: usize,
+    /// Length in mm of its steep stretches.
+    steep: f64,
+    /// Largest turn within 2 mm before the first steep stretch, in rad.
+    turn: f64,
+    y: f64,
+}
+
+impl Fall {
+    fn is_face(&self) -> bool {
+        self.depth >= SURE_FALL && self.steep >= 0.5 * SURE_FALL
+    }
+}
+
+/// A convex crown, with the falls at both sides; `None` where the points end on the crown.
+struct Head {
+    crown: f64,
+    falls: [Option<Fall>; 2],
+}
+
+impl Head {
+    fn has_both_faces(&self) -> bool {
+        let [Some(first), Some(last)] = self.falls else {
+            return false;
+        };
+        let [narrowest, widest] = SURE_WIDTH;
+        first.is_face()
+            && last.is_face()
+            && first.turn.max(last.turn) <= SURE_CORNER
+            && self.crown >= SURE_CROWN
+            && (narrowest..=widest).contains(&(last.y - first.y))
+    }
+}
+
+impl Section<'_> {
+    fn new(given: &[[f64; 2]]) -> Section<'_> {
+        let points = evenly(given);
+        let last = points.len().saturating_sub(1);
+        let angle = |k: usize| {
+            let (from, to) = (points[k.saturating_sub(SIDE)], points[(k + SIDE).min(last)]);
+            (to[1] - from[1]).atan2(to[0] - from[0])
+        };
+        let angles = (0..points.len()).map(angle).collect();
+        Section {
+            given,
+            points,
+            angles,
+        }
+    }
+
+    /// First and last sample of every flat run of at least this length in mm.
+    fn flat_runs(&self, least: f64) -> Vec<[usize; 2]> {
+        let mut runs: Vec<[usize; 2]> = Vec::new();
+        for (k, angle) in self.angles.iter().enumerate() {
+            if angle.abs() > FLAT {
+                continue;
+            }
+            match runs.last_mut() {
+                // One sample beyond the limit does not end a run.
+                Some(run) if k - run[1] <= 2 => run[1] = k,
+                _ => runs.push([k, k]),
+            }
+        }
+        runs.retain(|[first, last]| (last - first) as f64 * STEP >= least);
+        runs
+    }
+
+    /// The descent from a sample toward the first (`back`) or the last one.
+    fn fall(&self, from: usize, back: bool) -> Fall {
+        let mut found = Fall {
+            depth: 0.0,
+            lowest: from,
+            steep: 0.0,
+            turn: 0.0,
+            y: self.points[from][0],
+        };
+        let start = self.points[from][1];
+        let (mut steep, mut turn) = (0.0, 0.0_f64);
+        let mut at = from;
+        loop {
+            let next = if back {
+                at.checked_sub(1)
+            } else {
+                Some(at + 1)
+            };
+            let Some(next) = next.filter(|next| *next < self.points.len()) else {
+                return found;
+            };
+            at = next;
+            let depth = start - self.points[at][1];
+            let before = if back {
+                (at + 4).min(self.points.len() - 1)
+            } else {
+                at.saturating_sub(4)
+            };
+            if steep == 0.0 {
+                turn = turn.max((self.angles[at] - self.angles[before]).abs());
+            }
+            if self.angles[at].abs() >= STEEP {
+                steep += STEP;
+            }
+            if depth > found.depth {
+                found = Fall {
+                    depth,
+                    lowest: at,
+                    steep,
+                    turn,
+                    y: self.points[at][0],
+                };
+            } else if depth < found.depth - RISE {
+                return found;
+            }
+        }
+    }
+
+    /// The flange at the inner side of a tread.
+    fn flange(&self, [first, last]: [usize; 2]) -> Option<Flange> {
+        let inner = self.fall(first, true);
+        // What falls at both sides is a rail, or has two flanges.
+        if self.fall(last, false).depth >= FALL[0] {
+            return None;
+        }
+        let mut heights: Vec<f64> = self.points[first..=last].iter().map(|at| at[1]).collect();
+        heights.sort_by(f64::total_cmp);
+        let height = heights[heights.len() / 2] - self.points[inner.lowest][1];
+        let tip = self.tip(inner.lowest);
+        let to_tip = self.points[first][0] - 0.5 * (tip[0] + tip[1]);
+        let within = |[least, most]: [f64; 2], value: f64| (least..=most).contains(&value);
+        let end = self.points[..=first]
+            .iter()
+            .map(|at| at[0])
+            .fold(f64::INFINITY, f64::min);
+        let whole = within(TIP_WIDTH, tip[1] - tip[0])
+            && within(FLANGE_HEIGHT, height)
+            && within(ROOT_TO_TIP, to_tip)
+            && 0.5 * (tip[0] + tip[1]) - end <= TIP_TO_BACK;
+        if whole {
+            return Some(Flange {
+                tip: Some(tip),
+                back: self.back(inner.lowest),
+                end,
+            });
+        }
+        let steepest = self.angles[inner.lowest..=first]
+            .iter()
+            .copied()
+            .fold(0.0, f64::max);
+        let part = inner.lowest == 0
+            && within([PART_HEIGHT, FLANGE_HEIGHT[1]], height)
+            && within(PART_SLOPE, steepest);
+        part.then_some(Flange {
+            tip: None,
+            back: None,
+            end,
+        })
+    }
+
+    /// Range of y of the piece about a sample that is at most 2 mm higher.
+    fn tip(&self, lowest: usize) -> [f64; 2] {
+        let low = |at: &&[f64; 2]| at[1] < self.points[lowest][1] + TIP_DEPTH;
+        let after = self.points[lowest..].iter().take_while(low);
+        let before = self.points[..=lowest].iter().rev().take_while(low);
+        after.chain(before).fold(
+            [f64::INFINITY, f64::NEG_INFINITY],
+            |[least, most], [y, _]| [least.min(*y), most.max(*y)],
+        )
+    }
+
+    /// y of the back of a flange with its lowest place at this sample.
+    fn back(&self, lowest: usize) -> Option<f64> {
+        let steep = (0..lowest).filter(|k| (self.angles[*k] + FRAC_PI_2).abs() <= VERTICAL);
+        let mut places: Vec<f64> = steep.map(|k| self.points[k][0]).collect();
+        if places.len() as f64 * STEP >= BACK {
+            places.sort_by(f64::total_cmp);
+            let vertical = places[places.len() / 2];
+            return Some(vertical);
+        }
+        self.rounding_end(lowest)
+    }
+
+    /// y where the rounding of a back that ends before it is vertical would be so. Taken from the given points, between which it is curved.
+    fn rounding_end(&self, lowest: usize) -> Option<f64> {
+        let end = *self.given.first()?;
+        let beyond = |distance: f64| {
+            let far = |at: &&[f64; 2]| (at[0] - end[0]).hypot(at[1] - end[1]) >= distance;
+            self.given.iter().find(far).copied()
+        };
+        let (middle, inner) = (beyond(ROUNDING_STEP)?, beyond(2.0 * ROUNDING_STEP)?);
+        if inner[0] > self.points[lowest][0] {
+            return None;
+        }
+        let (centre, radius) = circle(end, middle, inner)?;
+        let inclination = (centre[0] - end[0]).atan2((centre[1] - end[1]).abs());
+        let leftmost = centre[0] - radius;
+        (radius <= ROUNDING_MAX && inclination >= ROUNDING_SLOPE && end[0] >= leftmost)
+            .then_some(leftmost)
+    }
+
+    /// The heads of rails in this section.
+    fn heads(&self) -> Vec<Head> {
+        let runs = self.flat_runs(CROWN).into_iter();
+        runs.filter_map(|[first, last]| {
+            let end = self.points.len() - 1;
+            let falls = [
+                (first > SIDE).then(|| self.fall(first, true)),
+                (last + SIDE < end).then(|| self.fall(last, false)),
+            ];
+            let [from, to] = [self.angles[first], self.angles[last]];
+            // Where the points end on the crown they must not rise to their end.
+            let cut_well = (falls[0].is_some() || from >= -CUT_SLOPE)
+                && (falls[1].is_some() || to <= CUT_SLOPE);
+            let deepest = falls.iter().flatten().map(|fall| fall.depth);
+            let deepest = deepest.fold(0.0, f64::max);
+            // A side that is cut soon after the crown falls too.
+            let falls_there =
+                |fall: &Fall| fall.depth >= FALL[1] || [0, end].contains(&fall.lowest);
+            let convex = deepest >= FALL[0] || from - to >= CROWN_TURN;
+            let convex = convex && falls.iter().flatten().all(falls_there);
+            (cut_well && convex).then_some(Head {
+                crown: (last - first) as f64 * STEP,
+                falls,
+            })
+        })
+        .collect()
+    }
+}
+
+/// Centre and radius of the circle through three points.
+fn circle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<([f64; 2], f64)> {
+    let ([bx, by], [cx, cy]) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+    let double = 2.0 * (bx * cy - by * cx);
+    if double == 0.0 {
+        return None;
+    }
+    let (b2, c2) = (bx * bx + by * by, cx * cx + cy * cy);
+    let centre = [(cy * b2 - by * c2) / double, (bx * c2 - cx * b2) / double];
+    let radius = centre[0].hypot(centre[1]);
+    Some(([a[0] + centre[0], a[1] + centre[1]], radius))
+}
+
+/// Points at even spacing along the chords.
+fn evenly(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let length = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+    let mut even: Vec<[f64; 2]> = points.first().copied().into_iter().collect();
+    let mut left = STEP;
+    for pair in points.windows(2) {
+        let chord = length(pair);
+        let mut along = left;
+        while along <= chord {
+            let part = along / chord;
+            even.push([0, 1].map(|k| pair[0][k] + part * (pair[1][k] - pair[0][k])));
+            along += STEP;
+        }
+        left = along - chord;
+    }
+    even
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wheel, z up: a flange of 28 mm with a round tip of 15 mm beside a tread of 100 mm.
+    fn wheel() -> Vec<[f64; 2]> {
+        (-650..=600)
+            .map(|k| 0.1 * f64::from(k))
+            .map(|y: f64| [y, -28.0 * (-((y + 45.0) / 15.0).powi(2)).exp()])
+            .collect()
+    }
+
+    #[test]
+    fn the_tip_of_a_flange_is_the_piece_within_two_millimetres_of_its_lowest_point() {
+        let found = flange(&wheel()).expect("a flange");
+        let [from, to] = found.tip.expect("a tip");
+        // 28 exp(−(d/15)²) = 26 at d = 15 √ln(28/26), within the spacing of the samples.
+        let half = 15.0 * (28.0_f64 / 26.0).ln().sqrt();
+        assert!((from + 45.0 + half).abs() < STEP, "{from}");
+        assert!((to + 45.0 - half).abs() < STEP, "{to}");
+    }
+
+    #[test]
+    fn a_rounding_is_continued_to_the_back_and_a_slope_is_not() {
+        let arc = |last: i32| -> Vec<[f64; 2]> {
+            // The tip at y = 0 and a rounding of 20 mm, whose back is at y = -20.
+            let rounding = (0..=last).rev().map(|k| {
+                let angle = f64::from(k).to_radians();
+                [-20.0 * angle.sin(), -28.0 + 20.0 * (1.0 - angle.cos())]
+            });
+            let face = (1..=24).map(|k| [f64::from(k), -28.0 + 28.0 / 24.0 * f64::from(k)]);
+            let tread = (1..=80).map(|k| [24.0 + f64::from(k), 0.0]);
+            rounding.chain(face).chain(tread).collect()
+        };
+        let back = |last: i32| flange(&arc(last)).expect("a flange").back;
+        for measured in [75, 80, 85] {
+            let found = back(measured).expect("a back");
+            assert!((found + 20.0).abs() < 0.05, "{measured}°: {found}");
+        }
+        assert_eq!(back(65), None);
+    }
+}
