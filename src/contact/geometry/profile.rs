@@ -125,9 +125,12 @@ impl Profile {
         let [shortest, longest] = ARC_LENGTH;
         if !(shortest..=longest).contains(&length) {
             let hint = match likely_unit(body, &points) {
-                Some((width, unit)) => format!(
-                    "the section is {width:.4} mm wide; if its numbers are in {unit} and not in mm, state unit: \"{unit}\""
-                ),
+                Some((width, unit)) => {
+                    let unit = unit.symbol();
+                    format!(
+                        "the section is {width:.4} mm wide; if its numbers are in {unit} and not in mm, state unit: \"{unit}\""
+                    )
+                }
                 None => "is another unit than mm used, or are the points not in order?".to_owned(),
             };
             return Err(format!(
@@ -138,7 +141,7 @@ impl Profile {
             remarks.push(Remark::ProfileSizeUnusual {
                 profile: body.name(),
                 width_mm,
-                unit,
+                unit: unit.symbol(),
             });
         }
         let flange = orient(body, &mut points, reading, format, &mut remarks)?;
@@ -346,13 +349,18 @@ fn orient(
         mirror_z: reading.mirror_z,
     };
     let [first, last] = shape::stray_ends(points).map(|stray| stray.map_or(0, |(count, _)| count));
-    let shown = &points[first..points.len() - last];
+    // A section in another unit than stated shows its senses all the same.
+    let scale = likely_unit(body, points).map_or(1.0, |(_, unit)| unit.mm());
+    let shown: Vec<[f64; 2]> = points[first..points.len() - last]
+        .iter()
+        .map(|point| point.map(|part| scale * part))
+        .collect();
     let FoundSenses {
         senses,
         contradicted,
     } = match body {
-        Body::Rail => orientation::orient_rail(shown, stated, format.fixed)?,
-        Body::Wheel => orientation::orient_wheel(shown, stated, format.fixed)?,
+        Body::Rail => orientation::orient_rail(&shown, stated, format.fixed)?,
+        Body::Wheel => orientation::orient_wheel(&shown, stated, format.fixed)?,
     };
     let profile = body.name();
     if stated.mirror_z.is_none() && senses.mirror_z != format.usual.mirror_z {
@@ -378,14 +386,15 @@ fn orient(
     ));
     let flange = match body {
         Body::Rail => None,
-        Body::Wheel => orientation::flange(&orientation::in_senses(shown, senses)),
+        Body::Wheel if scale == 1.0 => orientation::flange(&orientation::in_senses(&shown, senses)),
+        Body::Wheel => None,
     };
     *points = orientation::in_senses(points, senses);
     Ok(flange)
 }
 
 /// The width of a section, and the unit in which it would be that of a usual rail head or wheel, if that is not mm.
-fn likely_unit(body: Body, points: &[[f64; 2]]) -> Option<(f64, &'static str)> {
+fn likely_unit(body: Body, points: &[[f64; 2]]) -> Option<(f64, LengthUnit)> {
     let usual = match body {
         Body::Rail => RAIL_WIDTH,
         Body::Wheel => WHEEL_WIDTH,
@@ -393,7 +402,7 @@ fn likely_unit(body: Body, points: &[[f64; 2]]) -> Option<(f64, &'static str)> {
     let y = || points.iter().map(|point| point[0]);
     let width = y().fold(f64::NEG_INFINITY, f64::max) - y().fold(f64::INFINITY, f64::min);
     let unit = LengthUnit::likely(width, usual)?;
-    (unit != LengthUnit::Mm).then(|| (width, unit.symbol()))
+    (unit != LengthUnit::Mm).then_some((width, unit))
 }
 
 /// Drops points that run back between their neighbours, as they occur where measurements were stitched.
