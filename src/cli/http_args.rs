@@ -142,6 +142,10 @@ pub(super) struct HttpArgs {
         value_name = "ADDRESSES"
     )]
     pub trusted_proxies: Vec<AddressRange>,
+    /// Computing seconds that the reading of one batch, run or table, or the evaluation of its rows, may take; beyond: 413.
+    #[arg(long, env = "RAILHEAD_TABLE_TIME_S", default_value_t = 300, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub table_time_s: u32,
     /// Names of the service, separated by commas, by which it may be asked without a key; addresses and `localhost` always
     /// may. Others are refused, as a web page could make its own name lead here.
     #[arg(
@@ -190,6 +194,7 @@ impl HttpArgs {
             run_max_bytes: u64::from(self.run_max_mib) << 20,
             run_max_rows: self.run_max_rows,
             trusted_proxies: self.trusted_proxies.as_slice().into(),
+            table_time: seconds(self.table_time_s),
             allowed_hosts: self.allowed_host.as_slice().into(),
             page_dir: self.page_dir.as_deref().map(Into::into),
             ..default

@@ -63,6 +63,9 @@ pub(super) struct WorkerArgs {
         value_name = "MB"
     )]
     pub tenant_staged_mb: u32,
+    /// Size in MB of the cases, templates and results that one tenant may have stored; further submissions get 507 [default: any size].
+    #[arg(long, env = "RAILHEAD_TENANT_STORED_MB", value_name = "MB")]
+    pub tenant_stored_mb: Option<u32>,
 }
 
 impl WorkerArgs {
@@ -81,6 +84,7 @@ impl WorkerArgs {
                 all: bytes(self.staged_mb),
                 tenant: bytes(self.tenant_staged_mb),
             },
+            tenant_stored_max_bytes: self.tenant_stored_mb.map(bytes),
             ..options
         }
     }

@@ -61,6 +61,8 @@ pub struct HttpOptions {
     pub run_max_bytes: u64,
     /// Most rows of a run.
     pub run_max_rows: u64,
+    /// Computing time that reading one table, or evaluating its rows, may take.
+    pub table_time: Duration,
     /// Requests without a key are answered, as those of a tenant of their own.
     pub anonymous: bool,
     /// The same for those that came through a proxy.
@@ -107,6 +109,8 @@ impl Default for HttpOptions {
             evaluate_max_rows: 1_000_000,
             run_max_bytes: 1 << 30,
             run_max_rows: 10_000_000,
+            // Ten times what the largest usual table takes on a slow core; a judgement.
+            table_time: Duration::from_secs(300),
             anonymous: true,
             anonymous_proxied: false,
             trusted_proxies: Arc::default(),

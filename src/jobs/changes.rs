@@ -1,4 +1,4 @@
-//! Following everything that is a tenant's: jobs that were submitted alone, and batches.
+//! Following everything that is a tenant's: jobs that were submitted alone, batches and runs.
 //!
 //! The store is asked again and again what changed since a moment; nothing is kept for a client. Changes are ordered by their
 //! time, but may become visible a little later than they say, so each poll reaches back, and what was told already is left out.
@@ -13,6 +13,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::{Job, State};
+use crate::jobs::run::model::Run;
 use crate::jobs::store::list::{Change, Filter};
 
 /// Time between two polls of the store.
@@ -31,6 +32,8 @@ pub enum Changed {
     Job(Box<Job>),
     /// A batch: its jobs are told together.
     Batch(Box<Batch>),
+    /// A run: its chunks are told together.
+    Run(Box<Run>),
 }
 
 /// Where somebody who follows a tenant stands.
@@ -40,7 +43,7 @@ pub struct Follower {
     /// Everything that changed before this time was told.
     since: i64,
     told: VecDeque<(Changed, i64)>,
-    /// What was told of what changed lately: version of a job with its progress, counts of a batch.
+    /// What was told of what changed lately: version of a job with its progress, counts of a batch or run.
     known: HashMap<Uuid, (i64, String)>,
 }
 
@@ -86,12 +89,22 @@ impl Follower {
     }
 
     async fn poll(&mut self) -> Result<(), JobsError> {
-        let (mut from, mut after) = (self.since.saturating_sub(REACH_MS), None);
+        let from = self.since.saturating_sub(REACH_MS);
+        self.poll_lane(&self.jobs.clone(), from).await?;
+        self.poll_lane(&self.jobs.in_rows_lane(), from).await?;
+        self.tell_progress().await?;
+        let horizon = self.since.saturating_sub(2 * REACH_MS);
+        self.known.retain(|_, (at, _)| *at >= horizon);
+        Ok(())
+    }
+
+    /// Polls the jobs of the tenant, or the chunks of its runs.
+    async fn poll_lane(&mut self, lane: &Jobs, mut from: i64) -> Result<(), JobsError> {
+        let mut after = None;
         let mut batches = HashSet::new();
         loop {
-            let store = &self.jobs.shared.store;
-            let tenant = &self.jobs.tenant;
-            let changes = store.changes(tenant, from, after, AT_ONCE).await?;
+            let store = &lane.shared.store;
+            let changes = store.changes(&lane.tenant, from, after, AT_ONCE).await?;
             for change in &changes {
                 match change.batch {
                     Some(batch) => drop(batches.insert((batch, change.at))),
@@ -110,11 +123,8 @@ impl Follower {
             *time = at.max(*time);
         }
         for (batch, at) in latest {
-            self.tell_batch(batch, at).await?;
+            self.tell_batch(lane, batch, at).await?;
         }
-        self.tell_progress().await?;
-        let horizon = self.since.saturating_sub(2 * REACH_MS);
-        self.known.retain(|_, (at, _)| *at >= horizon);
         Ok(())
     }
 
@@ -128,14 +138,30 @@ impl Follower {
         Ok(())
     }
 
-    async fn tell_batch(&mut self, id: Uuid, at: i64) -> Result<(), JobsError> {
-        let batch = match self.jobs.recent_batch(id, PAUSE).await {
-            Ok(batch) => batch,
-            // Not acknowledged yet, or gone.
-            Err(JobsError::BatchNotFound | JobsError::Expired) => return Ok(()),
-            Err(error) => return Err(error),
+    async fn tell_batch(&mut self, lane: &Jobs, id: Uuid, at: i64) -> Result<(), JobsError> {
+        // Not acknowledged yet, or gone.
+        let gone = |error| match error {
+            JobsError::BatchNotFound | JobsError::RunNotFound | JobsError::Expired => Ok(()),
+            error => Err(error),
         };
-        self.tell(id, at, batch.change_tag(), Changed::Batch(Box::new(batch)));
+        let batch = match lane.recent_batch(id, PAUSE).await {
+            Ok(batch) => batch,
+            Err(error) => return gone(error),
+        };
+        let tag = batch.change_tag();
+        let changed = if lane.tenant == self.jobs.tenant {
+            Changed::Batch(Box::new(batch))
+        } else if self.is_known(id, &tag) {
+            // Its head need not be read.
+            self.known.insert(id, (at, tag));
+            return Ok(());
+        } else {
+            match self.jobs.with_head(batch).await {
+                Ok(run) => Changed::Run(Box::new(run)),
+                Err(error) => return gone(error),
+            }
+        };
+        self.tell(id, at, tag, changed);
         Ok(())
     }
 
@@ -154,8 +180,12 @@ impl Follower {
         Ok(())
     }
 
+    fn is_known(&self, id: Uuid, tag: &str) -> bool {
+        self.known.get(&id).is_some_and(|(_, known)| known == tag)
+    }
+
     fn tell(&mut self, id: Uuid, at: i64, tag: String, changed: Changed) {
-        let known = self.known.get(&id).is_some_and(|(_, known)| *known == tag);
+        let known = self.is_known(id, &tag);
         self.known.insert(id, (at, tag));
         if !known {
             self.told.push_back((changed, self.since));

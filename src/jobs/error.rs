@@ -26,6 +26,14 @@ pub enum JobsError {
         /// Bound of queued jobs of one tenant.
         queue_max: u64,
     },
+    /// What the tenant has stored would take more bytes than it may; nothing was stored.
+    #[error(
+        "the cases, templates and results of this tenant would take more than the {bytes_max} bytes that it may store; delete ended jobs, batches or runs"
+    )]
+    StoredQuotaExceeded {
+        /// Bound of stored bytes of one tenant.
+        bytes_max: u64,
+    },
     /// The batches of the tenant that are being received are as large as they may be together.
     #[error(
         "batches of this tenant that are being received stand for {bytes_max} bytes, which is the limit; try again later, or send fewer cases at once"
@@ -163,6 +171,12 @@ pub enum JobsError {
         "there is no job table in the database yet: run `railhead migrate --database-url …` once"
     )]
     NotMigrated,
+    /// The job table in the data folder is that of an earlier version, and the service may be using it.
+    #[error(
+        "the job table in the data folder is that of an earlier version: start `railhead serve` of this version with the folder once, which \
+         brings it forward"
+    )]
+    OldFolder,
     /// The tables in the database are those of an earlier version.
     #[error(
         "the job table in the database is that of an earlier version: run `railhead migrate --database-url …` of this version once"

@@ -62,6 +62,8 @@ pub struct Options {
     pub tenant_queue_max: u64,
     /// Bytes of cross-sections that a tenant may keep.
     pub tenant_profiles_max_bytes: u64,
+    /// Bytes of cases, templates and results that a tenant may have stored before its submissions are refused, if they are bounded.
+    pub tenant_stored_max_bytes: Option<u64>,
     /// Bounds of what batches that are being received stand for.
     pub staging: StagingBounds,
     /// Most jobs a worker claims together, if they are small; 1 means no groups.
@@ -102,6 +104,7 @@ impl Options {
             queue_max: 300_000,
             tenant_queue_max: 250_000,
             tenant_profiles_max_bytes: 64 << 20,
+            tenant_stored_max_bytes: None,
             staging: StagingBounds {
                 all: 16 << 30,
                 tenant: 4 << 30,

@@ -155,6 +155,7 @@ impl Jobs {
         QueueBounds {
             all: self.shared.options.queue_max,
             tenant: self.shared.options.tenant_queue_max,
+            stored: self.shared.options.tenant_stored_max_bytes,
         }
     }
 
@@ -167,6 +168,9 @@ impl Jobs {
             },
             Refusal::Queue => JobsError::QueueFull {
                 queue_max: bounds.all,
+            },
+            Refusal::Stored => JobsError::StoredQuotaExceeded {
+                bytes_max: bounds.stored.unwrap_or(u64::MAX),
             },
         }
     }

@@ -1,6 +1,5 @@
 //! Batches: taken whole or not at all, solved in groups, read in order.
 
-use std::collections::HashSet;
 use std::time::Duration;
 
 use railhead::contact::solve;
@@ -380,8 +379,7 @@ async fn an_incomplete_batch_is_gone_after_a_restart() {
         idempotency: Some(("k".to_owned(), [1; 32])),
         ..new_batch("anonymous", 2)
     };
-    let living = HashSet::new();
-    let begun = store.begin_batch(&new, &living, QueueBounds::NONE).await;
+    let begun = store.begin_batch(&new, &|_| false, QueueBounds::NONE).await;
     assert_eq!(begun.unwrap(), BatchBegun::Created);
     let job = crate::store::new_job();
     let id = job.id;

@@ -246,7 +246,7 @@ impl Events {
 }
 
 #[tokio::test]
-async fn one_stream_tells_all_jobs_and_batches_and_goes_on_where_it_was() {
+async fn one_stream_tells_all_jobs_batches_and_runs_and_goes_on_where_it_was() {
     let server = Server::start().await;
     let before = path_of(&server.solve(&case("before", 70_000)).await);
     tokio::time::sleep(Duration::from_millis(2_100)).await;
@@ -264,6 +264,18 @@ async fn one_stream_tells_all_jobs_and_batches_and_goes_on_where_it_was() {
         .await;
     let batch = batch.json["id"].as_str().expect("an id").to_owned();
     events.until(&batch, "ended").await;
+    let run = server.post("/v1/runs", &example("run.json")).await;
+    assert_eq!(run.status, 202, "{}", run.text);
+    loop {
+        let (name, _, data) = events.next().await;
+        if data["id"] == run.json["id"] {
+            assert_eq!(name, "run");
+            if data["state"] == "succeeded" {
+                assert_eq!(data["rows_done"], 4);
+                break;
+            }
+        }
+    }
     // Another stream from where the first one was: the batch, and nothing of long ago.
     let mut later = Events::open(&server, Some(&seen)).await;
     assert_eq!(later.next().await.0, "start");

@@ -223,6 +223,8 @@ pub fn new_batch(tenant: &str, count: u32) -> NewBatch {
         name: None,
         labels: BTreeMap::new(),
         template: None,
+        head: None,
+        bytes: 0,
         idempotency: None,
     }
 }

@@ -13,6 +13,7 @@ use crate::store_moves::Pair;
 
 /// The tables of a PostgreSQL, those first that others refer to.
 const TABLES: [&str; 13] = [
+    "templates",
     "batches",
     "blobs",
     "jobs",
@@ -22,7 +23,6 @@ const TABLES: [&str; 13] = [
     "objects",
     "blob_outbox",
     "job_slices",
-    "batch_templates",
     "batch_keys",
     "idempotency_keys",
     "tombstones",

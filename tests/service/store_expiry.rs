@@ -1,7 +1,5 @@
 //! What is removed together once its time is over?
 
-use std::collections::HashSet;
-
 use railhead::jobs::model::lane::rows_lane;
 use railhead::jobs::store::claim::Claim;
 use railhead::jobs::store::retention::RetentionRule;
@@ -38,7 +36,7 @@ async fn the_chunks_of_a_run_expire_together_with_the_last_of_them(kind: StoreKi
 
     let lane = rows_lane("anonymous");
     let run = new_batch(&lane, 3);
-    let none = HashSet::new();
+    let none = |_| false;
     let created = table.store.begin_batch(&run, &none, QueueBounds::NONE);
     assert_eq!(created.await.unwrap(), BatchBegun::Created);
     let chunk = |index| {

@@ -1,7 +1,7 @@
 //! Does a store behave like a plain model of it, whatever is asked in whatever order? Tenants, priorities, groups, batches,
 //! deadlines, slices, shared results, expiry, clocks that are set, a database that goes back in time: by the calls that production makes.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -204,8 +204,9 @@ impl Pair {
         let bounds = QueueBounds {
             all: BOUNDS.0,
             tenant: BOUNDS.1,
+            stored: None,
         };
-        let begun = self.store.begin_batch(&new, &HashSet::new(), bounds).await;
+        let begun = self.store.begin_batch(&new, &|_| false, bounds).await;
         match self.model.admit(tenant, u64::from(count)) {
             Err(refusal) => assert_eq!(begun.unwrap(), BatchBegun::Refused(refusal)),
             Ok(()) => {

@@ -76,6 +76,7 @@ impl Pair {
         let bounds = QueueBounds {
             all: BOUNDS.0,
             tenant: BOUNDS.1,
+            stored: None,
         };
         let answer = self.store.enqueue(&new, bounds).await.unwrap();
         let admitted = match new.source {

@@ -120,6 +120,7 @@ async fn maintain(store: &Arc<dyn Store>) {
             QueueBounds {
                 all: 2_000_000,
                 tenant: 2_000_000,
+                stored: None,
             },
         )
         .await

@@ -65,6 +65,7 @@ async fn a_quota_is_exact_whoever_submits_at_the_same_moment(kind: StoreKind) {
     let bounds = QueueBounds {
         all: 1000,
         tenant: 20,
+        stored: None,
     };
     // A batch holds some of the places already.
     let reserved = stores[0]
@@ -87,13 +88,13 @@ async fn one_key_makes_one_batch_and_is_known_once_it_is_acknowledged(kind: Stor
         batch
     };
     let (first, second) = (keyed(), keyed());
-    let living = HashSet::from([first.id]);
+    let filled = |id| id == first.id;
     let begun = stores[0]
-        .begin_batch(&first, &living, QueueBounds::NONE)
+        .begin_batch(&first, &filled, QueueBounds::NONE)
         .await;
     assert_eq!(begun.unwrap(), BatchBegun::Created);
     let begun = stores[1]
-        .begin_batch(&second, &living, QueueBounds::NONE)
+        .begin_batch(&second, &filled, QueueBounds::NONE)
         .await;
     assert_eq!(begun.unwrap(), BatchBegun::Unfinished);
     // No job of it is claimed before all are there.
@@ -103,7 +104,7 @@ async fn one_key_makes_one_batch_and_is_known_once_it_is_acknowledged(kind: Stor
         .unwrap();
     assert!(claim_up_to(&*stores[1], 0, LEASE, 9).await.is_empty());
     stores[0].complete_batch(first.id).await.unwrap();
-    let known = stores[1].batch_by_key(&second, &HashSet::new()).await;
+    let known = stores[1].batch_by_key(&second, &|_| false).await;
     assert_eq!(known.unwrap(), Some(BatchBegun::Existing(first.id)));
     assert_eq!(claim_up_to(&*stores[1], 0, LEASE, 9).await.len(), 1);
 }
@@ -111,9 +112,8 @@ async fn one_key_makes_one_batch_and_is_known_once_it_is_acknowledged(kind: Stor
 async fn what_was_given_up_is_neither_filled_nor_acknowledged(kind: StoreKind) {
     let (_table, stores) = two(kind).await;
     let batch = new_batch("anonymous", 3);
-    let none = HashSet::new();
     let begun = stores[0]
-        .begin_batch(&batch, &none, QueueBounds::NONE)
+        .begin_batch(&batch, &|_| false, QueueBounds::NONE)
         .await;
     assert_eq!(begun.unwrap(), BatchBegun::Created);
     let jobs = [(0, new_job()), (1, new_job())];

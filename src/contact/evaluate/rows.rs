@@ -1,5 +1,6 @@
 //! Evaluates rows: Hertz's ellipse and the creep forces of each, by the table or by the simplified theory.
 
+use std::convert::Infallible;
 use std::f64::consts::PI;
 
 use serde_json::Value;
@@ -115,18 +116,36 @@ impl Rows {
     /// The answers.
     #[must_use]
     pub fn evaluate(&self) -> RowsAnswer {
-        self.evaluate_to(|_| ())
+        let Ok(answer) = self.evaluate_to(|_| Ok::<_, Infallible>(()));
+        answer
+    }
+
+    /// The answers; `step` is called after each row and may end the evaluation.
+    ///
+    /// # Errors
+    /// The error of `step`.
+    pub fn evaluate_stepwise<E>(
+        &self,
+        mut step: impl FnMut() -> Result<(), E>,
+    ) -> Result<RowsAnswer, E> {
+        self.evaluate_to(|_| step())
     }
 
     /// The answers, and of each row its normal force in N and √(ab) in mm.
     #[must_use]
     pub fn evaluate_with_patches(&self) -> (RowsAnswer, Vec<[f64; 2]>) {
         let mut patches = Vec::with_capacity(self.rows);
-        let answer = self.evaluate_to(|patch| patches.push(patch));
+        let Ok(answer) = self.evaluate_to(|patch| {
+            patches.push(patch);
+            Ok::<_, Infallible>(())
+        });
         (answer, patches)
     }
 
-    fn evaluate_to(&self, mut note: impl FnMut([f64; 2])) -> RowsAnswer {
+    fn evaluate_to<E>(
+        &self,
+        mut note: impl FnMut([f64; 2]) -> Result<(), E>,
+    ) -> Result<RowsAnswer, E> {
         let mut answer = RowsAnswer::with_capacity(self.rows, self.gradients);
         let material = self.material_table();
         let mut state = Shapes {
@@ -141,9 +160,9 @@ impl Rows {
             }
             let (row, patch) = self.answer_row(&row, &mut state);
             answer.push(row);
-            note(patch);
+            note(patch)?;
         }
-        answer
+        Ok(answer)
     }
 
     /// The table at the rows' Poisson's ratio, if it is one and they are many.

@@ -42,7 +42,7 @@ where
         let tenant = request.extensions().get::<Tenant>().cloned();
         let Tenant(tenant) = tenant.unwrap_or_else(|| Tenant("".into()));
         let (bytes, held) = read_whole(request, &memory, &tenant, &options).await?;
-        let weight = weigh_in_turn(&memory, &bytes, options.parsed_max_bytes).await?;
+        let weight = weigh_in_turn(&memory, &tenant, &bytes, options.parsed_max_bytes).await?;
         let share = memory.parsed(&tenant, weight).await?;
         if weight <= SMALL_BYTES {
             let value = read_json(&bytes)?;
@@ -52,7 +52,7 @@ where
             });
         }
         // Off the threads that answer requests, few at a time.
-        let turn = memory.turn(weight).await?;
+        let turn = memory.turn(&tenant, weight).await?;
         let room = Room {
             share,
             turn: Some(turn),
@@ -68,11 +68,16 @@ where
 }
 
 /// The weight of a case; counting in a large one takes long enough that it must not hold up other requests.
-async fn weigh_in_turn(memory: &Memory, text: &Bytes, max_bytes: usize) -> Result<usize, ApiError> {
+async fn weigh_in_turn(
+    memory: &Memory,
+    tenant: &str,
+    text: &Bytes,
+    max_bytes: usize,
+) -> Result<usize, ApiError> {
     if text.len() <= SMALL_BYTES {
         return weigh_case(text, max_bytes);
     }
-    let (text, turn) = (text.clone(), memory.turn(text.len()).await?);
+    let (text, turn) = (text.clone(), memory.turn(tenant, text.len()).await?);
     let weighed = tokio::task::spawn_blocking(move || {
         let _turn = turn;
         weigh_case(&text, max_bytes)

@@ -1,13 +1,11 @@
 //! Memory and computing time of requests: bodies, parsed cases and answers are counted in bytes before they are allocated, and long
 //! computations (large cases, grids, pictures) run only a few at a time.
 
-use std::sync::Arc;
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-
 use crate::http::limits::shares::{Share, Shares};
+use crate::http::limits::turns::{Computation, Turn, Turns};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
@@ -16,7 +14,7 @@ use crate::http::problem::kinds::ProblemKind;
 const UNIT: usize = 1 << 10;
 /// Smaller amounts are not counted: even the largest number of requests takes little memory with them.
 pub(crate) const SMALL_BYTES: usize = 64 << 10;
-/// How long a request waits for memory or for a turn to compute.
+/// How long a request waits for memory.
 const WITHIN: Duration = Duration::from_secs(20);
 /// The word for the memory of answers in refusals.
 const ANSWERS: &str = "answers that clients have not taken yet";
@@ -28,15 +26,16 @@ pub struct Memory {
     parsed: Shares,
     answers: Shares,
     /// Turns for large cases: half of the cores, so that small cases need not wait for large ones.
-    large: Arc<Semaphore>,
-    small: Arc<Semaphore>,
+    large: Turns,
+    small: Turns,
     /// Turns for solves that find out how long a case takes: half of the cores, beside the workers.
-    trials: Arc<Semaphore>,
+    trials: Turns,
     /// Turns for large grids.
-    grids: Arc<Semaphore>,
+    grids: Turns,
     /// Turns for pictures, small grids and tables, which therefore need not wait for large grids.
-    renderings: Arc<Semaphore>,
+    renderings: Turns,
     waiting: Shares,
+    table_time: Duration,
 }
 
 impl Share {
@@ -50,7 +49,7 @@ impl Share {
 #[derive(Debug)]
 pub struct Rendering {
     share: Option<Share>,
-    turn: OwnedSemaphorePermit,
+    turn: Turn,
     memory: Memory,
     tenant: String,
 }
@@ -61,7 +60,7 @@ pub struct Room {
     /// The memory.
     pub share: Option<Share>,
     /// The turn.
-    pub turn: Option<OwnedSemaphorePermit>,
+    pub turn: Option<Turn>,
 }
 
 impl Memory {
@@ -76,18 +75,18 @@ impl Memory {
             )
         };
         let cores = available_parallelism().map_or(1, usize::from);
-        let turns = |count: usize| Arc::new(Semaphore::new(count.max(1)));
         let waiting = options.renderings_waiting_max;
         Memory {
             bodies: part(1),
             parsed: part(3),
             answers: part(4),
-            large: turns(cores / 2),
-            small: turns(cores),
-            trials: turns(cores / 2),
-            grids: turns(options.renderings),
-            renderings: turns(options.renderings),
+            large: Turns::new(cores / 2),
+            small: Turns::new(cores),
+            trials: Turns::new(cores / 2),
+            grids: Turns::new(options.renderings),
+            renderings: Turns::new(options.renderings),
             waiting: Shares::new(waiting, waiting.div_ceil(2)),
+            table_time: options.table_time,
         }
     }
 
@@ -119,19 +118,25 @@ impl Memory {
     ///
     /// # Errors
     /// `overloaded`: it does not come in time.
-    pub async fn turn(&self, bytes: usize) -> Result<OwnedSemaphorePermit, ApiError> {
+    pub async fn turn(&self, tenant: &str, bytes: usize) -> Result<Turn, ApiError> {
         let turns = if bytes > SMALL_BYTES {
             &self.large
         } else {
             &self.small
         };
-        in_turn(turns).await
+        turns.take_in_time(tenant).await
+    }
+
+    /// The reading of a table or the evaluation of rows, in turns for large cases.
+    #[must_use]
+    pub fn computation(&self, tenant: &str) -> Computation {
+        Computation::new(self.large.clone(), tenant, self.table_time)
     }
 
     /// A turn to solve a case for a moment; none if it does not come within that time.
-    pub async fn trial(&self, within: Duration) -> Option<OwnedSemaphorePermit> {
-        let turn = tokio::time::timeout(within, self.trials.clone().acquire_owned());
-        turn.await.ok()?.ok()
+    pub async fn trial(&self, tenant: &str, within: Duration) -> Option<Turn> {
+        let turn = tokio::time::timeout(within, self.trials.take(tenant));
+        turn.await.ok()
     }
 
     /// Memory for an answer that exists already. It does not wait, since the answer would be held in the meantime.
@@ -166,7 +171,7 @@ impl Memory {
         } else {
             &self.renderings
         };
-        let turn = in_turn(turns).await?;
+        let turn = turns.take_in_time(tenant).await?;
         drop(waiting);
         Ok(Rendering {
             share,
@@ -203,14 +208,6 @@ impl Rendering {
             None => self.memory.ready_answer(&self.tenant, bytes)?,
         };
         Ok((done, share))
-    }
-}
-
-async fn in_turn(turns: &Arc<Semaphore>) -> Result<OwnedSemaphorePermit, ApiError> {
-    let turn = tokio::time::timeout(WITHIN, turns.clone().acquire_owned());
-    match turn.await {
-        Ok(Ok(turn)) => Ok(turn),
-        _ => Err(overloaded("other requests of this kind take all turns")),
     }
 }
 

@@ -4,3 +4,4 @@ pub(super) mod concurrency;
 pub(super) mod holding_body;
 pub(super) mod memory;
 pub(super) mod shares;
+pub(super) mod turns;

@@ -259,6 +259,9 @@ fn of_rows(error: JobsError) -> ApiError {
             ApiError::new(ProblemKind::ProfileNotFound, "no profile has this digest")
         }
         JobsError::BoundKey { .. } => ApiError::new(ProblemKind::Forbidden, error.to_string()),
+        JobsError::StoredQuotaExceeded { .. } => {
+            ApiError::new(ProblemKind::StoredQuotaExceeded, error.to_string())
+        }
         JobsError::ProfilesFull(_) => ApiError::new(ProblemKind::ProfilesFull, error.to_string()),
         JobsError::TooManyRows(_) => ApiError::new(ProblemKind::BodyTooLarge, error.to_string()),
         other => match other.storage_fault() {

@@ -27,7 +27,7 @@ use crate::jobs::batch::upload::BatchUpload;
 problems! {
     /// What `POST /v1/batches` can fail with.
     BatchProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding,
-    FaultyBatch, FaultyTable, JobNotFound, IdempotencyConflict, QuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable, StorageUnreachable
+    FaultyBatch, FaultyTable, JobNotFound, IdempotencyConflict, QuotaExceeded, StoredQuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable, StorageUnreachable
 }
 
 query! {

@@ -82,7 +82,7 @@ pub(crate) async fn check(
     JsonBody { value, mut room }: JsonBody,
 ) -> Result<Json<CheckReport>, ApiError> {
     if room.turn.is_none() {
-        room.turn = Some(memory.turn(0).await?);
+        room.turn = Some(memory.turn(jobs.tenant(), 0).await?);
     }
     let value = jobs.with_profiles(value).await?;
     let Room { share, turn } = room;
@@ -100,7 +100,7 @@ pub(crate) async fn check(
     let turn = if limit.is_zero() {
         None
     } else {
-        memory.trial(limit).await
+        memory.trial(jobs.tenant(), limit).await
     };
     if let Some(turn) = turn {
         let probed = tokio::task::spawn_blocking(move || {

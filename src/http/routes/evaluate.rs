@@ -25,6 +25,7 @@ use crate::http::extract::query::{Parameters, id, query};
 use crate::http::extract::rows::{declared_bytes, read_arrow, read_body, read_csv, read_json};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
+use crate::http::limits::turns::Pace;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
@@ -175,10 +176,9 @@ pub(crate) async fn evaluate(
     };
     let mut share = memory.rows(jobs.tenant(), 2 * bytes).await?;
     let text = read_body(request, &options).await?;
-    let turn = memory.turn(2 * text.len()).await?;
+    let mut computation = memory.computation(jobs.tenant());
     let (rows_max, bytes_max) = (options.evaluate_max_rows, options.evaluate_max_bytes);
-    let work = tokio::task::spawn_blocking(move || {
-        let _turn = turn;
+    let work = computation.run(move |pace| {
         let (template, columns) = match template {
             Some(template) if essence == NPZ => (template, read_npz(text.clone(), bytes_max)?),
             Some(template) if essence == "text/csv" => (template, read_csv(&text)?),
@@ -186,7 +186,7 @@ pub(crate) async fn evaluate(
             None => read_json(&text)?,
         };
         drop(text);
-        let answer = answer(&jobs, &template, columns, rows_max)?;
+        let answer = answer(&jobs, &template, columns, rows_max, pace)?;
         let (bytes, body) = match format {
             Format::Csv => (answer.bytes(), csv_body(answer)),
             Format::Arrow => (answer.bytes(), arrow_body(answer)),
@@ -200,9 +200,9 @@ pub(crate) async fn evaluate(
         if let Some(share) = &mut share {
             share.keep(bytes);
         }
-        Ok::<_, ApiError>((body, share))
+        Ok((body, share))
     });
-    let (body, share) = work.await.map_err(|error| ApiError::internal(&error))??;
+    let (body, share) = work.await?;
     let headers = [
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
@@ -245,6 +245,7 @@ fn answer(
     template: &Value,
     columns: Vec<Column>,
     rows_max: usize,
+    pace: &mut Pace,
 ) -> Result<RowsAnswer, ApiError> {
     let rows = columns.first().map_or(0, |column| column.values.len());
     if rows == 0 || rows > rows_max {
@@ -258,7 +259,7 @@ fn answer(
         let pointers: Vec<_> = pointers.map(|pointer| (pointer, pointer)).collect();
         of_first_row(error, &pointers)
     })?;
-    Ok(Rows::new(&first, &checked, columns)?.evaluate())
+    Rows::new(&first, &checked, columns)?.evaluate_stepwise(|| pace.step())
 }
 
 /// The case of the first row.

@@ -36,7 +36,7 @@ const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 problems! {
     /// What `POST /v1/jobs` can fail with.
     SubmitProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase,
-    IdempotencyConflict, QuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable, StorageUnreachable
+    IdempotencyConflict, QuotaExceeded, StoredQuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable, StorageUnreachable
 }
 
 /// Submits one case as a job.

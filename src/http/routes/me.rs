@@ -32,20 +32,24 @@ pub(crate) struct Me {
 /// What a tenant may use at most.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Quota {
-    /// Queued jobs, with those of batches that are being received.
+    /// Queued jobs and chunks of runs, with those of batches that are being received.
     queued: u64,
     /// Bytes reserved for batches that are being received.
     staged_bytes: u64,
+    /// Bytes of stored cases, templates and results; null: any number.
+    stored_bytes: Option<u64>,
 }
 
 /// What a tenant uses at present.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Used {
-    /// Queued jobs, with the places that are reserved for batches being received.
+    /// Queued jobs and chunks of runs, with the places that are reserved for batches being received.
     queued: u64,
     /// Bytes reserved for batches that are being received.
     staged_bytes: u64,
-    /// Number of its jobs in each state.
+    /// Bytes of stored cases, templates and results.
+    stored_bytes: u64,
+    /// Number of its jobs in each state, the chunks of its runs included.
     #[schema(value_type = BTreeMap<String, u64>)]
     jobs: BTreeMap<&'static str, u64>,
 }
@@ -71,10 +75,12 @@ pub(crate) async fn me(
         quota: Quota {
             queued: own.tenant_queue_max.min(own.queue_max),
             staged_bytes: own.staging.tenant.min(own.staging.all),
+            stored_bytes: own.tenant_stored_max_bytes,
         },
         used: Used {
             queued: number(JobState::Queued) + usage.reserved,
             staged_bytes: usage.staged_bytes,
+            stored_bytes: usage.stored_bytes,
             jobs: JobState::ALL
                 .map(|state| (state.name(), number(state)))
                 .into(),

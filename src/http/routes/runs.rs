@@ -34,7 +34,7 @@ const LIST_LIMIT_DEFAULT: u32 = 20;
 problems! {
     /// What `POST /v1/runs` can fail with.
     SubmitRunProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding,
-    FaultyCase, FaultyTable, JobNotFound, IdempotencyConflict, QuotaExceeded, QueueFull, Overloaded, Draining, StorageFull, StorageUnwritable
+    FaultyCase, FaultyTable, JobNotFound, IdempotencyConflict, QuotaExceeded, StoredQuotaExceeded, QueueFull, Overloaded, Draining, StorageFull, StorageUnwritable
 }
 
 query! {

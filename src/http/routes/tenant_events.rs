@@ -13,6 +13,7 @@ use utoipa::{PartialSchema, ToSchema};
 
 use crate::http::dto::batch::BatchAnswer;
 use crate::http::dto::job::JobAnswer;
+use crate::http::dto::run::RunAnswer;
 use crate::http::problem::catalogue::PlainProblems;
 use crate::http::problem::error::ApiError;
 use crate::http::routes::event_stream::{EventRequest, changed, event};
@@ -28,6 +29,8 @@ pub(crate) enum TenantEvent {
     Job(Box<JobAnswer>),
     /// `batch`: the batch as `/v1/batches/{id}` answers it.
     Batch(Box<BatchAnswer>),
+    /// `run`: the run as `/v1/runs/{id}` answers it.
+    Run(Box<RunAnswer>),
 }
 
 /// One event of the stream, in the contract.
@@ -35,7 +38,7 @@ pub(crate) struct TenantEventSent;
 
 impl PartialSchema for TenantEventSent {
     fn schema() -> RefOr<Schema> {
-        event_schema::<TenantEvent>("`start`, `job` or `batch`")
+        event_schema::<TenantEvent>("`start`, `job`, `batch` or `run`")
     }
 }
 
@@ -46,10 +49,10 @@ impl ToSchema for TenantEventSent {
     }
 }
 
-/// Follows everything of the tenant: jobs that were submitted alone, and batches.
+/// Follows everything of the tenant: jobs that were submitted alone, batches and runs.
 ///
-/// The first event is `start`. To miss no change, connect first and read the lists after `start`. Each `job` or `batch` event carries the
-/// changed resource as its route returns it; jobs of a batch are reported through the batch. Changes in quick succession are merged into one
+/// The first event is `start`. To miss no change, connect first and read the lists after `start`. Each `job`, `batch` or `run` event
+/// carries the changed resource as its route returns it; jobs of a batch and rows of a run are reported through these. Changes in quick succession are merged into one
 /// event; after `Last-Event-ID` some events may repeat. Deletions are not reported. The stream ends when the service shuts down.
 #[utoipa::path(
     get,
@@ -74,6 +77,7 @@ async fn next(mut follower: Follower) -> Option<(Result<Event, Infallible>, Foll
     let event = match change {
         Changed::Job(job) => event("job", &since, &JobAnswer::new(*job)),
         Changed::Batch(batch) => event("batch", &since, &BatchAnswer::from(*batch)),
+        Changed::Run(run) => event("run", &since, &RunAnswer::from(*run)),
     };
     Some((Ok(event?), follower))
 }

@@ -65,6 +65,7 @@ pub async fn serve(
         let proxy = proxies.any(|range| range.contains(address.ip()));
         let place = places.enter(address.ip(), !proxy);
         let stream = WriteTimeout::new(stream, options.write_timeout);
+        let left = stream.client_left();
         let unread = Unread::default();
         let (router, peer, own) = (router.clone(), Peer(address.ip()), place.clone());
         let watch = unread.clone();
@@ -84,6 +85,7 @@ pub async fn serve(
                 },
                 () = place.closed() => tracing::debug!("connection closed for a new one"),
                 () = silent(&place, options.first_head_timeout) => {}
+                () = left => tracing::debug!("connection closed: its client has left"),
                 () = unread.stalled(options.write_timeout) => {
                     tracing::debug!("connection closed: its client does not take an answer");
                 }

@@ -3,17 +3,23 @@
 
 use std::io::{Error, ErrorKind, IoSlice, Result};
 use std::pin::Pin;
+use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::io::{AsyncRead, AsyncWrite, Interest, ReadBuf};
 use tokio::net::TcpStream;
+use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::time::{Instant, Sleep, sleep};
+
+/// How often an unread connection is looked at, and how long it stays open after its client has left.
+const LEFT_AFTER: Duration = Duration::from_secs(1);
 
 /// A connection with a limit on how long a write may stand still.
 #[derive(Debug)]
 pub(crate) struct WriteTimeout {
-    stream: TcpStream,
+    reading: Arc<OwnedReadHalf>,
+    writing: OwnedWriteHalf,
     limit: Duration,
     /// Runs while `waiting`.
     timer: Pin<Box<Sleep>>,
@@ -24,11 +30,31 @@ impl WriteTimeout {
     /// The connection with this limit.
     #[must_use]
     pub(crate) fn new(stream: TcpStream, limit: Duration) -> WriteTimeout {
+        let (reading, writing) = stream.into_split();
         WriteTimeout {
-            stream,
+            reading: Arc::new(reading),
+            writing,
             limit,
             timer: Box::pin(sleep(limit)),
             waiting: false,
+        }
+    }
+
+    /// Ends some time after the client has closed its side of the connection, even if bytes of a request are still unread.
+    ///
+    /// The protocol notices an end that it reads. It does not read on while a request is computed whose body is not taken yet.
+    pub(crate) fn client_left(&self) -> impl Future<Output = ()> + use<> {
+        let reading = self.reading.clone();
+        async move {
+            // Closing a connection is also how a client without further requests ends them; those under way are answered.
+            while reading
+                .ready(Interest::READABLE)
+                .await
+                .is_ok_and(|ready| !ready.is_read_closed())
+            {
+                sleep(LEFT_AFTER).await;
+            }
+            sleep(LEFT_AFTER).await;
         }
     }
 
@@ -54,7 +80,7 @@ impl AsyncWrite for WriteTimeout {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<Result<usize>> {
-        let written = Pin::new(&mut self.stream).poll_write(context, bytes);
+        let written = Pin::new(&mut self.writing).poll_write(context, bytes);
         self.judge(context, written).map(Result::flatten)
     }
 
@@ -63,29 +89,40 @@ impl AsyncWrite for WriteTimeout {
         context: &mut Context<'_>,
         parts: &[IoSlice<'_>],
     ) -> Poll<Result<usize>> {
-        let written = Pin::new(&mut self.stream).poll_write_vectored(context, parts);
+        let written = Pin::new(&mut self.writing).poll_write_vectored(context, parts);
         self.judge(context, written).map(Result::flatten)
     }
 
     fn is_write_vectored(&self) -> bool {
-        self.stream.is_write_vectored()
+        self.writing.is_write_vectored()
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Result<()>> {
-        Pin::new(&mut self.stream).poll_flush(context)
+        Pin::new(&mut self.writing).poll_flush(context)
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(context)
+        Pin::new(&mut self.writing).poll_shutdown(context)
     }
 }
 
 impl AsyncRead for WriteTimeout {
     fn poll_read(
-        mut self: Pin<&mut Self>,
+        self: Pin<&mut Self>,
         context: &mut Context<'_>,
         into: &mut ReadBuf<'_>,
     ) -> Poll<Result<()>> {
-        Pin::new(&mut self.stream).poll_read(context, into)
+        let stream: &TcpStream = (*self.reading).as_ref();
+        loop {
+            ready!(stream.poll_read_ready(context))?;
+            match stream.try_read(into.initialize_unfilled()) {
+                Ok(bytes) => {
+                    into.advance(bytes);
+                    return Poll::Ready(Ok(()));
+                }
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                Err(error) => return Poll::Ready(Err(error)),
+            }
+        }
     }
 }

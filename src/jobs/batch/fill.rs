@@ -56,19 +56,20 @@ impl Jobs {
     ) -> Result<(Batch, bool), JobsError> {
         let id = draft.id;
         let new = draft.as_new(idempotency_key);
+        let filled_here = |id| self.shared.unfinished_batches().living.contains(&id);
         let mut pause = FILLING_PAUSE.0;
         loop {
             if self.shared.draining.is_cancelled() {
                 return Err(JobsError::Draining);
             }
-            let living = self.shared.unfinished_batches().living.clone();
-            let known = self.shared.store.batch_by_key(&new, &living).await?;
+            let known = self.shared.store.batch_by_key(&new, &filled_here).await?;
             let begun = match known {
                 Some(begun) => begun,
                 None => {
                     draft.in_table = true;
                     let bounds = self.queue_bounds();
-                    let begun = self.shared.store.begin_batch(&new, &living, bounds).await;
+                    let store = &self.shared.store;
+                    let begun = store.begin_batch(&new, &filled_here, bounds).await;
                     self.observe_write(begun)?
                 }
             };

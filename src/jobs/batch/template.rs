@@ -100,6 +100,7 @@ mod tests {
         let checked = fill(&template, &row).unwrap();
         let stored = StoredCase {
             template: Some(template.to_string().into()),
+            head: None,
             body: serde_json::to_vec(&row).unwrap().into(),
         };
         assert_eq!(stored.value().unwrap(), checked);

@@ -69,6 +69,9 @@ pub struct BatchUpload {
     pub(crate) template: Option<Bytes>,
     /// The case that rows fill.
     rows: Option<RowTemplate>,
+    head: Option<Bytes>,
+    /// Bytes of the good cases as they are kept.
+    kept: u64,
     digest: blake3::Hasher,
     /// Cases seen so far.
     pub cases: u32,
@@ -114,6 +117,13 @@ impl BatchUpload {
             case,
             known: KnownPair::default(),
         });
+    }
+
+    /// What the chunks of a run share, as it is stored. `whole` is the text of all of it, by which a submission is known again.
+    pub(crate) fn set_head(&mut self, template: Bytes, head: Bytes, whole: &[u8]) {
+        self.digest.update(whole);
+        self.template = Some(template);
+        self.head = Some(head);
     }
 
     /// Checks one more case and keeps it if it has no fault. `case` is what `text` says, or why it says nothing. Blocks;
@@ -268,6 +278,7 @@ impl BatchUpload {
         let Some(staging) = &mut self.staging else {
             return Ok(());
         };
+        self.kept += body.len() as u64;
         let written = staging.push(&staged, body);
         written.map_err(|source| self.jobs.staging_failed(source))
     }
@@ -349,6 +360,7 @@ impl BatchUpload {
         let Some(staging) = &mut self.staging else {
             return Ok(());
         };
+        self.kept += kept.len() as u64;
         let written = staging.push(&staged, kept);
         written.map_err(|source| self.jobs.staging_failed(source))
     }
@@ -396,6 +408,8 @@ impl BatchUpload {
             name: self.name.clone(),
             labels: self.labels.clone(),
             template: self.template.clone(),
+            head: self.head.clone(),
+            bytes: self.kept,
             idempotency: idempotency_key.map(|key| (key, digest)),
         }
     }
@@ -452,6 +466,8 @@ impl Jobs {
             staging: Some(staging),
             template: None,
             rows: None,
+            head: None,
+            kept: 0,
             digest: blake3::Hasher::new(),
             cases: 0,
             rejected: 0,

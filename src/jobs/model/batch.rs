@@ -51,8 +51,10 @@ impl Batch {
 /// What is kept of a run beside its chunks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunRecord {
-    /// Its head, as stored.
-    pub head: Bytes,
+    /// Its template, as stored.
+    pub template: Bytes,
+    /// Its own part of what its chunks share, as stored; none in the first form, whose template has all.
+    pub head: Option<Bytes>,
     /// Rows of ended chunks that have no answer.
     pub without_answer: u64,
     /// Sum of the progress of the chunks that are being solved.

@@ -29,7 +29,11 @@ impl Jobs {
         self.with_head(batch).await
     }
 
-    async fn with_head(&self, batch: Batch) -> Result<Run, JobsError> {
+    /// The run of a batch in the lane of rows.
+    ///
+    /// # Errors
+    /// As [`Jobs::run`].
+    pub(crate) async fn with_head(&self, batch: Batch) -> Result<Run, JobsError> {
         let (_, there) = batch.ended();
         if there < u64::from(batch.count) {
             // Its first chunks have expired, or it is being deleted.
@@ -38,7 +42,11 @@ impl Jobs {
         let lane = rows_lane(&self.tenant);
         let record = self.shared.store.run(&lane, batch.id).await?;
         let record = record.ok_or(JobsError::RunNotFound)?;
-        Ok(Run::new(batch, RunHead::read(&record.head)?, &record))
+        Ok(Run::new(
+            batch,
+            RunHead::read(&record.template, record.head.as_deref())?,
+            &record,
+        ))
     }
 
     /// One page of the runs, newest first.

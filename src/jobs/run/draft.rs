@@ -58,6 +58,8 @@ pub struct RunDraft {
 #[derive(Debug)]
 struct Begun {
     head: RunHead,
+    /// Places and values of the first row.
+    first_row: Vec<(String, Value)>,
     row_seconds: f64,
 }
 
@@ -196,18 +198,33 @@ impl RunDraft {
         Ok(())
     }
 
-    /// Everything is there.
-    fn finish(mut self, starts: RowStarts) -> Result<BatchUpload, JobsError> {
+    /// Stages the rest of the rows once all of them were added. Blocks.
+    ///
+    /// # Errors
+    /// [`JobsError::Case`]: there are no rows, or the case of the first one is faulty; or as [`BatchUpload::add`].
+    pub fn cut_all(&mut self) -> Result<(), JobsError> {
         if self.rows == 0 {
             let fault = Fault::new("/columns", "0 rows given; at least one is needed");
             return Err(CaseError(vec![fault]).into());
         }
-        self.cut(true)?;
-        if let Some(Begun { mut head, .. }) = self.begun {
+        self.cut(true)
+    }
+
+    /// Everything is there.
+    fn finish(mut self, starts: RowStarts) -> Result<BatchUpload, JobsError> {
+        self.cut_all()?;
+        if let Some(Begun {
+            mut head,
+            first_row,
+            ..
+        }) = self.begun
+        {
             head.rows = self.rows;
             head.from_neighbours = starts == RowStarts::Neighbours;
             head.profiles = self.profiles.into_iter().collect();
-            self.upload.set_template(head.to_bytes());
+            let whole = head.whole();
+            let (common, own) = head.into_parts(&self.template, first_row);
+            self.upload.set_head(common, own, &whole);
         }
         Ok(self.upload)
     }
@@ -304,7 +321,13 @@ impl RunDraft {
             checked.run.method_asked.name().to_owned(),
         );
         head.chunk_rows = chunk_rows;
-        Ok(Begun { head, row_seconds })
+        let first_row = varied.iter();
+        let first_row = first_row.map(|column| (column.pointer.clone(), column.values.value(0)));
+        Ok(Begun {
+            head,
+            first_row: first_row.collect(),
+            row_seconds,
+        })
     }
 
     /// Reads the kept profiles that rows name.

@@ -1,5 +1,6 @@
 //! What all chunks of a run share: the case, the columns, the sizes.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use bytes::Bytes;
@@ -7,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::contact::evaluate::many::task::RowStarts;
-use crate::contact::evaluate::varied::Values;
+use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use crate::jobs::codec::table::{TableColumn, TableKind};
 use crate::jobs::error::JobsError;
 
@@ -100,6 +101,16 @@ pub struct RunHead {
     pub rows: u64,
     /// Rows of each chunk but the last.
     pub chunk_rows: u32,
+    /// Places and values that the first row puts into the template; none where `case` is stored itself.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    first_row: Vec<(String, Value)>,
+}
+
+/// The part of what the chunks of a run share that runs over the same template have in common.
+#[derive(Debug, Serialize, Deserialize)]
+struct CommonPart<'a> {
+    template: Cow<'a, Value>,
+    profiles: Cow<'a, BTreeMap<String, Value>>,
 }
 
 impl RunHead {
@@ -117,6 +128,7 @@ impl RunHead {
             with_reasons: true,
             rows: 0,
             chunk_rows: 0,
+            first_row: Vec::new(),
         }
     }
 
@@ -129,23 +141,63 @@ impl RunHead {
         }
     }
 
-    /// As it is stored.
+    /// The text of all of it, by which a submission is known again.
     #[must_use]
-    pub fn to_bytes(&self) -> Bytes {
-        Bytes::from(serde_json::to_vec(self).unwrap_or_default())
+    pub fn whole(&self) -> Vec<u8> {
+        serde_json::to_vec(self).unwrap_or_default()
     }
 
-    /// Reads a stored head.
+    /// As it is stored: the part in common with other runs over this template, and the rest. `first_row` is what makes the case of the
+    /// template.
+    #[must_use]
+    pub fn into_parts(self, template: &Value, first_row: Vec<(String, Value)>) -> (Bytes, Bytes) {
+        let common = CommonPart {
+            template: Cow::Borrowed(template),
+            profiles: Cow::Borrowed(&self.profiles),
+        };
+        let common = serde_json::to_vec(&common).unwrap_or_default();
+        let own = RunHead {
+            case: Value::Null,
+            profiles: BTreeMap::new(),
+            first_row,
+            ..self
+        };
+        (common.into(), own.whole().into())
+    }
+
+    /// Reads a stored head: the common part and the rest. Runs of earlier versions have all in the first.
     ///
     /// # Errors
     /// It is damaged, or of another form.
-    pub fn read(text: &[u8]) -> Result<RunHead, JobsError> {
-        let head: RunHead = serde_json::from_slice(text)
-            .map_err(|error| JobsError::Damaged(format!("the head of a run: {error}")))?;
-        match head.form {
-            FORM => Ok(head),
-            form => Err(JobsError::Damaged(format!("a run of form {form}"))),
+    pub fn read(common: &[u8], own: Option<&[u8]>) -> Result<RunHead, JobsError> {
+        let damaged = |reason: String| JobsError::Damaged(format!("the head of a run: {reason}"));
+        let text = own.unwrap_or(common);
+        let mut head: RunHead =
+            serde_json::from_slice(text).map_err(|error| damaged(error.to_string()))?;
+        if head.form != FORM {
+            return Err(damaged(format!("it is of form {}", head.form)));
         }
+        if own.is_some() {
+            let common: CommonPart<'_> =
+                serde_json::from_slice(common).map_err(|error| damaged(error.to_string()))?;
+            head.profiles = common.profiles.into_owned();
+            let first_row: Vec<VariedColumn> = std::mem::take(&mut head.first_row)
+                .into_iter()
+                .map(|(pointer, value)| VariedColumn {
+                    pointer,
+                    values: match value {
+                        Value::Number(number) => {
+                            Values::Numbers(vec![number.as_f64().unwrap_or(f64::NAN)])
+                        }
+                        text => Values::Texts(vec![text.as_str().map(str::to_owned)]),
+                    },
+                })
+                .collect();
+            let case = case_of_row(&common.template, &first_row, &head.profiles, 0);
+            head.case =
+                case.map_err(|(pointer, reason)| damaged(format!("{pointer}: {reason}")))?;
+        }
+        Ok(head)
     }
 
     /// Names and kinds of the columns of the answers, in their order: the row, what was carried along, what became of it, its numbers,

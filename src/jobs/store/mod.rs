@@ -47,7 +47,7 @@ use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
 use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
 use crate::jobs::store::submission::{
-    BatchBegun, CacheKey, Enqueued, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
+    BatchBegun, CacheKey, Enqueued, FilledHere, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
 };
 use crate::jobs::store_error::StoreError;
 
@@ -102,15 +102,15 @@ pub trait Store: KeyStore + Send + Sync + Debug {
     async fn batch_by_key(
         &self,
         new: &NewBatch,
-        living: &HashSet<Uuid>,
+        filled_here: FilledHere<'_>,
     ) -> Result<Option<BatchBegun>, StoreError>;
 
     /// Begins to fill a batch, or finds the one for which its idempotency key stands. Afterwards exactly the places of its
-    /// jobs are reserved. A key of an unfinished batch that is not in `living` is free.
+    /// jobs are reserved. A key of an unfinished batch that no process fills is free.
     async fn begin_batch(
         &self,
         new: &NewBatch,
-        living: &HashSet<Uuid>,
+        filled_here: FilledHere<'_>,
         bounds: QueueBounds,
     ) -> Result<BatchBegun, StoreError>;
 

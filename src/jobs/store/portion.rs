@@ -2,6 +2,7 @@
 
 /// The tables that are moved, those first that others refer to. What a database counts itself is counted anew.
 pub(crate) const TABLES: [&str; 13] = [
+    "templates",
     "batches",
     "blobs",
     "jobs",
@@ -9,7 +10,6 @@ pub(crate) const TABLES: [&str; 13] = [
     "job_labels",
     "job_slices",
     "blob_outbox",
-    "batch_templates",
     "batch_keys",
     "idempotency_keys",
     "tombstones",

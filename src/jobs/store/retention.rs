@@ -59,12 +59,14 @@ pub struct Stats {
 /// What a tenant has in a job table.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Usage {
-    /// Number of jobs in each state; a state may be missing.
+    /// Number of jobs and of chunks of runs in each state; a state may be missing.
     pub jobs: BTreeMap<State, u64>,
     /// Places in the queue that are reserved for batches that are being received.
     pub reserved: u64,
     /// Bytes that these stand for.
     pub staged_bytes: u64,
+    /// Bytes of cases, templates and results that are stored.
+    pub stored_bytes: u64,
 }
 
 /// Jobs whose deadline has passed.

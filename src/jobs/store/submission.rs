@@ -63,8 +63,10 @@ impl NewJob {
 pub struct QueueBounds {
     /// Of all tenants.
     pub all: u64,
-    /// Of one tenant.
+    /// Of one tenant, the chunks of its runs included.
     pub tenant: u64,
+    /// Bytes that one tenant may have stored, if they are bounded.
+    pub stored: Option<u64>,
 }
 
 impl QueueBounds {
@@ -72,16 +74,19 @@ impl QueueBounds {
     pub const NONE: QueueBounds = QueueBounds {
         all: u64::MAX,
         tenant: u64::MAX,
+        stored: None,
     };
 }
 
-/// Which bound has no place left.
+/// Which bound is reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
     /// That of the tenant.
     Quota,
     /// That of the queue.
     Queue,
+    /// That of the bytes that the tenant has stored.
+    Stored,
 }
 
 /// A batch about to be filled.
@@ -103,9 +108,17 @@ pub struct NewBatch {
     pub labels: BTreeMap<String, String>,
     /// The case that its rows fill, if it is a table.
     pub template: Option<Bytes>,
+    /// Of a run: its own part of what its chunks share.
+    pub head: Option<Bytes>,
+    /// Bytes of its cases as they will be stored.
+    pub bytes: u64,
     /// The client's idempotency key with the digest of all cases and options.
     pub idempotency: Option<(String, [u8; 32])>,
 }
+
+/// Whether this process receives or fills a batch at the moment of the call. It is called within the transaction that decides what an
+/// idempotency key stands for: a batch that began while the transaction waited for the writer counts too.
+pub type FilledHere<'a> = &'a (dyn Fn(Uuid) -> bool + Sync);
 
 /// What became of an attempt to begin a batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -140,6 +153,8 @@ pub enum Enqueued {
 pub struct StoredCase {
     /// The case that the body fills; none if the body is the case.
     pub template: Option<Bytes>,
+    /// Of a chunk of a run: the run's own part of what its chunks share.
+    pub head: Option<Bytes>,
     /// JSON text.
     pub body: Bytes,
 }

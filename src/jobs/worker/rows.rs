@@ -75,7 +75,10 @@ pub(crate) fn solve_chunk(
 }
 
 fn read(stored: &StoredCase) -> Result<(RunHead, RunChunk), JobsError> {
-    let head = RunHead::read(stored.template.as_deref().unwrap_or_default())?;
+    let head = RunHead::read(
+        stored.template.as_deref().unwrap_or_default(),
+        stored.head.as_deref(),
+    )?;
     let chunk = RunChunk::read(&stored.body, &head.columns)?;
     Ok((head, chunk))
 }

@@ -4,7 +4,6 @@ use axum::body::Body;
 use axum::extract::Request;
 use axum::http::HeaderMap;
 use serde_json::Value;
-use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use crate::contact::error::Fault;
@@ -14,6 +13,7 @@ use crate::http::extract::batch::splitter::{Element, Layout, Splitter};
 use crate::http::extract::batch::table::TableBody;
 use crate::http::extract::json::{essence, read_json, read_strict, weigh_case};
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
+use crate::http::limits::turns::Computation;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
@@ -107,13 +107,10 @@ pub async fn read_draft(
     let mut portion = Vec::new();
     let mut held = 0;
     let mut share = None;
-    let checking = Checking {
-        memory,
+    let mut checking = Checking {
+        computation: memory.computation(jobs.tenant()),
         parsed_max_bytes: options.parsed_max_bytes,
-        gone: CancellationToken::new(),
     };
-    // Dropped with this request when its client goes away.
-    let _gone = checking.gone.clone().drop_guard();
     while let Some(piece) = arriving.next().await? {
         held += piece.len();
         // Most cases are small; a large one is held until its end has come.
@@ -149,18 +146,16 @@ fn require_count(draft: &BatchUpload, options: &HttpOptions) -> Result<(), ApiEr
     ))
 }
 
-/// What it takes to check cases off the threads that answer requests.
-struct Checking<'a> {
-    memory: &'a Memory,
+/// Checks cases off the threads that answer requests.
+struct Checking {
+    computation: Computation,
     parsed_max_bytes: usize,
-    /// Nobody waits for the answer any more.
-    gone: CancellationToken,
 }
 
-impl Checking<'_> {
-    /// Checks some cases, in their turn.
+impl Checking {
+    /// Checks some cases, in turns.
     async fn check(
-        &self,
+        &mut self,
         mut draft: BatchUpload,
         mut form: Form,
         portion: Vec<Element>,
@@ -168,19 +163,15 @@ impl Checking<'_> {
         if portion.is_empty() {
             return Ok((draft, form));
         }
-        let turn = self.memory.turn(usize::MAX).await?;
-        let (gone, max_bytes) = (self.gone.clone(), self.parsed_max_bytes);
-        let checked = tokio::task::spawn_blocking(move || {
-            let _turn = turn;
+        let max_bytes = self.parsed_max_bytes;
+        let checked = self.computation.run(move |pace| {
             for element in portion {
-                if gone.is_cancelled() {
-                    return Err(ApiError::internal(&"the client has gone"));
-                }
+                pace.step()?;
                 add(&mut draft, &mut form, &element, max_bytes)?;
             }
             Ok((draft, form))
         });
-        checked.await.map_err(|error| ApiError::internal(&error))?
+        checked.await
     }
 }
 

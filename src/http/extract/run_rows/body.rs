@@ -17,6 +17,7 @@ use crate::http::extract::rows::{declared_bytes, read_body, read_json_columns};
 use crate::http::extract::run_rows::text::{CsvRows, JsonRows};
 use crate::http::extract::titles::{NamedColumns, faulty, require_few};
 use crate::http::limits::memory::Memory;
+use crate::http::limits::turns::Pace;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
@@ -117,21 +118,20 @@ pub async fn read_run(
         RowsForm::Npz => 2 * bytes_max,
         _ => PIECE_BYTES,
     };
-    let held = (
-        memory.rows(jobs.tenant(), bytes).await?,
-        memory.turn(bytes).await?,
-    );
-    let read = tokio::task::spawn_blocking(move || {
-        let _held = held;
+    let share = memory.rows(jobs.tenant(), bytes).await?;
+    let mut computation = memory.computation(jobs.tenant());
+    let read = computation.run(move |pace| {
+        let _held = share;
         let draft = |columns| jobs.draft_run(template.clone(), columns, rows_max);
-        match form {
+        let mut draft = match form {
             RowsForm::Ndjson => {
                 let mut rows = JsonRows::new(BufReader::new(file), &named)?;
                 let mut draft = draft(rows.columns.clone())?;
                 while let Some(values) = rows.next()? {
+                    pace.step()?;
                     draft.push(values)?;
                 }
-                Ok(draft)
+                draft
             }
             RowsForm::Arrow => {
                 let damaged = |error: &dyn std::fmt::Display| {
@@ -142,23 +142,27 @@ pub async fn read_run(
                 let tables = tables
                     .by_ref()
                     .map(|table| table.map_err(|error| damaged(&error)));
-                from_tables(tables, &named, draft)
+                from_tables(tables, &named, draft, pace)?
             }
-            RowsForm::Parquet => from_tables(groups(file)?, &named, draft),
+            RowsForm::Parquet => from_tables(groups(file)?, &named, draft, pace)?,
             RowsForm::Npz => {
-                from_tables(std::iter::once(npz_table(file, bytes_max)), &named, draft)
+                let table = npz_table(file, bytes_max);
+                from_tables(std::iter::once(table), &named, draft, pace)?
             }
             RowsForm::Csv | RowsForm::Json => {
                 let mut rows = CsvRows::new(BufReader::new(file), &named)?;
                 let mut draft = draft(rows.columns.clone())?;
                 while let Some(values) = rows.next()? {
+                    pace.step()?;
                     draft.push(values)?;
                 }
-                Ok(draft)
+                draft
             }
-        }
+        };
+        draft.cut_all()?;
+        Ok(draft)
     });
-    read.await.map_err(|error| ApiError::internal(&error))?
+    read.await
 }
 
 /// Rows in JSON, which has a template of its own and is held in memory.
@@ -173,9 +177,9 @@ async fn from_json(
     let bytes = 2 * declared_bytes(&request, options).min(options.evaluate_max_bytes);
     let share = memory.rows(jobs.tenant(), bytes).await?;
     let text = read_body(request, options).await?;
-    let turn = memory.turn(2 * text.len()).await?;
-    let read = tokio::task::spawn_blocking(move || {
-        let _held = (share, turn);
+    let mut computation = memory.computation(jobs.tenant());
+    let read = computation.run(move |_| {
+        let _held = share;
         let (template, columns) = read_json_columns(&text)?;
         drop(text);
         let (titles, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
@@ -185,9 +189,10 @@ async fn from_json(
         });
         let mut draft = jobs.draft_run(template, named.columns(kinds)?, rows_max)?;
         draft.push(values)?;
+        draft.cut_all()?;
         Ok(draft)
     });
-    read.await.map_err(|error| ApiError::internal(&error))?
+    read.await
 }
 
 async fn spool(
@@ -249,9 +254,11 @@ fn from_tables(
     tables: impl Iterator<Item = Result<RowTable, ApiError>>,
     named: &NamedColumns,
     draft: impl Fn(Vec<RunColumn>) -> Result<RunDraft, JobsError>,
+    pace: &mut Pace,
 ) -> Result<RunDraft, ApiError> {
     let mut begun: Option<RunDraft> = None;
     for table in tables {
+        pace.step()?;
         let table = table?;
         let titles = table.columns.iter();
         let titles =

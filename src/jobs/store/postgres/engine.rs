@@ -153,6 +153,13 @@ pub(crate) async fn fold_counts(pool: &DbPool) -> Result<(), StoreError> {
         )
         .execute(&mut *transaction)
         .await?;
+        sqlx::query(
+            "WITH gone AS (DELETE FROM stored_bytes RETURNING tenant, bytes) \
+             INSERT INTO stored_bytes (tenant, bytes) \
+             SELECT tenant, CAST(SUM(bytes) AS bigint) FROM gone GROUP BY tenant HAVING SUM(bytes) <> 0",
+        )
+        .execute(&mut *transaction)
+        .await?;
     }
     transaction.commit().await?;
     Ok(())

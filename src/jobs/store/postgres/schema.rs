@@ -41,6 +41,12 @@ const STEPS: &[Step] = &[
         // A new table, which programs before know nothing of.
         readable_from: 3,
     },
+    Step {
+        form: 5,
+        statements: include_str!("steps/5.sql"),
+        // Programs before look for templates in a table that is gone.
+        readable_from: 5,
+    },
 ];
 
 /// The form that is read and written.

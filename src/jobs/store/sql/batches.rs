@@ -12,7 +12,6 @@ use super::rows::{
     read_state, to_json,
 };
 use sqlx::Row;
-use std::collections::HashSet;
 use std::sync::Arc;
 
 use futures_util::TryStreamExt;
@@ -20,7 +19,9 @@ use uuid::Uuid;
 
 use crate::jobs::model::batch::{BatchItem, ItemResult};
 use crate::jobs::model::job::{State, created_at};
-use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds, Refusal};
+use crate::jobs::store::submission::{
+    BatchBegun, FilledHere, NewBatch, NewJob, QueueBounds, Refusal,
+};
 use crate::jobs::store_error::StoreError;
 
 const CANCEL: &str = concat!(
@@ -51,6 +52,9 @@ impl SqlStore {
         let mut transaction = engine::begin(&self.writer).await?;
         engine::admit_alone(&mut transaction).await?;
         let mut places = Places::new(&mut transaction, bounds);
+        if let Some(refusal) = places.store(tenant, 0).await? {
+            return Ok(Err(refusal));
+        }
         let places = match places.take(tenant, u64::from(most)).await? {
             Ok(places) => u32::try_from(places).unwrap_or(most),
             Err(refusal) => return Ok(Err(refusal)),
@@ -69,18 +73,18 @@ impl SqlStore {
         Ok(Ok(places))
     }
 
-    /// What the idempotency key of a batch stands for, if it was used by another batch. `living` are the batches that are
-    /// being filled; what is left of others is no hindrance.
+    /// What the idempotency key of a batch stands for, if it was used by another batch. What is left of a batch that
+    /// no process fills is ignored.
     ///
     /// # Errors
     /// The database failed.
     pub(crate) async fn batch_by_key(
         &self,
         new: &NewBatch,
-        living: &HashSet<Uuid>,
+        filled_here: FilledHere<'_>,
     ) -> Result<Option<BatchBegun>, StoreError> {
         let mut connection = self.readers.acquire().await?;
-        by_key(&mut connection, new, living).await
+        by_key(&mut connection, new, filled_here).await
     }
 
     /// Begins to fill a batch, or finds the one its idempotency key stands for. Afterwards exactly the places of its jobs
@@ -91,12 +95,12 @@ impl SqlStore {
     pub(crate) async fn begin_batch(
         &self,
         new: &NewBatch,
-        living: &HashSet<Uuid>,
+        filled_here: FilledHere<'_>,
         bounds: QueueBounds,
     ) -> Result<BatchBegun, StoreError> {
         let mut transaction = engine::begin(&self.writer).await?;
         engine::admit_alone(&mut transaction).await?;
-        if let Some(begun) = by_key(&mut transaction, new, living).await? {
+        if let Some(begun) = by_key(&mut transaction, new, filled_here).await? {
             return Ok(begun);
         }
         let reserved = sqlx::query("SELECT reserved FROM batches WHERE id = $1")
@@ -114,10 +118,32 @@ impl SqlStore {
             Ok(_) => return Ok(BatchBegun::Refused(places.refusal_of(&new.tenant))),
             Err(refusal) => return Ok(BatchBegun::Refused(refusal)),
         }
+        let template = new.template.as_ref();
+        let template = template.map(|body| (blake3::hash(body).as_bytes().to_vec(), body));
+        let known = match &template {
+            Some((digest, _)) => has_template(&mut transaction, &new.tenant, digest).await?,
+            None => true,
+        };
+        let of_template = template.as_ref().filter(|_| !known);
+        let bytes = new.bytes + of_template.map_or(0, |(_, body)| body.len() as u64);
+        let mut places = Places::new(&mut transaction, bounds);
+        if let Some(refusal) = places.store(&new.tenant, bytes).await? {
+            return Ok(BatchBegun::Refused(refusal));
+        }
+        if let Some((digest, body)) = of_template {
+            sqlx::query(
+                "INSERT INTO templates (tenant, digest, body) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
+            )
+            .bind(&*new.tenant)
+            .bind(digest)
+            .bind(body.as_ref())
+            .execute(&mut *transaction)
+            .await?;
+        }
         sqlx::query(
-            "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels) \
-             VALUES ($1, $2, $3, $4, $5, $4, $6, $7) \
-             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7",
+            "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head) \
+             VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9) \
+             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9",
         )
         .bind(new.id.to_string())
         .bind(&*new.tenant)
@@ -126,15 +152,10 @@ impl SqlStore {
         .bind(i64::from(new.rejected))
         .bind(&new.name)
         .bind(to_json(&new.labels)?)
+        .bind(template.as_ref().map(|(digest, _)| digest))
+        .bind(new.head.as_deref())
         .execute(&mut *transaction)
         .await?;
-        if let Some(template) = &new.template {
-            sqlx::query("INSERT INTO batch_templates (batch_id, body) VALUES ($1, $2)")
-                .bind(new.id.to_string())
-                .bind(template.as_ref())
-                .execute(&mut *transaction)
-                .await?;
-        }
         if let Some((key, digest)) = &new.idempotency {
             // A key that is still there belongs to what was left of a batch that failed.
             sqlx::query(
@@ -378,6 +399,19 @@ impl SqlStore {
     }
 }
 
+async fn has_template(
+    connection: &mut DbConnection,
+    tenant: &str,
+    digest: &[u8],
+) -> Result<bool, StoreError> {
+    let found = sqlx::query("SELECT 1 FROM templates WHERE tenant = $1 AND digest = $2")
+        .bind(tenant)
+        .bind(digest)
+        .fetch_optional(connection)
+        .await?;
+    Ok(found.is_some())
+}
+
 /// What was given up is not filled any more.
 fn require_batch(id: Uuid, found: u64) -> Result<(), StoreError> {
     match found {
@@ -391,7 +425,7 @@ fn require_batch(id: Uuid, found: u64) -> Result<(), StoreError> {
 async fn by_key(
     connection: &mut DbConnection,
     new: &NewBatch,
-    living: &HashSet<Uuid>,
+    filled_here: FilledHere<'_>,
 ) -> Result<Option<BatchBegun>, StoreError> {
     let Some((key, digest)) = &new.idempotency else {
         return Ok(None);
@@ -409,7 +443,7 @@ async fn by_key(
     let Some(row) = row else { return Ok(None) };
     let stored: Vec<u8> = row.try_get("digest")?;
     let (id, complete) = (read_id(&row)?, read_flag(&row, "complete")?);
-    let filled = read_flag(&row, "filled")? || living.contains(&id);
+    let filled = read_flag(&row, "filled")? || filled_here(id);
     Ok(match (stored == digest, complete) {
         // It is not filled any more, and it was never acknowledged.
         (_, false) if !filled => None,

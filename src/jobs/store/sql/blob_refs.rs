@@ -6,6 +6,7 @@
 use super::engine::{self, Db, DbConnection, DbRow};
 use super::rows::{count, push_list, read_blob_ids, read_id, read_small, read_state};
 use sqlx::{QueryBuilder, Row};
+use uuid::Uuid;
 
 use crate::jobs::store::ending::StoredResult;
 use crate::jobs::store_error::StoreError;
@@ -13,10 +14,10 @@ use crate::jobs::store_error::StoreError;
 /// Values bound in one statement; far below the bound of SQLite.
 pub(crate) const VALUES_PER_STATEMENT: usize = 250;
 
-/// Stores results within the caller's transaction; the ids of their blobs are in the order of the results.
+/// Stores results of jobs within the caller's transaction; the ids of their blobs are in the order of the results.
 pub(crate) async fn insert_blobs(
     connection: &mut DbConnection,
-    results: &[&StoredResult],
+    results: &[(Uuid, &StoredResult)],
 ) -> Result<Vec<i64>, StoreError> {
     if results.is_empty() {
         return Ok(Vec::new());
@@ -26,9 +27,10 @@ pub(crate) async fn insert_blobs(
     let ids = engine::new_blob_ids(connection, results.len()).await?;
     let mut next = ids.iter();
     for some in results.chunks(VALUES_PER_STATEMENT) {
-        let mut insert =
-            QueryBuilder::<Db>::new("INSERT INTO blobs (id, key, bytes, solution, fields) ");
-        insert.push_values(some, |mut row, result| {
+        let mut insert = QueryBuilder::<Db>::new(
+            "INSERT INTO blobs (id, key, bytes, solution, fields, tenant) ",
+        );
+        insert.push_values(some, |mut row, (job, result)| {
             let (key, inside) = match result {
                 StoredResult::Blob(key, _) => (Some(key.as_str()), None),
                 StoredResult::Inline(result) => (None, Some(result)),
@@ -37,7 +39,10 @@ pub(crate) async fn insert_blobs(
                 .push_bind(key)
                 .push_bind(count(result.bytes()))
                 .push_bind(inside.map(|result| result.solution.as_ref()))
-                .push_bind(inside.and_then(|result| result.fields.as_deref()));
+                .push_bind(inside.and_then(|result| result.fields.as_deref()))
+                .push("(SELECT replace(tenant, '/rows', '') FROM jobs WHERE id = ")
+                .push_bind_unseparated(job.to_string())
+                .push_unseparated(")");
         });
         insert.build().execute(&mut *connection).await?;
     }

@@ -19,7 +19,7 @@ use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
 use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
 use crate::jobs::store::submission::{
-    BatchBegun, CacheKey, Enqueued, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
+    BatchBegun, CacheKey, Enqueued, FilledHere, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
 };
 use crate::jobs::store::{KeyStore, Orphans, Store};
 use crate::jobs::store_error::StoreError;
@@ -76,18 +76,18 @@ impl Store for SqlStore {
     async fn batch_by_key(
         &self,
         new: &NewBatch,
-        living: &HashSet<Uuid>,
+        filled_here: FilledHere<'_>,
     ) -> Result<Option<BatchBegun>, StoreError> {
-        engine::again(|| self.batch_by_key(new, living)).await
+        engine::again(|| self.batch_by_key(new, filled_here)).await
     }
 
     async fn begin_batch(
         &self,
         new: &NewBatch,
-        living: &HashSet<Uuid>,
+        filled_here: FilledHere<'_>,
         bounds: QueueBounds,
     ) -> Result<BatchBegun, StoreError> {
-        engine::again(|| self.begin_batch(new, living, bounds)).await
+        engine::again(|| self.begin_batch(new, filled_here, bounds)).await
     }
 
     async fn fill_batch(

@@ -95,7 +95,10 @@ async fn end_solved(
     if rows.is_empty() {
         return Ok(HashSet::new());
     }
-    let results: Vec<_> = rows.iter().filter_map(|(_, end)| end.result).collect();
+    let results = rows.iter();
+    let results: Vec<_> = results
+        .filter_map(|(claim, end)| Some((claim.id, end.result?)))
+        .collect();
     let mut blobs = insert_blobs(connection, &results).await?.into_iter();
     let mut update = QueryBuilder::<Db>::new(
         "WITH done (id, lease_token, state, remarks, failure, blob, patches) AS (",

@@ -128,6 +128,13 @@ async fn store_together(
             known.insert(job.id, Enqueued::Refused(refusal));
         }
     }
+    for (_, job) in &added {
+        if !known.contains_key(&job.id)
+            && let Some(refusal) = places.store(&job.tenant, job.body.len() as u64).await?
+        {
+            known.insert(job.id, Enqueued::Refused(refusal));
+        }
+    }
     added.retain(|(_, job)| !known.contains_key(&job.id));
     let ended = insert_jobs(&mut transaction, None, &added).await?;
     for (_, job) in added {

@@ -2,14 +2,14 @@
 
 use super::cached::end_with_sources;
 use super::engine::{Db, DbConnection};
-use super::rows::to_json;
+use super::rows::{count, to_json};
 use sqlx::QueryBuilder;
 use uuid::Uuid;
 
 use crate::jobs::store::submission::{CacheKey, NewJob};
 use crate::jobs::store_error::StoreError;
 
-/// Jobs in one statement; with 18 values each far below the bound of SQLite.
+/// Jobs in one statement; with 19 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
 /// Queues jobs within the caller's transaction, those of a batch with their places in it. Returns those that ended at
@@ -28,7 +28,7 @@ pub(crate) async fn insert_jobs(
             .collect::<Result<Vec<_>, _>>()?;
         let mut rows = QueryBuilder::<Db>::new(
             "INSERT INTO jobs (id, state, name, labels, method, created_at, updated_at, batch_id, batch_index, cost_us, slice_us, outputs, \
-             cache_key, tenant, bypass_cache, rank, deadline, traceparent) ",
+             cache_key, tenant, bypass_cache, rank, deadline, traceparent, case_bytes) ",
         );
         rows.push_values(
             some.iter().zip(labels),
@@ -50,7 +50,8 @@ pub(crate) async fn insert_jobs(
                     .push_bind(i64::from(job.options.bypass_cache))
                     .push_bind(job.options.priority.rank())
                     .push_bind(job.deadline())
-                    .push_bind(job.traceparent.as_deref());
+                    .push_bind(job.traceparent.as_deref())
+                    .push_bind(count(job.body.len()));
             },
         );
         rows.build().execute(&mut *connection).await?;

@@ -127,9 +127,10 @@ impl SqlStore {
         id: Uuid,
     ) -> Result<Option<StoredCase>, StoreError> {
         let row = sqlx::query(
-            "SELECT cases.row, cases.body, batch_templates.body AS template FROM jobs JOIN cases ON cases.job_id = jobs.id \
-             LEFT JOIN batch_templates ON batch_templates.batch_id = jobs.batch_id \
-             WHERE jobs.id = $1 AND tenant = $2",
+            "SELECT cases.row, cases.body, head, templates.body AS template FROM jobs JOIN cases ON cases.job_id = jobs.id \
+             LEFT JOIN batches ON batches.id = jobs.batch_id \
+             LEFT JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
+             WHERE jobs.id = $1 AND jobs.tenant = $2",
         )
         .bind(id.to_string())
         .bind(tenant)
@@ -141,8 +142,10 @@ impl SqlStore {
             true => row.try_get("template")?,
             false => None,
         };
+        let head: Option<Vec<u8>> = row.try_get("head")?;
         Ok(Some(StoredCase {
             template: template.map(Bytes::from),
+            head: head.map(Bytes::from),
             body: body.into(),
         }))
     }

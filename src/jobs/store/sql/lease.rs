@@ -34,10 +34,10 @@ impl SqlStore {
         push_list(&mut query, ids);
         query.push(")");
         let rows = query.build().fetch_all(&self.readers).await?;
-        let mut templates: HashMap<String, Bytes> = HashMap::new();
+        let mut templates: HashMap<String, (Bytes, Option<Bytes>)> = HashMap::new();
         let mut cases = HashMap::with_capacity(rows.len());
         for row in &rows {
-            let mut template = None;
+            let (mut template, mut head) = (None, None);
             if read_flag(row, "row")? {
                 let batch: String = row.try_get("batch_id")?;
                 if !templates.contains_key(&batch)
@@ -45,14 +45,16 @@ impl SqlStore {
                 {
                     templates.insert(batch.clone(), read);
                 }
-                template = templates.get(&batch).cloned();
-                if template.is_none() {
+                let Some((of_batch, of_run)) = templates.get(&batch) else {
                     continue;
-                }
+                };
+                template = Some(of_batch.clone());
+                head.clone_from(of_run);
             }
             let body: Vec<u8> = row.try_get("body")?;
             let case = StoredCase {
                 template,
+                head,
                 body: body.into(),
             };
             cases.insert(read_id(row)?, (case, read_flag(row, "cancel_requested")?));
@@ -60,14 +62,19 @@ impl SqlStore {
         Ok(cases)
     }
 
-    async fn template(&self, batch: &str) -> Result<Option<Bytes>, StoreError> {
-        let body: Option<Vec<u8>> =
-            sqlx::query_scalar("SELECT body FROM batch_templates WHERE batch_id = $1")
-                .bind(batch)
-                .fetch_optional(&self.readers)
-                .await?;
+    /// The template of a batch, and the head of a run.
+    async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>, StoreError> {
+        let row = sqlx::query(
+            "SELECT body, head FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
+             WHERE batches.id = $1",
+        )
+        .bind(batch)
+        .fetch_optional(&self.readers)
+        .await?;
         // It goes with the last job of its batch.
-        Ok(body.map(Bytes::from))
+        let Some(row) = row else { return Ok(None) };
+        let (body, head): (Vec<u8>, Option<Vec<u8>>) = (row.try_get("body")?, row.try_get("head")?);
+        Ok(Some((body.into(), head.map(Bytes::from))))
     }
 
     /// Extends leases and notes the progress. The answers are in the order of the claims.

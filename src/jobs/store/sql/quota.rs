@@ -8,13 +8,14 @@ use std::collections::{HashMap, HashSet};
 
 use uuid::Uuid;
 
+use crate::jobs::model::lane::tenant_of;
 use crate::jobs::store::submission::{NewJob, QueueBounds, Refusal};
 use crate::jobs::store_error::StoreError;
 
-/// Queued jobs of a tenant (of all tenants if it is NULL) and the places reserved for batches that are being filled.
+/// Queued jobs of a tenant with the chunks of its runs (of all tenants if it is NULL), and the places reserved for batches that are being filled.
 const TAKEN: &str = "SELECT (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts \
-     WHERE state = 'queued' AND (tenant = $1 OR $1 IS NULL)) + \
-     (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND (tenant = $1 OR $1 IS NULL)) AS taken";
+     WHERE state = 'queued' AND (tenant IN ($1, $1 || '/rows') OR $1 IS NULL)) + \
+     (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND (tenant IN ($1, $1 || '/rows') OR $1 IS NULL)) AS taken";
 
 /// Places still free, as one transaction sees them and takes them.
 pub(crate) struct Places<'a> {
@@ -22,6 +23,8 @@ pub(crate) struct Places<'a> {
     bounds: QueueBounds,
     all: Option<u64>,
     of_tenants: HashMap<String, u64>,
+    /// Bytes that tenants have stored.
+    stored: HashMap<String, u64>,
 }
 
 impl Places<'_> {
@@ -32,6 +35,7 @@ impl Places<'_> {
             bounds,
             all: None,
             of_tenants: HashMap::new(),
+            stored: HashMap::new(),
         }
     }
 
@@ -41,6 +45,7 @@ impl Places<'_> {
         tenant: &str,
         most: u64,
     ) -> Result<Result<u64, Refusal>, StoreError> {
+        let tenant = tenant_of(tenant);
         let all = match self.all {
             Some(all) => all,
             None => taken(self.connection, None).await?,
@@ -61,15 +66,48 @@ impl Places<'_> {
         Ok(Err(self.refusal_of(tenant)))
     }
 
+    /// Counts bytes that are about to be stored; a refusal if the tenant would have more than it may. Nothing is read without a bound.
+    pub(crate) async fn store(
+        &mut self,
+        tenant: &str,
+        bytes: u64,
+    ) -> Result<Option<Refusal>, StoreError> {
+        let Some(bytes_max) = self.bounds.stored else {
+            return Ok(None);
+        };
+        let tenant = tenant_of(tenant);
+        let stored = match self.stored.get(tenant) {
+            Some(stored) => *stored,
+            None => stored(self.connection, tenant).await?,
+        };
+        if stored + bytes > bytes_max {
+            return Ok(Some(Refusal::Stored));
+        }
+        self.stored.insert(tenant.to_owned(), stored + bytes);
+        Ok(None)
+    }
+
     /// Which bound has no place left.
     pub(crate) fn refusal_of(&self, tenant: &str) -> Refusal {
-        let of_tenant = self.of_tenants.get(tenant).copied().unwrap_or(0);
+        let of_tenant = self.of_tenants.get(tenant_of(tenant));
+        let of_tenant = of_tenant.copied().unwrap_or(0);
         if of_tenant >= self.bounds.tenant {
             Refusal::Quota
         } else {
             Refusal::Queue
         }
     }
+}
+
+/// Bytes of cases, templates and results that a tenant has stored.
+pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Result<u64, StoreError> {
+    let row = sqlx::query(
+        "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM stored_bytes WHERE tenant = $1",
+    )
+    .bind(tenant)
+    .fetch_one(connection)
+    .await?;
+    read_count(&row, "bytes")
 }
 
 async fn taken(connection: &mut DbConnection, tenant: Option<&str>) -> Result<u64, StoreError> {

@@ -66,7 +66,7 @@ impl SqlStore {
             .fetch_all(&mut *transaction)
             .await?;
             release_blobs(&mut transaction, read_blob_ids(&replaced)?).await?;
-            let blobs = insert_blobs(&mut transaction, &[&slice.result]).await?;
+            let blobs = insert_blobs(&mut transaction, &[(claim.id, &slice.result)]).await?;
             sqlx::query(
                 "INSERT INTO job_slices (job_id, number, motions, digest, spent_us, blob_id) \
                  VALUES ($1, $2, $3, $4, $5, $6)",

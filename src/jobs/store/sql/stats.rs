@@ -1,12 +1,14 @@
 //! Statistics of the embedded job table: how many jobs, how old, how large; and what comes before a queued job.
 
 use super::engine::SqlStore;
+use super::quota::stored;
 use super::rows::{read_count, read_state};
 use crate::jobs::model::job::Job;
 use crate::jobs::store::claim::QueueAhead;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use crate::jobs::model::job::State;
+use crate::jobs::model::lane::{rows_lane, tenant_of};
 use crate::jobs::store::retention::{Stats, Usage};
 use crate::jobs::store_error::StoreError;
 
@@ -29,13 +31,15 @@ pub(crate) const RESULT_BYTES: &str =
     "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM blobs WHERE key IS NOT NULL";
 
 impl SqlStore {
-    /// What a tenant has here, read from what the database counts itself.
+    /// What a tenant has here with the chunks of its runs, read from what the database counts itself.
     ///
     /// # Errors
     /// The database failed.
     pub(crate) async fn usage(&self, tenant: &str) -> Result<Usage, StoreError> {
-        let rows = sqlx::query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state")
+        let lane = rows_lane(tenant);
+        let rows = sqlx::query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant IN ($1, $2) GROUP BY state")
             .bind(tenant)
+            .bind(&*lane)
             .fetch_all(&self.readers)
             .await?;
         let mut usage = Usage::default();
@@ -45,10 +49,12 @@ impl SqlStore {
                 .insert(read_state(row)?, read_count(row, "number")?);
         }
         let reserved = sqlx::query(
-            "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) AS reserved FROM batches WHERE complete = 0 AND tenant = $1",
+            "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) AS reserved FROM batches WHERE complete = 0 AND tenant IN ($1, $2)",
         );
-        let row = reserved.bind(tenant).fetch_one(&self.readers).await?;
+        let reserved = reserved.bind(tenant).bind(&*lane);
+        let row = reserved.fetch_one(&self.readers).await?;
         usage.reserved = read_count(&row, "reserved")?;
+        usage.stored_bytes = stored(&mut *self.readers.acquire().await?, tenant).await?;
         Ok(usage)
     }
 
@@ -102,11 +108,12 @@ impl SqlStore {
             .bind(i64::from(limit))
             .fetch_one(&self.readers)
             .await?;
-        let tenants = self.queued_tenants().await?.len();
+        let lanes = self.queued_tenants().await?;
+        let tenants: HashSet<&str> = lanes.iter().map(|lane| tenant_of(lane)).collect();
         Ok(QueueAhead {
             jobs: read_count(&row, "jobs")?,
             cost_us: read_count(&row, "cost_us")?,
-            tenants,
+            tenants: tenants.len(),
         })
     }
 }

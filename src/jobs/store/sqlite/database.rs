@@ -16,7 +16,7 @@ use sqlx::sqlite::{
 use sqlx::{Connection, SqliteConnection};
 
 use crate::jobs::error::JobsError;
-use crate::jobs::store::sqlite::schema::{make_or_require, mark, require};
+use crate::jobs::store::sqlite::schema::{mark, migrate, require};
 use crate::jobs::store::sqlite::sql::group_commit::GroupCommit;
 use crate::jobs::store_error::StoreError;
 
@@ -37,21 +37,21 @@ pub struct SqliteStore {
 }
 
 impl SqliteStore {
-    /// Opens the database file; makes it if there is none.
+    /// Opens the database file; makes it if there is none, and brings it forward if an earlier version made it.
     ///
     /// # Errors
     /// The file cannot be opened, or [`JobsError::OtherForm`].
     pub async fn open(file: &Path) -> Result<SqliteStore, JobsError> {
         make_private(file)?;
         let store = SqliteStore::connect(file).await?;
-        make_or_require(&store.writer).await?;
+        migrate(&store.writer).await?;
         Ok(store)
     }
 
     /// Opens the database file beside a service that may be using it; makes and changes nothing.
     ///
     /// # Errors
-    /// There is no such file, it cannot be opened, or [`JobsError::OtherForm`].
+    /// There is no such file, it cannot be opened, [`JobsError::OldFolder`] or [`JobsError::OtherForm`].
     pub async fn open_existing(file: &Path) -> Result<SqliteStore, JobsError> {
         std::fs::metadata(file).map_err(|source| JobsError::DataDir {
             path: file.to_owned(),

@@ -1,56 +1,80 @@
-//! The schema of the embedded job table: made in an empty file, required in every other. A file of another version is refused
-//! and left as it is.
+//! The schema of the embedded job table: made in an empty file, and brought forward where an earlier version made it. Anything else
+//! is refused and left as it is.
+//!
+//! `schema.sql` is its first form that later ones go on with. Every later one is a step, which is one transaction: a process that dies
+//! between two steps leaves a table that the next start brings forward.
 
-use sqlx::sqlite::SqlitePool;
+use sqlx::sqlite::{SqliteConnection, SqlitePool};
 
 use crate::jobs::error::JobsError;
 
-/// The statements that make an empty file a job table.
+/// The statements that make an empty file a job table of the first form.
 const SCHEMA: &str = include_str!("schema.sql");
 
 /// Marks a file as a job table of this service ("rhjb").
 const APPLICATION: i64 = 0x7268_6a62;
 
-/// The version of `schema.sql` that is read and written; it grows with every change of that file.
-const FORM: i64 = 7;
+/// The form of `schema.sql`.
+const FIRST_FORM: i64 = 7;
 
-/// Makes the tables in an empty file.
+/// What is done to tables of an earlier form, in this order: the form that each step leads to, and its statements. A step that has landed
+/// is never changed.
+const STEPS: &[(i64, &str)] = &[(8, include_str!("steps/8.sql"))];
+
+/// The form that is read and written.
+const FORM: i64 = STEPS[STEPS.len() - 1].0;
+
+/// Makes the tables in an empty file, or brings them forward to the form of this program.
 ///
 /// # Errors
-/// [`JobsError::OtherForm`] if the file holds something else, or the database failed.
-pub(crate) async fn make_or_require(writer: &SqlitePool) -> Result<(), JobsError> {
-    let mut transaction = writer.begin_with("BEGIN IMMEDIATE").await?;
-    let tables: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM sqlite_schema")
-        .fetch_one(&mut *transaction)
-        .await?;
-    if tables > 0 {
-        drop(transaction);
-        return require(writer).await;
+/// [`JobsError::OtherForm`] if the file holds something else or is of a later version, or the database failed.
+pub(crate) async fn migrate(writer: &SqlitePool) -> Result<(), JobsError> {
+    loop {
+        let mut transaction = writer.begin_with("BEGIN IMMEDIATE").await?;
+        let tables: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM sqlite_schema")
+            .fetch_one(&mut *transaction)
+            .await?;
+        let step = match tables {
+            0 => Some(&(FIRST_FORM, SCHEMA)),
+            _ => match form(&mut transaction).await? {
+                FORM => return Ok(()),
+                form => STEPS.iter().find(|(reached, _)| *reached == form + 1),
+            },
+        };
+        let (reached, statements) = *step.ok_or(JobsError::OtherForm)?;
+        sqlx::raw_sql(statements).execute(&mut *transaction).await?;
+        let marks =
+            format!("PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {reached}");
+        sqlx::raw_sql(sqlx::AssertSqlSafe(marks))
+            .execute(&mut *transaction)
+            .await?;
+        transaction.commit().await?;
+        tracing::debug!(form = reached, "the job table has a new form");
     }
-    sqlx::raw_sql(SCHEMA).execute(&mut *transaction).await?;
-    let marks = format!("PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {FORM}");
-    sqlx::raw_sql(sqlx::AssertSqlSafe(marks))
-        .execute(&mut *transaction)
-        .await?;
-    transaction.commit().await?;
-    Ok(())
 }
 
 /// Requires that a file is a job table of this version; changes nothing.
 ///
 /// # Errors
-/// [`JobsError::OtherForm`], or the database failed.
+/// [`JobsError::OldFolder`], [`JobsError::OtherForm`], or the database failed.
 pub(crate) async fn require(pool: &SqlitePool) -> Result<(), JobsError> {
-    let application: i64 = sqlx::query_scalar("PRAGMA application_id")
-        .fetch_one(pool)
-        .await?;
-    let form: i64 = sqlx::query_scalar("PRAGMA user_version")
-        .fetch_one(pool)
-        .await?;
-    if (application, form) == (APPLICATION, FORM) {
-        return Ok(());
+    match form(&mut *pool.acquire().await?).await? {
+        FORM => Ok(()),
+        FIRST_FORM..FORM => Err(JobsError::OldFolder),
+        _ => Err(JobsError::OtherForm),
     }
-    Err(JobsError::OtherForm)
+}
+
+/// The form of the tables.
+async fn form(connection: &mut SqliteConnection) -> Result<i64, JobsError> {
+    let application: i64 = sqlx::query_scalar("PRAGMA application_id")
+        .fetch_one(&mut *connection)
+        .await?;
+    if application != APPLICATION {
+        return Err(JobsError::OtherForm);
+    }
+    let form = sqlx::query_scalar("PRAGMA user_version");
+    Ok(form.fetch_one(connection).await?)
 }
 
 /// Writes the number of the version again: a page that stays as it was.

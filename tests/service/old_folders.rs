@@ -1,0 +1,195 @@
+//! Does a data folder that an earlier version wrote open in this one, with everything in it, whenever the process dies meanwhile?
+
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use reqwest::Method;
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use crate::server::{example, example_text};
+use crate::support::{Service, case, pause, railhead};
+
+/// A data folder of form 7, and what the program that wrote it answered.
+fn of_form_7() -> (TempDir, Value) {
+    let folder = tempfile::tempdir().unwrap();
+    let archive =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/data-folder-form-7.tar.gz");
+    let unpacked = Command::new("tar")
+        .arg("-xzf")
+        .arg(archive)
+        .arg("-C")
+        .arg(folder.path())
+        .status();
+    assert!(unpacked.unwrap().success());
+    let expected = std::fs::read_to_string(folder.path().join("expected.json")).unwrap();
+    (folder, serde_json::from_str(&expected).unwrap())
+}
+
+struct Client<'a> {
+    service: &'a Service,
+    key: &'a str,
+}
+
+impl Client<'_> {
+    async fn text(&self, path: &str) -> String {
+        let request = self
+            .service
+            .request(Method::GET, path)
+            .bearer_auth(self.key);
+        let answer = request.send().await.unwrap();
+        let status = answer.status();
+        let text = answer.text().await.unwrap();
+        assert!(status.is_success(), "{path}: {status} {text}");
+        text
+    }
+
+    async fn get(&self, path: &str) -> Value {
+        serde_json::from_str(&self.text(path).await).unwrap()
+    }
+
+    /// Submits again under a key; the id that is answered, and whether it is that of the first submission.
+    async fn again(&self, path: &str, key: &str, form: &str, body: String) -> (Value, bool) {
+        let request = self
+            .service
+            .request(Method::POST, path)
+            .bearer_auth(self.key);
+        let request = request
+            .header("idempotency-key", key)
+            .header("content-type", form);
+        let answer = request.body(body).send().await.unwrap();
+        let replayed = answer.headers().contains_key("idempotency-replayed");
+        let answer: Value = answer.json().await.unwrap();
+        assert!(answer["id"].is_string(), "{path}: {answer}");
+        (answer["id"].clone(), replayed)
+    }
+
+    async fn until_ended(&self, path: &str) -> Value {
+        loop {
+            let now = self.get(path).await;
+            if !now["ended_at"].is_null() && now["state"] != "running" && now["state"] != "queued" {
+                return now;
+            }
+            pause().await;
+        }
+    }
+}
+
+/// Column of a CSV text.
+fn column(text: &str, title: &str) -> Vec<String> {
+    let mut lines = text.lines();
+    let place = lines
+        .next()
+        .unwrap()
+        .split(',')
+        .position(|name| name == title);
+    let place = place.unwrap_or_else(|| panic!("no column {title} in {text}"));
+    lines
+        .map(|line| line.split(',').nth(place).unwrap().to_owned())
+        .collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_folder_of_form_7_opens_with_all_that_is_in_it() {
+    let (folder, expected) = of_form_7();
+    // A process may die at any moment of the first starts.
+    for ms in [0, 5, 20, 50, 100, 200] {
+        let mut program = railhead();
+        program
+            .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
+            .arg(folder.path());
+        let mut started = program
+            .stdout(std::process::Stdio::null())
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(ms));
+        started.kill().unwrap();
+        started.wait().unwrap();
+    }
+    let service = Service::start(folder.path(), &["--workers", "1"]);
+    let text = |name: &str| expected[name].as_str().unwrap().to_owned();
+    let id = text;
+    let key = text("key");
+    let client = Client {
+        service: &service,
+        key: &key,
+    };
+
+    let result = client.get(&format!("/v1/jobs/{}/result", id("job"))).await;
+    let force = |result: &Value| {
+        result["patches"][0]["points"][0]["force_y_n"]
+            .as_f64()
+            .unwrap()
+    };
+    assert_eq!(force(&result), force(&expected["result"]));
+    client.get(&format!("/v1/profiles/{}", id("profile"))).await;
+    let batch = client
+        .text(&format!("/v1/batches/{}/results?format=csv", id("batch")))
+        .await;
+    let run = client
+        .text(&format!("/v1/runs/{}/results?format=csv", id("run")))
+        .await;
+    for (now, then) in [(batch, text("batch_results")), (run, text("run_results"))] {
+        assert_eq!(column(&now, "force_x_n"), column(&then, "force_x_n"));
+    }
+    let row = client.get(&format!("/v1/runs/{}/rows/1", id("run"))).await;
+    assert_eq!(row["case"]["load"]["normal_force_n"], json!(74000.0));
+
+    // The same requests under their keys are the same jobs.
+    let form = "application/json";
+    let spin = example("spin.case.json").to_string();
+    assert_eq!(
+        client.again("/v1/jobs", "job", form, spin).await,
+        (json!(id("job")), true)
+    );
+    let table = "creepage_x,label:km,name\n0.001,1,first\n0.002,2,second\n".to_owned();
+    let path = format!("/v1/batches?template={}&name=table&label=line:7", id("job"));
+    assert_eq!(
+        client.again(&path, "batch", "text/csv", table).await,
+        (json!(id("batch")), true)
+    );
+    // Columns in their order.
+    let rows = example_text("run.json");
+    let path = "/v1/runs?name=rows&label=line:7";
+    assert_eq!(
+        client.again(path, "run", form, rows).await,
+        (json!(id("run")), true)
+    );
+
+    // What waited is solved.
+    for path in [
+        format!("/v1/jobs/{}", id("running")),
+        format!("/v1/jobs/{}", id("queued")),
+        format!("/v1/batches/{}", id("queued_batch")),
+        format!("/v1/runs/{}", id("queued_run")),
+    ] {
+        let ended = client.until_ended(&path).await;
+        assert!(
+            ended["state"] == "succeeded" || ended["states"]["succeeded"] == 2,
+            "{ended}"
+        );
+    }
+    let new = client
+        .again("/v1/jobs", "new", form, case("new").to_string())
+        .await;
+    assert!(!new.1);
+
+    // What is stored is counted from now on, and goes with what it belongs to.
+    let stored = async || {
+        client.get("/v1/me").await["used"]["stored_bytes"]
+            .as_u64()
+            .unwrap()
+    };
+    let before = stored().await;
+    assert!(before > 10_000, "{before}");
+    for path in [
+        format!("/v1/runs/{}", id("run")),
+        format!("/v1/batches/{}", id("batch")),
+    ] {
+        let request = service.request(Method::DELETE, &path).bearer_auth(&key);
+        assert_eq!(request.send().await.unwrap().status(), 204);
+    }
+    assert!(stored().await < before);
+}
