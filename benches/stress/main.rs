@@ -26,6 +26,8 @@ mod profile_reference_files;
 mod profile_shapes;
 mod random;
 mod rows;
+#[path = "../../src/jobs/runtime_probe.rs"]
+mod runtime_probe;
 mod sweeps;
 mod times;
 mod trial;
@@ -35,6 +37,7 @@ use std::fmt::Write as _;
 use std::process::ExitCode;
 
 use contacts::{Sample, samples};
+use railhead::contact;
 use serde_json::Value;
 use times::{CaseTimes, told};
 use trial::{End, Trial, trial};

@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::solution::words::found_by::FoundBy;
-use railhead::contact::trial::{TriedTime, USUAL_LIMIT, tried};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
 use super::contacts::{Sample, samples};
 use super::random::Random;
+use super::runtime_probe::{ProbedTime, USUAL_LIMIT, probe};
 use super::trial::attempt_timed;
 
 /// Shorter solves count as so long, in s: nobody plans by less.
@@ -29,7 +29,7 @@ pub struct CaseTimes {
     /// What the formulas expect alone, in s.
     pub formulas: f64,
     /// What `cases/check` tells.
-    pub told: TriedTime,
+    pub told: ProbedTime,
 }
 
 pub type Times = Vec<CaseTimes>;
@@ -38,13 +38,13 @@ pub type Times = Vec<CaseTimes>;
 ///
 /// # Panics
 /// It is no case.
-pub fn told(case: &Value) -> TriedTime {
+pub fn told(case: &Value) -> ProbedTime {
     let limits = Limits {
         memory_bytes: 4 << 30,
         ..Limits::default()
     };
     let checked = check(case, &limits).expect("a case");
-    tried(&checked, USUAL_LIMIT, |monitor| {
+    probe(&checked, USUAL_LIMIT, |monitor| {
         solve(&checked, monitor).map(drop)
     })
 }
