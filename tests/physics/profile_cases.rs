@@ -21,6 +21,15 @@ pub fn wheel_on_rail(rail: Value, wheel: Value, cant: f64) -> Value {
     })
 }
 
+/// The case with its rail placed by the origin of its cross-section, in mm from the middle of the track: shapes without a gauge face have no other place.
+pub fn by_origin(mut case: Value, origin: f64) -> Value {
+    let contact = case["contact"].as_object_mut().expect("a contact");
+    contact.remove("gauge_mm");
+    contact.remove("gauge_height_mm");
+    contact.insert("rail_origin_mm".to_owned(), json!(origin));
+    case
+}
+
 /// S1002 on 60E1 inclined 1:40, generated from their definitions.
 pub fn generated() -> Value {
     wheel_on_rail(

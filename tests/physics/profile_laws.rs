@@ -4,7 +4,7 @@ use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead::contact::solution::words::answer::{PatchSolution, Position, Solution};
 use serde_json::{Value, json};
 
-use crate::profile_cases::{generated, put, wheel_on_rail};
+use crate::profile_cases::{by_origin, generated, put, wheel_on_rail};
 use crate::reference::solve;
 
 fn position(patch: &PatchSolution) -> Position {
@@ -41,7 +41,7 @@ pub fn cone_on_arc() -> Value {
         .collect();
     let cone: Vec<[f64; 2]> = (-60..=60).map(f64::from).map(|y| [y, -0.05 * y]).collect();
     let stated = |points: Vec<[f64; 2]>| json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
-    wheel_on_rail(stated(arc), stated(cone), 0.0)
+    by_origin(wheel_on_rail(stated(arc), stated(cone), 0.0), 747.5)
 }
 
 #[test]

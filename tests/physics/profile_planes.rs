@@ -5,7 +5,7 @@ use railhead::contact::remark::figure::Figure;
 use railhead::contact::solution::words::answer::{Solution, Total};
 use serde_json::{Value, json};
 
-use crate::profile_cases::{generated, put, wheel_on_rail};
+use crate::profile_cases::{by_origin, generated, put, wheel_on_rail};
 use crate::profile_reference_files::reference_file;
 use crate::reference::solve;
 
@@ -128,7 +128,7 @@ fn a_cone_leaves_nothing_open_and_a_hollow_wheel_does() {
         .collect();
     let cone: Vec<[f64; 2]> = (-60..=60).map(f64::from).map(|y| [y, -0.1 * y]).collect();
     let stated = |points: Vec<[f64; 2]>| json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
-    let mut cone = wheel_on_rail(stated(arc), stated(cone), 0.0);
+    let mut cone = by_origin(wheel_on_rail(stated(arc), stated(cone), 0.0), 747.5);
     let mut hollow = put(
         &generated(),
         "contact",

@@ -330,6 +330,32 @@ mod tests {
         }
     }
 
+    /// 10 mm by 0.2 mm at 1 GPa: a spin of 0.0005/mm alone took 40 s where creepages of 0.001 with the same spin took 0.4 s.
+    #[test]
+    fn a_slender_patch_with_more_spin_than_creepage_takes_long() {
+        let elasticity = Elasticity {
+            shear_modulus: 82_000.0,
+            poisson_ratio: 0.28,
+            difference: 0.0,
+        };
+        let patch = PatchGuess {
+            half: [10.0, 0.2],
+            force: 4189.0,
+            times: 1.0,
+        };
+        let seconds = |creepage_x: f64, spin_per_mm: f64| {
+            let motion = Motion {
+                creepage_x,
+                creepage_y: 0.0,
+                spin_per_mm,
+            };
+            let guess = patch.seconds(0.005, &elasticity, 0.3, &motion, false);
+            guess.seconds
+        };
+        assert!(seconds(0.0, 5e-4) > 25.0 * seconds(1e-3, 5e-4));
+        assert!(seconds(0.0, 5e-3) < 3.0 * seconds(1e-3, 5e-3));
+    }
+
     #[test]
     fn time_never_falls_as_the_target_does() {
         for time in [STICK, SLIDE, CREEP, SPIN] {
