@@ -206,6 +206,7 @@ fn the_gap_of_a_cone_on_an_arc_has_the_closed_form() {
         profiles[0].clone(),
         profiles[1].clone(),
         Placement {
+            rail: RailPlace::Origin(747.5),
             cant: 0.0,
             ..placement()
         },

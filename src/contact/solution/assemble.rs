@@ -477,11 +477,13 @@ fn error_of_force(point: &MotionAnswer, limit: f64) -> Option<f64> {
 /// Most that an error may be of the force without a remark.
 const LARGE_FOR_FORCE: f64 = 0.1;
 
-/// The remark on an error that is within a target relative to μN but not small beside the force itself.
+/// The remark on an error that meets a target relative to μN but is not small beside the force itself.
 fn error_large(case: &CheckedCase, point: &MotionAnswer, limit: f64) -> Option<Remark> {
+    let target = case.run.resolution.target()?;
+    let met = point.error().is_some_and(|error| error <= target);
     let of_limit = case.run.relative_to == RelativeTo::FrictionLimit;
-    let error_over_force =
-        error_of_force(point, limit).filter(|relative| of_limit && *relative > LARGE_FOR_FORCE)?;
+    let error_over_force = error_of_force(point, limit)
+        .filter(|relative| of_limit && met && *relative > LARGE_FOR_FORCE)?;
     Some(Remark::ErrorLargeForForce {
         error_over_force,
         force_over_limit: point.force_share(limit),

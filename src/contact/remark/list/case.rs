@@ -31,7 +31,7 @@ macro_rules! case_remarks {
             code: "unit-suspected",
             severity: Warning,
             advice: "Check the unit of the member that `pointer` names; if the number is meant as it stands, nothing is wrong.",
-            detail: format!("{given} is taken in {unit}, which is unusual for wheel and rail: is it given in {likely_unit}?"),
+            detail: format!("{given} {unit} is unusual for wheel and rail: is it given in {likely_unit}?"),
 
             /// The two bodies differ. Their materials are combined, but pressure and traction are solved one after the other.
             CouplingNeglected {
