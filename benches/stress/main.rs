@@ -27,6 +27,7 @@ mod profile_shapes;
 mod random;
 mod rows;
 #[path = "../../src/jobs/runtime_probe.rs"]
+#[allow(dead_code, reason = "its tests run with the service")]
 mod runtime_probe;
 mod sweeps;
 mod times;
