@@ -156,19 +156,7 @@ impl SqlStore {
         .bind(new.head.as_deref())
         .execute(&mut *transaction)
         .await?;
-        if let Some((key, digest)) = &new.idempotency {
-            // A key that is still there belongs to what was left of a batch that failed.
-            sqlx::query(
-                "INSERT INTO batch_keys (of_tenant, key, digest, batch_id) VALUES ($1, $2, $3, $4) \
-                 ON CONFLICT (of_tenant, key) DO UPDATE SET digest = $3, batch_id = $4",
-            )
-            .bind(&*new.tenant)
-            .bind(key)
-            .bind(digest.as_slice())
-            .bind(new.id.to_string())
-            .execute(&mut *transaction)
-            .await?;
-        }
+        keep_key(&mut transaction, new).await?;
         transaction.commit().await?;
         Ok(BatchBegun::Created)
     }
@@ -397,6 +385,24 @@ impl SqlStore {
         let keys = rows.iter().map(|row| Ok(row.try_get("key")?));
         keys.collect()
     }
+}
+
+/// Stores the idempotency key of a batch. A key that is still there belongs to the rest of a batch that failed.
+async fn keep_key(connection: &mut DbConnection, new: &NewBatch) -> Result<(), StoreError> {
+    let Some((key, digest)) = &new.idempotency else {
+        return Ok(());
+    };
+    sqlx::query(
+        "INSERT INTO batch_keys (of_tenant, key, digest, batch_id) VALUES ($1, $2, $3, $4) \
+         ON CONFLICT (of_tenant, key) DO UPDATE SET digest = $3, batch_id = $4",
+    )
+    .bind(&*new.tenant)
+    .bind(key)
+    .bind(digest.as_slice())
+    .bind(new.id.to_string())
+    .execute(connection)
+    .await?;
+    Ok(())
 }
 
 async fn has_template(
