@@ -252,10 +252,10 @@ fn at_rest(checked: &CheckedCase) -> (f64, u32) {
         accuracy: Accuracy::For(0.005),
     };
     let rest = || {
-        let search = contact.search().expect("a wheel over a rail");
+        let mut search = contact.search().expect("a wheel over a rail");
         contact
             .find_height(
-                &search,
+                &mut search,
                 wanted,
                 HeightStart::default(),
                 &mut GridWorkspace::default(),
