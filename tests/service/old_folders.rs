@@ -65,6 +65,21 @@ impl Client<'_> {
         (answer["id"].clone(), replayed)
     }
 
+    /// Submits again under a key that now stands for another digest.
+    async fn assert_conflict(&self, path: &str, key: &str, form: &str, body: String) {
+        let request = self
+            .service
+            .request(Method::POST, path)
+            .bearer_auth(self.key);
+        let request = request
+            .header("idempotency-key", key)
+            .header("content-type", form);
+        let answer = request.body(body).send().await.unwrap();
+        assert_eq!(answer.status(), 422, "{path}");
+        let problem: Value = answer.json().await.unwrap();
+        assert_eq!(problem["type"], "/problems/idempotency-conflict");
+    }
+
     async fn until_ended(&self, path: &str) -> Value {
         loop {
             let now = self.get(path).await;
@@ -90,15 +105,13 @@ fn column(text: &str, title: &str) -> Vec<String> {
         .collect()
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_folder_of_form_7_opens_with_all_that_is_in_it() {
-    let (folder, expected) = of_form_7();
-    // A process may die at any moment of the first starts.
+/// Starts the service several times and kills it. A process may die at any moment of its first starts.
+fn kill_while_starting(folder: &Path) {
     for ms in [0, 5, 20, 50, 100, 200] {
         let mut program = railhead();
         program
             .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
-            .arg(folder.path());
+            .arg(folder);
         let mut started = program
             .stdout(std::process::Stdio::null())
             .stderr(std::process::Stdio::null())
@@ -108,6 +121,12 @@ async fn a_folder_of_form_7_opens_with_all_that_is_in_it() {
         started.kill().unwrap();
         started.wait().unwrap();
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_folder_of_form_7_opens_with_all_that_is_in_it() {
+    let (folder, expected) = of_form_7();
+    kill_while_starting(folder.path());
     let service = Service::start(folder.path(), &["--workers", "1"]);
     let text = |name: &str| expected[name].as_str().unwrap().to_owned();
     let id = text;
@@ -152,14 +171,7 @@ async fn a_folder_of_form_7_opens_with_all_that_is_in_it() {
         (batch.as_str(), "batch", "text/csv", table),
         ("/v1/runs?name=rows&label=line:7", "run", form, rows),
     ] {
-        let request = service.request(Method::POST, path).bearer_auth(&key);
-        let request = request
-            .header("idempotency-key", key_used)
-            .header("content-type", form);
-        let answer = request.body(body).send().await.unwrap();
-        assert_eq!(answer.status(), 422, "{path}");
-        let problem: Value = answer.json().await.unwrap();
-        assert_eq!(problem["type"], "/problems/idempotency-conflict");
+        client.assert_conflict(path, key_used, form, body).await;
     }
 
     // What waited is solved.
@@ -180,7 +192,11 @@ async fn a_folder_of_form_7_opens_with_all_that_is_in_it() {
         .await;
     assert!(!new.1);
 
-    // What is stored is counted from now on, and goes with what it belongs to.
+    assert_stored_bytes_go(&client, [id("run"), id("batch")]).await;
+}
+
+/// Stored bytes are counted from now on, and go with the run and the batch they belong to.
+async fn assert_stored_bytes_go(client: &Client<'_>, [run, batch]: [String; 2]) {
     let stored = async || {
         client.get("/v1/me").await["used"]["stored_bytes"]
             .as_u64()
@@ -188,11 +204,11 @@ async fn a_folder_of_form_7_opens_with_all_that_is_in_it() {
     };
     let before = stored().await;
     assert!(before > 10_000, "{before}");
-    for path in [
-        format!("/v1/runs/{}", id("run")),
-        format!("/v1/batches/{}", id("batch")),
-    ] {
-        let request = service.request(Method::DELETE, &path).bearer_auth(&key);
+    for path in [format!("/v1/runs/{run}"), format!("/v1/batches/{batch}")] {
+        let request = client
+            .service
+            .request(Method::DELETE, &path)
+            .bearer_auth(client.key);
         assert_eq!(request.send().await.unwrap().status(), 204);
     }
     assert!(stored().await < before);
