@@ -137,6 +137,11 @@ impl WheelTask {
     ) -> Result<WheelContact, NormalError> {
         let mut wheel = self.height_as_divided(search, wanted, start, workspace, monitor)?;
         for _ in 0..REGROUPINGS_MAX {
+            // A single patch in each gap cannot be divided.
+            let single = |gap: &GapContact| gap.field.patches().len() == 1;
+            if search.grouping.is_none() && wheel.patches.iter().all(single) {
+                break;
+            }
             let loaded = self.loaded_patches(search, &wheel);
             let loaded = loaded.map_err(|miss| NormalError::NoAnswer(miss.to_string()))?;
             let Some(grouping) = search.regrouped(&loaded, wheel.lowering) else {
