@@ -79,7 +79,8 @@ export class CreepCurve extends HTMLElement {
       cursor: { points: { size: 9 }, drag: { x: false, y: false } },
       hooks: { draw: [(plot) => this.#annotate(plot, token, font)] },
     };
-    this.#plot = new uPlot(options, [curve.x, ...curve.lines.map((line) => line.y)], this);
+    // Values that are missing are gaps of the line; NaN would spoil the scale.
+    this.#plot = new uPlot(options, [curve.x, ...curve.lines.map((line) => line.y.map((value) => (Number.isFinite(value) ? value : null)))], this);
     this.#plot.over.addEventListener('click', () => {
       const at = this.#plot?.cursor.idx;
       if (typeof at === 'number') this.#shown?.pick(curve.order[at]);
