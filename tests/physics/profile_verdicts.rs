@@ -147,7 +147,6 @@ fn verdicts(case: &Value) -> Vec<String> {
 }
 
 #[test]
-#[ignore = "takes minutes: narrow patches on ridges of displaced points"]
 fn every_defect_is_named_for_what_it_is() {
     let mut wrong = Vec::new();
     for kind in &KINDS {
