@@ -21,8 +21,8 @@ use crate::contact::solution::words::fields::Fields;
 
 /// Strips of a patch over which creepages are compared.
 const STRIPS: usize = 9;
-/// Strips of a patch over which directions are compared: more, so that its turn is seen up to its edges.
-const STRIPS_OF_NORMALS: usize = 12;
+/// Strips of a patch over which directions are compared. Six integrate the load of an ellipse to 1 %.
+const STRIPS_OF_NORMALS: usize = 6;
 /// Kalker's C₁₁ of a circle at ν = 0.28.
 const C11: f64 = 4.3;
 /// A share of μN from which a remark says so; on treads where the rail's radius changes under the patch it is often half of this.
