@@ -3,7 +3,7 @@
 //! The store is asked again and again what changed since a moment; nothing is kept for a client. Changes are ordered by their
 //! time, but may become visible a little later than they say, so each poll reaches back, and what was told already is left out.
 
-use std::collections::{HashMap, HashSet, VecDeque};
+use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 
 use tokio::time::sleep;
@@ -13,6 +13,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::{Job, State};
+use crate::jobs::model::kind::Kind;
 use crate::jobs::run::model::Run;
 use crate::jobs::store::list::{Change, Filter};
 
@@ -90,24 +91,27 @@ impl Follower {
 
     async fn poll(&mut self) -> Result<(), JobsError> {
         let from = self.since.saturating_sub(REACH_MS);
-        self.poll_lane(&self.jobs.clone(), from).await?;
-        self.poll_lane(&self.jobs.in_rows_lane(), from).await?;
+        self.poll_changes(from).await?;
         self.tell_progress().await?;
         let horizon = self.since.saturating_sub(2 * REACH_MS);
         self.known.retain(|_, (at, _)| *at >= horizon);
         Ok(())
     }
 
-    /// Polls the jobs of the tenant, or the chunks of its runs.
-    async fn poll_lane(&mut self, lane: &Jobs, mut from: i64) -> Result<(), JobsError> {
+    async fn poll_changes(&mut self, mut from: i64) -> Result<(), JobsError> {
         let mut after = None;
-        let mut batches = HashSet::new();
+        let mut batches: HashMap<(Kind, Uuid), i64> = HashMap::new();
         loop {
-            let store = &lane.shared.store;
-            let changes = store.changes(&lane.tenant, from, after, AT_ONCE).await?;
+            let store = &self.jobs.shared.store;
+            let changes = store
+                .changes(&self.jobs.tenant, from, after, AT_ONCE)
+                .await?;
             for change in &changes {
                 match change.batch {
-                    Some(batch) => drop(batches.insert((batch, change.at))),
+                    Some(batch) => {
+                        let latest = batches.entry((change.kind, batch)).or_insert(change.at);
+                        *latest = change.at.max(*latest);
+                    }
                     None => self.tell_job(*change).await?,
                 }
                 self.since = self.since.max(change.at);
@@ -117,13 +121,12 @@ impl Follower {
             };
             (from, after) = (last.at, Some(last.id));
         }
-        let mut latest: HashMap<Uuid, i64> = HashMap::new();
-        for (batch, at) in batches {
-            let time = latest.entry(batch).or_insert(at);
-            *time = at.max(*time);
-        }
-        for (batch, at) in latest {
-            self.tell_batch(lane, batch, at).await?;
+        for ((of_job, batch), at) in batches {
+            let kind = match of_job {
+                Kind::Rows => Kind::Rows,
+                _ => Kind::Cases,
+            };
+            self.tell_batch(kind, batch, at).await?;
         }
         Ok(())
     }
@@ -138,18 +141,18 @@ impl Follower {
         Ok(())
     }
 
-    async fn tell_batch(&mut self, lane: &Jobs, id: Uuid, at: i64) -> Result<(), JobsError> {
+    async fn tell_batch(&mut self, kind: Kind, id: Uuid, at: i64) -> Result<(), JobsError> {
         // Not acknowledged yet, or gone.
         let gone = |error| match error {
-            JobsError::BatchNotFound | JobsError::RunNotFound | JobsError::Expired => Ok(()),
+            JobsError::BatchNotFound(_) | JobsError::Expired => Ok(()),
             error => Err(error),
         };
-        let batch = match lane.recent_batch(id, PAUSE).await {
+        let batch = match self.jobs.recent_batch(kind, id, PAUSE).await {
             Ok(batch) => batch,
             Err(error) => return gone(error),
         };
         let tag = batch.change_tag();
-        let changed = if lane.tenant == self.jobs.tenant {
+        let changed = if kind == Kind::Cases {
             Changed::Batch(Box::new(batch))
         } else if self.is_known(id, &tag) {
             // Its head need not be read.

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use crate::contact::error::CaseError;
 use crate::jobs::model::job::{Job, State};
+use crate::jobs::model::kind::Kind;
 use crate::jobs::store_error::StoreError;
 
 /// Every way a call of [`Jobs`](crate::jobs::Jobs) can fail.
@@ -64,15 +65,12 @@ pub enum JobsError {
     /// There was such a job or batch, but its time is over.
     #[error("its time is over, it has been removed")]
     Expired,
-    /// There is no such batch.
-    #[error("there is no such batch")]
-    BatchNotFound,
+    /// There is no batch, or no run for [`Kind::Rows`], with this id.
+    #[error("there is no such {}", .0.noun())]
+    BatchNotFound(Kind),
     /// The job must end first.
     #[error("the job is {}; only an ended job can be deleted, cancel it first", .0.name())]
     NotEnded(State),
-    /// There is no such run.
-    #[error("there is no such run")]
-    RunNotFound,
     /// The key is bound to labels, and this concerns the whole tenant.
     #[error("this key is bound to {labels}; it may not {action}, use a key without labels")]
     BoundKey {
@@ -89,15 +87,12 @@ pub enum JobsError {
         "the profiles of this tenant would take more than the {0} bytes that are allowed (`--tenant-profiles-mb`); delete some"
     )]
     ProfilesFull(u64),
-    /// The run must end first.
-    #[error("the run has not ended; cancel it first")]
-    RunNotEnded,
     /// The run has more rows than it may.
     #[error("the run has more than the {0} rows that are allowed (`--run-max-rows`)")]
     TooManyRows(u64),
-    /// This many jobs of the batch must end first.
-    #[error("{0} jobs of the batch have not ended; cancel it first")]
-    BatchNotEnded(u64),
+    /// This many jobs of the batch, or chunks of the run, must end first.
+    #[error("the {} has not ended; cancel it first", .0.noun())]
+    BatchNotEnded(Kind, u64),
     /// There is no result yet.
     #[error("the job is {}; its result is not there yet", .0.name())]
     NotReady(State),

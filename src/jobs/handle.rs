@@ -12,14 +12,13 @@ use crate::contact::error::CaseError;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
-use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::{Job, QueuePlace, State};
 use crate::jobs::model::labels::Labels;
 use crate::jobs::options::Options;
 use crate::jobs::runtime_probe::{ProbedTime, probe};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::cluster::Bell;
-use crate::jobs::store::list::{BatchFilter, Filter, Page};
+use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::retention::{Deleted, Usage};
 
 /// Longest list page.
@@ -175,29 +174,6 @@ impl Jobs {
             staged_bytes: self.shared.staged.of(&self.tenant),
             ..usage
         })
-    }
-
-    /// One page of the batches, newest first; `limit` is brought into 1 to [`BATCH_PAGE_MAX`].
-    ///
-    /// # Errors
-    /// [`JobsError::BadCursor`], or a failed database.
-    pub async fn batches(
-        &self,
-        filter: &BatchFilter,
-        cursor: Option<&str>,
-        limit: u32,
-    ) -> Result<Page<Batch>, JobsError> {
-        let filter = &BatchFilter {
-            labels: self.narrowed(&filter.labels),
-            ..filter.clone()
-        };
-        let after = match cursor {
-            Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
-            None => None,
-        };
-        let limit = limit.clamp(1, BATCH_PAGE_MAX);
-        let store = &self.shared.store;
-        Ok(store.batches(&self.tenant, filter, after, limit).await?)
     }
 
     /// Cancels a job: a queued one ends at once, a running one at the next tick of its solver, an ended one stays as

@@ -12,6 +12,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::Job;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::shared::POLL_INTERVAL;
 
 /// Shortest time between two reads of one waiting caller.
@@ -59,21 +60,22 @@ impl Jobs {
         }
     }
 
-    /// Waits until the jobs of a batch are in other states than `seen` says and returns it; at once if they are, or if
+    /// Waits until the jobs of a batch or run are in other states than `seen` says and returns it; at once if they are, or if
     /// nothing was seen yet. `None` when nothing more will come: all jobs had ended, or the service is about to stop.
     ///
     /// # Errors
     /// [`JobsError::BatchNotFound`], or a failed database.
     pub async fn batch_changed_since(
         &self,
+        kind: Kind,
         id: Uuid,
         seen: Option<&str>,
     ) -> Result<Option<Batch>, JobsError> {
         let mut pause = PAUSE;
         loop {
             let batch = match seen {
-                None => self.batch(id).await?,
-                Some(_) => self.recent_batch(id, pause).await?,
+                None => self.batch(kind, id).await?,
+                Some(_) => self.recent_batch(kind, id, pause).await?,
             };
             if seen != Some(&batch.change_tag()) {
                 return Ok(Some(batch));
@@ -110,19 +112,20 @@ impl Jobs {
         }
     }
 
-    /// The same of a batch.
-    pub(crate) async fn recent_batch(&self, id: Uuid, age: Duration) -> Result<Batch, JobsError> {
-        let read = self.shared.store.batch(&self.tenant, id);
+    /// As [`Jobs::batch`], as the batch was a moment ago.
+    pub(crate) async fn recent_batch(
+        &self,
+        kind: Kind,
+        id: Uuid,
+        age: Duration,
+    ) -> Result<Batch, JobsError> {
+        let read = self.shared.store.batch(&self.tenant, kind, id);
         let batch = self
             .shared
             .recent_batches
             .at(&self.tenant, id, age, read)
             .await?;
-        match batch {
-            Some(batch) if !self.sees(&batch.labels) => Err(JobsError::BatchNotFound),
-            Some(batch) => Ok(batch),
-            None => Err(self.missing(id, JobsError::BatchNotFound).await),
-        }
+        self.visible(kind, id, batch).await
     }
 }
 

@@ -14,7 +14,6 @@ use crate::contact::evaluate::sections::{named_and_given, named_sections, put_se
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
-use crate::jobs::model::lane::tenant_of;
 use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 
 /// Longest list.
@@ -43,7 +42,7 @@ impl Jobs {
         let (report, digest, text) = read
             .await
             .map_err(|error| JobsError::Damaged(error.to_string()))?;
-        let (report, tenant) = (report?, &self.own_tenant());
+        let (report, tenant) = (report?, &*self.tenant);
         let new = StoredProfile {
             digest,
             body: Bytes::from(text),
@@ -63,11 +62,7 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::ProfileNotFound`], or a failed database.
     pub async fn profile(&self, digest: &str) -> Result<StoredProfile, JobsError> {
-        let found = self
-            .shared
-            .store
-            .profile(&self.own_tenant(), digest)
-            .await?;
+        let found = self.shared.store.profile(&self.tenant, digest).await?;
         found.ok_or(JobsError::ProfileNotFound)
     }
 
@@ -78,7 +73,7 @@ impl Jobs {
     pub async fn profiles(&self) -> Result<Vec<(String, u64, i64)>, JobsError> {
         self.require_unbound("list the profiles of the tenant")?;
         let store = &self.shared.store;
-        Ok(store.profiles(&self.own_tenant(), PROFILES_MAX).await?)
+        Ok(store.profiles(&self.tenant, PROFILES_MAX).await?)
     }
 
     /// Removes a kept cross-section. Jobs and runs that named it have it.
@@ -88,7 +83,7 @@ impl Jobs {
     pub async fn delete_profile(&self, digest: &str) -> Result<(), JobsError> {
         self.require_unbound("delete profiles of the tenant")?;
         let store = &self.shared.store;
-        match store.delete_profile(&self.own_tenant(), digest).await? {
+        match store.delete_profile(&self.tenant, digest).await? {
             true => Ok(()),
             false => Err(JobsError::ProfileNotFound),
         }
@@ -143,21 +138,12 @@ impl Jobs {
         if let Some(section) = known.get(digest) {
             return Ok(Some(section.clone()));
         }
-        let found = self
-            .shared
-            .store
-            .profile(&self.own_tenant(), digest)
-            .await?;
+        let found = self.shared.store.profile(&self.tenant, digest).await?;
         let Some(found) = found else { return Ok(None) };
         let section: Value = serde_json::from_slice(&found.body)
             .map_err(|error| JobsError::Damaged(format!("profile {digest}: {error}")))?;
         known.insert(digest.to_owned(), section.clone());
         Ok(Some(section))
-    }
-
-    /// The tenant, whichever of its lanes this is.
-    fn own_tenant(&self) -> String {
-        tenant_of(&self.tenant).to_owned()
     }
 }
 

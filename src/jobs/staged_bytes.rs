@@ -5,7 +5,6 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::jobs::error::JobsError;
-use crate::jobs::model::lane::tenant_of;
 
 /// Bounds of staged bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,7 +20,7 @@ pub struct StagingBounds {
 pub(crate) struct StagedBytes(Mutex<HashMap<Arc<str>, u64>>);
 
 impl StagedBytes {
-    /// Counts more bytes of a tenant, in either of its lanes, or says which bound they would pass.
+    /// Counts more bytes of a tenant, or says which bound they would pass.
     pub(crate) fn add(
         &self,
         tenant: &str,
@@ -29,7 +28,6 @@ impl StagedBytes {
         bounds: StagingBounds,
     ) -> Result<(), JobsError> {
         let mut staged = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let tenant = tenant_of(tenant);
         let of_tenant = staged.get(tenant).copied().unwrap_or(0);
         if of_tenant + bytes > bounds.tenant {
             return Err(JobsError::StagingQuotaExceeded {
@@ -48,13 +46,12 @@ impl StagedBytes {
     /// The bytes of a tenant.
     pub(crate) fn of(&self, tenant: &str) -> u64 {
         let staged = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        staged.get(tenant_of(tenant)).copied().unwrap_or(0)
+        staged.get(tenant).copied().unwrap_or(0)
     }
 
     /// Gives bytes of a tenant back.
     pub(crate) fn give_back(&self, tenant: &str, bytes: u64) {
         let mut staged = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let tenant = tenant_of(tenant);
         let left = staged.get(tenant).map_or(0, |of| of.saturating_sub(bytes));
         if left == 0 {
             staged.remove(tenant);

@@ -13,6 +13,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
 use crate::jobs::model::job::{Job, created_at};
+use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds, Refusal};
 
@@ -125,6 +126,7 @@ impl Jobs {
         NewJob {
             id,
             tenant: self.tenant.clone(),
+            kind: Kind::Case,
             created_at: created_at(id),
             method: checked.run.method.name().to_owned(),
             outputs: outputs_text(&checked.run.outputs),

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use railhead::contact::solve;
 use railhead::jobs::Options;
+use railhead::jobs::model::kind::Kind;
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -387,7 +388,7 @@ async fn an_incomplete_batch_is_gone_after_a_restart() {
     store.close().await;
     let jobs = open(Options::new(folder.path()), solve).await;
     assert!(jobs.get(id).await.is_err());
-    assert!(jobs.batch(new.id).await.is_err());
+    assert!(jobs.batch(Kind::Cases, new.id).await.is_err());
     jobs.shutdown(Duration::ZERO).await;
 }
 

@@ -11,11 +11,11 @@ use tempfile::TempDir;
 use crate::server::{example, example_text};
 use crate::support::{Service, case, pause, railhead};
 
-/// A data folder of form 7, and what the program that wrote it answered.
-fn of_form_7() -> (TempDir, Value) {
+/// A data folder of a form of the embedded table, and what the program that wrote it answered.
+fn of_form(form: u32) -> (TempDir, Value) {
     let folder = tempfile::tempdir().unwrap();
-    let archive =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/data-folder-form-7.tar.gz");
+    let archive = format!("tests/data/data-folder-form-{form}.tar.gz");
+    let archive = Path::new(env!("CARGO_MANIFEST_DIR")).join(archive);
     let unpacked = Command::new("tar")
         .arg("-xzf")
         .arg(archive)
@@ -125,7 +125,16 @@ fn kill_while_starting(folder: &Path) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_folder_of_form_7_opens_with_all_that_is_in_it() {
-    let (folder, expected) = of_form_7();
+    opens_with_all_that_is_in_it(7).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_folder_of_form_8_opens_with_all_that_is_in_it() {
+    opens_with_all_that_is_in_it(8).await;
+}
+
+async fn opens_with_all_that_is_in_it(form: u32) {
+    let (folder, expected) = of_form(form);
     kill_while_starting(folder.path());
     let service = Service::start(folder.path(), &["--workers", "1"]);
     let text = |name: &str| expected[name].as_str().unwrap().to_owned();
@@ -157,6 +166,7 @@ async fn a_folder_of_form_7_opens_with_all_that_is_in_it() {
     assert_eq!(row["case"]["load"]["normal_force_n"], json!(74000.0));
 
     // The same requests under their keys are the same jobs.
+    let before = form;
     let form = "application/json";
     let spin = example("spin.case.json").to_string();
     assert_eq!(
@@ -164,14 +174,30 @@ async fn a_folder_of_form_7_opens_with_all_that_is_in_it() {
         (json!(id("job")), true)
     );
     let table = "creepage_x,label:km,name\n0.001,1,first\n0.002,2,second\n".to_owned();
-    // Digests of tables and rows have changed since: a key used again is a conflict, never a second batch or run.
+    // Digests of tables and rows have changed since form 7: a key used again is a conflict, never a second batch or run.
     let rows = example_text("run.json");
     let batch = format!("/v1/batches?template={}&name=table&label=line:7", id("job"));
     for (path, key_used, form, body) in [
         (batch.as_str(), "batch", "text/csv", table),
         ("/v1/runs?name=rows&label=line:7", "run", form, rows),
     ] {
-        client.assert_conflict(path, key_used, form, body).await;
+        if before == 7 {
+            client.assert_conflict(path, key_used, form, body).await;
+        } else {
+            let found = client.again(path, key_used, form, body).await;
+            assert_eq!(found, (json!(id(key_used)), true));
+        }
+    }
+    // Runs belong to their tenant.
+    for (kind, other) in [("batches", "runs"), ("runs", "batches")] {
+        let listed = client.get(&format!("/v1/{kind}?limit=100")).await;
+        let listed = listed[kind].as_array().unwrap();
+        assert_eq!(listed.len(), 2, "{listed:?}");
+        for entry in listed {
+            let path = format!("/v1/{other}/{}", entry["id"].as_str().unwrap());
+            let request = service.request(Method::GET, &path).bearer_auth(&key);
+            assert_eq!(request.send().await.unwrap().status(), 404, "{path}");
+        }
     }
 
     // What waited is solved.

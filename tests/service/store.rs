@@ -10,6 +10,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::remark::list::Remark;
+use railhead::jobs::model::kind::{Kind, Queue};
 use railhead::jobs::model::submit_options::SubmitOptions;
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, ReleaseReason, Renewal};
@@ -152,13 +153,21 @@ pub async fn open_beside(folder: &Path) -> Arc<dyn Store> {
         .unwrap()
 }
 
-/// Claims at most so many small jobs of the first tenant that has any.
+/// The queue of the jobs of a tenant.
+pub fn queue_of(tenant: &str) -> Queue {
+    Queue {
+        tenant: tenant.into(),
+        kind: Kind::Case,
+    }
+}
+
+/// Claims at most `jobs` small jobs of the first queue that has any.
 pub async fn claim_up_to(store: &dyn Store, now: i64, lease_ms: i64, jobs: usize) -> Vec<Claim> {
-    let tenants = store.queued_tenants().await.unwrap();
-    for tenant in &tenants {
+    let queues = store.queues().await.unwrap();
+    for queue in &queues {
         let request = ClaimRequest {
             worker: "w",
-            tenant,
+            queue,
             jobs,
             cost_us: 1_000_000,
             kind: ClaimKind::New,
@@ -196,6 +205,7 @@ pub fn new_job() -> NewJob {
     NewJob {
         id,
         tenant: "anonymous".into(),
+        kind: Kind::Case,
         created_at: i64::try_from(id.as_u128() >> 80).unwrap(),
         name: Some("a case".to_owned()),
         labels: BTreeMap::new(),
@@ -217,6 +227,7 @@ pub fn new_batch(tenant: &str, count: u32) -> NewBatch {
     NewBatch {
         id: Uuid::now_v7(),
         tenant: tenant.into(),
+        kind: Kind::Cases,
         created_at: 0,
         count,
         rejected: 0,

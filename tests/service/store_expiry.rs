@@ -1,9 +1,9 @@
 //! What is removed together once its time is over?
 
-use railhead::jobs::model::lane::rows_lane;
+use railhead::jobs::model::kind::Kind;
 use railhead::jobs::store::claim::Claim;
 use railhead::jobs::store::retention::RetentionRule;
-use railhead::jobs::store::submission::{BatchBegun, NewJob, QueueBounds};
+use railhead::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds};
 
 use crate::store::{
     LEASE, StoreKind, Table, claim_up_to, conformance, new_batch, new_job, success,
@@ -34,14 +34,16 @@ async fn the_chunks_of_a_run_expire_together_with_the_last_of_them(kind: StoreKi
     let claim = table.claim(begun).await.unwrap();
     end(&table, &claim, begun + 1000).await;
 
-    let lane = rows_lane("anonymous");
-    let run = new_batch(&lane, 3);
+    let run = NewBatch {
+        kind: Kind::Rows,
+        ..new_batch("anonymous", 3)
+    };
     let none = |_| false;
     let created = table.store.begin_batch(&run, &none, QueueBounds::NONE);
     assert_eq!(created.await.unwrap(), BatchBegun::Created);
     let chunk = |index| {
         let chunk = NewJob {
-            tenant: lane.clone(),
+            kind: Kind::Rows,
             ..new_job()
         };
         (index, chunk)
@@ -58,8 +60,12 @@ async fn the_chunks_of_a_run_expire_together_with_the_last_of_them(kind: StoreKi
     assert_eq!(expire(&table, begun + 6000).await, 0);
     end(&table, &claims[2], begun + 9000).await;
     assert_eq!(expire(&table, begun + 8999).await, 0);
-    assert!(table.store.batch(&lane, run.id).await.unwrap().is_some());
+    let there = async || {
+        let found = table.store.batch("anonymous", Kind::Rows, run.id).await;
+        found.unwrap().is_some()
+    };
+    assert!(there().await);
     assert_eq!(expire(&table, begun + 9000).await, 3);
-    assert!(table.store.batch(&lane, run.id).await.unwrap().is_none());
-    assert!(table.store.has_expired(&lane, run.id).await.unwrap());
+    assert!(!there().await);
+    assert!(table.store.has_expired("anonymous", run.id).await.unwrap());
 }

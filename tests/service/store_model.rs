@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use proptest::prelude::*;
 use proptest::sample::Index;
+use railhead::jobs::model::kind::Kind;
 use railhead::jobs::store::claim::Claim;
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::submission::{BatchBegun, NewBatch, QueueBounds};
@@ -177,7 +178,11 @@ impl Pair {
             );
         }
         for (id, batch) in &self.model.batches {
-            let found = self.store.batch(batch.tenant, *id).await.unwrap();
+            let found = self
+                .store
+                .batch(batch.tenant, Kind::Cases, *id)
+                .await
+                .unwrap();
             let jobs = found.map(|found| found.states.values().sum::<u64>());
             let left = self
                 .of_batch(*id, |_| true)

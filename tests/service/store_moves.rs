@@ -18,7 +18,7 @@ use railhead::jobs::{Failure, FailureKind, State};
 use uuid::Uuid;
 
 use crate::model::{ATTEMPTS_MAX, BOUNDS, Model, Row};
-use crate::store::{Table, new_job};
+use crate::store::{Table, new_job, queue_of};
 use crate::store_back::Saved;
 
 pub const LEASE: i64 = 10;
@@ -103,7 +103,7 @@ impl Pair {
     pub async fn claim(&mut self, tenant: &'static str, jobs: usize, begun: bool) {
         let request = ClaimRequest {
             worker: "w",
-            tenant,
+            queue: &queue_of(tenant),
             kind: if begun {
                 ClaimKind::Begun
             } else {

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use railhead::jobs::State;
+use railhead::jobs::model::kind::{Kind, Queue};
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason};
 use railhead::jobs::store::list::{BatchFilter, Filter};
@@ -17,7 +18,7 @@ use sqlx::PgPool;
 use uuid::Uuid;
 
 use crate::postgres::{database, log_lines, with_parameter};
-use crate::store::{new_job, success};
+use crate::store::{new_job, queue_of, success};
 
 const TENANT: &str = "north";
 const GROUP: usize = 32;
@@ -34,10 +35,10 @@ const FILL: &str = "INSERT INTO jobs (id, tenant, state, labels, method, outputs
 const EXPLAINED: &str = "options=-c%20session_preload_libraries%3Dauto_explain%20-c%20auto_explain.log_min_duration%3D0%20\
      -c%20auto_explain.log_analyze%3Don%20-c%20auto_explain.log_timing%3Doff%20-c%20auto_explain.log_format%3Djson";
 
-fn request<'a>(kind: ClaimKind) -> ClaimRequest<'a> {
+fn request(queue: &Queue, kind: ClaimKind) -> ClaimRequest<'_> {
     ClaimRequest {
         worker: "w",
-        tenant: TENANT,
+        queue,
         kind,
         jobs: GROUP,
         cost_us: u64::MAX,
@@ -51,15 +52,16 @@ fn request<'a>(kind: ClaimKind) -> ClaimRequest<'a> {
 
 /// The calls that nodes and clients make again and again.
 async fn use_store(store: &Arc<dyn Store>) {
+    let queue = queue_of(TENANT);
     let mut claims: Vec<Claim> = Vec::new();
     for _ in 0..4 {
-        let group = store.claim(&request(ClaimKind::New)).await.unwrap();
+        let group = store.claim(&request(&queue, ClaimKind::New)).await.unwrap();
         assert_eq!(group.len(), GROUP);
         claims.extend(group);
     }
     assert!(
         store
-            .claim(&request(ClaimKind::Begun))
+            .claim(&request(&queue, ClaimKind::Begun))
             .await
             .unwrap()
             .is_empty()
@@ -127,7 +129,7 @@ async fn maintain(store: &Arc<dyn Store>) {
         .unwrap();
     assert!(matches!(added, Enqueued::Created(_)), "{added:?}");
     store.cached(&[[7; 16]]).await.unwrap();
-    store.queued_tenants().await.unwrap();
+    store.queues().await.unwrap();
     store.stats().await.unwrap();
     store.usage(TENANT).await.unwrap();
     store.ready(true).await.unwrap();
@@ -155,7 +157,7 @@ async fn read_lists(store: &Arc<dyn Store>, id: Uuid) {
     };
     store.list(TENANT, &labelled, None, 50).await.unwrap();
     store
-        .batches(TENANT, &BatchFilter::default(), None, 50)
+        .batches(TENANT, &BatchFilter::all(Kind::Cases), None, 50)
         .await
         .unwrap();
 }

@@ -1,6 +1,7 @@
 //! Are jobs and batches found by several states, labels and words, and told when they change?
 
 use railhead::jobs::State;
+use railhead::jobs::model::kind::Kind;
 use railhead::jobs::store::list::{BatchFilter, Change, Filter, Total};
 use railhead::jobs::store::retention::Usage;
 use railhead::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds};
@@ -235,7 +236,7 @@ async fn batches_are_listed_with_their_counts_and_found_by_name_and_label(kind: 
             .map(|batch| ids.iter().position(|id| *id == batch.id).unwrap());
         (places.collect::<Vec<_>>(), page)
     };
-    let all = BatchFilter::default();
+    let all = BatchFilter::all(Kind::Cases);
     let (first, page) = list(&all, None, 2).await;
     assert_eq!((first, page.total), (vec![2, 1], Total::Exactly(3)));
     let after = all.read_cursor(&page.next_cursor.unwrap());
@@ -249,16 +250,20 @@ async fn batches_are_listed_with_their_counts_and_found_by_name_and_label(kind: 
     );
     assert_eq!(
         Some(batch),
-        store.batch("anonymous", ids[0]).await.unwrap().as_ref()
+        store
+            .batch("anonymous", Kind::Cases, ids[0])
+            .await
+            .unwrap()
+            .as_ref()
     );
     let named = BatchFilter {
         name: Some("PLAN".to_owned()),
-        ..BatchFilter::default()
+        ..BatchFilter::all(Kind::Cases)
     };
     assert_eq!(list(&named, None, 9).await.0, [1, 0]);
     let labelled = BatchFilter {
         labels: vec![("part".to_owned(), "0".to_owned())],
-        ..BatchFilter::default()
+        ..BatchFilter::all(Kind::Cases)
     };
     assert_eq!(list(&labelled, None, 9).await.0, [2, 0]);
     assert!(

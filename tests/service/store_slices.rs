@@ -15,13 +15,15 @@ use railhead::jobs::store::submission::NewJob;
 use railhead::jobs::{Failure, State};
 use uuid::Uuid;
 
-use crate::store::{StoreKind, Table, claim_up_to, conformance, finish_one, new_job, success};
+use crate::store::{
+    StoreKind, Table, claim_up_to, conformance, finish_one, new_job, queue_of, success,
+};
 
 /// Claims a job of which some slices are solved.
 async fn claim_begun(store: &dyn Store, now: i64) -> Option<Claim> {
     let request = ClaimRequest {
         worker: "w",
-        tenant: "anonymous",
+        queue: &queue_of("anonymous"),
         kind: ClaimKind::Begun,
         jobs: 1,
         cost_us: 1_000_000,

@@ -1,6 +1,7 @@
 //! Does it cost claims and ends nothing that somebody keeps a transaction open, so that dead rows stay? Work is counted, not time.
 
 use railhead::jobs::codec::result::EncodedResult;
+use railhead::jobs::model::kind::Queue;
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, ReleaseReason};
 use railhead::jobs::store::ending::{Ending, StoredResult};
@@ -9,6 +10,7 @@ use railhead::jobs::store::postgres::schema::migrate;
 use sqlx::{Connection, PgConnection};
 
 use crate::postgres::database;
+use crate::store::queue_of;
 
 const QUEUED: i64 = 9000;
 const GROUP: usize = 32;
@@ -29,10 +31,10 @@ async fn read(connection: &mut PgConnection, index: &str) -> i64 {
         .unwrap()
 }
 
-fn request<'a>() -> ClaimRequest<'a> {
+fn request(queue: &Queue) -> ClaimRequest<'_> {
     ClaimRequest {
         worker: "w",
-        tenant: "north",
+        queue,
         kind: ClaimKind::New,
         jobs: GROUP,
         cost_us: u64::MAX,
@@ -79,13 +81,13 @@ async fn claims_and_ends_do_not_walk_over_dead_rows_and_miss_nothing_that_came_b
     let ending = success();
     let mut seen = std::collections::BTreeSet::new();
     for group in 0..GROUPS {
-        let claims = store.claim(&request()).await.unwrap();
+        let claims = store.claim(&request(&queue_of("north"))).await.unwrap();
         assert_eq!(claims.len(), GROUP);
         if group == GROUPS / 2 {
             // The next claim begins with them.
             let back = Store::release(&store, &claims, ReleaseReason::NotBegun, 0).await;
             assert_eq!(back.unwrap().len(), GROUP);
-            let again = store.claim(&request()).await.unwrap();
+            let again = store.claim(&request(&queue_of("north"))).await.unwrap();
             assert_eq!(again[0].id, claims[0].id);
             Store::release(&store, &again, ReleaseReason::NotBegun, 0)
                 .await

@@ -1,16 +1,22 @@
 //! In which order are jobs claimed, and what is held against them when their process dies?
 
-use railhead::jobs::State;
+use railhead::jobs::model::kind::Kind;
 use railhead::jobs::model::submit_options::{Priority, SubmitOptions};
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason};
-use railhead::jobs::store::submission::{NewJob, QueueBounds};
+use railhead::jobs::store::submission::{
+    BatchBegun, Enqueued, NewBatch, NewJob, QueueBounds, Refusal,
+};
+use railhead::jobs::{BatchFilter, Filter, State, Total};
 
-use crate::store::{StoreKind, Table, claim_up_to, conformance, new_job, success};
+use crate::store::{
+    StoreKind, Table, claim_up_to, conformance, new_batch, new_job, queue_of, success,
+};
 
 conformance!(
     jobs_are_claimed_by_priority_and_then_by_age,
     a_bystander_of_a_dead_process_counts_no_attempt,
     a_job_that_was_longer_than_thought_is_known_as_long,
+    jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together,
 );
 
 fn wishing(tenant: &str, priority: Priority) -> NewJob {
@@ -95,9 +101,10 @@ async fn a_job_that_was_longer_than_thought_is_known_as_long(kind: StoreKind) {
         store.release(&claims, long, 1).await.unwrap(),
         [(id, State::Queued)]
     );
+    let queue = queue_of("anonymous");
     let request = |each_slice_us| ClaimRequest {
         worker: "w",
-        tenant: "anonymous",
+        queue: &queue,
         jobs: 8,
         cost_us: 200_000,
         kind: ClaimKind::New,
@@ -121,4 +128,72 @@ async fn a_job_that_was_longer_than_thought_is_known_as_long(kind: StoreKind) {
     assert_eq!(store.stats().await.unwrap().jobs[&State::Queued], 0);
     store.enqueue(&new_job(), QueueBounds::NONE).await.unwrap();
     assert_eq!(store.stats().await.unwrap().jobs[&State::Queued], 1);
+}
+
+async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let store = &*table.store;
+    let bounds = QueueBounds {
+        tenant: 3,
+        ..QueueBounds::NONE
+    };
+    let of_kind = |kind| NewJob { kind, ..new_job() };
+    let none = |_| false;
+    let run = NewBatch {
+        kind: Kind::Rows,
+        idempotency: Some(("key".to_owned(), [1; 32])),
+        ..new_batch("anonymous", 2)
+    };
+    let created = store.begin_batch(&run, &none, bounds).await.unwrap();
+    assert_eq!(created, BatchBegun::Created);
+    let chunks = [(0, of_kind(Kind::Rows)), (1, of_kind(Kind::Rows))];
+    store.fill_batch(run.id, &chunks).await.unwrap();
+    store.complete_batch(run.id).await.unwrap();
+    let job = table.add(of_kind(Kind::Case)).await.id;
+
+    // The quota is one for both.
+    let refused = store.enqueue(&new_job(), bounds).await.unwrap();
+    assert_eq!(refused, Enqueued::Refused(Refusal::Quota));
+    assert_eq!(
+        store.usage("anonymous").await.unwrap().jobs[&State::Queued],
+        3
+    );
+    // A chunk is no job for clients, and a run is no batch.
+    let listed = store.list("anonymous", &Filter::default(), None, 9).await;
+    let listed = listed.unwrap();
+    assert_eq!(
+        listed.entries.iter().map(|job| job.id).collect::<Vec<_>>(),
+        [job]
+    );
+    assert_eq!(listed.total, Total::Exactly(1));
+    let chunk = chunks[0].1.id;
+    assert_eq!(store.job("anonymous", chunk).await.unwrap(), None);
+    assert_eq!(store.result("anonymous", chunk).await.unwrap(), None);
+    assert_eq!(store.cancel("anonymous", chunk, 1).await.unwrap(), None);
+    for (kind, found) in [(Kind::Rows, 1), (Kind::Cases, 0)] {
+        let filter = BatchFilter::all(kind);
+        let page = store.batches("anonymous", &filter, None, 9).await.unwrap();
+        assert_eq!(page.entries.len(), found);
+        let batch = store.batch("anonymous", kind, run.id).await.unwrap();
+        assert_eq!(batch.is_some(), found == 1);
+    }
+    // A key stands for a run and for a batch.
+    let batch = NewBatch {
+        kind: Kind::Cases,
+        ..run.clone()
+    };
+    assert_eq!(store.batch_by_key(&batch, &none).await.unwrap(), None);
+    let known = store.batch_by_key(&run, &none).await.unwrap();
+    assert_eq!(known, Some(BatchBegun::Existing(run.id)));
+
+    let queues = store.queues().await.unwrap();
+    let kinds: Vec<Kind> = queues.iter().map(|queue| queue.kind).collect();
+    assert_eq!(kinds, [Kind::Case, Kind::Rows]);
+    let claims = claim_up_to(store, 0, 1000, 8).await;
+    assert_eq!(
+        claims.iter().map(|claim| claim.id).collect::<Vec<_>>(),
+        [job]
+    );
+    assert_eq!(claim_up_to(store, 0, 1000, 8).await.len(), 2);
+    assert_eq!(store.queues().await.unwrap(), []);
 }

@@ -11,6 +11,7 @@ use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::StorageFault;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::job::{Job, State};
+use crate::jobs::model::kind::Kind;
 
 /// Content type of every failure.
 pub(crate) const PROBLEM_JSON: &str = "application/problem+json";
@@ -194,7 +195,10 @@ impl From<JobsError> for ApiError {
                 ProblemKind::Expired,
                 "ended longer ago than this service keeps ended jobs, so it was removed",
             ),
-            JobsError::BatchNotFound => {
+            JobsError::BatchNotFound(Kind::Rows) => {
+                ApiError::new(ProblemKind::RunNotFound, "no run has this id")
+            }
+            JobsError::BatchNotFound(_) => {
                 ApiError::new(ProblemKind::BatchNotFound, "no batch has this id")
             }
             JobsError::NotReady(state) => ApiError::new(
@@ -206,7 +210,11 @@ impl From<JobsError> for ApiError {
                 ProblemKind::JobNotEnded,
                 "the job is queued or running; cancel it first, then delete it",
             ),
-            JobsError::BatchNotEnded(jobs) => ApiError::new(
+            JobsError::BatchNotEnded(Kind::Rows, _) => ApiError::new(
+                ProblemKind::RunNotEnded,
+                "rows of the run are waiting or being solved; cancel it first, then delete it",
+            ),
+            JobsError::BatchNotEnded(_, jobs) => ApiError::new(
                 ProblemKind::BatchNotEnded,
                 format!(
                     "{jobs} jobs of the batch are queued or running; cancel it first, then delete it"
@@ -250,11 +258,6 @@ impl From<JobsError> for ApiError {
 /// What went wrong with a run or a kept profile, or with the store.
 fn of_rows(error: JobsError) -> ApiError {
     match error {
-        JobsError::RunNotFound => ApiError::new(ProblemKind::RunNotFound, "no run has this id"),
-        JobsError::RunNotEnded => ApiError::new(
-            ProblemKind::RunNotEnded,
-            "rows of the run are waiting or being solved; cancel it first, then delete it",
-        ),
         JobsError::ProfileNotFound => {
             ApiError::new(ProblemKind::ProfileNotFound, "no profile has this digest")
         }

@@ -11,6 +11,7 @@ use crate::http::extract::query::{Parameters, count};
 use crate::http::problem::error::ApiError;
 use crate::http::routes::job_list::{ListProblems, ListTotal};
 use crate::http::routes::next_page::{answer, list_query};
+use crate::jobs::model::kind::Kind;
 use crate::jobs::{BATCH_PAGE_MAX, BatchFilter};
 
 /// Batches in one page of a list when nothing is said.
@@ -50,6 +51,7 @@ list_query! {
 pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
     let query = BatchListQuery::read(&uri, &())?;
     let filter = BatchFilter {
+        kind: Kind::Cases,
         labels: query.label.unwrap_or_default(),
         name: query.name,
         created_after: query.created_after,

@@ -30,6 +30,7 @@ use crate::http::render::format::Format;
 use crate::http::routes::batch_lines::{FIRST_PAGE_JOBS, Lines, STREAM_BYTES, Source};
 use crate::http::state::AppState;
 use crate::jobs::model::job::State as JobState;
+use crate::jobs::model::kind::Kind;
 
 /// Longest time results are waited for, in s.
 const WAIT_MAX_SECONDS: u32 = 3600;
@@ -119,7 +120,7 @@ pub(crate) async fn results(
         return Err(ApiError::bad_parameter("columns", detail));
     }
     // Unknown batches are answered before the stream begins.
-    jobs.batch(id).await?;
+    jobs.batch(Kind::Cases, id).await?;
     let place = match wait {
         Some(_) => Some(crowds.require_wait(jobs.tenant())?),
         None => None,

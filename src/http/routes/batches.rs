@@ -23,6 +23,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::routes::jobs::{idempotency_key, mark_replay};
 use crate::jobs::batch::upload::BatchUpload;
+use crate::jobs::model::kind::Kind;
 
 problems! {
     /// What `POST /v1/batches` can fail with.
@@ -185,7 +186,7 @@ pub(crate) async fn get(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
 ) -> Result<Json<BatchAnswer>, ApiError> {
-    Ok(Json(jobs.batch(id).await?.into()))
+    Ok(Json(jobs.batch(Kind::Cases, id).await?.into()))
 }
 
 /// Stops all jobs of a batch that have not ended. Those that have ended stay as they are.
@@ -205,7 +206,7 @@ pub(crate) async fn cancel(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
 ) -> Result<Response, ApiError> {
-    let batch: BatchAnswer = jobs.cancel_batch(id).await?.into();
+    let batch: BatchAnswer = jobs.cancel_batch(Kind::Cases, id).await?.into();
     let status = if batch.ended {
         StatusCode::OK
     } else {
@@ -232,6 +233,6 @@ pub(crate) async fn delete(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
 ) -> Result<StatusCode, ApiError> {
-    jobs.delete_batch(id).await?;
+    jobs.delete_batch(Kind::Cases, id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -27,6 +27,7 @@ use crate::http::routes::jobs::GetProblems;
 use crate::http::routes::runs::GetRunProblems;
 use crate::jobs::Jobs;
 use crate::jobs::model::job::{Job, State as JobState};
+use crate::jobs::model::kind::Kind;
 
 /// The data of an event of a job.
 #[derive(Debug, Serialize, ToSchema)]
@@ -183,28 +184,7 @@ pub(crate) async fn batch(
     request: EventRequest,
     BatchId(id): BatchId,
 ) -> Result<Response, ApiError> {
-    let jobs = request.jobs.clone();
-    let batch = jobs.batch(id).await?;
-    let seen = request.seen.clone();
-    let (ended, all) = batch.ended();
-    if ended == all && seen.as_deref() == Some(&batch.change_tag()) {
-        return Ok(StatusCode::NO_CONTENT.into_response());
-    }
-    request.answer(unfold(Some(seen), move |seen| {
-        let jobs = jobs.clone();
-        async move { next_of_batch(&jobs, id, seen?).await }
-    }))
-}
-
-async fn next_of_batch(
-    jobs: &Jobs,
-    id: Uuid,
-    seen: Option<String>,
-) -> Option<(Result<Event, Infallible>, Option<Option<String>>)> {
-    let batch = changed(jobs.batch_changed_since(id, seen.as_deref()).await)?;
-    let (mark, (ended, all)) = (batch.change_tag(), batch.ended());
-    let event = event("state", &mark, &BatchAnswer::from(batch))?;
-    Some((Ok(event), (ended < all).then_some(Some(mark))))
+    follow(request, Kind::Cases, id).await
 }
 
 /// Follows a run.
@@ -227,25 +207,40 @@ async fn next_of_batch(
     )
 )]
 pub(crate) async fn run(request: EventRequest, RunId(id): RunId) -> Result<Response, ApiError> {
+    follow(request, Kind::Rows, id).await
+}
+
+async fn follow(request: EventRequest, kind: Kind, id: Uuid) -> Result<Response, ApiError> {
     let jobs = request.jobs.clone();
-    let run = jobs.run(id).await?;
+    let batch = jobs.batch(kind, id).await?;
+    let (tag, (ended, all)) = (batch.change_tag(), batch.ended());
+    if kind == Kind::Rows {
+        // Refused if some of its chunks have expired.
+        jobs.with_head(batch).await?;
+    }
     let seen = request.seen.clone();
-    if run.state().ended() && seen.as_deref() == Some(&run.chunks.change_tag()) {
+    if ended == all && seen.as_deref() == Some(&tag) {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
     request.answer(unfold(Some(seen), move |seen| {
         let jobs = jobs.clone();
-        async move { next_of_run(&jobs, id, seen?).await }
+        async move { next_of_batch(&jobs, kind, id, seen?).await }
     }))
 }
 
-async fn next_of_run(
+async fn next_of_batch(
     jobs: &Jobs,
+    kind: Kind,
     id: Uuid,
     seen: Option<String>,
 ) -> Option<(Result<Event, Infallible>, Option<Option<String>>)> {
-    let run = changed(jobs.run_changed_since(id, seen.as_deref()).await)?;
-    let (mark, ended) = (run.chunks.change_tag(), run.state().ended());
-    let event = event("state", &mark, &RunAnswer::from(run))?;
-    Some((Ok(event), (!ended).then_some(Some(mark))))
+    let batch = changed(jobs.batch_changed_since(kind, id, seen.as_deref()).await)?;
+    let (mark, (ended, all)) = (batch.change_tag(), batch.ended());
+    let event = if kind == Kind::Rows {
+        let run = changed(jobs.with_head(batch).await.map(Some))?;
+        event("state", &mark, &RunAnswer::from(run))?
+    } else {
+        event("state", &mark, &BatchAnswer::from(batch))?
+    };
+    Some((Ok(event), (ended < all).then_some(Some(mark))))
 }

@@ -25,6 +25,8 @@ use crate::http::routes::batches::labels_of;
 use crate::http::routes::job_list::{ListProblems, ListTotal};
 use crate::http::routes::jobs::{idempotency_key, mark_replay};
 use crate::http::routes::next_page::{answer, list_query};
+use crate::jobs::error::JobsError;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::run::draft::RunOptions;
 use crate::jobs::{BATCH_PAGE_MAX, BatchFilter};
 
@@ -166,16 +168,28 @@ list_query! {
 pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
     let query = RunListQuery::read(&uri, &())?;
     let filter = BatchFilter {
+        kind: Kind::Rows,
         labels: query.label.unwrap_or_default(),
         name: query.name,
         created_after: query.created_after,
         created_before: query.created_before,
     };
     let limit = query.limit.unwrap_or(LIST_LIMIT_DEFAULT);
-    let page = jobs.runs(&filter, query.cursor.as_deref(), limit).await?;
+    let page = jobs
+        .batches(&filter, query.cursor.as_deref(), limit)
+        .await?;
+    let mut runs = Vec::with_capacity(page.entries.len());
+    for batch in page.entries {
+        match jobs.with_head(batch).await {
+            Ok(run) => runs.push(RunAnswer::from(run)),
+            // Deleted meanwhile, or about to be removed.
+            Err(JobsError::BatchNotFound(_) | JobsError::Expired) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
     let cursor = page.next_cursor.clone();
     let page = RunPage {
-        runs: page.entries.into_iter().map(RunAnswer::from).collect(),
+        runs,
         next_cursor: page.next_cursor,
         count: page.total.into(),
     };
@@ -217,7 +231,10 @@ pub(crate) async fn get(
     )
 )]
 pub(crate) async fn cancel(Caller(jobs): Caller, RunId(id): RunId) -> Result<Response, ApiError> {
-    let run: RunAnswer = jobs.cancel_run(id).await?.into();
+    let run: RunAnswer = jobs
+        .with_head(jobs.cancel_batch(Kind::Rows, id).await?)
+        .await?
+        .into();
     let status = match run.ended() {
         true => StatusCode::OK,
         false => StatusCode::ACCEPTED,
@@ -240,6 +257,6 @@ problems! {
     responses((status = 204, description = "The run is gone"), DeleteRunProblems)
 )]
 pub(crate) async fn delete(Caller(jobs): Caller, RunId(id): RunId) -> Result<StatusCode, ApiError> {
-    jobs.delete_run(id).await?;
+    jobs.delete_batch(Kind::Rows, id).await?;
     Ok(StatusCode::NO_CONTENT)
 }

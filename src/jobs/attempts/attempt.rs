@@ -28,6 +28,7 @@ use crate::jobs::attempts::outcome::Outcome;
 use crate::jobs::attempts::running::RunningEntry;
 use crate::jobs::attempts::slices::SlicedCase;
 use crate::jobs::attempts::solver_thread::SolverThread;
+use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::Claim;
 
 /// One claimed job.
@@ -70,7 +71,7 @@ pub(crate) enum TimeSpentOn {
 /// Claimed jobs with the thread that solves them one after the other.
 #[derive(Debug)]
 pub(crate) struct Attempt {
-    pub(crate) tenant: Arc<str>,
+    pub(crate) queue: Queue,
     pub(crate) members: Vec<Member>,
     pub(crate) lease: GroupLease,
     pub(crate) gate: Arc<Gate>,
@@ -252,6 +253,7 @@ mod tests {
     use super::*;
     use crate::jobs::attempts::lease::HeldLeases;
     use crate::jobs::attempts::running::RunningAttempts;
+    use crate::jobs::model::kind::Kind;
 
     fn attempt(jobs: u32) -> Attempt {
         let gate = Arc::new(Gate::default());
@@ -277,7 +279,10 @@ mod tests {
         };
         let heartbeat = tokio::spawn(std::future::pending::<()>()).abort_handle();
         Attempt {
-            tenant: "t".into(),
+            queue: Queue {
+                tenant: "t".into(),
+                kind: Kind::Case,
+            },
             members: (0..jobs).map(|_| member(claim())).collect(),
             lease: GroupLease::new(Arc::new(HeldLeases::new(Vec::new())), heartbeat),
             gate,

@@ -1,13 +1,13 @@
-//! Whose turn is it? Tenants share solver seconds; within a tenant long solves and the queue take turns.
+//! Which queue has the next turn. Tenants share solver seconds; within a queue, long solves and new jobs take turns.
 //!
 //! The seconds are kept in memory, by the process that spends them, and fade: what counts is the last minutes.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::jobs::attempts::attempt::{Attempt, TimeSpentOn};
-use crate::jobs::model::lane::{rows_lane, tenant_of};
+use crate::jobs::model::kind::{Kind, Queue};
 
 /// Time after which a solver second counts half.
 const HALF_LIFE: Duration = Duration::from_secs(60);
@@ -21,7 +21,7 @@ pub(crate) struct FairTurns(Mutex<Inner>);
 
 #[derive(Debug, Default)]
 struct Inner {
-    used: HashMap<Arc<str>, Used>,
+    used: HashMap<Queue, Used>,
     parked: Vec<Attempt>,
 }
 
@@ -30,7 +30,7 @@ struct Used {
     /// As of `at`.
     seconds: f64,
     at: Instant,
-    /// Seconds that new jobs of the tenant have had since one of its long solves had a turn.
+    /// Seconds that new jobs of the queue have had since one of its long solves had a turn.
     queue_since: f64,
     /// That was one that had waited at its gate.
     parked_was_last: bool,
@@ -54,11 +54,11 @@ pub(crate) enum LongSolve {
 }
 
 impl FairTurns {
-    /// Puts solver time on the account of a tenant.
-    pub(crate) fn charge(&self, tenant: &Arc<str>, time: Duration, spent: TimeSpentOn) {
+    /// Puts solver time on the account of a queue.
+    pub(crate) fn charge(&self, queue: &Queue, time: Duration, spent: TimeSpentOn) {
         let mut inner = self.lock();
         let now = Instant::now();
-        let used = inner.used.entry(tenant.clone()).or_insert(Used {
+        let used = inner.used.entry(queue.clone()).or_insert(Used {
             seconds: 0.0,
             at: now,
             queue_since: 0.0,
@@ -76,19 +76,24 @@ impl FairTurns {
         inner.used.retain(|_, used| used.at(now) > FORGOTTEN);
     }
 
-    /// Lanes in the order of their turns: the tenant that has used the least in both of its lanes comes first, and of these the lane that has.
-    pub(crate) fn order(&self, mut tenants: Vec<Arc<str>>) -> Vec<Arc<str>> {
+    /// Queues in the order of their turns: first those of the tenant that has used the least in all, and of these the one that has.
+    pub(crate) fn order(&self, mut queues: Vec<Queue>) -> Vec<Queue> {
         let inner = self.lock();
-        tenants.extend(inner.parked.iter().map(|attempt| attempt.tenant.clone()));
-        // All at one moment, so that both lanes of a tenant have the same sum.
+        queues.extend(inner.parked.iter().map(|attempt| attempt.queue.clone()));
+        // One present for all, so that both queues of a tenant have the same sum.
         let now = Instant::now();
-        let used = |lane: &str| inner.used.get(lane).map_or(0.0, |used| used.at(now));
-        let mut keyed: Vec<_> = tenants
+        let used = |queue: &Queue| inner.used.get(queue).map_or(0.0, |used| used.at(now));
+        let mut keyed: Vec<_> = queues
             .into_iter()
-            .map(|lane| {
-                let tenant = tenant_of(&lane);
-                let of_tenant = used(tenant) + used(&rows_lane(tenant));
-                ([of_tenant, used(&lane)], lane)
+            .map(|queue| {
+                let of_kind = |kind| {
+                    used(&Queue {
+                        tenant: queue.tenant.clone(),
+                        kind,
+                    })
+                };
+                let of_tenant = of_kind(Kind::Case) + of_kind(Kind::Rows);
+                ([of_tenant, used(&queue)], queue)
             })
             .collect();
         keyed.sort_by(|(a, first), (b, second)| {
@@ -96,22 +101,22 @@ impl FairTurns {
             used.then_with(|| first.cmp(second))
         });
         keyed.dedup_by(|a, b| a.1 == b.1);
-        keyed.into_iter().map(|(_, lane)| lane).collect()
+        keyed.into_iter().map(|(_, queue)| queue).collect()
     }
 
-    /// Has the queue of this tenant had its share beside the long solves, of a slice each?
-    pub(crate) fn queue_had_its_share(&self, tenant: &str, slice: Duration) -> bool {
+    /// Have new jobs of this queue had a slice of time since one of its long solves had a turn?
+    pub(crate) fn queue_had_its_share(&self, queue: &Queue, slice: Duration) -> bool {
         let inner = self.lock();
-        let used = inner.used.get(tenant);
+        let used = inner.used.get(queue);
         used.is_some_and(|used| used.queue_since >= slice.as_secs_f64())
     }
 
-    /// The kinds of long solves of this tenant in the order of their turns: they take turns too.
-    pub(crate) fn long_ones(&self, tenant: &str) -> [LongSolve; 2] {
+    /// The kinds of long solves of this queue in the order of their turns.
+    pub(crate) fn long_ones(&self, queue: &Queue) -> [LongSolve; 2] {
         let inner = self.lock();
         match inner
             .used
-            .get(tenant)
+            .get(queue)
             .is_some_and(|used| used.parked_was_last)
         {
             true => [LongSolve::Begun, LongSolve::Parked],
@@ -124,13 +129,13 @@ impl FairTurns {
         self.lock().parked.push(attempt);
     }
 
-    /// The attempt of a tenant that waits longest.
-    pub(crate) fn resume(&self, tenant: &str) -> Option<Attempt> {
+    /// The attempt of a queue that waits longest.
+    pub(crate) fn resume(&self, queue: &Queue) -> Option<Attempt> {
         let mut inner = self.lock();
         let place = inner
             .parked
             .iter()
-            .position(|attempt| *attempt.tenant == *tenant)?;
+            .position(|attempt| attempt.queue == *queue)?;
         Some(inner.parked.remove(place))
     }
 
@@ -162,47 +167,75 @@ impl FairTurns {
 mod tests {
     use super::*;
 
-    fn names(tenants: &[Arc<str>]) -> Vec<&str> {
-        tenants.iter().map(AsRef::as_ref).collect()
+    fn queue(tenant: &str, kind: Kind) -> Queue {
+        Queue {
+            tenant: tenant.into(),
+            kind,
+        }
+    }
+
+    fn names(queues: &[Queue]) -> Vec<String> {
+        let name = |queue: &Queue| format!("{} {}", queue.tenant, queue.kind.name());
+        queues.iter().map(name).collect()
     }
 
     #[test]
     fn whoever_has_used_the_least_seconds_comes_first() {
         let turns = FairTurns::default();
-        let tenants: Vec<Arc<str>> = ["a", "b", "c"].map(Arc::from).to_vec();
-        assert_eq!(names(&turns.order(tenants.clone())), ["a", "b", "c"]);
+        let tenants = ["a", "b", "c"]
+            .map(|tenant| queue(tenant, Kind::Case))
+            .to_vec();
+        assert_eq!(
+            names(&turns.order(tenants.clone())),
+            ["a case", "b case", "c case"]
+        );
         turns.charge(&tenants[0], Duration::from_secs(100), TimeSpentOn::New);
         turns.charge(&tenants[1], Duration::from_secs(1), TimeSpentOn::New);
-        assert_eq!(names(&turns.order(tenants.clone())), ["c", "b", "a"]);
+        assert_eq!(
+            names(&turns.order(tenants.clone())),
+            ["c case", "b case", "a case"]
+        );
         // Many short jobs weigh what they take, not how many they are.
         for _ in 0..1000 {
             turns.charge(&tenants[2], Duration::from_micros(10), TimeSpentOn::New);
         }
-        assert_eq!(names(&turns.order(tenants)), ["c", "b", "a"]);
+        assert_eq!(names(&turns.order(tenants)), ["c case", "b case", "a case"]);
     }
 
     #[test]
     fn jobs_and_rows_of_a_tenant_share_its_turn() {
         let turns = FairTurns::default();
-        let lanes: Vec<Arc<str>> = ["a", "a/rows", "b"].map(Arc::from).to_vec();
-        turns.charge(&lanes[1], Duration::from_secs(10), TimeSpentOn::New);
-        assert_eq!(names(&turns.order(lanes.clone())), ["b", "a", "a/rows"]);
-        turns.charge(&lanes[2], Duration::from_secs(20), TimeSpentOn::New);
-        assert_eq!(names(&turns.order(lanes)), ["a", "a/rows", "b"]);
+        let queues = vec![
+            queue("a", Kind::Case),
+            queue("a", Kind::Rows),
+            queue("b", Kind::Case),
+        ];
+        turns.charge(&queues[1], Duration::from_secs(10), TimeSpentOn::New);
+        let order = turns.order(queues.clone());
+        assert_eq!(names(&order), ["b case", "a case", "a rows"]);
+        turns.charge(&queues[2], Duration::from_secs(20), TimeSpentOn::New);
+        let order = turns.order(queues);
+        assert_eq!(names(&order), ["a case", "a rows", "b case"]);
     }
 
     #[test]
     fn queue_and_long_solves_of_a_tenant_take_turns() {
         let turns = FairTurns::default();
-        let (tenant, slice): (Arc<str>, _) = ("a".into(), Duration::from_secs(2));
-        assert!(!turns.queue_had_its_share("a", slice));
-        turns.charge(&tenant, slice, TimeSpentOn::New);
-        assert!(turns.queue_had_its_share("a", slice));
-        turns.charge(&tenant, slice, TimeSpentOn::Parked);
-        assert!(!turns.queue_had_its_share("a", slice));
+        let (queue, slice) = (queue("a", Kind::Case), Duration::from_secs(2));
+        assert!(!turns.queue_had_its_share(&queue, slice));
+        turns.charge(&queue, slice, TimeSpentOn::New);
+        assert!(turns.queue_had_its_share(&queue, slice));
+        turns.charge(&queue, slice, TimeSpentOn::Parked);
+        assert!(!turns.queue_had_its_share(&queue, slice));
         // So do those at a gate and those in the queue.
-        assert_eq!(turns.long_ones("a"), [LongSolve::Begun, LongSolve::Parked]);
-        turns.charge(&tenant, slice, TimeSpentOn::Begun);
-        assert_eq!(turns.long_ones("a"), [LongSolve::Parked, LongSolve::Begun]);
+        assert_eq!(
+            turns.long_ones(&queue),
+            [LongSolve::Begun, LongSolve::Parked]
+        );
+        turns.charge(&queue, slice, TimeSpentOn::Begun);
+        assert_eq!(
+            turns.long_ones(&queue),
+            [LongSolve::Parked, LongSolve::Begun]
+        );
     }
 }

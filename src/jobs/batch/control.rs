@@ -1,12 +1,14 @@
-//! Batches as a whole: read, cancelled, deleted.
+//! Batches and runs as a whole: read, listed, cancelled, deleted.
 
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
-use crate::jobs::handle::Jobs;
+use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs};
 use crate::jobs::model::batch::Batch;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::store::cluster::Bell;
+use crate::jobs::store::list::{BatchFilter, Page};
 
 /// Jobs removed in one transaction.
 pub(crate) const DELETED_AT_ONCE: u32 = 500;
@@ -15,26 +17,60 @@ pub(crate) const DELETED_AT_ONCE: u32 = 500;
 const CANCELLED_AT_ONCE: u32 = 2000;
 
 impl Jobs {
-    /// A batch with its counts.
+    /// A batch or a run with the counts of its jobs.
     ///
     /// # Errors
-    /// [`JobsError::BatchNotFound`], or a failed database.
-    pub async fn batch(&self, id: Uuid) -> Result<Batch, JobsError> {
-        let batch = self.shared.store.batch(&self.tenant, id).await?;
+    /// [`JobsError::BatchNotFound`], [`JobsError::Expired`], or a failed database.
+    pub async fn batch(&self, kind: Kind, id: Uuid) -> Result<Batch, JobsError> {
+        let batch = self.shared.store.batch(&self.tenant, kind, id).await?;
+        self.visible(kind, id, batch).await
+    }
+
+    /// A batch that was read, if this handle may see it.
+    pub(crate) async fn visible(
+        &self,
+        kind: Kind,
+        id: Uuid,
+        batch: Option<Batch>,
+    ) -> Result<Batch, JobsError> {
         match batch {
-            Some(batch) if !self.sees(&batch.labels) => Err(JobsError::BatchNotFound),
-            Some(batch) => Ok(batch),
-            None => Err(self.missing(id, JobsError::BatchNotFound).await),
+            Some(batch) if batch.kind == kind && self.sees(&batch.labels) => Ok(batch),
+            Some(_) => Err(JobsError::BatchNotFound(kind)),
+            None => Err(self.missing(id, JobsError::BatchNotFound(kind)).await),
         }
     }
 
-    /// Cancels every job of a batch that has not ended: queued ones end at once, running ones at the next tick of
+    /// One page of the batches or of the runs, newest first; `limit` is brought into 1 to [`BATCH_PAGE_MAX`].
+    ///
+    /// # Errors
+    /// [`JobsError::BadCursor`], or a failed database.
+    pub async fn batches(
+        &self,
+        filter: &BatchFilter,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page<Batch>, JobsError> {
+        // The store makes cursors for the filter that it is asked, so the labels of the key come first.
+        let filter = &BatchFilter {
+            labels: self.narrowed(&filter.labels),
+            ..filter.clone()
+        };
+        let after = match cursor {
+            Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
+            None => None,
+        };
+        let limit = limit.clamp(1, BATCH_PAGE_MAX);
+        let store = &self.shared.store;
+        Ok(store.batches(&self.tenant, filter, after, limit).await?)
+    }
+
+    /// Cancels every job of a batch or run that has not ended: queued ones end at once, running ones at the next tick of
     /// their solvers. Returns the batch as it then is.
     ///
     /// # Errors
     /// [`JobsError::BatchNotFound`], or a failed database.
-    pub async fn cancel_batch(&self, id: Uuid) -> Result<Batch, JobsError> {
-        self.batch(id).await?;
+    pub async fn cancel_batch(&self, kind: Kind, id: Uuid) -> Result<Batch, JobsError> {
+        self.batch(kind, id).await?;
         loop {
             let now = self.shared.now_ms();
             let store = &self.shared.store;
@@ -55,18 +91,18 @@ impl Jobs {
                 break;
             }
         }
-        self.batch(id).await
+        self.batch(kind, id).await
     }
 
-    /// Removes a batch of which every job has ended, with its jobs, their cases and their results. The jobs go in portions, so that
+    /// Removes a batch or run of which every job has ended, with its jobs, their cases and their results. The jobs go in portions, so that
     /// other writers are not held up; if the process dies meanwhile, the rest is still there and can be removed again.
     ///
     /// # Errors
     /// [`JobsError::BatchNotEnded`], [`JobsError::BatchNotFound`], or a failed database.
-    pub async fn delete_batch(&self, id: Uuid) -> Result<(), JobsError> {
-        let (ended, all) = self.batch(id).await?.ended();
+    pub async fn delete_batch(&self, kind: Kind, id: Uuid) -> Result<(), JobsError> {
+        let (ended, all) = self.batch(kind, id).await?.ended();
         if ended < all {
-            return Err(JobsError::BatchNotEnded(all - ended));
+            return Err(JobsError::BatchNotEnded(kind, all - ended));
         }
         let store = &self.shared.store;
         while !store

@@ -12,6 +12,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::created_at;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob};
 
@@ -54,7 +55,7 @@ impl Jobs {
         idempotency_key: Option<String>,
         traceparent: Option<Arc<str>>,
     ) -> Result<(Batch, bool), JobsError> {
-        let id = draft.id;
+        let (kind, id) = (draft.kind, draft.id);
         let new = draft.as_new(idempotency_key);
         let filled_here = |id| self.shared.unfinished_batches().living.contains(&id);
         let mut pause = FILLING_PAUSE.0;
@@ -75,7 +76,7 @@ impl Jobs {
             };
             match begun {
                 BatchBegun::Created => break,
-                BatchBegun::Existing(id) => return Ok((self.batch(id).await?, true)),
+                BatchBegun::Existing(id) => return Ok((self.batch(new.kind, id).await?, true)),
                 BatchBegun::Conflict => return Err(JobsError::IdempotencyConflict),
                 BatchBegun::Refused(refusal) => {
                     self.give_up(draft).await;
@@ -104,7 +105,7 @@ impl Jobs {
             .await
             .map_err(|error| JobsError::Damaged(error.to_string()))?;
         self.observe_write(filled)?;
-        Ok((self.batch(id).await?, false))
+        Ok((self.batch(kind, id).await?, false))
     }
 
     async fn fill(
@@ -142,7 +143,10 @@ impl Jobs {
                     let traceparent = traceparent.clone();
                     (
                         staged.index,
-                        self.staged_job(staged, case, options, traceparent),
+                        NewJob {
+                            kind: new.kind.of_job(),
+                            ..self.staged_job(staged, case, options, traceparent)
+                        },
                     )
                 })
                 .collect();
@@ -178,6 +182,7 @@ impl Jobs {
         NewJob {
             id,
             tenant: self.tenant.clone(),
+            kind: Kind::Case,
             created_at: created_at(id),
             name: staged.name,
             labels: staged.labels,

@@ -88,6 +88,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::jobs::model::kind::Kind;
 
     #[test]
     fn a_stored_row_is_the_case_that_was_checked() {
@@ -99,6 +100,7 @@ mod tests {
         ];
         let checked = fill(&template, &row).unwrap();
         let stored = StoredCase {
+            kind: Kind::Case,
             template: Some(template.to_string().into()),
             head: None,
             body: serde_json::to_vec(&row).unwrap().into(),

@@ -17,6 +17,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
 use crate::jobs::model::job::created_at;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::{CaseOptions, SubmitOptions};
 use crate::jobs::profiles::KnownSections;
 use crate::jobs::store::submission::NewBatch;
@@ -64,6 +65,7 @@ pub struct BatchRow {
 #[derive(Debug)]
 pub struct BatchUpload {
     jobs: Jobs,
+    pub(crate) kind: Kind,
     pub(crate) id: Uuid,
     pub(crate) staging: Option<Staging>,
     pub(crate) template: Option<Bytes>,
@@ -402,6 +404,7 @@ impl BatchUpload {
         NewBatch {
             id: self.id,
             tenant: self.jobs.tenant.clone(),
+            kind: self.kind,
             created_at: created_at(self.id),
             count: self.cases - self.rejected,
             rejected: self.rejected,
@@ -448,11 +451,11 @@ impl Drop for BatchUpload {
 }
 
 impl Jobs {
-    /// An empty batch.
+    /// An empty batch, or an empty run for [`Kind::Rows`].
     ///
     /// # Errors
     /// [`JobsError::Draining`], or the data folder cannot be written.
-    pub fn draft(&self) -> Result<BatchUpload, JobsError> {
+    pub fn draft(&self, kind: Kind) -> Result<BatchUpload, JobsError> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
@@ -462,6 +465,7 @@ impl Jobs {
         self.shared.unfinished_batches().living.insert(id);
         Ok(BatchUpload {
             jobs: self.clone(),
+            kind,
             id,
             staging: Some(staging),
             template: None,

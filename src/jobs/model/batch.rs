@@ -1,4 +1,4 @@
-//! A batch and its jobs as clients read them.
+//! Batches and runs, and their jobs, as clients read them.
 
 use std::collections::BTreeMap;
 
@@ -6,6 +6,7 @@ use bytes::Bytes;
 use uuid::Uuid;
 
 use crate::jobs::model::job::{Job, State};
+use crate::jobs::model::kind::Kind;
 
 /// What is known of one batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,6 +15,8 @@ pub struct Batch {
     pub id: Uuid,
     /// Whose it is.
     pub tenant: String,
+    /// [`Kind::Cases`], or [`Kind::Rows`]: a run, whose jobs are its chunks.
+    pub kind: Kind,
     /// Time of submission, epoch milliseconds.
     pub created_at: i64,
     /// Number of jobs it was made of.

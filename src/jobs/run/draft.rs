@@ -19,6 +19,7 @@ use crate::jobs::codec::table::COLUMNS_MAX;
 use crate::jobs::disk_reserve::nameless;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::profiles::{KnownSections, unknown};
 use crate::jobs::run::chunk::RunChunk;
@@ -96,12 +97,11 @@ impl Jobs {
         }
         let mut profiles = KnownSections::new();
         let template = self.with_profiles_here(template, &mut profiles)?;
-        let lane = self.in_rows_lane();
         Ok(RunDraft {
             profiles: KnownSections::new(),
             profile_bytes: 0,
-            upload: lane.draft()?,
-            jobs: lane,
+            upload: self.draft(Kind::Rows)?,
+            jobs: self.clone(),
             held: columns.iter().map(|column| empty(column.text)).collect(),
             template,
             columns,
@@ -147,9 +147,8 @@ impl Jobs {
             bypass_cache: true,
             ..options.submit
         };
-        let lane = self.in_rows_lane();
-        let (batch, replayed) = lane.submit_batch(upload, options.idempotency_key).await?;
-        Ok((self.run(batch.id).await?, replayed))
+        let (batch, replayed) = self.submit_batch(upload, options.idempotency_key).await?;
+        Ok((self.with_head(batch).await?, replayed))
     }
 }
 

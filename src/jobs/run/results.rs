@@ -12,7 +12,6 @@ use crate::jobs::handle::Jobs;
 use crate::jobs::model::batch::ItemResult;
 use crate::jobs::model::job::State;
 use crate::jobs::run::chunk::{RunChunk, parted};
-use crate::jobs::run::control::of_run;
 use crate::jobs::run::head::{RunHead, table_column};
 use crate::jobs::run::model::Run;
 
@@ -44,10 +43,9 @@ impl Jobs {
         run: Uuid,
         after: Option<Uuid>,
     ) -> Result<Vec<ChunkRef>, JobsError> {
-        let lane = self.in_rows_lane();
         let store = &self.shared.store;
-        let items = store.batch_items(&lane.tenant, run, after, AT_ONCE, usize::MAX);
-        let items = items.await.map_err(|error| of_run(error.into()))?;
+        let items = store.batch_items(&self.tenant, run, after, AT_ONCE, usize::MAX);
+        let items = items.await?;
         let chunks = items.into_iter().map(|item| ChunkRef {
             index: u64::from(item.index),
             job: item.job.id,
@@ -156,8 +154,7 @@ impl Jobs {
     /// # Errors
     /// A failed database, or the run has gone.
     pub async fn chunk_rows(&self, head: &RunHead, job: Uuid) -> Result<RunChunk, JobsError> {
-        let lane = self.in_rows_lane();
-        let case = self.shared.store.case(&lane.tenant, job).await?;
+        let case = self.shared.store.case(&self.tenant, job).await?;
         RunChunk::read(&case.ok_or(JobsError::Expired)?.body, &head.columns)
     }
 }

@@ -2,6 +2,7 @@
 
 use uuid::Uuid;
 
+use crate::jobs::model::kind::Queue;
 use crate::jobs::store::submission::CacheKey;
 
 /// The right to work on a job, until the lease runs out.
@@ -49,9 +50,9 @@ pub enum ClaimKind {
 pub struct ClaimRequest<'a> {
     /// Name of the worker.
     pub worker: &'a str,
-    /// Whose turn it is.
-    pub tenant: &'a str,
-    /// Which of the tenant's jobs.
+    /// The queue whose turn it is.
+    pub queue: &'a Queue,
+    /// Which of its jobs.
     pub kind: ClaimKind,
     /// Most jobs.
     pub jobs: usize,

@@ -3,6 +3,7 @@
 use uuid::Uuid;
 
 use crate::jobs::model::job::State;
+use crate::jobs::model::kind::Kind;
 
 /// Which jobs to list; everything left out does not restrict.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -23,9 +24,11 @@ pub struct Filter {
     pub updated_after: Option<i64>,
 }
 
-/// Which batches to list; everything left out does not restrict.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+/// Which batches or runs to list; everything left out does not restrict.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BatchFilter {
+    /// [`Kind::Cases`] or [`Kind::Rows`].
+    pub kind: Kind,
     /// Only batches that carry each of these labels with its value.
     pub labels: Vec<(String, String)>,
     /// Only batches whose name contains this text; ASCII letters match in either case.
@@ -64,6 +67,8 @@ pub struct Change {
     pub id: Uuid,
     /// Its batch.
     pub batch: Option<Uuid>,
+    /// [`Kind::Case`], or [`Kind::Rows`] for a chunk of a run.
+    pub kind: Kind,
     /// When, epoch milliseconds.
     pub at: i64,
 }
@@ -114,6 +119,18 @@ impl Filter {
 }
 
 impl BatchFilter {
+    /// All batches or all runs.
+    #[must_use]
+    pub fn all(kind: Kind) -> BatchFilter {
+        BatchFilter {
+            kind,
+            labels: Vec::new(),
+            name: None,
+            created_after: None,
+            created_before: None,
+        }
+    }
+
     /// The cursor that continues this list after the batch `last`.
     #[must_use]
     pub fn cursor_after(&self, last: Uuid) -> String {
@@ -128,7 +145,7 @@ impl BatchFilter {
 
     fn change_tag(&self) -> String {
         let mut parts = vec![
-            Some("batches".to_owned()),
+            Some(self.kind.name().to_owned()),
             self.created_after.map(|time| time.to_string()),
             self.created_before.map(|time| time.to_string()),
             self.name.clone(),

@@ -30,7 +30,6 @@ pub mod submission;
 
 use std::collections::{HashMap, HashSet};
 use std::fmt::Debug;
-use std::sync::Arc;
 
 use async_trait::async_trait;
 use uuid::Uuid;
@@ -38,6 +37,7 @@ use uuid::Uuid;
 use crate::jobs::model::batch::{Batch, BatchItem, RunRecord};
 use crate::jobs::model::job::{Failure, Job, State};
 use crate::jobs::model::key::Key;
+use crate::jobs::model::kind::{Kind, Queue};
 use crate::jobs::store::claim::{
     Claim, ClaimRequest, Lease, QueueAhead, Reap, ReleaseReason, Renewal,
 };
@@ -166,8 +166,8 @@ pub trait Store: KeyStore + Send + Sync + Debug {
         limit: u32,
     ) -> Result<Vec<Change>, StoreError>;
 
-    /// An acknowledged batch with its counts.
-    async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError>;
+    /// An acknowledged batch or run with its counts.
+    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError>;
 
     /// The template of an acknowledged batch that is a run, and how far its chunks are.
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError>;
@@ -260,10 +260,10 @@ pub trait Store: KeyStore + Send + Sync + Debug {
 
     // Workers.
 
-    /// Tenants that have queued jobs.
-    async fn queued_tenants(&self) -> Result<Vec<Arc<str>>, StoreError>;
+    /// Queues with jobs in them.
+    async fn queues(&self) -> Result<Vec<Queue>, StoreError>;
 
-    /// Claims the first queued job of a tenant, by priority and then by age, together with those behind it that are small
+    /// Claims the first job of a queue, by priority and then by age, together with those behind it that are small
     /// enough, in their order. A suspect comes alone, and no job of a batch that is not acknowledged.
     async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError>;
 

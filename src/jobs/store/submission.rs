@@ -7,6 +7,7 @@ use bytes::Bytes;
 use uuid::Uuid;
 
 use crate::jobs::model::job::Job;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::SubmitOptions;
 
 /// Equal for cases of one tenant that have the same answer.
@@ -19,6 +20,8 @@ pub struct NewJob {
     pub id: Uuid,
     /// Whose it is.
     pub tenant: Arc<str>,
+    /// [`Kind::Case`], or [`Kind::Rows`] for a chunk of a run.
+    pub kind: Kind,
     /// Time of submission.
     pub created_at: i64,
     /// Free text of the client.
@@ -96,6 +99,8 @@ pub struct NewBatch {
     pub id: Uuid,
     /// Whose it is.
     pub tenant: Arc<str>,
+    /// [`Kind::Cases`] or [`Kind::Rows`].
+    pub kind: Kind,
     /// Time of submission.
     pub created_at: i64,
     /// Number of jobs it will have.
@@ -151,6 +156,8 @@ pub enum Enqueued {
 /// A case as it is stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredCase {
+    /// [`Kind::Case`], or [`Kind::Rows`] for a chunk of a run.
+    pub kind: Kind,
     /// The case that the body fills; none if the body is the case.
     pub template: Option<Bytes>,
     /// Of a chunk of a run: the run's own part of what its chunks share.

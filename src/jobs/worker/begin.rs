@@ -13,6 +13,7 @@ use crate::jobs::attempts::outcome::{Outcome, Work};
 use crate::jobs::attempts::solver_thread::{SolverThread, Task};
 use crate::jobs::job_trace::JobTrace;
 use crate::jobs::model::job::{Failure, FailureKind};
+use crate::jobs::model::kind::Queue;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::claim::Claim;
 use crate::jobs::worker::heartbeat;
@@ -22,7 +23,7 @@ use crate::jobs::worker::solve::solve_guarded;
 const GROUP_TIME: Duration = Duration::from_millis(400);
 
 /// Lists claimed jobs as running and keeps their leases from now on.
-pub(crate) fn take_up(shared: &Arc<Shared>, tenant: Arc<str>, claims: Vec<Claim>) -> Attempt {
+pub(crate) fn take_up(shared: &Arc<Shared>, queue: Queue, claims: Vec<Claim>) -> Attempt {
     let gate = Arc::new(Gate::default());
     let suspect = claims.iter().any(|claim| claim.suspect);
     let on = match claims.iter().any(|claim| claim.slices > 0) {
@@ -46,7 +47,7 @@ pub(crate) fn take_up(shared: &Arc<Shared>, tenant: Arc<str>, claims: Vec<Claim>
         .iter()
         .map(|one| (one.claim.clone(), one.control.clone()));
     Attempt {
-        tenant,
+        queue,
         lease: heartbeat::start(shared, held.collect()),
         members,
         gate,

@@ -1,10 +1,9 @@
 //! What a worker does next: a new claim, or a solve that waits for its next turn.
 
-use std::sync::Arc;
-
 use crate::jobs::attempts::attempt::Attempt;
 use crate::jobs::attempts::fair_turns::LongSolve;
 use crate::jobs::error::JobsError;
+use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::{Claim, ClaimKind, ClaimRequest};
 use crate::jobs::worker::begin;
 use crate::jobs::worker::pool::Worker;
@@ -23,38 +22,38 @@ impl Worker {
         if shared.draining.is_cancelled() {
             return Ok(turns.resume_any());
         }
-        let tenants = shared.store.queued_tenants().await?;
+        let queues = shared.store.queues().await?;
         let slice = shared.options.slice;
-        for tenant in turns.order(tenants) {
-            let long_first = turns.queue_had_its_share(&tenant, slice);
-            if long_first && let Some(attempt) = self.next_long(&tenant).await? {
+        for queue in turns.order(queues) {
+            let long_first = turns.queue_had_its_share(&queue, slice);
+            if long_first && let Some(attempt) = self.next_long(&queue).await? {
                 return Ok(Some(attempt));
             }
-            let claims = self.claim(&tenant, ClaimKind::New).await?;
+            let claims = self.claim(&queue, ClaimKind::New).await?;
             if !claims.is_empty() {
-                return Ok(Some(begin::take_up(shared, tenant, claims)));
+                return Ok(Some(begin::take_up(shared, queue, claims)));
             }
-            if let Some(attempt) = self.next_long(&tenant).await? {
+            if let Some(attempt) = self.next_long(&queue).await? {
                 return Ok(Some(attempt));
             }
         }
         Ok(None)
     }
 
-    /// A solve of a tenant that waits for its next turn, at its gate or in the queue.
-    async fn next_long(&self, tenant: &Arc<str>) -> Result<Option<Attempt>, JobsError> {
+    /// A solve of a queue that waits for its next turn, at its gate or in the queue.
+    async fn next_long(&self, queue: &Queue) -> Result<Option<Attempt>, JobsError> {
         let shared = &self.shared;
-        for long in shared.turns.long_ones(tenant) {
+        for long in shared.turns.long_ones(queue) {
             match long {
                 LongSolve::Parked => {
-                    if let Some(attempt) = shared.turns.resume(tenant) {
+                    if let Some(attempt) = shared.turns.resume(queue) {
                         return Ok(Some(attempt));
                     }
                 }
                 LongSolve::Begun => {
-                    let claims = self.claim(tenant, ClaimKind::Begun).await?;
+                    let claims = self.claim(queue, ClaimKind::Begun).await?;
                     if !claims.is_empty() {
-                        return Ok(Some(begin::take_up(shared, tenant.clone(), claims)));
+                        return Ok(Some(begin::take_up(shared, queue.clone(), claims)));
                     }
                 }
             }
@@ -62,14 +61,14 @@ impl Worker {
         Ok(None)
     }
 
-    async fn claim(&self, tenant: &str, kind: ClaimKind) -> Result<Vec<Claim>, JobsError> {
+    async fn claim(&self, queue: &Queue, kind: ClaimKind) -> Result<Vec<Claim>, JobsError> {
         let shared = &self.shared;
         let options = &shared.options;
         let full = shared.turns.parked().0 >= options.parked_max;
         let slice_us = u64::try_from(options.slice.as_micros()).unwrap_or(u64::MAX);
         let request = ClaimRequest {
             worker: &self.name,
-            tenant,
+            queue,
             kind,
             jobs: options.group_max.max(1),
             cost_us: GROUP_COST_US,

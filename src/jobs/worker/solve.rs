@@ -17,7 +17,7 @@ use crate::jobs::codec::encode::encode;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::job::{Failure, FailureKind};
-use crate::jobs::run::chunk::RunChunk;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
@@ -49,7 +49,7 @@ fn check_and_solve(
     stored: &StoredCase,
     notes: &[SliceRecord],
 ) -> Outcome {
-    if RunChunk::is_one(&stored.body) {
+    if stored.kind == Kind::Rows {
         return rows::solve_chunk(shared, control, stored);
     }
     let case = match stored.value() {

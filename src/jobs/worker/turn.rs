@@ -180,7 +180,7 @@ impl Worker {
                 }
                 () = lost.cancelled(), if told.is_none() => told = Some(Instant::now()),
                 _ = check.tick() => {
-                    shared.turns.charge(&attempt.tenant, charged.elapsed(), spent);
+                    shared.turns.charge(&attempt.queue, charged.elapsed(), spent);
                     charged = Instant::now();
                     unwanted = attempt.unwanted().map(|member| {
                         let same = unwanted.filter(|(before, _)| *before == member);
@@ -201,7 +201,7 @@ impl Worker {
         };
         shared
             .turns
-            .charge(&attempt.tenant, charged.elapsed(), spent);
+            .charge(&attempt.queue, charged.elapsed(), spent);
         attempt.spent += start.elapsed();
         turn
     }
@@ -241,9 +241,9 @@ impl Worker {
         shared.turns.parked().0 > 0
             || shared
                 .store
-                .queued_tenants()
+                .queues()
                 .await
-                .is_ok_and(|tenants| !tenants.is_empty())
+                .is_ok_and(|queues| !queues.is_empty())
     }
 
     /// Leaves a thread behind whose solver does not stop. Nothing but the end of the process ends such threads, so that too many of

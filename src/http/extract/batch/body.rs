@@ -19,6 +19,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::Jobs;
 use crate::jobs::batch::upload::BatchUpload;
+use crate::jobs::model::kind::Kind;
 
 /// Cases are checked in portions of about this many bytes.
 const PORTION_BYTES: usize = 256 << 10;
@@ -99,7 +100,7 @@ pub async fn read_draft(
         "one batch",
         request,
     )?;
-    let mut draft = jobs.draft()?;
+    let mut draft = jobs.draft(Kind::Cases)?;
     if let Form::Table(_, template) = &mut form {
         draft.set_row_template(template.take());
     }

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use sqlx::Row;
 use sqlx::postgres::{PgConnection, PgRow};
 
+use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::ClaimRequest;
 use crate::jobs::store::postgres::sql::claim::{PEEK, count_waiting, first_queued};
 use crate::jobs::store::postgres::sql::rows::count;
@@ -25,8 +26,8 @@ const PLACE_KEPT: Duration = Duration::from_secs(2);
 /// How long the length of a queue is remembered, less what was claimed since.
 const LENGTH_KEPT: Duration = Duration::from_secs(1);
 
-/// How long the tenants with queued jobs are remembered while a queue is long.
-const TENANTS_KEPT: Duration = Duration::from_millis(250);
+/// How long the queues with jobs in them are remembered while one is long.
+const QUEUES_KEPT: Duration = Duration::from_millis(250);
 
 /// Ranks of priority, the most urgent first.
 const RANKS: usize = 3;
@@ -35,7 +36,7 @@ macro_rules! peek_of {
     ($rank:literal, $after:literal) => {
         concat!(
             "SELECT * FROM (SELECT id, suspect, cost_us, rank FROM jobs \
-             WHERE state = 'queued' AND tenant = $1 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND slices = 0 \
+             WHERE state = 'queued' AND tenant = $1 AND kind = $8 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND slices = 0 \
              AND (batch_id IS NULL OR batch_id NOT IN (SELECT id FROM batches WHERE complete = 0 AND tenant = $1)) \
              AND rank = ",
             $rank,
@@ -58,9 +59,9 @@ const PEEK_FROM: &str = concat!(
     ") AS queued LIMIT $2"
 );
 
-/// What is known of the queue of a tenant.
+/// What is known of a queue.
 #[derive(Debug, Clone)]
-struct Queue {
+struct KnownQueue {
     waiting: i64,
     counted: Instant,
     /// Where the last claim began, in each rank; empty: at its start.
@@ -70,8 +71,8 @@ struct Queue {
 
 #[derive(Debug, Default)]
 struct Known {
-    queues: HashMap<String, Queue>,
-    tenants: Option<(Instant, Vec<Arc<str>>)>,
+    queues: HashMap<Queue, KnownQueue>,
+    all: Option<(Instant, Vec<Queue>)>,
 }
 
 /// What a process remembers; clones share it.
@@ -90,42 +91,42 @@ impl ClaimMemory {
         }
     }
 
-    /// The number of queued jobs of a tenant, exact for a short queue.
+    /// The number of jobs in a queue, exact for a short one.
     pub(crate) async fn waiting(
         &self,
         connection: &mut PgConnection,
-        tenant: &str,
+        queue: &Queue,
     ) -> Result<i64, StoreError> {
-        if let Some(queue) = self.known().queues.get(tenant)
-            && queue.waiting >= LONG
-            && queue.counted.elapsed() < LENGTH_KEPT
+        if let Some(known) = self.known().queues.get(queue)
+            && known.waiting >= LONG
+            && known.counted.elapsed() < LENGTH_KEPT
         {
-            return Ok(queue.waiting);
+            return Ok(known.waiting);
         }
-        let waiting = count_waiting(connection, tenant).await?;
+        let waiting = count_waiting(connection, queue).await?;
         let mut known = self.known();
-        match known.queues.get_mut(tenant) {
-            Some(queue) => {
-                (queue.waiting, queue.counted) = (waiting, Instant::now());
+        match known.queues.get_mut(queue) {
+            Some(known) => {
+                (known.waiting, known.counted) = (waiting, Instant::now());
             }
             None if waiting >= LONG => {
-                let queue = Queue {
+                let long = KnownQueue {
                     waiting,
                     counted: Instant::now(),
                     places: Default::default(),
                     placed: None,
                 };
-                known.queues.insert(tenant.to_owned(), queue);
+                known.queues.insert(queue.clone(), long);
             }
             None => {}
         }
         if waiting < LONG {
-            known.queues.remove(tenant);
+            known.queues.remove(queue);
         }
         Ok(waiting)
     }
 
-    /// The first queued jobs of a tenant, locked, at most so many.
+    /// The first jobs of a queue, locked, at most `most`.
     pub(crate) async fn peek(
         &self,
         connection: &mut PgConnection,
@@ -134,23 +135,25 @@ impl ClaimMemory {
     ) -> Result<Vec<PgRow>, StoreError> {
         let places = {
             let known = self.known();
-            let queue = known.queues.get(request.tenant);
-            let kept = |queue: &&Queue| queue.placed.is_some_and(|at| at.elapsed() < PLACE_KEPT);
+            let queue = known.queues.get(request.queue);
+            let kept =
+                |queue: &&KnownQueue| queue.placed.is_some_and(|at| at.elapsed() < PLACE_KEPT);
             queue.filter(kept).map(|queue| queue.places.clone())
         };
         if let Some([high, normal, low]) = places {
             let found = sqlx::query(PEEK_FROM)
-                .bind(request.tenant)
+                .bind(&*request.queue.tenant)
                 .bind(most)
                 .bind(request.late_before)
                 .bind(request.each_slice_us.map_or(i64::MAX, count))
                 .bind(high)
                 .bind(normal)
                 .bind(low)
+                .bind(request.queue.kind.name())
                 .fetch_all(&mut *connection)
                 .await?;
             if i64::try_from(found.len()).unwrap_or(i64::MAX) == most {
-                self.remember(request.tenant, &found, false)?;
+                self.remember(request.queue, &found, false)?;
                 return Ok(found);
             }
             self.forget_places();
@@ -160,15 +163,15 @@ impl ClaimMemory {
         }
         let found = first_queued(connection, PEEK, request, most).await?;
         if i64::try_from(found.len()).unwrap_or(i64::MAX) == most {
-            self.remember(request.tenant, &found, true)?;
+            self.remember(request.queue, &found, true)?;
         }
         Ok(found)
     }
 
     /// Remembers where a full group began.
-    fn remember(&self, tenant: &str, found: &[PgRow], anew: bool) -> Result<(), StoreError> {
+    fn remember(&self, queue: &Queue, found: &[PgRow], anew: bool) -> Result<(), StoreError> {
         let mut known = self.known();
-        let Some(queue) = known.queues.get_mut(tenant) else {
+        let Some(queue) = known.queues.get_mut(queue) else {
             return Ok(());
         };
         if anew {
@@ -189,15 +192,15 @@ impl ClaimMemory {
         Ok(())
     }
 
-    /// The tenants with queued jobs as they were a moment ago, if a queue is long.
-    pub(crate) fn tenants(&self) -> Option<Vec<Arc<str>>> {
+    /// The queues with jobs in them as they were a moment ago, if one is long.
+    pub(crate) fn queues(&self) -> Option<Vec<Queue>> {
         let known = self.known();
-        let (at, tenants) = known.tenants.as_ref()?;
-        (!known.queues.is_empty() && at.elapsed() < TENANTS_KEPT).then(|| tenants.clone())
+        let (at, queues) = known.all.as_ref()?;
+        (!known.queues.is_empty() && at.elapsed() < QUEUES_KEPT).then(|| queues.clone())
     }
 
-    /// Remembers the tenants with queued jobs.
-    pub(crate) fn remember_tenants(&self, tenants: &[Arc<str>]) {
-        self.known().tenants = Some((Instant::now(), tenants.to_vec()));
+    /// Remembers the queues with jobs in them.
+    pub(crate) fn remember_queues(&self, queues: &[Queue]) {
+        self.known().all = Some((Instant::now(), queues.to_vec()));
     }
 }

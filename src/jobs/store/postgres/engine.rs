@@ -1,11 +1,10 @@
 //! PostgreSQL as the shared statements see it.
 
-use std::sync::Arc;
-
 use sqlx::Transaction;
 use sqlx::postgres::{PgConnection, PgPool, PgRow, Postgres};
 use uuid::Uuid;
 
+use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::ClaimRequest;
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::postgres::answer::in_time;
@@ -90,16 +89,16 @@ impl PostgresStore {
         Some(self)
     }
 
-    /// Queued jobs of a tenant; of a long queue, as they were a moment ago.
+    /// Jobs in a queue; of a long one, as they were a moment ago.
     pub(crate) async fn waiting(
         &self,
         connection: &mut DbConnection,
-        tenant: &str,
+        queue: &Queue,
     ) -> Result<i64, StoreError> {
-        self.claim_memory.waiting(connection, tenant).await
+        self.claim_memory.waiting(connection, queue).await
     }
 
-    /// The first queued jobs of a tenant, in a long queue from where the last claim began.
+    /// The first jobs of a queue, in a long one from where the last claim began.
     pub(crate) async fn peek(
         &self,
         connection: &mut DbConnection,
@@ -109,13 +108,13 @@ impl PostgresStore {
         self.claim_memory.peek(connection, request, most).await
     }
 
-    /// The tenants with queued jobs, if they were asked for a moment ago and a queue is long.
-    pub(crate) fn known_tenants(&self) -> Option<Vec<Arc<str>>> {
-        self.claim_memory.tenants()
+    /// The queues with jobs in them, if they were read a moment ago and one is long.
+    pub(crate) fn known_queues(&self) -> Option<Vec<Queue>> {
+        self.claim_memory.queues()
     }
 
-    pub(crate) fn remember_tenants(&self, tenants: &[Arc<str>]) {
-        self.claim_memory.remember_tenants(tenants);
+    pub(crate) fn remember_queues(&self, queues: &[Queue]) {
+        self.claim_memory.remember_queues(queues);
     }
 
     /// Jobs went back to the queue.

@@ -47,6 +47,12 @@ const STEPS: &[Step] = &[
         // Programs before look for templates in a table that is gone.
         readable_from: 5,
     },
+    Step {
+        form: 6,
+        statements: include_str!("steps/6.sql"),
+        // Earlier programs look for runs under a tenant that no longer has them.
+        readable_from: 6,
+    },
 ];
 
 /// The form that is read and written.

@@ -1,7 +1,7 @@
 //! Lists of batches, newest first, with the numbers of their jobs.
 
 use super::engine::{Db, DbRow, SqlStore};
-use super::rows::{from_json, push_list, read_count, read_id, read_small, read_state};
+use super::rows::{from_json, push_list, read_count, read_id, read_kind, read_small, read_state};
 use sqlx::{QueryBuilder, Row};
 use std::collections::{BTreeMap, HashMap};
 
@@ -9,6 +9,7 @@ use uuid::Uuid;
 
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::State;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::store::list::{BatchFilter, Page, Total, first_id_at};
 use crate::jobs::store_error::StoreError;
 
@@ -16,7 +17,7 @@ use crate::jobs::store_error::StoreError;
 const EXAMINED_MAX: i64 = 10_000;
 
 /// The columns a [`Batch`] is read from.
-const COLUMNS: &str = "id, tenant, created_at, count, rejected, name, labels, ended_at";
+const COLUMNS: &str = "id, tenant, kind, created_at, count, rejected, name, labels, ended_at";
 
 impl SqlStore {
     /// One page of the batches of a tenant, newest first.
@@ -49,7 +50,12 @@ impl SqlStore {
     ///
     /// # Errors
     /// The database failed.
-    pub(crate) async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError> {
+    pub(crate) async fn batch(
+        &self,
+        tenant: &str,
+        kind: Kind,
+        id: Uuid,
+    ) -> Result<Option<Batch>, StoreError> {
         let mut query = QueryBuilder::<Db>::new("SELECT ");
         query
             .push(COLUMNS)
@@ -57,7 +63,9 @@ impl SqlStore {
         query
             .push_bind(id.to_string())
             .push(" AND tenant = ")
-            .push_bind(tenant);
+            .push_bind(tenant)
+            .push(" AND kind = ")
+            .push_bind(kind.name());
         let rows = query.build().fetch_all(&self.readers).await?;
         Ok(self.with_counts(&rows).await?.pop())
     }
@@ -96,6 +104,7 @@ impl SqlStore {
             Ok(Batch {
                 id,
                 tenant: row.try_get("tenant")?,
+                kind: read_kind(row)?,
                 created_at: row.try_get("created_at")?,
                 count: read_small(row, "count")?,
                 rejected: read_small(row, "rejected")?,
@@ -132,7 +141,8 @@ fn push_page(
 ) {
     query.push("SELECT ").push(columns);
     query.push(" FROM batches WHERE complete = 1 AND tenant = ");
-    query.push_bind(tenant.to_owned());
+    query.push_bind(tenant.to_owned()).push(" AND kind = ");
+    query.push_bind(filter.kind.name());
     if let Some(time) = filter.created_after {
         query
             .push(" AND id >= ")

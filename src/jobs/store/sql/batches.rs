@@ -141,9 +141,9 @@ impl SqlStore {
             .await?;
         }
         sqlx::query(
-            "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head) \
-             VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9) \
-             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9",
+            "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head, kind) \
+             VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9, $10) \
+             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9, kind = $10",
         )
         .bind(new.id.to_string())
         .bind(&*new.tenant)
@@ -154,6 +154,7 @@ impl SqlStore {
         .bind(to_json(&new.labels)?)
         .bind(template.as_ref().map(|(digest, _)| digest))
         .bind(new.head.as_deref())
+        .bind(new.kind.name())
         .execute(&mut *transaction)
         .await?;
         keep_key(&mut transaction, new).await?;
@@ -393,13 +394,14 @@ async fn keep_key(connection: &mut DbConnection, new: &NewBatch) -> Result<(), S
         return Ok(());
     };
     sqlx::query(
-        "INSERT INTO batch_keys (of_tenant, key, digest, batch_id) VALUES ($1, $2, $3, $4) \
-         ON CONFLICT (of_tenant, key) DO UPDATE SET digest = $3, batch_id = $4",
+        "INSERT INTO batch_keys (of_tenant, key, digest, batch_id, kind) VALUES ($1, $2, $3, $4, $5) \
+         ON CONFLICT (of_tenant, kind, key) DO UPDATE SET digest = $3, batch_id = $4",
     )
     .bind(&*new.tenant)
     .bind(key)
     .bind(digest.as_slice())
     .bind(new.id.to_string())
+    .bind(new.kind.name())
     .execute(connection)
     .await?;
     Ok(())
@@ -440,10 +442,11 @@ async fn by_key(
         "SELECT digest, id, complete, ",
         being_filled!(),
         " AS filled FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id \
-         WHERE of_tenant = $1 AND key = $2"
+         WHERE of_tenant = $1 AND key = $2 AND batch_keys.kind = $3"
     ))
     .bind(&*new.tenant)
     .bind(key)
+    .bind(new.kind.name())
     .fetch_optional(connection)
     .await?;
     let Some(row) = row else { return Ok(None) };

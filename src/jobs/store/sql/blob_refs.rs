@@ -40,7 +40,7 @@ pub(crate) async fn insert_blobs(
                 .push_bind(count(result.bytes()))
                 .push_bind(inside.map(|result| result.solution.as_ref()))
                 .push_bind(inside.and_then(|result| result.fields.as_deref()))
-                .push("(SELECT replace(tenant, '/rows', '') FROM jobs WHERE id = ")
+                .push("(SELECT tenant FROM jobs WHERE id = ")
                 .push_bind_unseparated(job.to_string())
                 .push_unseparated(")");
         });

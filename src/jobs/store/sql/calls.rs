@@ -2,7 +2,6 @@
 
 use super::engine::{self, SqlStore};
 use std::collections::{HashMap, HashSet};
-use std::sync::Arc;
 
 use async_trait::async_trait;
 use uuid::Uuid;
@@ -10,6 +9,7 @@ use uuid::Uuid;
 use crate::jobs::model::batch::{Batch, BatchItem, RunRecord};
 use crate::jobs::model::job::{Failure, Job, State};
 use crate::jobs::model::key::Key;
+use crate::jobs::model::kind::{Kind, Queue};
 use crate::jobs::store::claim::{
     Claim, ClaimRequest, Lease, QueueAhead, Reap, ReleaseReason, Renewal,
 };
@@ -144,8 +144,8 @@ impl Store for SqlStore {
         engine::again(|| self.changes(tenant, since, after, limit)).await
     }
 
-    async fn batch(&self, tenant: &str, id: Uuid) -> Result<Option<Batch>, StoreError> {
-        engine::again(|| self.batch(tenant, id)).await
+    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError> {
+        engine::again(|| self.batch(tenant, kind, id)).await
     }
 
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError> {
@@ -247,8 +247,8 @@ impl Store for SqlStore {
         engine::again(|| self.delete_batch(tenant, id, limit)).await
     }
 
-    async fn queued_tenants(&self) -> Result<Vec<Arc<str>>, StoreError> {
-        engine::again(|| self.queued_tenants()).await
+    async fn queues(&self) -> Result<Vec<Queue>, StoreError> {
+        engine::again(|| self.queues()).await
     }
 
     async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError> {

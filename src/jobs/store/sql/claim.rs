@@ -1,13 +1,16 @@
 //! Claims: the next group of queued jobs of a tenant.
 
 use super::engine::{self, Db, DbConnection, DbRow, SqlStore};
-use super::rows::{count, push_list, read_cache_key, read_count, read_flag, read_id, read_small};
+use super::rows::{
+    count, push_list, read_cache_key, read_count, read_flag, read_id, read_kind, read_small,
+};
 use sqlx::{QueryBuilder, Row};
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use uuid::Uuid;
 
+use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease};
 use crate::jobs::store_error::StoreError;
 
@@ -15,7 +18,7 @@ macro_rules! peek {
     ($begun:literal) => {
         concat!(
             "SELECT id, suspect, cost_us, rank FROM jobs \
-             WHERE state = 'queued' AND tenant = $1 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND ",
+             WHERE state = 'queued' AND tenant = $1 AND kind = $5 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND ",
             $begun,
             " AND (batch_id IS NULL OR batch_id NOT IN (SELECT id FROM batches WHERE complete = 0 AND tenant = $1)) \
              ORDER BY rank, id LIMIT $2",
@@ -24,39 +27,45 @@ macro_rules! peek {
     };
 }
 
-/// Tenants with queued jobs: a row per tenant.
-pub(crate) const QUEUED_TENANTS: &str = "SELECT tenant FROM job_counts WHERE state = 'queued' GROUP BY tenant HAVING SUM(number) > 0 ORDER BY tenant";
+/// Queues with jobs in them.
+pub(crate) const QUEUES: &str = "SELECT tenant, kind FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0 ORDER BY tenant, kind";
 
-/// The queued jobs of a tenant that come first: by priority, the oldest of each first. Jobs whose deadline has passed are
+/// The jobs of a queue that come first: by priority, the oldest of each first. Jobs whose deadline has passed are
 /// left to whoever ends them, jobs of a batch that is not acknowledged to whoever fills it.
 pub(crate) const PEEK: &str = peek!("slices = 0");
 
 /// The same of those of which some slices are solved.
 pub(crate) const PEEK_BEGUN: &str = peek!("slices > 0");
 
-/// Queued jobs of a tenant.
+/// Jobs in a queue.
 pub(crate) const WAITING: &str = "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts \
-     WHERE state = 'queued' AND tenant = $1";
+     WHERE state = 'queued' AND tenant = $1 AND kind = $2";
 
 impl SqlStore {
-    /// Tenants that have queued jobs.
+    /// Queues with jobs in them.
     ///
     /// # Errors
     /// The database failed.
-    pub(crate) async fn queued_tenants(&self) -> Result<Vec<Arc<str>>, StoreError> {
-        if let Some(known) = self.known_tenants() {
+    pub(crate) async fn queues(&self) -> Result<Vec<Queue>, StoreError> {
+        if let Some(known) = self.known_queues() {
             return Ok(known);
         }
-        let rows = sqlx::query(QUEUED_TENANTS).fetch_all(&self.readers).await?;
-        let tenants = rows
+        let rows = sqlx::query(QUEUES).fetch_all(&self.readers).await?;
+        let read = |row: &DbRow| {
+            Ok(Queue {
+                tenant: row.try_get::<String, _>("tenant")?.into(),
+                kind: read_kind(row)?,
+            })
+        };
+        let queues = rows
             .iter()
-            .map(|row| Ok(row.try_get::<String, _>("tenant")?.into()))
+            .map(read)
             .collect::<Result<Vec<_>, StoreError>>()?;
-        self.remember_tenants(&tenants);
-        Ok(tenants)
+        self.remember_queues(&queues);
+        Ok(queues)
     }
 
-    /// Claims the first queued job of a tenant together with those behind it that are as small, in their order: by
+    /// Claims the first job of a queue together with those behind it that are as small, in their order: by
     /// priority, then by age. A suspect comes alone.
     ///
     /// # Errors
@@ -105,14 +114,14 @@ impl SqlStore {
         connection: &mut DbConnection,
         request: &ClaimRequest<'_>,
     ) -> Result<i64, StoreError> {
-        let waiting = self.waiting(connection, request.tenant).await?;
+        let waiting = self.waiting(connection, request.queue).await?;
         let waiting = usize::try_from(waiting).unwrap_or(0);
         let share = waiting.div_ceil(request.workers.max(1));
         Ok(count(share.min(request.jobs).max(1)))
     }
 }
 
-/// The first queued jobs of a tenant, found by a statement from the start of its queue.
+/// The first jobs of a queue, found by a statement from its start.
 pub(crate) async fn first_queued(
     connection: &mut DbConnection,
     peek: &'static str,
@@ -120,22 +129,24 @@ pub(crate) async fn first_queued(
     most: i64,
 ) -> Result<Vec<DbRow>, StoreError> {
     let rows = sqlx::query(peek)
-        .bind(request.tenant)
+        .bind(&*request.queue.tenant)
         .bind(most)
         .bind(request.late_before)
         .bind(request.each_slice_us.map_or(i64::MAX, count))
+        .bind(request.queue.kind.name())
         .fetch_all(connection)
         .await?;
     Ok(rows)
 }
 
-/// Queued jobs of a tenant.
+/// Jobs in a queue.
 pub(crate) async fn count_waiting(
     connection: &mut DbConnection,
-    tenant: &str,
+    queue: &Queue,
 ) -> Result<i64, StoreError> {
     let row = sqlx::query(WAITING)
-        .bind(tenant)
+        .bind(&*queue.tenant)
+        .bind(queue.kind.name())
         .fetch_one(connection)
         .await?;
     Ok(count(read_count(&row, "number")?))

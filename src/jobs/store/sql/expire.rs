@@ -10,12 +10,12 @@ use crate::jobs::store::list::first_id_at;
 use crate::jobs::store::retention::RetentionRule;
 use crate::jobs::store_error::StoreError;
 
-/// Ids grow with the time of submission, so that only the oldest rows are read. Chunks of a run, which are the jobs of a lane, expire with
-/// the last of them.
+/// Ids grow with the time of submission, so that only the oldest rows are read. Chunks of a run expire with the last of
+/// them.
 pub(crate) const EXPIRED: &str = concat!(
     "SELECT id, blob_id FROM jobs \
      WHERE id < $1 AND ended_at <= $2 \
-     AND (batch_id IS NULL OR tenant NOT LIKE '%/rows' \
+     AND (batch_id IS NULL OR kind = 'case' \
      OR NOT EXISTS (SELECT 1 FROM batches WHERE batches.id = jobs.batch_id AND batches.ended_at > $2) \
      AND NOT EXISTS (SELECT 1 FROM jobs AS beside WHERE beside.batch_id = jobs.batch_id AND beside.state IN ('queued', 'running'))) \
      ORDER BY id LIMIT $3",

@@ -9,7 +9,7 @@ use uuid::Uuid;
 use crate::jobs::store::submission::{CacheKey, NewJob};
 use crate::jobs::store_error::StoreError;
 
-/// Jobs in one statement; with 19 values each far below the bound of SQLite.
+/// Jobs in one statement; with 20 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
 /// Queues jobs within the caller's transaction, those of a batch with their places in it. Returns those that ended at
@@ -28,7 +28,7 @@ pub(crate) async fn insert_jobs(
             .collect::<Result<Vec<_>, _>>()?;
         let mut rows = QueryBuilder::<Db>::new(
             "INSERT INTO jobs (id, state, name, labels, method, created_at, updated_at, batch_id, batch_index, cost_us, slice_us, outputs, \
-             cache_key, tenant, bypass_cache, rank, deadline, traceparent, case_bytes) ",
+             cache_key, tenant, bypass_cache, rank, deadline, traceparent, case_bytes, kind) ",
         );
         rows.push_values(
             some.iter().zip(labels),
@@ -51,7 +51,8 @@ pub(crate) async fn insert_jobs(
                     .push_bind(job.options.priority.rank())
                     .push_bind(job.deadline())
                     .push_bind(job.traceparent.as_deref())
-                    .push_bind(count(job.body.len()));
+                    .push_bind(count(job.body.len()))
+                    .push_bind(job.kind.name());
             },
         );
         rows.build().execute(&mut *connection).await?;

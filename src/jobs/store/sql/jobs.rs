@@ -2,7 +2,9 @@
 
 use super::blob_refs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, SqlStore};
-use super::rows::{GET, job_columns, read_blob_id, read_count, read_flag, read_job, read_small};
+use super::rows::{
+    GET, job_columns, read_blob_id, read_count, read_flag, read_job, read_kind, read_small,
+};
 use crate::jobs::store::ending::StoredResult;
 use crate::jobs::store::submission::StoredCase;
 use bytes::Bytes;
@@ -32,7 +34,7 @@ impl SqlStore {
             "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
              ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
              cancel_requested = 1, version = version + 1, updated_at = $1 \
-             WHERE id = $2 AND tenant = $3 AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
+             WHERE id = $2 AND tenant = $3 AND kind = 'case' AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
             job_columns!(),
             ", slices"
         ))
@@ -56,7 +58,7 @@ impl SqlStore {
     pub(crate) async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted, StoreError> {
         let mut transaction = engine::begin(&self.writer).await?;
         let gone = sqlx::query(
-            "DELETE FROM jobs WHERE id = $1 AND tenant = $2 AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id",
+            "DELETE FROM jobs WHERE id = $1 AND tenant = $2 AND kind = 'case' AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id",
         )
         .bind(id.to_string())
         .bind(tenant)
@@ -96,7 +98,7 @@ impl SqlStore {
             job_columns!(),
             ", blob_id, field_patches, outputs, blob_key, blob_bytes, solution, fields FROM jobs LEFT JOIN \
              (SELECT id AS blob, key AS blob_key, bytes AS blob_bytes, solution, fields FROM blobs) AS stored ON blob = blob_id \
-             WHERE id = $1 AND tenant = $2"
+             WHERE id = $1 AND tenant = $2 AND kind = 'case'"
         ))
         .bind(id.to_string())
         .bind(tenant)
@@ -127,7 +129,7 @@ impl SqlStore {
         id: Uuid,
     ) -> Result<Option<StoredCase>, StoreError> {
         let row = sqlx::query(
-            "SELECT cases.row, cases.body, head, templates.body AS template FROM jobs JOIN cases ON cases.job_id = jobs.id \
+            "SELECT jobs.kind, cases.row, cases.body, head, templates.body AS template FROM jobs JOIN cases ON cases.job_id = jobs.id \
              LEFT JOIN batches ON batches.id = jobs.batch_id \
              LEFT JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
              WHERE jobs.id = $1 AND jobs.tenant = $2",
@@ -144,6 +146,7 @@ impl SqlStore {
         };
         let head: Option<Vec<u8>> = row.try_get("head")?;
         Ok(Some(StoredCase {
+            kind: read_kind(&row)?,
             template: template.map(Bytes::from),
             head: head.map(Bytes::from),
             body: body.into(),

@@ -3,7 +3,7 @@
 use super::blob_refs::drop_slices_of_ended;
 use super::claim::push_lease_until;
 use super::engine::{self, Db, SqlStore};
-use super::rows::{count, fence, push_list, read_flag, read_id, read_move};
+use super::rows::{count, fence, push_list, read_flag, read_id, read_kind, read_move};
 use sqlx::{QueryBuilder, Row};
 use std::collections::HashMap;
 
@@ -28,7 +28,7 @@ impl SqlStore {
             return Ok(HashMap::new());
         }
         let mut query = QueryBuilder::<Db>::new(
-            "SELECT id, cases.row, body, batch_id, cancel_requested FROM cases JOIN jobs ON jobs.id = cases.job_id \
+            "SELECT id, kind, cases.row, body, batch_id, cancel_requested FROM cases JOIN jobs ON jobs.id = cases.job_id \
              WHERE job_id IN (",
         );
         push_list(&mut query, ids);
@@ -53,6 +53,7 @@ impl SqlStore {
             }
             let body: Vec<u8> = row.try_get("body")?;
             let case = StoredCase {
+                kind: read_kind(row)?,
                 template,
                 head,
                 body: body.into(),

@@ -1,7 +1,7 @@
 //! Lists of the embedded job table: one indexed statement per page and state, whatever the filter.
 
 use super::engine::{Db, DbRow, SqlStore};
-use super::rows::{job_columns, read_count, read_id, read_job};
+use super::rows::{job_columns, read_count, read_id, read_job, read_kind};
 use sqlx::{QueryBuilder, Row};
 use std::cmp::Reverse;
 
@@ -107,6 +107,7 @@ impl SqlStore {
             Ok(Change {
                 id: read_id(row)?,
                 batch: batch.map_err(|error| StoreError::Corrupt(format!("batch id: {error}")))?,
+                kind: read_kind(row)?,
                 at: row.try_get("updated_at")?,
             })
         };
@@ -114,7 +115,7 @@ impl SqlStore {
     }
 }
 
-const CHANGES: &str = "SELECT id, batch_id, updated_at FROM jobs WHERE tenant = $1 AND (updated_at, id) > ($2, $3) \
+const CHANGES: &str = "SELECT id, batch_id, kind, updated_at FROM jobs WHERE tenant = $1 AND (updated_at, id) > ($2, $3) \
      ORDER BY updated_at, id LIMIT $4";
 
 /// The states whose jobs are walked one after the other; `None` stands for all of them.
@@ -191,7 +192,7 @@ fn count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuil
 /// The counts that the database keeps itself.
 fn kept_count_query(tenant: &str, state: Option<State>) -> QueryBuilder<Db> {
     let mut query = QueryBuilder::new(
-        "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts WHERE tenant = ",
+        "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts WHERE kind = 'case' AND tenant = ",
     );
     query.push_bind(tenant.to_owned());
     if let Some(state) = state {
@@ -227,8 +228,8 @@ fn walk(
     // Within a batch one of its indices is walked, not that of the tenant: a bare expression keeps that out.
     let owner = match (label, filter.batch) {
         (Some(_), _) => "of_tenant = ",
-        (None, Some(_)) => concat!(bare!("tenant"), " = "),
-        (None, None) => "tenant = ",
+        (None, Some(_)) => concat!("kind = 'case' AND ", bare!("tenant"), " = "),
+        (None, None) => "kind = 'case' AND tenant = ",
     };
     and(query, owner, tenant.to_owned());
     if let Some((key, value)) = label {

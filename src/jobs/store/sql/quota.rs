@@ -8,14 +8,13 @@ use std::collections::{HashMap, HashSet};
 
 use uuid::Uuid;
 
-use crate::jobs::model::lane::tenant_of;
 use crate::jobs::store::submission::{NewJob, QueueBounds, Refusal};
 use crate::jobs::store_error::StoreError;
 
 /// Queued jobs of a tenant with the chunks of its runs (of all tenants if it is NULL), and the places reserved for batches that are being filled.
 const TAKEN: &str = "SELECT (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts \
-     WHERE state = 'queued' AND (tenant IN ($1, $1 || '/rows') OR $1 IS NULL)) + \
-     (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND (tenant IN ($1, $1 || '/rows') OR $1 IS NULL)) AS taken";
+     WHERE state = 'queued' AND (tenant = $1 OR $1 IS NULL)) + \
+     (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND (tenant = $1 OR $1 IS NULL)) AS taken";
 
 /// Places still free, as one transaction sees them and takes them.
 pub(crate) struct Places<'a> {
@@ -45,7 +44,6 @@ impl Places<'_> {
         tenant: &str,
         most: u64,
     ) -> Result<Result<u64, Refusal>, StoreError> {
-        let tenant = tenant_of(tenant);
         let all = match self.all {
             Some(all) => all,
             None => taken(self.connection, None).await?,
@@ -75,7 +73,6 @@ impl Places<'_> {
         let Some(bytes_max) = self.bounds.stored else {
             return Ok(None);
         };
-        let tenant = tenant_of(tenant);
         let stored = match self.stored.get(tenant) {
             Some(stored) => *stored,
             None => stored(self.connection, tenant).await?,
@@ -89,7 +86,7 @@ impl Places<'_> {
 
     /// Which bound has no place left.
     pub(crate) fn refusal_of(&self, tenant: &str) -> Refusal {
-        let of_tenant = self.of_tenants.get(tenant_of(tenant));
+        let of_tenant = self.of_tenants.get(tenant);
         let of_tenant = of_tenant.copied().unwrap_or(0);
         if of_tenant >= self.bounds.tenant {
             Refusal::Quota

@@ -8,6 +8,7 @@ use sqlx::{QueryBuilder, Row};
 use uuid::Uuid;
 
 use crate::jobs::model::job::{Job, State};
+use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::Priority;
 use crate::jobs::store::submission::CacheKey;
 use crate::jobs::store_error::StoreError;
@@ -80,6 +81,12 @@ pub(crate) fn read_blob_ids(rows: &[DbRow]) -> Result<Vec<i64>, StoreError> {
     Ok(ids.into_iter().flatten().collect())
 }
 
+/// The kind of the work in a row.
+pub(crate) fn read_kind(row: &DbRow) -> Result<Kind, StoreError> {
+    let name: &str = row.try_get("kind")?;
+    Kind::from_name(name).ok_or_else(|| StoreError::Corrupt(format!("kind {name:?}")))
+}
+
 pub(crate) fn read_state(row: &DbRow) -> Result<State, StoreError> {
     let name: &str = row.try_get("state")?;
     State::from_name(name).ok_or_else(|| StoreError::Corrupt(format!("job state {name:?}")))
@@ -142,5 +149,5 @@ pub(crate) fn fence(claim: &Claim) -> i64 {
 pub(crate) const GET: &str = concat!(
     "SELECT ",
     job_columns!(),
-    " FROM jobs WHERE id = $1 AND tenant = $2"
+    " FROM jobs WHERE id = $1 AND tenant = $2 AND kind = 'case'"
 );

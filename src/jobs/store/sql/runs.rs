@@ -15,7 +15,7 @@ const GET: &str = "SELECT body, head, \
      (SELECT CAST(COALESCE(SUM(field_patches), 0) AS bigint) FROM jobs WHERE batch_id = batches.id AND state = 'succeeded') AS without_answer, \
      (SELECT CAST(COALESCE(SUM(progress), 0.0) AS double precision) FROM jobs WHERE batch_id = batches.id AND state = 'running') AS running \
      FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
-     WHERE batches.id = $1 AND batches.tenant = $2 AND complete = 1";
+     WHERE batches.id = $1 AND batches.tenant = $2 AND kind = 'rows' AND complete = 1";
 
 impl SqlStore {
     /// The head of a run and how far its chunks are.

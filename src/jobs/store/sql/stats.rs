@@ -8,7 +8,6 @@ use crate::jobs::store::claim::QueueAhead;
 use std::collections::{BTreeMap, HashSet};
 
 use crate::jobs::model::job::State;
-use crate::jobs::model::lane::{rows_lane, tenant_of};
 use crate::jobs::store::retention::{Stats, Usage};
 use crate::jobs::store_error::StoreError;
 
@@ -17,14 +16,14 @@ pub(crate) const COUNT: &str =
 
 /// Mean expected solve time of queued jobs in µs; of each tenant, of those that come first.
 pub(crate) const MEAN_COST: &str = "SELECT CAST(COALESCE(SUM(number * mean) / SUM(number), 0) AS double precision) FROM (SELECT number, \
-     (SELECT AVG(cost_us) FROM (SELECT cost_us FROM jobs WHERE state = 'queued' AND tenant = queued.tenant ORDER BY rank, id LIMIT 100) AS sampled) AS mean \
-     FROM (SELECT tenant, SUM(number) AS number FROM job_counts WHERE state = 'queued' GROUP BY tenant HAVING SUM(number) > 0) AS queued) AS means";
+     (SELECT AVG(cost_us) FROM (SELECT cost_us FROM jobs WHERE state = 'queued' AND tenant = queued.tenant AND kind = queued.kind ORDER BY rank, id LIMIT 100) AS sampled) AS mean \
+     FROM (SELECT tenant, kind, SUM(number) AS number FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0) AS queued) AS means";
 
 /// When the oldest queued job was submitted: the first of each tenant and priority is looked at, however long their queues are. The
 /// priority is no equation, so that only the index of the queue has the order that is asked for.
 pub(crate) const OLDEST: &str = "SELECT MIN(first) FROM (SELECT (SELECT created_at FROM jobs \
-     WHERE state = 'queued' AND tenant = queued.tenant AND rank >= ranks.rank AND rank <= ranks.rank ORDER BY rank, id LIMIT 1) AS first \
-     FROM (SELECT tenant FROM job_counts WHERE state = 'queued' GROUP BY tenant HAVING SUM(number) > 0) AS queued, \
+     WHERE state = 'queued' AND tenant = queued.tenant AND kind = queued.kind AND rank >= ranks.rank AND rank <= ranks.rank ORDER BY rank, id LIMIT 1) AS first \
+     FROM (SELECT tenant, kind FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0) AS queued, \
      (SELECT 0 AS rank UNION ALL SELECT 1 UNION ALL SELECT 2) AS ranks) AS firsts";
 
 pub(crate) const RESULT_BYTES: &str =
@@ -36,10 +35,8 @@ impl SqlStore {
     /// # Errors
     /// The database failed.
     pub(crate) async fn usage(&self, tenant: &str) -> Result<Usage, StoreError> {
-        let lane = rows_lane(tenant);
-        let rows = sqlx::query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant IN ($1, $2) GROUP BY state")
+        let rows = sqlx::query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state")
             .bind(tenant)
-            .bind(&*lane)
             .fetch_all(&self.readers)
             .await?;
         let mut usage = Usage::default();
@@ -49,9 +46,9 @@ impl SqlStore {
                 .insert(read_state(row)?, read_count(row, "number")?);
         }
         let reserved = sqlx::query(
-            "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) AS reserved FROM batches WHERE complete = 0 AND tenant IN ($1, $2)",
+            "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) AS reserved FROM batches WHERE complete = 0 AND tenant = $1",
         );
-        let reserved = reserved.bind(tenant).bind(&*lane);
+        let reserved = reserved.bind(tenant);
         let row = reserved.fetch_one(&self.readers).await?;
         usage.reserved = read_count(&row, "reserved")?;
         usage.stored_bytes = stored(&mut *self.readers.acquire().await?, tenant).await?;
@@ -88,7 +85,7 @@ impl SqlStore {
 
 /// Jobs of the tenant before one of this rank and id, and their expected µs; no further than the limit.
 pub(crate) const BEFORE: &str = "SELECT COUNT(*) AS jobs, CAST(COALESCE(SUM(cost_us), 0) AS bigint) AS cost_us FROM (SELECT cost_us FROM jobs \
-     WHERE state = 'queued' AND tenant = $1 AND (rank, id) < ($2, $3) LIMIT $4) AS before";
+     WHERE state = 'queued' AND tenant = $1 AND kind = 'case' AND (rank, id) < ($2, $3) LIMIT $4) AS before";
 
 impl SqlStore {
     /// Number of queued jobs of a tenant that come before this one, and their expected solve time in µs, counted no
@@ -108,8 +105,8 @@ impl SqlStore {
             .bind(i64::from(limit))
             .fetch_one(&self.readers)
             .await?;
-        let lanes = self.queued_tenants().await?;
-        let tenants: HashSet<&str> = lanes.iter().map(|lane| tenant_of(lane)).collect();
+        let queues = self.queues().await?;
+        let tenants: HashSet<&str> = queues.iter().map(|queue| &*queue.tenant).collect();
         Ok(QueueAhead {
             jobs: read_count(&row, "jobs")?,
             cost_us: read_count(&row, "cost_us")?,

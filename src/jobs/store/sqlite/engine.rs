@@ -2,12 +2,12 @@
 
 use std::ffi::OsString;
 use std::path::Path;
-use std::sync::Arc;
 
 use sqlx::Transaction;
 use sqlx::sqlite::{Sqlite, SqliteConnection, SqlitePool, SqliteRow};
 use uuid::Uuid;
 
+use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::ClaimRequest;
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::sqlite::database::SqliteStore;
@@ -70,16 +70,16 @@ impl SqliteStore {
         Some(now)
     }
 
-    /// Queued jobs of a tenant.
+    /// Jobs in a queue.
     pub(crate) async fn waiting(
         &self,
         connection: &mut DbConnection,
-        tenant: &str,
+        queue: &Queue,
     ) -> Result<i64, StoreError> {
-        count_waiting(connection, tenant).await
+        count_waiting(connection, queue).await
     }
 
-    /// The first queued jobs of a tenant.
+    /// The first jobs of a queue.
     pub(crate) async fn peek(
         &self,
         connection: &mut DbConnection,
@@ -89,12 +89,12 @@ impl SqliteStore {
         first_queued(connection, PEEK, request, most).await
     }
 
-    /// They are asked for every time.
-    pub(crate) fn known_tenants(&self) -> Option<Vec<Arc<str>>> {
+    /// Not cached: the query is cheap.
+    pub(crate) fn known_queues(&self) -> Option<Vec<Queue>> {
         None
     }
 
-    pub(crate) fn remember_tenants(&self, _: &[Arc<str>]) {}
+    pub(crate) fn remember_queues(&self, _: &[Queue]) {}
 
     /// Every claim walks the queue from its start.
     pub(crate) fn requeued(&self) {}

@@ -4,10 +4,11 @@ use sqlx::{AssertSqlSafe, Row};
 use uuid::Uuid;
 
 use crate::jobs::model::job::State;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::store::list::{BatchFilter, Filter};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::sql::cached::SOURCE;
-use crate::jobs::store::sqlite::sql::claim::{PEEK, PEEK_BEGUN, QUEUED_TENANTS, WAITING};
+use crate::jobs::store::sqlite::sql::claim::{PEEK, PEEK_BEGUN, QUEUES, WAITING};
 use crate::jobs::store::sqlite::sql::deadlines::{FAIL_LATE, LATE};
 use crate::jobs::store::sqlite::sql::expire::EXPIRED;
 use crate::jobs::store::sqlite::sql::reap::{REAP, REAP_BYSTANDERS};
@@ -25,12 +26,12 @@ async fn the_list_of_batches_walks_its_index_without_sorting() {
         let filter = BatchFilter {
             labels: vec![("line".to_owned(), "A12".to_owned())],
             name: Some("x".to_owned()),
-            ..BatchFilter::default()
+            ..BatchFilter::all(Kind::Cases)
         };
         let query = batch_lists::page_query("t", &filter, after);
         let steps = plan(&store, query.sql().as_str()).await;
         assert!(
-            steps[0].contains("batches_by_tenant (tenant=?"),
+            steps[0].contains("batches_by_tenant (tenant=? AND kind=?"),
             "{steps:?}"
         );
         let sorts = |step: &String| step.contains("TEMP B-TREE");
@@ -107,10 +108,10 @@ async fn the_claim_and_the_reaper_find_their_jobs_by_index() {
         .unwrap();
     let bystanders = REAP_BYSTANDERS;
     for (statement, seek) in [
-        (QUEUED_TENANTS, "PRIMARY KEY (state=?"),
-        (WAITING, "PRIMARY KEY (state=? AND tenant=?"),
-        (PEEK, "jobs_queued (tenant=?"),
-        (PEEK_BEGUN, "jobs_begun (tenant=?"),
+        (QUEUES, "PRIMARY KEY (state=?"),
+        (WAITING, "PRIMARY KEY (state=? AND tenant=? AND kind=?"),
+        (PEEK, "jobs_queued (tenant=? AND kind=?"),
+        (PEEK_BEGUN, "jobs_begun (tenant=? AND kind=?"),
         (REAP, "jobs_by_state (state=?"),
         (bystanders, "jobs_by_state (state=?"),
     ] {
@@ -280,7 +281,8 @@ async fn figures_are_read_from_indices_alone() {
     let steps = plan(&store, COUNT).await;
     assert_eq!(steps, ["SCAN job_counts"], "a row per state and tenant");
     let steps = plan(&store, OLDEST).await;
-    let seeks = |step: &String| step.contains("jobs_queued (tenant=? AND rank>? AND rank<?");
+    let seeks =
+        |step: &String| step.contains("jobs_queued (tenant=? AND kind=? AND rank>? AND rank<?");
     assert!(steps.iter().any(seeks), "{steps:?}");
     let walks =
         |step: &String| step.contains("SCAN jobs") || step.contains("TEMP B-TREE FOR ORDER");
@@ -294,6 +296,6 @@ async fn a_place_in_the_queue_is_read_from_an_index_alone() {
         .await
         .unwrap();
     let steps = plan(&store, BEFORE).await;
-    let seeks = |step: &String| step.contains("COVERING INDEX jobs_queued (tenant=?");
+    let seeks = |step: &String| step.contains("COVERING INDEX jobs_queued (tenant=? AND kind=?");
     assert!(steps.iter().any(seeks), "{steps:?}");
 }
