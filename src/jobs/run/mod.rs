@@ -1,8 +1,7 @@
 //! Runs: one case with columns of values, many rows as one piece of work.
 //!
-//! A run is kept as a batch whose jobs are chunks of rows, in a [lane](crate::jobs::model::lane) of its tenant, so that the claim, the lease, the retries, cancellation
-//! and retention are those of jobs. The template of the batch is the [`head`] of the run; the case of each of its jobs is a [`chunk`] of
-//! rows, its result a Parquet file of answers. Where it is cut depends on the rows alone.
+//! A run is a batch of the kind [`Rows`](crate::jobs::model::kind::Kind::Rows), whose jobs are chunks of rows. Claims, leases, retries,
+//! cancellation and retention are those of all batches.
 
 pub mod chunk;
 pub mod control;
