@@ -16,8 +16,8 @@ pub(super) struct HttpArgs {
     /// answered on the first one alone, where a few places are kept for them.
     #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]
     pub probe_listen: Option<SocketAddr>,
-    /// Open connections beyond which the one that has waited longest without a request is closed for the new one; fewer if
-    /// the process may not open so many files.
+    /// Maximum number of open connections. A further one replaces the connection that has waited longest for a request. Lowered
+    /// if the process may not open so many files.
     #[arg(long, env = "RAILHEAD_CONNECTIONS_MAX", default_value_t = 4096, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub connections_max: u32,
@@ -73,7 +73,7 @@ pub(super) struct HttpArgs {
     #[arg(long, env = "RAILHEAD_BODY_TIMEOUT_S", default_value_t = 60, value_name = "SECONDS",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub body_timeout_s: u32,
-    /// Seconds that a client may take nothing of its answer.
+    /// Seconds in which a client must take a piece of its answer.
     #[arg(long, env = "RAILHEAD_WRITE_TIMEOUT_S", default_value_t = 60, value_name = "SECONDS",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub write_timeout_s: u32,

@@ -3,8 +3,8 @@
 //!
 //! The way of a request:
 //!
-//! 1. [`server::listener`] accepts the connection and gives it a [place](server::places); [`server::connection`] passes its
-//!    requests on. A client that sends nothing, or does not read its answer, is disconnected ([`server::write_timeout`]).
+//! 1. [`server::serve`] accepts the connection and passes its requests on. [`server::connections`] limits the number of connections,
+//!    and closes those whose client sends no request or does not read its answer.
 //! 2. The [`layers`] around all routes, from the outside inward: [`security_headers`], the client behind a trusted proxy
 //!    ([`client_address`]), [`drain_body`], [`request_id`], [`request_log`], [`otel`], [`metrics`], [`etag::complete`], [`compression`], [`final_newline`], the path in problems
 //!    ([`error::name_instance`]), [`origin_guard`], what is left of the rate ([`rate_limit::tell_left`]), what the request holds
@@ -71,8 +71,8 @@ use crate::jobs::Jobs;
 
 pub use crate::http::layers::cors::allow_origins;
 pub use crate::http::options::{AddressRange, HttpOptions};
-pub use crate::http::server::connection::Peer;
-pub use crate::http::server::listener::serve;
+pub use crate::http::server::connections::Peer;
+pub use crate::http::server::serve;
 
 /// The contract as JSON text, ending with a line break; the same as `api/openapi.json`.
 #[must_use]

@@ -19,9 +19,9 @@ pub struct HttpOptions {
     pub head_timeout: Duration,
     /// Time for the body of a case to arrive whole; for a larger body, time between two pieces, and the head start over its lowest rate.
     pub body_timeout: Duration,
-    /// How long a client may take nothing of its answer.
+    /// Time in which a client must take a piece of its answer.
     pub write_timeout: Duration,
-    /// Most open connections; for further ones the oldest without a request makes way.
+    /// Most open connections. A further one replaces the connection that has waited longest for a request.
     pub connections_max: usize,
     /// Most open connections of one address (IPv6: of one network of 64 bits), loopback included.
     pub address_connections_max: usize,

@@ -9,7 +9,7 @@ use crate::http::layers::rate_limit::{RateKey, RateLeft, RateLimit};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
-use crate::http::server::connection::Peer;
+use crate::http::server::connections::Peer;
 use crate::jobs::Jobs;
 use crate::jobs::model::key::Key;
 

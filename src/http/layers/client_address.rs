@@ -13,7 +13,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 
 use crate::http::options::{AddressRange, HttpOptions};
-use crate::http::server::connection::Peer;
+use crate::http::server::connections::Peer;
 
 const X_FORWARDED_FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 

@@ -17,7 +17,7 @@ use axum::response::{IntoResponse, Response};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
-use crate::http::server::connection::ProbesOnly;
+use crate::http::server::connections::ProbesOnly;
 
 /// Headers that proxies add, about their clients or about themselves.
 static FORWARDED: [HeaderName; 6] = [

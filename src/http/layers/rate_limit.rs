@@ -19,8 +19,8 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
-use crate::http::server::connection::Peer;
-use crate::http::server::places::network;
+use crate::http::server::connections::Peer;
+use crate::http::server::connections::network;
 
 /// Size of a burst: the requests of so many seconds.
 const BURST_SECONDS: u32 = 2;

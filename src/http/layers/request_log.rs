@@ -10,7 +10,7 @@ use tower_http::trace::{DefaultOnFailure, DefaultOnRequest, MakeSpan, OnResponse
 use tracing::{Span, field};
 
 use crate::http::layers::request_id::REQUEST_ID;
-use crate::http::server::connection::Peer;
+use crate::http::server::connections::Peer;
 
 /// One span per request, closed by one line with status and time.
 pub(crate) fn span_layer()

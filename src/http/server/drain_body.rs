@@ -1,9 +1,8 @@
 //! Reads the rest of a body whose request has been answered already.
 //!
-//! A faulty batch is refused at its first fault, while the rest of it is on the way. The connection cannot be used again
-//! before that rest has been read, and closing it at once can lose the answer: the client fails while it writes, and never reads.
-//! So a short rest is read before the answer is sent. If more follows, the answer says that the connection closes, and more of the
-//! rest is read and discarded meanwhile.
+//! A faulty batch is refused at its first fault, while the rest of it is still arriving. If the connection were closed at
+//! once, the client would fail while it writes and never read the answer. So the rest is read and discarded. After a
+//! long rest the connection closes, which the answer announces.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,19 +18,16 @@ use http_body_util::{BodyExt, Limited};
 use hyper::body::{Frame, SizeHint};
 use tokio::time::timeout;
 
-/// Longest rest that is read before the answer is sent, in bytes.
-const REST_BYTES: usize = 1 << 20;
-/// How long the client may take to send it.
-const REST_WITHIN: Duration = Duration::from_millis(500);
-
-/// Longest rest that is read after that, in bytes: as much as the largest body that is held in memory by default.
-const LATE_BYTES: usize = 64 << 20;
-/// How long the client may take to send it. Chosen by judgement: a client that writes without reading needs 6 MB/s for all of it.
-const LATE_WITHIN: Duration = Duration::from_secs(10);
+/// Longest rest in bytes after which the connection is used again.
+const SHORT_BYTES: u64 = 1 << 20;
+/// Longest rest that is read, in bytes: the largest body that is held in memory by default.
+const REST_BYTES: usize = 64 << 20;
+/// Time for the client to send it.
+const REST_WITHIN: Duration = Duration::from_secs(10);
 
 type BodySlot = Arc<Mutex<Option<Body>>>;
 
-/// Layer that discards the rest of a body, or has the connection closed; it stands around everything that reads bodies.
+/// Layer that discards the rest of a body; it stands around everything that reads bodies.
 pub(crate) async fn drain_body(request: Request, next: Next) -> Response {
     if request.body().is_end_stream() {
         return next.run(request).await;
@@ -43,30 +39,20 @@ pub(crate) async fn drain_body(request: Request, next: Next) -> Response {
     let request = request.map(|body| Body::new(DrainableBody(Some(body), kept)));
     let mut response = next.run(request).await;
     let rest = slot.lock().unwrap_or_else(PoisonError::into_inner).take();
-    if let Some(mut rest) = rest
-        && (asks || timeout(REST_WITHIN, ends(&mut rest, REST_BYTES)).await != Ok(true))
-    {
-        let close = HeaderValue::from_static("close");
-        response.headers_mut().insert(header::CONNECTION, close);
+    if let Some(rest) = rest {
+        if asks || rest.size_hint().lower() > SHORT_BYTES {
+            let close = HeaderValue::from_static("close");
+            response.headers_mut().insert(header::CONNECTION, close);
+        }
         if !asks {
+            let mut rest = Limited::new(rest, REST_BYTES);
             // The connection stays open until this ends, so that the client can send on and then read its answer.
-            tokio::spawn(timeout(LATE_WITHIN, async move {
-                ends(&mut rest, LATE_BYTES).await
+            tokio::spawn(timeout(REST_WITHIN, async move {
+                while let Some(Ok(_)) = rest.frame().await {}
             }));
         }
     }
     response
-}
-
-/// Reads a body to its end; `false` if it breaks or is longer than allowed.
-async fn ends(body: &mut Body, most: usize) -> bool {
-    let mut body = Limited::new(body, most);
-    while let Some(frame) = body.frame().await {
-        if frame.is_err() {
-            return false;
-        }
-    }
-    true
 }
 
 /// A body that goes into the slot if it is dropped before its end.
