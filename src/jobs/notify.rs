@@ -5,6 +5,7 @@
 
 use std::time::Duration;
 
+use tokio::sync::broadcast;
 use tokio::time::{Instant, sleep, timeout_at};
 use uuid::Uuid;
 
@@ -20,6 +21,10 @@ const PAUSE: Duration = Duration::from_millis(50);
 
 /// Time between two reads of a batch for each of its jobs: counting them takes time.
 const PAUSE_PER_JOB: Duration = Duration::from_micros(10);
+
+/// Announcements of ended jobs since the subscription.
+#[derive(Debug)]
+pub struct Announcements(broadcast::Receiver<Uuid>);
 
 impl Jobs {
     /// Waits until a job is at another version than `seen` and returns it; at once if it is, or if nothing was seen yet.
@@ -136,11 +141,30 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn wait(&self, id: Uuid, at_most: Duration) -> Result<Job, JobsError> {
-        let until = Instant::now() + at_most;
         // Subscribe first, then read: what ends in between is announced.
-        let mut ended = self.shared.ended.subscribe();
+        let ended = self.announcements();
+        let job = self.get(id).await?;
+        self.wait_from(ended, job, at_most).await
+    }
+
+    /// Subscribes to the announcements of ended jobs.
+    #[must_use]
+    pub fn announcements(&self) -> Announcements {
+        Announcements(self.shared.ended.subscribe())
+    }
+
+    /// As [`Jobs::wait`], for a job that was read after the subscription.
+    ///
+    /// # Errors
+    /// As [`Jobs::wait`].
+    pub async fn wait_from(
+        &self,
+        Announcements(mut ended): Announcements,
+        mut job: Job,
+        at_most: Duration,
+    ) -> Result<Job, JobsError> {
+        let (id, until) = (job.id, Instant::now() + at_most);
         loop {
-            let job = self.get(id).await?;
             if job.state.ended() || Instant::now() >= until || self.shared.draining.is_cancelled() {
                 return Ok(job);
             }
@@ -152,6 +176,7 @@ impl Jobs {
                 _ = timeout_at(until.min(Instant::now() + POLL_INTERVAL), announced) => {}
                 () = self.shared.draining.cancelled() => {}
             }
+            job = self.get(id).await?;
         }
     }
 }

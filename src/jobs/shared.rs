@@ -157,6 +157,12 @@ impl Shared {
         self.options.workers.max(others)
     }
 
+    /// Wakes one worker for one job.
+    pub(crate) fn wake_worker(&self) {
+        self.wake.notify_one();
+        self.ring(Bell::Work);
+    }
+
     /// Tells workers that there is something to be claimed.
     pub(crate) fn wake_workers(&self) {
         self.wake_here();

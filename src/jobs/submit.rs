@@ -115,7 +115,7 @@ impl Jobs {
             tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
             return Ok((job, false));
         }
-        self.shared.wake_workers();
+        self.shared.wake_worker();
         tracing::info!(job = %job.id, method = new.method, "job queued");
         Ok((job, replayed))
     }

@@ -119,7 +119,8 @@ impl Table {
 
     /// The case of a job, and whether its cancellation was asked for.
     pub async fn case(&self, id: Uuid) -> Option<(Bytes, bool)> {
-        let (case, cancelled) = self.store.claimed_cases(&[id]).await.unwrap().remove(&id)?;
+        let claimed = self.store.claimed_cases(&[id]).await.unwrap().remove(&id)?;
+        let (case, cancelled) = (claimed.case, claimed.cancel_requested);
         assert_eq!(case.template, None);
         Some((case.body, cancelled))
     }

@@ -86,6 +86,7 @@ pub(crate) async fn submit(
         preferred_wait(&headers).and_then(|seconds| Some((seconds, crowds.wait(jobs.tenant())?)));
     let wait = place.as_ref().map(|(seconds, _)| *seconds);
     let options = SubmitQuery::read(&uri, &())?.options(&headers);
+    let announcements = jobs.announcements();
     let (mut job, replayed) = jobs.submit_with(value, key, options).await?;
     drop(room);
     let location = format!("/v1/jobs/{}", job.id);
@@ -94,7 +95,7 @@ pub(crate) async fn submit(
         held.release();
         // The job is stored: whatever ends the wait early, the client must learn its id.
         tokio::select! {
-            later = jobs.wait(job.id, Duration::from_secs(seconds.into())) => match later {
+            later = jobs.wait_from(announcements, job.clone(), Duration::from_secs(seconds.into())) => match later {
                 Ok(later) => job = later,
                 Err(reason) => tracing::debug!(%reason, job = %job.id, "the wait ended early"),
             },

@@ -30,6 +30,7 @@ use crate::jobs::attempts::slices::SlicedCase;
 use crate::jobs::attempts::solver_thread::SolverThread;
 use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::Claim;
+use crate::jobs::store::submission::ClaimedCase;
 
 /// One claimed job.
 #[derive(Debug)]
@@ -37,6 +38,8 @@ pub(crate) struct Member {
     pub(crate) claim: Claim,
     pub(crate) control: Arc<AttemptControl>,
     pub(crate) phase: Phase,
+    /// Its case, until it is handed to a thread.
+    pub(crate) case: Option<ClaimedCase>,
     /// What it goes on with, once it is known.
     pub(crate) sliced: Option<Box<SlicedCase>>,
     pub(crate) _listed: RunningEntry,
@@ -274,6 +277,7 @@ mod tests {
                 claim,
                 control,
                 phase: Phase::Solving,
+                case: None,
                 sliced: None,
             }
         };

@@ -47,7 +47,8 @@ use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
 use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
 use crate::jobs::store::submission::{
-    BatchBegun, CacheKey, Enqueued, FilledHere, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
+    BatchBegun, CacheKey, ClaimedCase, Enqueued, FilledHere, NewBatch, NewJob, QueueBounds,
+    Refusal, StoredCase,
 };
 use crate::jobs::store_error::StoreError;
 
@@ -267,11 +268,8 @@ pub trait Store: KeyStore + Send + Sync + Debug {
     /// enough, in their order. A suspect comes alone, and no job of a batch that is not acknowledged.
     async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError>;
 
-    /// The cases of claimed jobs, each with whether its client has cancelled it.
-    async fn claimed_cases(
-        &self,
-        ids: &[Uuid],
-    ) -> Result<HashMap<Uuid, (StoredCase, bool)>, StoreError>;
+    /// The cases of claimed jobs, with what has happened to them meanwhile.
+    async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>, StoreError>;
 
     /// Extends leases and stores progress; the answers are in the order of the claims.
     async fn renew(

@@ -153,6 +153,17 @@ pub enum Enqueued {
     Refused(Refusal),
 }
 
+/// The case of a claimed job.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ClaimedCase {
+    /// The case.
+    pub case: StoredCase,
+    /// The client asked to cancel the job.
+    pub cancel_requested: bool,
+    /// A succeeded job with the same answer, if the job may end with that.
+    pub source: Option<Uuid>,
+}
+
 /// A case as it is stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredCase {

@@ -39,6 +39,7 @@ pub(crate) fn take_up(shared: &Arc<Shared>, queue: Queue, claims: Vec<Claim>) ->
                 claim,
                 control,
                 phase: Phase::Solving,
+                case: None,
                 sliced: None,
             }
         })

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use tokio::time::{MissedTickBehavior, interval};
+use tokio::time::{Instant, MissedTickBehavior, interval_at};
 
 use crate::jobs::attempts::attempt_control::{AttemptControl, StopReason};
 use crate::jobs::attempts::lease::{GroupLease, HeldLeases};
@@ -18,7 +18,8 @@ pub(crate) fn start(shared: &Arc<Shared>, leases: Vec<(Claim, Arc<AttemptControl
 }
 
 async fn beat(shared: Arc<Shared>, kept: Arc<HeldLeases>) {
-    let mut beat = interval(heartbeat(&shared));
+    let period = heartbeat(&shared);
+    let mut beat = interval_at(Instant::now() + period, period);
     beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let lease_ms = shared.lease_ms();
     let mut until = shared.steady_ms().saturating_add(lease_ms);

@@ -18,20 +18,25 @@ use crate::jobs::worker::pool::{StepReport, Worker};
 use crate::jobs::worker::slice_storage::SliceFate;
 
 impl Worker {
-    /// Ends those of the claimed jobs whose result has been there since they were queued.
-    pub(crate) async fn answer_known(
+    /// Reads the cases of the claimed jobs, and ends those whose result has been there since they were queued. To be called once the attempt
+    /// is listed: a cancellation is then either read here or finds the control of the attempt.
+    pub(crate) async fn read_cases(
         &self,
         attempt: &mut Attempt,
         step: &mut StepReport,
     ) -> Result<(), JobsError> {
         let claims = attempt.claims(|phase| matches!(phase, Phase::Solving));
-        let keys: Vec<_> = claims.iter().filter_map(|claim| claim.cache_key).collect();
-        let sources = self.shared.store.cached(&keys).await?;
-        let known = claims.into_iter().filter_map(|claim| {
-            let source = *sources.get(&claim.cache_key?)?;
-            Some((claim, source))
-        });
-        self.answer_with(attempt, known.collect(), step).await
+        let ids: Vec<_> = claims.iter().map(|claim| claim.id).collect();
+        let mut cases = self.shared.store.claimed_cases(&ids).await?;
+        let mut known = Vec::new();
+        for member in &mut attempt.members {
+            if let Some(case) = cases.remove(&member.claim.id) {
+                let source = case.source.filter(|_| member.claim.cache_key.is_some());
+                known.extend(source.map(|source| (member.claim.clone(), source)));
+                member.case = Some(case);
+            }
+        }
+        self.answer_with(attempt, known, step).await
     }
 
     /// Ends claimed jobs with the results of these others; where there is none, the job goes back to the queue.

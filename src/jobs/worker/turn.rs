@@ -19,6 +19,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
 use crate::jobs::storage_fault::StoragePlace;
 use crate::jobs::store::claim::ReleaseReason;
+use crate::jobs::store::submission::ClaimedCase;
 use crate::jobs::worker::begin;
 use crate::jobs::worker::pool::{StepReport, Turn, Worker};
 
@@ -36,7 +37,7 @@ impl Worker {
     ) -> Result<Turn, JobsError> {
         let start = Instant::now();
         if !attempt.begun() {
-            self.answer_known(attempt, step).await?;
+            self.read_cases(attempt, step).await?;
             attempt.set_aside_duplicates();
         }
         attempt.turn_began = start;
@@ -117,11 +118,6 @@ impl Worker {
 
     async fn begin(&mut self, attempt: &mut Attempt) -> Result<(), JobsError> {
         let places = attempt.to_solve();
-        let members = places.iter().map(|place| &attempt.members[*place]);
-        let new = members.filter(|member| member.sliced.is_none());
-        let ids: Vec<_> = new.map(|member| member.claim.id).collect();
-        // Read after the attempt was listed: a cancellation is either seen here or finds the control of the attempt.
-        let mut cases = self.shared.store.claimed_cases(&ids).await?;
         let mut work = Vec::with_capacity(places.len());
         for place in places {
             let member = &mut attempt.members[place];
@@ -129,8 +125,12 @@ impl Worker {
                 work.push((place, self.next_of(member.claim.id, sliced).await?));
                 continue;
             }
-            match cases.remove(&member.claim.id) {
-                Some((case, cancel_requested)) => {
+            match member.case.take() {
+                Some(ClaimedCase {
+                    case,
+                    cancel_requested,
+                    ..
+                }) => {
                     if cancel_requested {
                         member.control.stop(StopReason::Cancel);
                     }

@@ -13,8 +13,8 @@ use sqlx::postgres::{PgConnection, PgRow};
 
 use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::ClaimRequest;
-use crate::jobs::store::postgres::sql::claim::{PEEK, count_waiting, first_queued};
-use crate::jobs::store::postgres::sql::rows::count;
+use crate::jobs::store::postgres::sql::claim::peek;
+use crate::jobs::store::postgres::sql::rows::{count, read_count};
 use crate::jobs::store_error::StoreError;
 
 /// Queues that are shorter are counted and walked from their start at every claim.
@@ -58,6 +58,17 @@ const PEEK_FROM: &str = concat!(
     peek_of!("2", "$7"),
     ") AS queued LIMIT $2"
 );
+
+/// The jobs of a queue that come first: by priority, the oldest of each first. Jobs whose deadline has passed are
+/// left to whoever ends them, jobs of a batch that is not acknowledged to whoever fills it.
+const PEEK: &str = peek!("slices = 0", "$2");
+
+/// The same of those of which some slices are solved.
+pub(crate) const PEEK_BEGUN: &str = peek!("slices > 0", "$2");
+
+/// Jobs in a queue.
+const WAITING: &str = "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts \
+     WHERE state = 'queued' AND tenant = $1 AND kind = $2";
 
 /// What is known of a queue.
 #[derive(Debug, Clone)]
@@ -203,4 +214,32 @@ impl ClaimMemory {
     pub(crate) fn remember_queues(&self, queues: &[Queue]) {
         self.known().all = Some((Instant::now(), queues.to_vec()));
     }
+}
+
+/// The first jobs of a queue, found by a statement from its start.
+pub(crate) async fn first_queued(
+    connection: &mut PgConnection,
+    peek: &'static str,
+    request: &ClaimRequest<'_>,
+    most: i64,
+) -> Result<Vec<PgRow>, StoreError> {
+    let rows = sqlx::query(peek)
+        .bind(&*request.queue.tenant)
+        .bind(most)
+        .bind(request.late_before)
+        .bind(request.each_slice_us.map_or(i64::MAX, count))
+        .bind(request.queue.kind.name())
+        .fetch_all(connection)
+        .await?;
+    Ok(rows)
+}
+
+/// Jobs in a queue.
+async fn count_waiting(connection: &mut PgConnection, queue: &Queue) -> Result<i64, StoreError> {
+    let row = sqlx::query(WAITING)
+        .bind(&*queue.tenant)
+        .bind(queue.kind.name())
+        .fetch_one(connection)
+        .await?;
+    Ok(count(read_count(&row, "number")?))
 }

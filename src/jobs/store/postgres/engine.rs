@@ -1,15 +1,19 @@
 //! PostgreSQL as the shared statements see it.
 
-use sqlx::Transaction;
 use sqlx::postgres::{PgConnection, PgPool, PgRow, Postgres};
+use sqlx::{QueryBuilder, Transaction};
 use uuid::Uuid;
 
 use crate::jobs::model::kind::Queue;
-use crate::jobs::store::claim::ClaimRequest;
+use crate::jobs::store::claim::{ClaimKind, ClaimRequest};
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::postgres::answer::in_time;
+use crate::jobs::store::postgres::claim_memory::{PEEK_BEGUN, first_queued};
 use crate::jobs::store::postgres::connection::{ADMISSION, FOLD, LOCKS, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
+use crate::jobs::store::postgres::sql::claim::{claimed, push_lease_until};
+use crate::jobs::store::postgres::sql::rows::{count, push_list, read_count, read_flag, read_id};
+use crate::jobs::store::postgres::statements::{Statements, Writer};
 use crate::jobs::store_error::StoreError;
 
 pub(crate) type Db = Postgres;
@@ -36,20 +40,6 @@ pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, Sto
 /// before did is seen by the next statement.
 pub(crate) async fn admit_alone(connection: &mut DbConnection) -> Result<(), StoreError> {
     lock(connection, ADMISSION).await
-}
-
-/// Ids for new blobs. They are given here, not by the insertion: rows of one statement may come back in any order.
-pub(crate) async fn new_blob_ids(
-    connection: &mut DbConnection,
-    number: usize,
-) -> Result<Vec<i64>, StoreError> {
-    let ids = sqlx::query_scalar(
-        "SELECT nextval('blob_ids') FROM generate_series(1, CAST($1 AS bigint))",
-    )
-    .bind(i64::try_from(number).unwrap_or(i64::MAX))
-    .fetch_all(connection)
-    .await?;
-    Ok(ids)
 }
 
 /// Keeps jobs from being removed until the end of the transaction: another job is about to refer to their results.
@@ -79,6 +69,72 @@ pub(crate) async fn lock_blobs(
 }
 
 impl PostgresStore {
+    /// Where transactions that write begin.
+    pub(crate) fn writer(&self) -> Writer {
+        self.writer.clone()
+    }
+
+    /// Ids for new blobs. They are given here, not by the insertion: rows of one statement may come back in any order.
+    pub(crate) async fn new_blob_ids(
+        &self,
+        statements: &mut Statements,
+        number: usize,
+    ) -> Result<Vec<i64>, StoreError> {
+        let ids = sqlx::query_scalar(
+            "SELECT nextval('blob_ids') FROM generate_series(1, CAST($1 AS bigint))",
+        )
+        .bind(i64::try_from(number).unwrap_or(i64::MAX))
+        .fetch_all(statements.connection())
+        .await?;
+        Ok(ids)
+    }
+
+    /// Claims the next jobs of a queue; rows with the columns of `claimed`.
+    pub(crate) async fn claim_next(
+        &self,
+        request: &ClaimRequest<'_>,
+        token: i64,
+    ) -> Result<Vec<DbRow>, StoreError> {
+        let mut transaction = begin(&self.writer).await?;
+        let queued = match request.kind {
+            ClaimKind::New => {
+                let waiting = self
+                    .claim_memory
+                    .waiting(&mut transaction, request.queue)
+                    .await?;
+                // So that each worker gets some of a short queue.
+                let share = usize::try_from(waiting)
+                    .unwrap_or(0)
+                    .div_ceil(request.workers.max(1));
+                let most = count(share.min(request.jobs).max(1));
+                self.claim_memory
+                    .peek(&mut transaction, request, most)
+                    .await?
+            }
+            ClaimKind::Begun => first_queued(&mut transaction, PEEK_BEGUN, request, 1).await?,
+        };
+        if queued.is_empty() {
+            return Ok(Vec::new());
+        }
+        let ids = choose(&queued, request)?;
+        let mut update = QueryBuilder::<Db>::new(
+            "UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = ",
+        );
+        update.push_bind(token).push(", lease_until = ");
+        push_lease_until(&mut update, self, request.lease);
+        update.push(", worker = ").push_bind(request.worker);
+        update.push(", started_at = ").push_bind(request.now);
+        update.push(", updated_at = ").push_bind(request.now);
+        update.push(", group_size = ");
+        update.push_bind(count(ids.len()));
+        update.push(", solving = 1 - suspect, progress = done, version = version + 1 WHERE state = 'queued' AND id IN (");
+        push_list(&mut update, &ids);
+        update.push(concat!(") RETURNING ", claimed!()));
+        let rows = update.build().fetch_all(&mut *transaction).await?;
+        transaction.commit().await?;
+        Ok(rows)
+    }
+
     /// The present by which leases are judged: none, so that the database's clock is asked; in tests the one that is given.
     pub(crate) fn lease_now(&self, now: i64) -> Option<i64> {
         self.given_clock.then_some(now)
@@ -87,25 +143,6 @@ impl PostgresStore {
     /// Any number of processes use it.
     pub(crate) fn as_cluster(&self) -> Option<&dyn Cluster> {
         Some(self)
-    }
-
-    /// Jobs in a queue; of a long one, as they were a moment ago.
-    pub(crate) async fn waiting(
-        &self,
-        connection: &mut DbConnection,
-        queue: &Queue,
-    ) -> Result<i64, StoreError> {
-        self.claim_memory.waiting(connection, queue).await
-    }
-
-    /// The first jobs of a queue, in a long one from where the last claim began.
-    pub(crate) async fn peek(
-        &self,
-        connection: &mut DbConnection,
-        request: &ClaimRequest<'_>,
-        most: i64,
-    ) -> Result<Vec<DbRow>, StoreError> {
-        self.claim_memory.peek(connection, request, most).await
     }
 
     /// The queues with jobs in them, if they were read a moment ago and one is long.
@@ -188,4 +225,22 @@ fn gave_way(error: &StoreError) -> bool {
     let cause = cause.downcast_ref::<sqlx::Error>();
     let code = cause.and_then(|cause| cause.as_database_error()?.code());
     code.is_some_and(|code| [SERIALIZATION, DEADLOCK, FOREIGN_KEY].contains(&&*code))
+}
+
+/// The ids of the next group: the first of the queued jobs together with those behind it that are small enough.
+fn choose(queued: &[DbRow], request: &ClaimRequest<'_>) -> Result<Vec<Uuid>, StoreError> {
+    let mut ids = Vec::with_capacity(queued.len());
+    let mut cost_us = 0;
+    for row in queued {
+        let suspect = read_flag(row, "suspect")?;
+        cost_us += read_count(row, "cost_us")?;
+        if !ids.is_empty() && (suspect || cost_us > request.cost_us) {
+            break;
+        }
+        ids.push(read_id(row)?);
+        if suspect {
+            break;
+        }
+    }
+    Ok(ids)
 }

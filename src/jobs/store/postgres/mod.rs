@@ -25,4 +25,5 @@ pub mod schema;
     reason = "the shared statements are compiled once for each database"
 )]
 pub mod sql;
+pub(crate) mod statements;
 pub(crate) mod url;

@@ -3,6 +3,7 @@
 //! No worker claims a job of a batch while it is being filled: the statement that claims leaves it out. A batch that a dead process left
 //! incomplete was never acknowledged and is removed with its jobs.
 
+use super::super::statements::Statements;
 use super::blob_refs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, DbConnection, SqlStore};
 use super::insert::insert_jobs;
@@ -51,11 +52,11 @@ impl SqlStore {
     ) -> Result<Result<u32, Refusal>, StoreError> {
         let mut transaction = engine::begin(&self.writer).await?;
         engine::admit_alone(&mut transaction).await?;
-        let mut places = Places::new(&mut transaction, bounds);
-        if let Some(refusal) = places.store(tenant, 0).await? {
-            return Ok(Err(refusal));
-        }
-        let places = match places.take(tenant, u64::from(most)).await? {
+        let mut places = Places::of(&mut transaction, tenant, bounds).await?;
+        let taken = places
+            .store(tenant, 0)
+            .and_then(|()| places.take(tenant, u64::from(most)));
+        let places = match taken {
             Ok(places) => u32::try_from(places).unwrap_or(most),
             Err(refusal) => return Ok(Err(refusal)),
         };
@@ -112,8 +113,8 @@ impl SqlStore {
             None => 0,
         };
         let lacking = u64::from(new.count).saturating_sub(reserved);
-        let mut places = Places::new(&mut transaction, bounds);
-        match places.take(&new.tenant, lacking).await? {
+        let mut places = Places::of(&mut transaction, &new.tenant, bounds).await?;
+        match places.take(&new.tenant, lacking) {
             Ok(taken) if taken == lacking => {}
             Ok(_) => return Ok(BatchBegun::Refused(places.refusal_of(&new.tenant))),
             Err(refusal) => return Ok(BatchBegun::Refused(refusal)),
@@ -126,8 +127,7 @@ impl SqlStore {
         };
         let of_template = template.as_ref().filter(|_| !known);
         let bytes = new.bytes + of_template.map_or(0, |(_, body)| body.len() as u64);
-        let mut places = Places::new(&mut transaction, bounds);
-        if let Some(refusal) = places.store(&new.tenant, bytes).await? {
+        if let Err(refusal) = places.store(&new.tenant, bytes) {
             return Ok(BatchBegun::Refused(refusal));
         }
         if let Some((digest, body)) = of_template {
@@ -176,19 +176,20 @@ impl SqlStore {
             .iter()
             .map(|(index, job)| (Some(*index), job))
             .collect();
-        let mut transaction = engine::begin(&self.writer).await?;
-        let filled = sqlx::query(concat!(
+        let mut statements = Statements::begin(&self.writer()).await?;
+        let update = statements.next();
+        update.push(concat!(
             "UPDATE batches SET reserved = ",
             greatest!(),
-            "(reserved - $1, 0) WHERE id = $2 AND dropped = 0"
-        ))
-        .bind(count(jobs.len()))
-        .bind(batch.to_string())
-        .execute(&mut *transaction)
-        .await?;
-        require_batch(batch, filled.rows_affected())?;
-        let ended = insert_jobs(&mut transaction, Some(batch), &jobs).await?;
-        transaction.commit().await?;
+            "(reserved - "
+        ));
+        update.push_bind(count(jobs.len())).push(", 0) WHERE id = ");
+        update.push_bind(batch.to_string());
+        update.push(" AND dropped = 0 RETURNING id");
+        let filled = statements.send().await?;
+        require_batch(batch, filled.iter().flatten().count() as u64)?;
+        let ended = insert_jobs(&mut statements, Some(batch), &jobs).await?;
+        statements.commit().await?;
         Ok(ended)
     }
 

@@ -3,50 +3,57 @@
 //! A blob is a row. Jobs and stored slices refer to it; a job that shares a result is one more reference. [`release_blobs`] is
 //! the only place where a blob ends: it is called in every transaction that drops references.
 
-use super::engine::{self, Db, DbConnection, DbRow};
-use super::rows::{count, push_list, read_blob_ids, read_id, read_small, read_state};
+use super::super::statements::Statements;
+use super::engine::{self, Db, DbConnection, DbRow, SqlStore};
+use super::rows::{count, fence, push_list, read_blob_ids, read_id, read_small, read_state};
 use sqlx::{QueryBuilder, Row};
-use uuid::Uuid;
 
+use crate::jobs::store::claim::Claim;
 use crate::jobs::store::ending::StoredResult;
 use crate::jobs::store_error::StoreError;
 
 /// Values bound in one statement; far below the bound of SQLite.
 pub(crate) const VALUES_PER_STATEMENT: usize = 250;
 
-/// Stores results of jobs within the caller's transaction; the ids of their blobs are in the order of the results.
-pub(crate) async fn insert_blobs(
-    connection: &mut DbConnection,
-    results: &[(Uuid, &StoredResult)],
-) -> Result<Vec<i64>, StoreError> {
-    if results.is_empty() {
-        return Ok(Vec::new());
+impl SqlStore {
+    /// Stores results of claimed jobs whose leases are held, within the caller's transaction, which sends the statements; the ids of
+    /// their blobs are in the order of the results.
+    pub(crate) async fn insert_blobs(
+        &self,
+        statements: &mut Statements,
+        results: &[(&Claim, &StoredResult)],
+    ) -> Result<Vec<i64>, StoreError> {
+        if results.is_empty() {
+            return Ok(Vec::new());
+        }
+        let ids = self.new_blob_ids(statements, results.len()).await?;
+        let mut next = ids.iter();
+        for some in results.chunks(VALUES_PER_STATEMENT) {
+            let insert = statements.next();
+            insert.push("WITH made (id, job, lease_token, key, bytes, solution, fields) AS (");
+            insert.push_values(some, |mut row, (claim, result)| {
+                let (key, inside) = match result {
+                    StoredResult::Blob(key, _) => (Some(key.as_str()), None),
+                    StoredResult::Inline(result) => (None, Some(result)),
+                };
+                row.push_bind(next.next().copied())
+                    .push_bind(claim.id.to_string())
+                    .push_bind(fence(claim))
+                    .push_bind(key)
+                    .push_bind(count(result.bytes()))
+                    .push_bind(inside.map(|result| result.solution.as_ref()))
+                    .push_bind(inside.and_then(|result| result.fields.as_deref()));
+            });
+            insert.push(concat!(
+                ") INSERT INTO blobs (id, key, bytes, solution, fields, tenant) \
+                 SELECT made.id, made.key, made.bytes, made.solution, made.fields, jobs.tenant FROM made JOIN jobs \
+                 ON jobs.id = made.job AND jobs.lease_token = made.lease_token WHERE ",
+                unordered!("jobs.state"),
+                " = 'running'"
+            ));
+        }
+        Ok(ids)
     }
-    // The ids are given here, not by the database: rows of one statement may come back in any order. An id is never used
-    // twice, so that a reader cannot meet the result of another job under it.
-    let ids = engine::new_blob_ids(connection, results.len()).await?;
-    let mut next = ids.iter();
-    for some in results.chunks(VALUES_PER_STATEMENT) {
-        let mut insert = QueryBuilder::<Db>::new(
-            "INSERT INTO blobs (id, key, bytes, solution, fields, tenant) ",
-        );
-        insert.push_values(some, |mut row, (job, result)| {
-            let (key, inside) = match result {
-                StoredResult::Blob(key, _) => (Some(key.as_str()), None),
-                StoredResult::Inline(result) => (None, Some(result)),
-            };
-            row.push_bind(next.next().copied())
-                .push_bind(key)
-                .push_bind(count(result.bytes()))
-                .push_bind(inside.map(|result| result.solution.as_ref()))
-                .push_bind(inside.and_then(|result| result.fields.as_deref()))
-                .push("(SELECT tenant FROM jobs WHERE id = ")
-                .push_bind_unseparated(job.to_string())
-                .push_unseparated(")");
-        });
-        insert.build().execute(&mut *connection).await?;
-    }
-    Ok(ids)
 }
 
 /// Removes those of these blobs that nothing refers to any more; the keys of the large ones enter the outbox.

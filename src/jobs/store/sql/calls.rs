@@ -19,7 +19,8 @@ use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
 use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
 use crate::jobs::store::submission::{
-    BatchBegun, CacheKey, Enqueued, FilledHere, NewBatch, NewJob, QueueBounds, Refusal, StoredCase,
+    BatchBegun, CacheKey, ClaimedCase, Enqueued, FilledHere, NewBatch, NewJob, QueueBounds,
+    Refusal, StoredCase,
 };
 use crate::jobs::store::{KeyStore, Orphans, Store};
 use crate::jobs::store_error::StoreError;
@@ -255,10 +256,7 @@ impl Store for SqlStore {
         engine::again(|| self.claim(request)).await
     }
 
-    async fn claimed_cases(
-        &self,
-        ids: &[Uuid],
-    ) -> Result<HashMap<Uuid, (StoredCase, bool)>, StoreError> {
+    async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>, StoreError> {
         engine::again(|| self.claimed_cases(ids)).await
     }
 

@@ -1,9 +1,10 @@
 //! Ends of claimed jobs in the embedded job table: one transaction, and so one write to the disk, for all of them.
 
-use super::blob_refs::{drop_slices_of_ended, insert_blobs, release_blobs};
+use super::super::statements::Statements;
+use super::blob_refs::{drop_slices_of_ended, leave_to_collector, release_blobs};
 use super::cached::{Pair, SOURCE, end_pairs};
-use super::engine::{self, Db, DbConnection, SqlStore};
-use super::rows::{fence, read_cache_key, read_id, read_move, to_json};
+use super::engine::{self, Db, DbRow, SqlStore};
+use super::rows::{fence, read_cache_key, read_id, read_move, read_small, to_json};
 use crate::jobs::store::submission::CacheKey;
 use sqlx::{QueryBuilder, Row};
 use std::collections::HashMap;
@@ -47,12 +48,96 @@ impl SqlStore {
             .filter(|(_, ending)| !matches!(ending, Ending::Cached { .. }))
             .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
             .collect::<Result<Vec<_>, StoreError>>()?;
-        let mut transaction = engine::begin(&self.writer).await?;
-        let mut ended = end_solved(&mut transaction, &rows, now).await?;
-        ended.extend(end_pairs(&mut transaction, &pairs).await?);
-        transaction.commit().await?;
+        let mut statements = Statements::begin(&self.writer()).await?;
+        let made = self.push_ends(&mut statements, &rows, now).await?;
+        let keys = |(claim, end): &(&Claim, EndRow<'_>)| match end.result {
+            Some(StoredResult::Blob(key, _)) => Some((claim.id, key.clone())),
+            _ => None,
+        };
+        let keys: Vec<(Uuid, String)> = rows.iter().filter_map(keys).collect();
+        let sliced = ends.iter().any(|(claim, _)| claim.slices > 0);
+        if Statements::EXCLUSIVE && pairs.is_empty() && keys.is_empty() && !sliced {
+            let results = statements.commit().await?;
+            let ended = results.last().map_or(&[] as &[DbRow], Vec::as_slice);
+            if ended
+                .iter()
+                .any(|row| read_small::<u32>(row, "slices").is_ok_and(|slices| slices > 0))
+            {
+                // Slices were stored since the claim was read.
+                let mut transaction = engine::begin(&self.writer).await?;
+                drop_slices_of_ended(&mut transaction, ended).await?;
+                transaction.commit().await?;
+            }
+            return read_ended(ended);
+        }
+        let results = statements.send().await?;
+        let rows_ended = results.last().map_or(&[] as &[DbRow], Vec::as_slice);
+        let connection = statements.connection();
+        drop_slices_of_ended(connection, rows_ended).await?;
+        let mut ended = read_ended(rows_ended)?;
+        if ended.len() < rows.len() {
+            // Results whose lease was lost meanwhile have no owner.
+            release_blobs(connection, made).await?;
+            let lost = keys.into_iter().filter(|(id, _)| !ended.contains(id));
+            let lost: Vec<String> = lost.map(|(_, key)| key).collect();
+            leave_to_collector(connection, &lost).await?;
+        }
+        ended.extend(end_pairs(connection, &pairs).await?);
+        statements.commit().await?;
         Ok(ended)
     }
+
+    /// Writes the statements that end jobs with what their solves gave, as long as their leases are held; the ids of the blobs.
+    async fn push_ends(
+        &self,
+        statements: &mut Statements,
+        rows: &[(&Claim, EndRow<'_>)],
+        now: i64,
+    ) -> Result<Vec<i64>, StoreError> {
+        let results = rows.iter();
+        let results: Vec<_> = results
+            .filter_map(|(claim, end)| Some((*claim, end.result?)))
+            .collect();
+        let made = self.insert_blobs(statements, &results).await?;
+        let update = statements.next();
+        if rows.is_empty() {
+            update.push("SELECT id, state, slices FROM jobs WHERE 1 = 0");
+            return Ok(made);
+        }
+        let mut blobs = made.iter();
+        update.push("WITH done (id, lease_token, state, remarks, failure, blob, patches) AS (");
+        update.push_values(rows, |mut row, (claim, end)| {
+            row.push_bind(claim.id.to_string())
+                .push_bind(fence(claim))
+                .push_bind(end.state.name())
+                .push_bind(&end.remarks)
+                .push_bind(&end.failure)
+                .push_bind(end.result.and_then(|_| blobs.next().copied()))
+                .push_bind(i64::from(end.field_patches));
+        });
+        update.push(") UPDATE jobs SET state = done.state, ended_at = ");
+        update.push_bind(now);
+        update.push(", updated_at = ").push_bind(now);
+        // Jobs are found by their ids: the index of running ones keeps what no longer runs, until that can be removed.
+        update.push(concat!(
+            ", remarks = done.remarks, failure = done.failure, blob_id = done.blob, \
+             field_patches = done.patches, \
+             progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
+             lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
+             FROM done WHERE jobs.id = done.id AND jobs.lease_token = done.lease_token \
+             AND ",
+            unordered!("jobs.state"),
+            " = 'running' RETURNING jobs.id AS id, jobs.state AS state, slices",
+        ));
+        Ok(made)
+    }
+}
+
+/// The jobs that ended.
+fn read_ended(rows: &[DbRow]) -> Result<HashSet<Uuid>, StoreError> {
+    rows.iter()
+        .map(|row| Ok(read_move(row, State::Running)?.0))
+        .collect()
 }
 
 impl SqlStore {
@@ -84,62 +169,6 @@ impl SqlStore {
         }
         Ok(sources)
     }
-}
-
-/// Ends jobs with what their solves gave, as long as their leases are held; returns them.
-async fn end_solved(
-    connection: &mut DbConnection,
-    rows: &[(&Claim, EndRow<'_>)],
-    now: i64,
-) -> Result<HashSet<Uuid>, StoreError> {
-    if rows.is_empty() {
-        return Ok(HashSet::new());
-    }
-    let results = rows.iter();
-    let results: Vec<_> = results
-        .filter_map(|(claim, end)| Some((claim.id, end.result?)))
-        .collect();
-    let mut blobs = insert_blobs(connection, &results).await?.into_iter();
-    let mut update = QueryBuilder::<Db>::new(
-        "WITH done (id, lease_token, state, remarks, failure, blob, patches) AS (",
-    );
-    let mut inserted = Vec::with_capacity(results.len());
-    update.push_values(rows, |mut row, (claim, end)| {
-        let blob = end.result.and_then(|_| blobs.next());
-        inserted.extend(blob);
-        row.push_bind(claim.id.to_string())
-            .push_bind(fence(claim))
-            .push_bind(end.state.name())
-            .push_bind(&end.remarks)
-            .push_bind(&end.failure)
-            .push_bind(blob)
-            .push_bind(i64::from(end.field_patches));
-    });
-    update.push(") UPDATE jobs SET state = done.state, ended_at = ");
-    update.push_bind(now);
-    update.push(", updated_at = ").push_bind(now);
-    // Jobs are found by their ids: the index of running ones keeps what no longer runs, until that can be removed.
-    update.push(concat!(
-        ", remarks = done.remarks, failure = done.failure, blob_id = done.blob, \
-         field_patches = done.patches, \
-         progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
-         lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
-         FROM done WHERE jobs.id = done.id AND jobs.lease_token = done.lease_token \
-         AND ",
-        unordered!("jobs.state"),
-        " = 'running' RETURNING jobs.id AS id, jobs.state AS state, slices",
-    ));
-    let ended = update.build().fetch_all(&mut *connection).await?;
-    drop_slices_of_ended(connection, &ended).await?;
-    let ended = ended
-        .iter()
-        .map(|row| Ok(read_move(row, State::Running)?.0))
-        .collect::<Result<HashSet<_>, StoreError>>()?;
-    if ended.len() < rows.len() {
-        // The results of those whose lease was lost have no owner.
-        release_blobs(connection, inserted).await?;
-    }
-    Ok(ended)
 }
 
 /// The end of a job in the form the database takes.

@@ -1,14 +1,16 @@
 //! Jobs submitted one by one, stored together: all that wait at a moment share one transaction, and so one write to the disk,
 //! which takes longer than everything else about them.
 
-use super::engine::{self, DbConnection, DbPool};
+use super::super::statements::{Statements, Writer};
+use super::engine::{self, DbConnection};
 use super::insert::insert_jobs;
-use super::quota::{Places, with_living_source};
-use super::rows::{GET, job_columns, read_job};
+use super::quota::{Places, push_succeeded, push_taken};
+use super::rows::{GET, job_columns, read_id, read_job};
 use sqlx::Row;
 use std::collections::{HashMap, HashSet};
 
 use tokio::sync::{mpsc, oneshot};
+use uuid::Uuid;
 
 use crate::jobs::model::job::{Job, State};
 use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
@@ -38,14 +40,14 @@ pub(crate) struct GroupCommit(pub(crate) mpsc::Sender<Submission>);
 
 impl GroupCommit {
     /// Starts the task.
-    pub(crate) fn start(writer: DbPool) -> GroupCommit {
+    pub(crate) fn start(writer: Writer) -> GroupCommit {
         let (sender, waiting) = mpsc::channel(GROUP_MAX);
         tokio::spawn(store_all(writer, waiting));
         GroupCommit(sender)
     }
 }
 
-async fn store_all(writer: DbPool, mut waiting: mpsc::Receiver<Submission>) {
+async fn store_all(writer: Writer, mut waiting: mpsc::Receiver<Submission>) {
     let mut group = Vec::with_capacity(GROUP_MAX);
     while waiting.recv_many(&mut group, GROUP_MAX).await > 0 {
         while !group.is_empty() {
@@ -69,7 +71,7 @@ fn set_aside_repeated_keys(group: &mut Vec<Submission>) -> Vec<Submission> {
         .collect()
 }
 
-async fn store_some(writer: &DbPool, group: Vec<Submission>) {
+async fn store_some(writer: &Writer, group: Vec<Submission>) {
     let jobs: Vec<&NewJob> = group.iter().map(|waiting| &waiting.new).collect();
     let Some(bounds) = group.first().map(|waiting| waiting.bounds) else {
         return;
@@ -102,16 +104,29 @@ async fn store_some(writer: &DbPool, group: Vec<Submission>) {
 
 /// Stores jobs in one transaction; the answers are in their order. Idempotency keys must differ.
 async fn store_together(
-    writer: &DbPool,
+    writer: &Writer,
     jobs: &[&NewJob],
     bounds: QueueBounds,
 ) -> Result<Vec<Enqueued>, StoreError> {
-    let mut transaction = engine::begin(writer).await?;
-    engine::admit_alone(&mut transaction).await?;
+    let mut statements = Statements::begin(writer).await?;
+    engine::admit_alone(statements.connection()).await?;
+    let tenants: HashSet<&str> = jobs.iter().map(|job| &*job.tenant).collect();
+    push_taken(statements.next(), tenants);
+    let sources: Vec<Uuid> = jobs.iter().filter_map(|job| Some(job.source?.0)).collect();
+    if !sources.is_empty() {
+        push_succeeded(statements.next(), &sources);
+    }
+    let mut read = statements.send().await?.into_iter();
+    let mut places = Places::read(&read.next().unwrap_or_default(), bounds)?;
+    let living = read.next().unwrap_or_default();
+    let living = living
+        .iter()
+        .map(read_id)
+        .collect::<Result<HashSet<_>, _>>()?;
     let mut known = HashMap::new();
     for job in jobs {
         if let Some((key, digest)) = &job.idempotency
-            && let Some(found) = by_key(&mut transaction, &job.tenant, key, digest).await?
+            && let Some(found) = by_key(statements.connection(), &job.tenant, key, digest).await?
         {
             known.insert(job.id, found);
         }
@@ -121,42 +136,53 @@ async fn store_together(
         .filter(|job| !known.contains_key(&job.id))
         .map(|job| (None, *job))
         .collect();
-    let ending = with_living_source(&mut transaction, jobs).await?;
-    let mut places = Places::new(&mut transaction, bounds);
-    for (_, job) in added.iter().filter(|(_, job)| !ending.contains(&job.id)) {
-        if let Err(refusal) = places.take(&job.tenant, 1).await? {
-            known.insert(job.id, Enqueued::Refused(refusal));
-        }
-    }
     for (_, job) in &added {
-        if !known.contains_key(&job.id)
-            && let Some(refusal) = places.store(&job.tenant, job.body.len() as u64).await?
-        {
+        // A job that ends at once with the result of its source needs no place.
+        let ends = job
+            .source
+            .is_some_and(|(source, _)| living.contains(&source));
+        let taken = match ends {
+            true => Ok(0),
+            false => places.take(&job.tenant, 1),
+        };
+        let room = taken.and_then(|_| places.store(&job.tenant, job.body.len() as u64));
+        if let Err(refusal) = room {
             known.insert(job.id, Enqueued::Refused(refusal));
         }
     }
     added.retain(|(_, job)| !known.contains_key(&job.id));
-    let ended = insert_jobs(&mut transaction, None, &added).await?;
+    if added.is_empty() {
+        statements.commit().await?;
+        return answers(jobs, known);
+    }
+    let ended = insert_jobs(&mut statements, None, &added).await?;
     for (_, job) in added {
         if let Some((key, digest)) = &job.idempotency {
-            sqlx::query(
-                "INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) VALUES ($1, $2, $3, $4)",
-            )
-            .bind(&*job.tenant)
-            .bind(key)
-            .bind(digest.as_slice())
-            .bind(job.id.to_string())
-            .execute(&mut *transaction)
-            .await?;
+            let insert = statements.next();
+            insert.push("INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) ");
+            insert.push_values([()], |mut row, ()| {
+                row.push_bind(&*job.tenant)
+                    .push_bind(key)
+                    .push_bind(digest.as_slice())
+                    .push_bind(job.id.to_string());
+            });
         }
         let as_it_is = if ended.contains(&job.id) {
-            read_back(&mut transaction, job).await?
+            read_back(statements.connection(), job).await?
         } else {
             queued(job)
         };
         known.insert(job.id, Enqueued::Created(as_it_is));
     }
-    transaction.commit().await?;
+    statements.commit().await?;
+    answers(jobs, known)
+}
+
+/// The answers in the order of the jobs.
+fn answers(
+    jobs: &[&NewJob],
+    mut known: HashMap<Uuid, Enqueued>,
+) -> Result<Vec<Enqueued>, StoreError> {
     jobs.iter()
         .map(|job| known.remove(&job.id).ok_or_else(lost))
         .collect()

@@ -12,23 +12,25 @@ use uuid::Uuid;
 
 use crate::jobs::model::job::State;
 use crate::jobs::store::claim::{Claim, Lease, ReleaseReason, Renewal};
-use crate::jobs::store::submission::StoredCase;
+use crate::jobs::store::submission::{ClaimedCase, StoredCase};
 use crate::jobs::store_error::StoreError;
 
 impl SqlStore {
-    /// The cases of jobs, and whether their cancellation was asked for. A template is read once, however many rows fill it.
+    /// The cases of claimed jobs. A template is read once, however many rows fill it.
     ///
     /// # Errors
     /// The database failed.
     pub(crate) async fn claimed_cases(
         &self,
         ids: &[Uuid],
-    ) -> Result<HashMap<Uuid, (StoredCase, bool)>, StoreError> {
+    ) -> Result<HashMap<Uuid, ClaimedCase>, StoreError> {
         if ids.is_empty() {
             return Ok(HashMap::new());
         }
         let mut query = QueryBuilder::<Db>::new(
-            "SELECT id, kind, cases.row, body, batch_id, cancel_requested FROM cases JOIN jobs ON jobs.id = cases.job_id \
+            "SELECT id, kind, cases.row, body, batch_id, cancel_requested, CASE WHEN bypass_cache = 0 AND jobs.cache_key IS NOT NULL THEN \
+             (SELECT source.id FROM jobs AS source WHERE source.cache_key = jobs.cache_key AND source.state = 'succeeded' LIMIT 1) END AS source \
+             FROM cases JOIN jobs ON jobs.id = cases.job_id \
              WHERE job_id IN (",
         );
         push_list(&mut query, ids);
@@ -58,7 +60,14 @@ impl SqlStore {
                 head,
                 body: body.into(),
             };
-            cases.insert(read_id(row)?, (case, read_flag(row, "cancel_requested")?));
+            let source: Option<&str> = row.try_get("source")?;
+            let source = source.map(Uuid::try_parse).transpose();
+            let claimed = ClaimedCase {
+                case,
+                cancel_requested: read_flag(row, "cancel_requested")?,
+                source: source.map_err(|error| StoreError::Corrupt(format!("source: {error}")))?,
+            };
+            cases.insert(read_id(row)?, claimed);
         }
         Ok(cases)
     }

@@ -1,94 +1,104 @@
 //! How much of the queue is taken: counted by triggers of the database, compared with the bounds in the transaction that
 //! inserts.
 
-use super::engine::{Db, DbConnection};
-use super::rows::{push_list, read_count, read_id};
-use sqlx::QueryBuilder;
-use std::collections::{HashMap, HashSet};
+use super::engine::{Db, DbConnection, DbRow};
+use super::rows::{push_list, read_count};
+use sqlx::{QueryBuilder, Row};
+use std::collections::HashMap;
 
 use uuid::Uuid;
 
-use crate::jobs::store::submission::{NewJob, QueueBounds, Refusal};
+use crate::jobs::store::submission::{QueueBounds, Refusal};
 use crate::jobs::store_error::StoreError;
 
-/// Queued jobs of a tenant with the chunks of its runs (of all tenants if it is NULL), and the places reserved for batches that are being filled.
-const TAKEN: &str = "SELECT (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts \
-     WHERE state = 'queued' AND (tenant = $1 OR $1 IS NULL)) + \
-     (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND (tenant = $1 OR $1 IS NULL)) AS taken";
-
-/// Places still free, as one transaction sees them and takes them.
-pub(crate) struct Places<'a> {
-    connection: &'a mut DbConnection,
+/// Places still free, as one transaction has read them and takes them.
+pub(crate) struct Places {
     bounds: QueueBounds,
-    all: Option<u64>,
-    of_tenants: HashMap<String, u64>,
-    /// Bytes that tenants have stored.
-    stored: HashMap<String, u64>,
+    /// Queued jobs of all tenants with the places that are reserved for batches being filled.
+    all: u64,
+    /// The same of each tenant, and the bytes that it has stored.
+    of_tenants: HashMap<String, (u64, u64)>,
 }
 
-impl Places<'_> {
-    /// Nothing is read before the first place is asked for.
-    pub(crate) fn new(connection: &mut DbConnection, bounds: QueueBounds) -> Places<'_> {
-        Places {
-            connection,
+/// Writes a statement that reads what these tenants have taken.
+pub(crate) fn push_taken<'a>(
+    query: &mut QueryBuilder<Db>,
+    tenants: impl IntoIterator<Item = &'a str>,
+) {
+    query.push("WITH asked (tenant) AS (");
+    query.push_values(tenants, |mut row, tenant| {
+        row.push_bind(tenant);
+    });
+    query.push(
+        ") SELECT tenant, \
+         (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued' AND job_counts.tenant = asked.tenant) + \
+         (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND batches.tenant = asked.tenant) AS taken, \
+         (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued') + \
+         (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0) AS taken_by_all, \
+         (SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM stored_bytes WHERE stored_bytes.tenant = asked.tenant) AS stored FROM asked",
+    );
+}
+
+impl Places {
+    /// Reads the rows of [`push_taken`].
+    pub(crate) fn read(rows: &[DbRow], bounds: QueueBounds) -> Result<Places, StoreError> {
+        let mut places = Places {
             bounds,
-            all: None,
+            all: 0,
             of_tenants: HashMap::new(),
-            stored: HashMap::new(),
+        };
+        for row in rows {
+            places.all = read_count(row, "taken_by_all")?;
+            let of_tenant = (read_count(row, "taken")?, read_count(row, "stored")?);
+            places.of_tenants.insert(row.try_get("tenant")?, of_tenant);
         }
+        Ok(places)
+    }
+
+    /// What one tenant has taken.
+    pub(crate) async fn of(
+        connection: &mut DbConnection,
+        tenant: &str,
+        bounds: QueueBounds,
+    ) -> Result<Places, StoreError> {
+        let mut query = QueryBuilder::new("");
+        push_taken(&mut query, [tenant]);
+        Places::read(&query.build().fetch_all(connection).await?, bounds)
     }
 
     /// Takes as many places as there are, at most `most`; a refusal if there is not even one.
-    pub(crate) async fn take(
-        &mut self,
-        tenant: &str,
-        most: u64,
-    ) -> Result<Result<u64, Refusal>, StoreError> {
-        let all = match self.all {
-            Some(all) => all,
-            None => taken(self.connection, None).await?,
-        };
-        let of_tenant = match self.of_tenants.get(tenant) {
-            Some(taken) => *taken,
-            None => taken(self.connection, Some(tenant)).await?,
-        };
+    pub(crate) fn take(&mut self, tenant: &str, most: u64) -> Result<u64, Refusal> {
+        let (of_tenant, stored) = self.taken_by(tenant);
         let places = most
-            .min(self.bounds.all.saturating_sub(all))
+            .min(self.bounds.all.saturating_sub(self.all))
             .min(self.bounds.tenant.saturating_sub(of_tenant));
-        self.all = Some(all + places);
-        self.of_tenants
-            .insert(tenant.to_owned(), of_tenant + places);
-        if places > 0 || most == 0 {
-            return Ok(Ok(places));
+        if places == 0 && most > 0 {
+            return Err(self.refusal_of(tenant));
         }
-        Ok(Err(self.refusal_of(tenant)))
+        self.all += places;
+        self.of_tenants
+            .insert(tenant.to_owned(), (of_tenant + places, stored));
+        Ok(places)
     }
 
-    /// Counts bytes that are about to be stored; a refusal if the tenant would have more than it may. Nothing is read without a bound.
-    pub(crate) async fn store(
-        &mut self,
-        tenant: &str,
-        bytes: u64,
-    ) -> Result<Option<Refusal>, StoreError> {
-        let Some(bytes_max) = self.bounds.stored else {
-            return Ok(None);
-        };
-        let stored = match self.stored.get(tenant) {
-            Some(stored) => *stored,
-            None => stored(self.connection, tenant).await?,
-        };
-        if stored + bytes > bytes_max {
-            return Ok(Some(Refusal::Stored));
+    /// Counts bytes that are about to be stored; a refusal if the tenant would have more than it may.
+    pub(crate) fn store(&mut self, tenant: &str, bytes: u64) -> Result<(), Refusal> {
+        let (of_tenant, stored) = self.taken_by(tenant);
+        if self.bounds.stored.is_some_and(|most| stored + bytes > most) {
+            return Err(Refusal::Stored);
         }
-        self.stored.insert(tenant.to_owned(), stored + bytes);
-        Ok(None)
+        self.of_tenants
+            .insert(tenant.to_owned(), (of_tenant, stored + bytes));
+        Ok(())
+    }
+
+    fn taken_by(&self, tenant: &str) -> (u64, u64) {
+        self.of_tenants.get(tenant).copied().unwrap_or((0, 0))
     }
 
     /// Which bound has no place left.
     pub(crate) fn refusal_of(&self, tenant: &str) -> Refusal {
-        let of_tenant = self.of_tenants.get(tenant);
-        let of_tenant = of_tenant.copied().unwrap_or(0);
-        if of_tenant >= self.bounds.tenant {
+        if self.taken_by(tenant).0 >= self.bounds.tenant {
             Refusal::Quota
         } else {
             Refusal::Queue
@@ -107,38 +117,13 @@ pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Resul
     read_count(&row, "bytes")
 }
 
-async fn taken(connection: &mut DbConnection, tenant: Option<&str>) -> Result<u64, StoreError> {
-    let row = sqlx::query(TAKEN)
-        .bind(tenant)
-        .fetch_one(connection)
-        .await?;
-    read_count(&row, "taken")
-}
-
-/// Those of these jobs whose source is still there, so that they end at once and need no place.
-pub(crate) async fn with_living_source(
-    connection: &mut DbConnection,
-    jobs: &[&NewJob],
-) -> Result<HashSet<Uuid>, StoreError> {
-    let sources: Vec<_> = jobs.iter().filter_map(|job| Some(job.source?.0)).collect();
-    if sources.is_empty() {
-        return Ok(HashSet::new());
-    }
-    let mut query = QueryBuilder::<Db>::new(concat!(
+/// Writes a statement that reads which of these jobs have succeeded.
+pub(crate) fn push_succeeded(query: &mut QueryBuilder<Db>, ids: &[Uuid]) {
+    query.push(concat!(
         "SELECT id FROM jobs WHERE ",
         bare!("state"),
         " = 'succeeded' AND id IN ("
     ));
-    push_list(&mut query, &sources);
+    push_list(query, ids);
     query.push(")");
-    let rows = query.build().fetch_all(connection).await?;
-    let living = rows
-        .iter()
-        .map(read_id)
-        .collect::<Result<HashSet<_>, _>>()?;
-    let with = jobs.iter().filter(|job| {
-        job.source
-            .is_some_and(|(source, _)| living.contains(&source))
-    });
-    Ok(with.map(|job| job.id).collect())
 }

@@ -1,8 +1,9 @@
 //! Solved slices of jobs that are not solved whole.
 
-use super::blob_refs::{insert_blobs, release_blobs};
-use super::engine::{self, SqlStore};
-use super::rows::{fence, read_blob_ids, read_count, read_small};
+use super::super::statements::Statements;
+use super::blob_refs::release_blobs;
+use super::engine::SqlStore;
+use super::rows::{count, fence, read_blob_ids, read_count, read_small};
 use sqlx::Row;
 use std::time::Duration;
 
@@ -18,10 +19,6 @@ pub(crate) const NOTES: &str =
 pub(crate) const RESULTS: &str = "SELECT key, bytes, solution, fields FROM job_slices JOIN blobs ON blobs.id = blob_id \
      WHERE job_id = $1 ORDER BY number";
 
-/// Attempts are counted from the last slice that was stored: who gets on is not what processes die of.
-const ADD: &str = "UPDATE jobs SET slices = $3 + 1, done = $4, progress = $4, cost_us = $5, attempt = 1, \
-     version = version + 1 WHERE id = $1 AND lease_token = $2 AND state = 'running'";
-
 impl SqlStore {
     /// Stores a solved slice of a claimed job in place of what there was from its number on; the same call again changes
     /// nothing. Returns whether the lease was still held; otherwise nothing changed.
@@ -36,16 +33,19 @@ impl SqlStore {
         let id = claim.id.to_string();
         let note = &slice.note;
         let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
-        let mut transaction = engine::begin(&self.writer).await?;
-        let added = sqlx::query(ADD)
-            .bind(&id)
-            .bind(fence(claim))
-            .bind(i64::from(note.number))
-            .bind(slice.done)
-            .bind(i64::try_from(slice.rest_us).unwrap_or(i64::MAX))
-            .execute(&mut *transaction)
-            .await?;
-        if added.rows_affected() == 0 {
+        let mut statements = Statements::begin(&self.writer()).await?;
+        let add = statements.next();
+        // Attempts are counted from the last slice that was stored: who gets on is not what processes die of.
+        add.push("UPDATE jobs SET attempt = 1, version = version + 1, slices = ");
+        add.push_bind(i64::from(note.number) + 1).push(", done = ");
+        add.push_bind(slice.done).push(", progress = ");
+        add.push_bind(slice.done).push(", cost_us = ");
+        add.push_bind(count(slice.rest_us)).push(" WHERE id = ");
+        add.push_bind(&id).push(" AND lease_token = ");
+        add.push_bind(fence(claim))
+            .push(" AND state = 'running' RETURNING id");
+        let added = statements.send().await?;
+        if added.iter().flatten().count() == 0 {
             return Ok(false);
         }
         let there = sqlx::query(
@@ -55,7 +55,7 @@ impl SqlStore {
         .bind(i64::from(note.number))
         .bind(&note.digest)
         .bind(spent_us)
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(statements.connection())
         .await?;
         if there.is_none() {
             let replaced = sqlx::query(
@@ -63,10 +63,13 @@ impl SqlStore {
             )
             .bind(&id)
             .bind(i64::from(note.number))
-            .fetch_all(&mut *transaction)
+            .fetch_all(statements.connection())
             .await?;
-            release_blobs(&mut transaction, read_blob_ids(&replaced)?).await?;
-            let blobs = insert_blobs(&mut transaction, &[(claim.id, &slice.result)]).await?;
+            release_blobs(statements.connection(), read_blob_ids(&replaced)?).await?;
+            let blobs = self
+                .insert_blobs(&mut statements, &[(claim, &slice.result)])
+                .await?;
+            statements.send().await?;
             sqlx::query(
                 "INSERT INTO job_slices (job_id, number, motions, digest, spent_us, blob_id) \
                  VALUES ($1, $2, $3, $4, $5, $6)",
@@ -77,10 +80,10 @@ impl SqlStore {
             .bind(&note.digest)
             .bind(spent_us)
             .bind(blobs.first())
-            .execute(&mut *transaction)
+            .execute(statements.connection())
             .await?;
         }
-        transaction.commit().await?;
+        statements.commit().await?;
         Ok(true)
     }
 

@@ -7,6 +7,8 @@
 
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use sqlx::sqlite::{
@@ -18,6 +20,7 @@ use sqlx::{Connection, SqliteConnection};
 use crate::jobs::error::JobsError;
 use crate::jobs::store::sqlite::schema::{mark, migrate, require};
 use crate::jobs::store::sqlite::sql::group_commit::GroupCommit;
+use crate::jobs::store::sqlite::statements::Writer;
 use crate::jobs::store_error::StoreError;
 
 /// The write-ahead log is cut to this size when it was larger for a while.
@@ -34,6 +37,8 @@ pub struct SqliteStore {
     pub(crate) writer: SqlitePool,
     pub(crate) readers: SqlitePool,
     pub(crate) group_commit: GroupCommit,
+    /// A transaction of the writing connection was begun and its end is not known.
+    pub(crate) interrupted: Arc<AtomicBool>,
 }
 
 impl SqliteStore {
@@ -82,16 +87,25 @@ impl SqliteStore {
         if std::fs::metadata(file).is_ok_and(|about| about.len() == 0) {
             writing = writing.auto_vacuum(SqliteAutoVacuum::Incremental);
         }
+        let interrupted = Arc::new(AtomicBool::new(false));
+        let open = interrupted.clone();
         let writer = pool(1)
-            .before_acquire(|connection, _| Box::pin(is_free(connection)))
+            .before_acquire(move |connection, _| {
+                let interrupted = open.swap(false, Ordering::AcqRel);
+                Box::pin(async move { Ok(!interrupted && is_free(connection).await?) })
+            })
             .connect_with(writing)
             .await?;
         let readers = pool(READERS).connect_with(options.read_only(true)).await?;
         Ok(SqliteStore {
             file: file.to_owned(),
-            group_commit: GroupCommit::start(writer.clone()),
+            group_commit: GroupCommit::start(Writer {
+                pool: writer.clone(),
+                interrupted: interrupted.clone(),
+            }),
             writer,
             readers,
+            interrupted,
         })
     }
 

@@ -3,15 +3,17 @@
 use std::ffi::OsString;
 use std::path::Path;
 
-use sqlx::Transaction;
 use sqlx::sqlite::{Sqlite, SqliteConnection, SqlitePool, SqliteRow};
+use sqlx::{Row, Transaction};
 use uuid::Uuid;
 
 use crate::jobs::model::kind::Queue;
-use crate::jobs::store::claim::ClaimRequest;
+use crate::jobs::store::claim::{ClaimKind, ClaimRequest};
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::sqlite::database::SqliteStore;
-use crate::jobs::store::sqlite::sql::claim::{PEEK, count_waiting, first_queued};
+use crate::jobs::store::sqlite::sql::claim::{claimed, peek};
+use crate::jobs::store::sqlite::sql::rows::count;
+use crate::jobs::store::sqlite::statements::{Statements, Writer};
 use crate::jobs::store_error::StoreError;
 
 pub(crate) type Db = Sqlite;
@@ -23,6 +25,33 @@ pub(crate) type SqlStore = SqliteStore;
 /// What stands before and behind the present by which leases are judged, a value.
 pub(crate) const LEASE_NOW: (&str, &str) = ("", "");
 
+macro_rules! claim {
+    ($begun:literal, $most:literal) => {
+        concat!(
+            "WITH queued AS MATERIALIZED (",
+            peek!($begun, $most),
+            "), placed AS (SELECT id, ROW_NUMBER() OVER in_order AS place, SUM(cost_us) OVER in_order AS cost_us, \
+                 SUM(suspect) OVER in_order AS suspects FROM queued WINDOW in_order AS (ORDER BY rank, id)), \
+             chosen AS MATERIALIZED (SELECT id FROM placed WHERE place = 1 OR (cost_us <= $7 AND suspects = 0)) \
+             UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = $8, lease_until = $9, worker = $10, \
+             started_at = $11, updated_at = $11, group_size = (SELECT COUNT(*) FROM chosen), \
+             solving = 1 - suspect, progress = done, version = version + 1 \
+             WHERE id IN (SELECT id FROM chosen) RETURNING ",
+            claimed!()
+        )
+    };
+}
+
+/// Claims the first new jobs of a queue, of a short queue only a share for each worker.
+pub(crate) const CLAIM_NEW: &str = claim!(
+    "slices = 0",
+    "MAX(1, MIN($2, (SELECT (COALESCE(SUM(number), 0) + $6 - 1) / $6 FROM job_counts \
+     WHERE state = 'queued' AND tenant = $1 AND kind = $5)))"
+);
+
+/// Claims the first job of a queue of which some slices are solved.
+pub(crate) const CLAIM_BEGUN: &str = claim!("slices > 0", "1");
+
 /// Begins a transaction that writes. One that reads first and then turns into a writer would fail at once beside another.
 pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, StoreError> {
     Ok(pool.begin_with("BEGIN IMMEDIATE").await?)
@@ -32,19 +61,6 @@ pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, Sto
 /// writer.
 pub(crate) async fn admit_alone(_: &mut DbConnection) -> Result<(), StoreError> {
     Ok(())
-}
-
-/// Ids for new blobs. They are given here, not by the insertion: rows of one statement may come back in any order. An id is
-/// never used twice, so that a reader cannot meet the result of another job under it.
-pub(crate) async fn new_blob_ids(
-    connection: &mut DbConnection,
-    number: usize,
-) -> Result<Vec<i64>, StoreError> {
-    let last: Option<i64> =
-        sqlx::query_scalar("SELECT seq FROM sqlite_sequence WHERE name = 'blobs'")
-            .fetch_optional(connection)
-            .await?;
-    Ok((last.unwrap_or(0) + 1..).take(number).collect())
 }
 
 /// Keeps jobs from being removed until the end of the transaction: there is one writer.
@@ -65,28 +81,58 @@ pub(crate) async fn again<T, F: Future<Output = Result<T, StoreError>>>(
 }
 
 impl SqliteStore {
+    /// Where transactions that write begin.
+    pub(crate) fn writer(&self) -> Writer {
+        Writer {
+            pool: self.writer.clone(),
+            interrupted: self.interrupted.clone(),
+        }
+    }
+
+    /// Ids for new blobs. An id is never used twice, so that a reader cannot meet the result of another job under it.
+    pub(crate) async fn new_blob_ids(
+        &self,
+        statements: &mut Statements,
+        number: usize,
+    ) -> Result<Vec<i64>, StoreError> {
+        let last = statements.next();
+        last.push("SELECT seq FROM sqlite_sequence WHERE name = 'blobs'");
+        let sent = statements.send().await?;
+        let last = sent.last().and_then(|rows| rows.first());
+        let last: i64 = last.map_or(Ok(0), |row| row.try_get("seq"))?;
+        Ok((last + 1..).take(number).collect())
+    }
+
+    /// Claims the next jobs of a queue; rows with the columns of `claimed`.
+    pub(crate) async fn claim_next(
+        &self,
+        request: &ClaimRequest<'_>,
+        token: i64,
+    ) -> Result<Vec<DbRow>, StoreError> {
+        let claim = match request.kind {
+            ClaimKind::New => CLAIM_NEW,
+            ClaimKind::Begun => CLAIM_BEGUN,
+        };
+        let rows = sqlx::query(claim)
+            .bind(&*request.queue.tenant)
+            .bind(count(request.jobs))
+            .bind(request.late_before)
+            .bind(request.each_slice_us.map_or(i64::MAX, count))
+            .bind(request.queue.kind.name())
+            .bind(count(request.workers.max(1)))
+            .bind(count(request.cost_us))
+            .bind(token)
+            .bind(request.lease.now.saturating_add(request.lease.ms))
+            .bind(request.worker)
+            .bind(request.now)
+            .fetch_all(&self.writer)
+            .await?;
+        Ok(rows)
+    }
+
     /// The present by which leases are judged: that of the one process.
     pub(crate) fn lease_now(&self, now: i64) -> Option<i64> {
         Some(now)
-    }
-
-    /// Jobs in a queue.
-    pub(crate) async fn waiting(
-        &self,
-        connection: &mut DbConnection,
-        queue: &Queue,
-    ) -> Result<i64, StoreError> {
-        count_waiting(connection, queue).await
-    }
-
-    /// The first jobs of a queue.
-    pub(crate) async fn peek(
-        &self,
-        connection: &mut DbConnection,
-        request: &ClaimRequest<'_>,
-        most: i64,
-    ) -> Result<Vec<DbRow>, StoreError> {
-        first_queued(connection, PEEK, request, most).await
     }
 
     /// Not cached: the query is cheap.

@@ -11,3 +11,4 @@ mod plans;
 pub mod schema;
 #[path = "../sql/mod.rs"]
 pub mod sql;
+pub(crate) mod statements;
