@@ -10,7 +10,7 @@ use crate::jobs::open_store::table_file;
 use crate::jobs::options::Options;
 use crate::jobs::result_place::settle::settle;
 use crate::jobs::result_place::url::ResultsPlace;
-use crate::jobs::store::Store;
+use crate::jobs::store::Upkeep;
 use crate::jobs::store::claim::Reap;
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::sqlite::database::SqliteStore;
@@ -57,7 +57,7 @@ pub async fn relocate(
     to.require_empty().await?;
     let now = jiff::Timestamp::now().as_millisecond();
     let attempts_max = Options::new(data_dir).attempts_max;
-    Store::reap(&from, Reap::Dead, now, attempts_max).await?;
+    Upkeep::reap(&from, Reap::Dead, now, attempts_max).await?;
     let results = settle(&to, place, Metrics::new().store_requests.clone()).await?;
     let mut moved = Moved {
         rows: Vec::new(),

@@ -54,17 +54,25 @@ use crate::jobs::store_error::StoreError;
 
 /// A job table, which also keeps API keys.
 #[async_trait]
-pub trait Store: KeyStore + Send + Sync + Debug {
-    // Health.
-
+pub trait Store:
+    SubmitJobs
+    + Batches
+    + BatchLists
+    + ClientJobs
+    + JobLists
+    + Profiles
+    + Claims
+    + Leases
+    + Slices
+    + Ends
+    + Upkeep
+    + ResultKeys
+    + Statistics
+    + KeyStore
+    + Debug
+{
     /// Makes a round trip; with `write` the round trip writes, although it changes nothing.
     async fn ready(&self, write: bool) -> Result<(), StoreError>;
-
-    /// Counts and sizes, read from indices alone.
-    async fn stats(&self) -> Result<Stats, StoreError>;
-
-    /// What a tenant has; the bytes that its unfinished batches stand for are not known here.
-    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError>;
 
     /// What the store can do beside, if several processes may use it at once.
     fn cluster(&self) -> Option<&dyn Cluster>;
@@ -72,12 +80,20 @@ pub trait Store: KeyStore + Send + Sync + Debug {
     /// Closes every connection. Later calls fail.
     async fn close(&self);
 
-    // Submission.
+    /// Gives up to `step` free pages back to the file system if there are more than `spare`; says whether it did.
+    async fn compact(&self, spare: i64, step: u32) -> Result<bool, StoreError>;
+}
 
+/// Submission of single jobs.
+#[async_trait]
+pub trait SubmitJobs: Send + Sync {
     /// Inserts a job if the bounds leave it a place, or finds the job for which its idempotency key stands. A job with a
     /// cached result ends at once and needs no place; if its source has gone meanwhile, the job is queued. A caller that
     /// stops waiting does not stop the call.
     async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, StoreError>;
+
+    /// Frees an idempotency key of a tenant.
+    async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), StoreError>;
 
     /// The job for which an idempotency key of a tenant stands, or the conflict if it stands for another digest.
     async fn job_by_key(
@@ -86,10 +102,11 @@ pub trait Store: KeyStore + Send + Sync + Debug {
         key: &str,
         digest: &[u8; 32],
     ) -> Result<Option<Enqueued>, StoreError>;
+}
 
-    /// Frees an idempotency key of a tenant.
-    async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), StoreError>;
-
+/// Batches and runs: filled piece by piece, acknowledged once they are complete, read and removed as a whole.
+#[async_trait]
+pub trait Batches: Send + Sync {
     /// Reserves up to `most` more places in the queue for a batch that is being received; returns how many.
     async fn reserve(
         &self,
@@ -133,45 +150,17 @@ pub trait Store: KeyStore + Send + Sync + Debug {
     /// The batches that are not acknowledged.
     async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError>;
 
-    // Reading.
-
-    /// A job.
-    async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>, StoreError>;
-
-    /// One page of the jobs of a tenant, newest first, from the first job older than `after`. It reads no more rows than it
-    /// returns, up to a constant.
-    async fn list(
+    /// The same for up to `limit` jobs of a batch; returns those that changed.
+    async fn cancel_batch(
         &self,
         tenant: &str,
-        filter: &Filter,
-        after: Option<Uuid>,
+        id: Uuid,
         limit: u32,
-    ) -> Result<Page<Job>, StoreError>;
+        now: i64,
+    ) -> Result<Vec<(Uuid, State)>, StoreError>;
 
-    /// One page of the acknowledged batches of a tenant with their counts, newest first, from the first one older than `after`.
-    async fn batches(
-        &self,
-        tenant: &str,
-        filter: &BatchFilter,
-        after: Option<Uuid>,
-        limit: u32,
-    ) -> Result<Page<Batch>, StoreError>;
-
-    /// Jobs of a tenant that changed, progress aside, in the order of the time of their last change and of their ids: those
-    /// that changed later than `since`, and of those that changed at that time the ones after the job `after`, or all of them.
-    async fn changes(
-        &self,
-        tenant: &str,
-        since: i64,
-        after: Option<Uuid>,
-        limit: u32,
-    ) -> Result<Vec<Change>, StoreError>;
-
-    /// An acknowledged batch or run with its counts.
-    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError>;
-
-    /// The template of an acknowledged batch that is a run, and how far its chunks are.
-    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError>;
+    /// Removes up to `limit` ended jobs of a batch, and the batch with its last job; `true` once no ended job is left.
+    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool, StoreError>;
 
     /// The jobs of a batch after the job `after`, in the order in which they were sent, at most `limit`; small solutions are read with
     /// them, and none after those of `bytes` together.
@@ -191,9 +180,39 @@ pub trait Store: KeyStore + Send + Sync + Debug {
         id: Uuid,
         limit: u32,
     ) -> Result<Vec<String>, StoreError>;
+}
 
-    /// The case of a job as it was submitted.
-    async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>, StoreError>;
+/// Batches and runs with the counts of their jobs.
+#[async_trait]
+pub trait BatchLists: Send + Sync {
+    /// One page of the acknowledged batches of a tenant with their counts, newest first, from the first one older than `after`.
+    async fn batches(
+        &self,
+        tenant: &str,
+        filter: &BatchFilter,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Page<Batch>, StoreError>;
+
+    /// An acknowledged batch or run with its counts.
+    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError>;
+
+    /// The template of an acknowledged batch that is a run, and how far its chunks are.
+    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError>;
+}
+
+/// What clients ask of one job.
+#[async_trait]
+pub trait ClientJobs: Send + Sync {
+    /// Cancels a queued job at once, and marks a running one as to be cancelled; an ended one stays as it is. Returns the
+    /// job as it then is.
+    async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>, StoreError>;
+
+    /// Removes an ended job with all that hangs on it; its blob goes with the last reference to it.
+    async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted, StoreError>;
+
+    /// A job.
+    async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>, StoreError>;
 
     /// A job with its result: a small one itself, a large one by the key of its blob.
     async fn result(
@@ -202,17 +221,37 @@ pub trait Store: KeyStore + Send + Sync + Debug {
         id: Uuid,
     ) -> Result<Option<(Job, Option<ResultRef>)>, StoreError>;
 
-    /// For each of these keys that a succeeded job carries, one such job.
-    async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, StoreError>;
+    /// The case of a job as it was submitted.
+    async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>, StoreError>;
+}
 
-    /// What comes before a queued job among the jobs of its tenant, counted no further than `limit` jobs.
-    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError>;
+/// Lists of jobs, and what changed lately.
+#[async_trait]
+pub trait JobLists: Send + Sync {
+    /// One page of the jobs of a tenant, newest first, from the first job older than `after`. It reads no more rows than it
+    /// returns, up to a constant.
+    async fn list(
+        &self,
+        tenant: &str,
+        filter: &Filter,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Page<Job>, StoreError>;
 
-    /// Was there a job or a batch of this tenant that has expired?
-    async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool, StoreError>;
+    /// Jobs of a tenant that changed, progress aside, in the order of the time of their last change and of their ids: those
+    /// that changed later than `since`, and of those that changed at that time the ones after the job `after`, or all of them.
+    async fn changes(
+        &self,
+        tenant: &str,
+        since: i64,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Vec<Change>, StoreError>;
+}
 
-    // Profiles.
-
+/// Cross-sections that tenants keep.
+#[async_trait]
+pub trait Profiles: Send + Sync {
     /// Keeps a cross-section for a tenant, unless it has it already, or would keep more than `max_bytes` with it.
     async fn add_profile(
         &self,
@@ -237,37 +276,22 @@ pub trait Store: KeyStore + Send + Sync + Debug {
 
     /// Removes a cross-section of a tenant; `false` if there was none.
     async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool, StoreError>;
+}
 
-    // Control.
-
-    /// Cancels a queued job at once, and marks a running one as to be cancelled; an ended one stays as it is. Returns the
-    /// job as it then is.
-    async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>, StoreError>;
-
-    /// The same for up to `limit` jobs of a batch; returns those that changed.
-    async fn cancel_batch(
-        &self,
-        tenant: &str,
-        id: Uuid,
-        limit: u32,
-        now: i64,
-    ) -> Result<Vec<(Uuid, State)>, StoreError>;
-
-    /// Removes an ended job with all that hangs on it; its blob goes with the last reference to it.
-    async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted, StoreError>;
-
-    /// Removes up to `limit` ended jobs of a batch, and the batch with its last job; `true` once no ended job is left.
-    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool, StoreError>;
-
-    // Workers.
-
+/// Claims of queued jobs.
+#[async_trait]
+pub trait Claims: Send + Sync {
     /// Queues with jobs in them.
     async fn queues(&self) -> Result<Vec<Queue>, StoreError>;
 
     /// Claims the first job of a queue, by priority and then by age, together with those behind it that are small
     /// enough, in their order. A suspect comes alone, and no job of a batch that is not acknowledged.
     async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError>;
+}
 
+/// What workers do while they hold a lease.
+#[async_trait]
+pub trait Leases: Send + Sync {
     /// The cases of claimed jobs, with what has happened to them meanwhile.
     async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>, StoreError>;
 
@@ -281,6 +305,19 @@ pub trait Store: KeyStore + Send + Sync + Debug {
     /// Notes that claimed jobs are being solved, or that they wait for their turn; each stands for itself from now on.
     async fn set_solving(&self, claims: &[Claim], solving: bool) -> Result<(), StoreError>;
 
+    /// Gives claimed jobs back to the queue without counting their attempts; those that the client has cancelled end.
+    /// Returns those that were still held, with their new states.
+    async fn release(
+        &self,
+        claims: &[Claim],
+        why: ReleaseReason,
+        now: i64,
+    ) -> Result<Vec<(Uuid, State)>, StoreError>;
+}
+
+/// Solved slices of jobs that are not solved whole.
+#[async_trait]
+pub trait Slices: Send + Sync {
     /// Stores a solved slice in place of what there was from its number on; `false` if the lease is lost. Attempts are
     /// counted from the last slice. The same call again changes nothing.
     async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool, StoreError>;
@@ -290,23 +327,23 @@ pub trait Store: KeyStore + Send + Sync + Debug {
 
     /// The parts of the answer that the slices of a job are, in their order.
     async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, StoreError>;
+}
 
+/// Ends of claimed jobs.
+#[async_trait]
+pub trait Ends: Send + Sync {
     /// Ends claimed jobs, all in one transaction; returns those that ended. Of the others the lease is lost, or the source
     /// of their cached result has gone.
     async fn finish(&self, ends: &[(Claim, Ending)], now: i64)
     -> Result<HashSet<Uuid>, StoreError>;
 
-    /// Gives claimed jobs back to the queue without counting their attempts; those that the client has cancelled end.
-    /// Returns those that were still held, with their new states.
-    async fn release(
-        &self,
-        claims: &[Claim],
-        why: ReleaseReason,
-        now: i64,
-    ) -> Result<Vec<(Uuid, State)>, StoreError>;
+    /// For each of these keys that a succeeded job carries, one such job.
+    async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, StoreError>;
+}
 
-    // Maintenance.
-
+/// What ends or goes by itself.
+#[async_trait]
+pub trait Upkeep: Send + Sync {
     /// Takes running jobs from their workers: to `cancelled` if the client asked for that, to `failed` if `attempts_max` are
     /// used up, else back to the queue. An attempt counts only for a job that was solved alone; the others come alone
     /// next time. Returns them with their new states.
@@ -329,6 +366,13 @@ pub trait Store: KeyStore + Send + Sync + Debug {
     /// of jobs removed.
     async fn expire(&self, rule: RetentionRule) -> Result<u64, StoreError>;
 
+    /// Was there a job or a batch of this tenant that has expired?
+    async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool, StoreError>;
+}
+
+/// Keys of large results.
+#[async_trait]
+pub trait ResultKeys: Send + Sync {
     /// Keys of large results that nobody refers to any more, at most `limit`; those in `done` are forgotten first.
     async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>, StoreError>;
 
@@ -337,24 +381,24 @@ pub trait Store: KeyStore + Send + Sync + Debug {
 
     /// Which of these large results no job refers to.
     async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans, StoreError>;
-
-    /// Gives up to `step` free pages back to the file system if there are more than `spare`; says whether it did.
-    async fn compact(&self, spare: i64, step: u32) -> Result<bool, StoreError>;
 }
 
-/// Large results that no job refers to.
-#[derive(Debug, Default, PartialEq, Eq)]
-pub struct Orphans {
-    /// Keys of those that none will refer to.
-    pub certain: Vec<String>,
-    /// Those whose job is running, with its id: this attempt may have written them and refer to them when it ends, or an earlier
-    /// one may have left them behind.
-    pub undecided: Vec<(Uuid, String)>,
-}
-
-/// Where API keys are kept.
+/// Counts and sizes.
 #[async_trait]
-pub trait KeyStore: Send + Sync + Debug {
+pub trait Statistics: Send + Sync {
+    /// What a tenant has; the bytes that its unfinished batches stand for are not known here.
+    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError>;
+
+    /// Counts and sizes, read from indices alone.
+    async fn stats(&self) -> Result<Stats, StoreError>;
+
+    /// What comes before a queued job among the jobs of its tenant, counted no further than `limit` jobs.
+    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError>;
+}
+
+/// API keys.
+#[async_trait]
+pub trait KeyStore: Send + Sync {
     /// Stores a key. It fails if there is one with the same id.
     async fn add_key(&self, key: &Key) -> Result<(), StoreError>;
 
@@ -366,4 +410,14 @@ pub trait KeyStore: Send + Sync + Debug {
 
     /// Revokes a key; `None` if there is none. A key that was revoked before keeps its time.
     async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, StoreError>;
+}
+
+/// Large results that no job refers to.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Orphans {
+    /// Keys of those that none will refer to.
+    pub certain: Vec<String>,
+    /// Those whose job is running, with its id: this attempt may have written them and refer to them when it ends, or an earlier
+    /// one may have left them behind.
+    pub undecided: Vec<(Uuid, String)>,
 }

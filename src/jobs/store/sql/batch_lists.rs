@@ -1,15 +1,19 @@
 //! Lists of batches, newest first, with the numbers of their jobs.
 
-use super::engine::{Db, DbRow, SqlStore};
+use super::engine::{self, Db, DbRow, SqlStore};
 use super::rows::{from_json, push_list, read_count, read_id, read_kind, read_small, read_state};
 use sqlx::{QueryBuilder, Row};
 use std::collections::{BTreeMap, HashMap};
 
+use bytes::Bytes;
 use uuid::Uuid;
 
-use crate::jobs::model::batch::Batch;
+use async_trait::async_trait;
+
+use crate::jobs::model::batch::{Batch, RunRecord};
 use crate::jobs::model::job::State;
 use crate::jobs::model::kind::Kind;
+use crate::jobs::store::BatchLists;
 use crate::jobs::store::list::{BatchFilter, Page, Total, first_id_at};
 use crate::jobs::store_error::StoreError;
 
@@ -20,56 +24,6 @@ const EXAMINED_MAX: i64 = 10_000;
 const COLUMNS: &str = "id, tenant, kind, created_at, count, rejected, name, labels, ended_at";
 
 impl SqlStore {
-    /// One page of the batches of a tenant, newest first.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn batches(
-        &self,
-        tenant: &str,
-        filter: &BatchFilter,
-        after: Option<Uuid>,
-        limit: u32,
-    ) -> Result<Page<Batch>, StoreError> {
-        let mut query = page_query(tenant, filter, after);
-        query.push(" LIMIT ").push_bind(i64::from(limit) + 1);
-        let mut rows = query.build().fetch_all(&self.readers).await?;
-        let more = rows.len() > limit as usize;
-        rows.truncate(limit as usize);
-        let batches = self.with_counts(&rows).await?;
-        let last = batches.last().filter(|_| more);
-        let total = self.count_batches(tenant, filter).await?;
-        Ok(Page {
-            next_cursor: last.map(|batch| filter.cursor_after(batch.id)),
-            total,
-            entries: batches,
-        })
-    }
-
-    /// An acknowledged batch with its counts.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn batch(
-        &self,
-        tenant: &str,
-        kind: Kind,
-        id: Uuid,
-    ) -> Result<Option<Batch>, StoreError> {
-        let mut query = QueryBuilder::<Db>::new("SELECT ");
-        query
-            .push(COLUMNS)
-            .push(" FROM batches WHERE complete = 1 AND id = ");
-        query
-            .push_bind(id.to_string())
-            .push(" AND tenant = ")
-            .push_bind(tenant)
-            .push(" AND kind = ")
-            .push_bind(kind.name());
-        let rows = query.build().fetch_all(&self.readers).await?;
-        Ok(self.with_counts(&rows).await?.pop())
-    }
-
     async fn count_batches(&self, tenant: &str, filter: &BatchFilter) -> Result<Total, StoreError> {
         let mut query = QueryBuilder::<Db>::new("SELECT COUNT(*) AS number FROM (");
         push_page(&mut query, "id", tenant, filter, None);
@@ -170,4 +124,77 @@ fn push_page(
         query.push_bind(value.clone()).push(")");
     }
     query.push(" ORDER BY id DESC");
+}
+
+/// Of a chunk, `field_patches` counts the rows without an answer.
+const GET_RUN: &str = "SELECT body, head, \
+     (SELECT CAST(COALESCE(SUM(field_patches), 0) AS bigint) FROM jobs WHERE batch_id = batches.id AND state = 'succeeded') AS without_answer, \
+     (SELECT CAST(COALESCE(SUM(progress), 0.0) AS double precision) FROM jobs WHERE batch_id = batches.id AND state = 'running') AS running \
+     FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
+     WHERE batches.id = $1 AND batches.tenant = $2 AND kind = 'rows' AND complete = 1";
+
+#[async_trait]
+impl BatchLists for SqlStore {
+    async fn batches(
+        &self,
+        tenant: &str,
+        filter: &BatchFilter,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Page<Batch>, StoreError> {
+        engine::again(|| async move {
+            let mut query = page_query(tenant, filter, after);
+            query.push(" LIMIT ").push_bind(i64::from(limit) + 1);
+            let mut rows = query.build().fetch_all(&self.readers).await?;
+            let more = rows.len() > limit as usize;
+            rows.truncate(limit as usize);
+            let batches = self.with_counts(&rows).await?;
+            let last = batches.last().filter(|_| more);
+            let total = self.count_batches(tenant, filter).await?;
+            Ok(Page {
+                next_cursor: last.map(|batch| filter.cursor_after(batch.id)),
+                total,
+                entries: batches,
+            })
+        })
+        .await
+    }
+
+    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError> {
+        engine::again(|| async move {
+            let mut query = QueryBuilder::<Db>::new("SELECT ");
+            query
+                .push(COLUMNS)
+                .push(" FROM batches WHERE complete = 1 AND id = ");
+            query
+                .push_bind(id.to_string())
+                .push(" AND tenant = ")
+                .push_bind(tenant)
+                .push(" AND kind = ")
+                .push_bind(kind.name());
+            let rows = query.build().fetch_all(&self.readers).await?;
+            Ok(self.with_counts(&rows).await?.pop())
+        })
+        .await
+    }
+
+    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError> {
+        engine::again(|| async move {
+            let row = sqlx::query(GET_RUN)
+                .bind(id.to_string())
+                .bind(tenant)
+                .fetch_optional(&self.readers)
+                .await?;
+            let Some(row) = row else { return Ok(None) };
+            let template: Vec<u8> = row.try_get("body")?;
+            let head: Option<Vec<u8>> = row.try_get("head")?;
+            Ok(Some(RunRecord {
+                template: template.into(),
+                head: head.map(Bytes::from),
+                without_answer: read_count(&row, "without_answer")?,
+                running: row.try_get("running")?,
+            }))
+        })
+        .await
+    }
 }

@@ -18,8 +18,11 @@ use std::sync::Arc;
 use futures_util::TryStreamExt;
 use uuid::Uuid;
 
+use async_trait::async_trait;
+
 use crate::jobs::model::batch::{BatchItem, ItemResult};
 use crate::jobs::model::job::{State, created_at};
+use crate::jobs::store::Batches;
 use crate::jobs::store::submission::{
     BatchBegun, FilledHere, NewBatch, NewJob, QueueBounds, Refusal,
 };
@@ -37,295 +40,274 @@ const CANCEL: &str = concat!(
      WHERE id IN (SELECT id FROM open) RETURNING id, state, slices"
 );
 
-impl SqlStore {
-    /// Reserves places in the queue for a batch that is being staged, at most `most`, beside those that it has; returns how
-    /// many.
-    ///
-    /// # Errors
-    /// The database failed; nothing was stored.
-    pub(crate) async fn reserve(
+#[async_trait]
+impl Batches for SqlStore {
+    async fn reserve(
         &self,
         id: Uuid,
         tenant: &str,
         most: u32,
         bounds: QueueBounds,
     ) -> Result<Result<u32, Refusal>, StoreError> {
-        let mut transaction = engine::begin(&self.writer).await?;
-        engine::admit_alone(&mut transaction).await?;
-        let mut places = Places::of(&mut transaction, tenant, bounds).await?;
-        let taken = places
-            .store(tenant, 0)
-            .and_then(|()| places.take(tenant, u64::from(most)));
-        let places = match taken {
-            Ok(places) => u32::try_from(places).unwrap_or(most),
-            Err(refusal) => return Ok(Err(refusal)),
-        };
-        sqlx::query(
-            "INSERT INTO batches (id, tenant, created_at, reserved) VALUES ($1, $2, $3, $4) \
+        engine::again(|| async move {
+            let mut transaction = engine::begin(&self.writer).await?;
+            engine::admit_alone(&mut transaction).await?;
+            let mut places = Places::of(&mut transaction, tenant, bounds).await?;
+            let taken = places
+                .store(tenant, 0)
+                .and_then(|()| places.take(tenant, u64::from(most)));
+            let places = match taken {
+                Ok(places) => u32::try_from(places).unwrap_or(most),
+                Err(refusal) => return Ok(Err(refusal)),
+            };
+            sqlx::query(
+                "INSERT INTO batches (id, tenant, created_at, reserved) VALUES ($1, $2, $3, $4) \
              ON CONFLICT (id) DO UPDATE SET reserved = batches.reserved + $4",
-        )
-        .bind(id.to_string())
-        .bind(tenant)
-        .bind(created_at(id))
-        .bind(i64::from(places))
-        .execute(&mut *transaction)
-        .await?;
-        transaction.commit().await?;
-        Ok(Ok(places))
+            )
+            .bind(id.to_string())
+            .bind(tenant)
+            .bind(created_at(id))
+            .bind(i64::from(places))
+            .execute(&mut *transaction)
+            .await?;
+            transaction.commit().await?;
+            Ok(Ok(places))
+        })
+        .await
     }
 
-    /// What the idempotency key of a batch stands for, if it was used by another batch. What is left of a batch that
-    /// no process fills is ignored.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn batch_by_key(
+    async fn batch_by_key(
         &self,
         new: &NewBatch,
         filled_here: FilledHere<'_>,
     ) -> Result<Option<BatchBegun>, StoreError> {
-        let mut connection = self.readers.acquire().await?;
-        by_key(&mut connection, new, filled_here).await
+        engine::again(|| async move {
+            let mut connection = self.readers.acquire().await?;
+            by_key(&mut connection, new, filled_here).await
+        })
+        .await
     }
 
-    /// Begins to fill a batch, or finds the one its idempotency key stands for. Afterwards exactly the places of its jobs
-    /// are reserved.
-    ///
-    /// # Errors
-    /// The database failed; nothing was stored.
-    pub(crate) async fn begin_batch(
+    async fn begin_batch(
         &self,
         new: &NewBatch,
         filled_here: FilledHere<'_>,
         bounds: QueueBounds,
     ) -> Result<BatchBegun, StoreError> {
-        let mut transaction = engine::begin(&self.writer).await?;
-        engine::admit_alone(&mut transaction).await?;
-        if let Some(begun) = by_key(&mut transaction, new, filled_here).await? {
-            return Ok(begun);
-        }
-        let reserved = sqlx::query("SELECT reserved FROM batches WHERE id = $1")
-            .bind(new.id.to_string())
-            .fetch_optional(&mut *transaction)
-            .await?;
-        let reserved = match &reserved {
-            Some(row) => read_count(row, "reserved")?,
-            None => 0,
-        };
-        let lacking = u64::from(new.count).saturating_sub(reserved);
-        let mut places = Places::of(&mut transaction, &new.tenant, bounds).await?;
-        match places.take(&new.tenant, lacking) {
-            Ok(taken) if taken == lacking => {}
-            Ok(_) => return Ok(BatchBegun::Refused(places.refusal_of(&new.tenant))),
-            Err(refusal) => return Ok(BatchBegun::Refused(refusal)),
-        }
-        let template = new.template.as_ref();
-        let template = template.map(|body| (blake3::hash(body).as_bytes().to_vec(), body));
-        let known = match &template {
-            Some((digest, _)) => has_template(&mut transaction, &new.tenant, digest).await?,
-            None => true,
-        };
-        let of_template = template.as_ref().filter(|_| !known);
-        let bytes = new.bytes + of_template.map_or(0, |(_, body)| body.len() as u64);
-        if let Err(refusal) = places.store(&new.tenant, bytes) {
-            return Ok(BatchBegun::Refused(refusal));
-        }
-        if let Some((digest, body)) = of_template {
+        engine::again(|| async move {
+            let mut transaction = engine::begin(&self.writer).await?;
+            engine::admit_alone(&mut transaction).await?;
+            if let Some(begun) = by_key(&mut transaction, new, filled_here).await? {
+                return Ok(begun);
+            }
+            let reserved = sqlx::query("SELECT reserved FROM batches WHERE id = $1")
+                .bind(new.id.to_string())
+                .fetch_optional(&mut *transaction)
+                .await?;
+            let reserved = match &reserved {
+                Some(row) => read_count(row, "reserved")?,
+                None => 0,
+            };
+            let lacking = u64::from(new.count).saturating_sub(reserved);
+            let mut places = Places::of(&mut transaction, &new.tenant, bounds).await?;
+            match places.take(&new.tenant, lacking) {
+                Ok(taken) if taken == lacking => {}
+                Ok(_) => return Ok(BatchBegun::Refused(places.refusal_of(&new.tenant))),
+                Err(refusal) => return Ok(BatchBegun::Refused(refusal)),
+            }
+            let template = new.template.as_ref();
+            let template = template.map(|body| (blake3::hash(body).as_bytes().to_vec(), body));
+            let known = match &template {
+                Some((digest, _)) => has_template(&mut transaction, &new.tenant, digest).await?,
+                None => true,
+            };
+            let of_template = template.as_ref().filter(|_| !known);
+            let bytes = new.bytes + of_template.map_or(0, |(_, body)| body.len() as u64);
+            if let Err(refusal) = places.store(&new.tenant, bytes) {
+                return Ok(BatchBegun::Refused(refusal));
+            }
+            if let Some((digest, body)) = of_template {
+                sqlx::query(
+                    "INSERT INTO templates (tenant, digest, body) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
+                )
+                .bind(&*new.tenant)
+                .bind(digest)
+                .bind(body.as_ref())
+                .execute(&mut *transaction)
+                .await?;
+            }
             sqlx::query(
-                "INSERT INTO templates (tenant, digest, body) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
+                "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head, kind) \
+                 VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9, $10) \
+                 ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9, kind = $10",
             )
+            .bind(new.id.to_string())
             .bind(&*new.tenant)
-            .bind(digest)
-            .bind(body.as_ref())
+            .bind(new.created_at)
+            .bind(i64::from(new.count))
+            .bind(i64::from(new.rejected))
+            .bind(&new.name)
+            .bind(to_json(&new.labels)?)
+            .bind(template.as_ref().map(|(digest, _)| digest))
+            .bind(new.head.as_deref())
+            .bind(new.kind.name())
             .execute(&mut *transaction)
             .await?;
-        }
-        sqlx::query(
-            "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head, kind) \
-             VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9, $10) \
-             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9, kind = $10",
-        )
-        .bind(new.id.to_string())
-        .bind(&*new.tenant)
-        .bind(new.created_at)
-        .bind(i64::from(new.count))
-        .bind(i64::from(new.rejected))
-        .bind(&new.name)
-        .bind(to_json(&new.labels)?)
-        .bind(template.as_ref().map(|(digest, _)| digest))
-        .bind(new.head.as_deref())
-        .bind(new.kind.name())
-        .execute(&mut *transaction)
-        .await?;
-        keep_key(&mut transaction, new).await?;
-        transaction.commit().await?;
-        Ok(BatchBegun::Created)
+            keep_key(&mut transaction, new).await?;
+            transaction.commit().await?;
+            Ok(BatchBegun::Created)
+        })
+        .await
     }
 
-    /// Queues jobs of a batch with their places in it, all or none, on the places reserved for them. Returns those that
-    /// ended at once with the result of their source.
-    ///
-    /// # Errors
-    /// The database failed; nothing was stored.
-    pub(crate) async fn fill_batch(
+    async fn fill_batch(
         &self,
         batch: Uuid,
         jobs: &[(u32, NewJob)],
     ) -> Result<Vec<Uuid>, StoreError> {
-        let jobs: Vec<_> = jobs
-            .iter()
-            .map(|(index, job)| (Some(*index), job))
-            .collect();
-        let mut statements = Statements::begin(&self.writer()).await?;
-        let update = statements.next();
-        update.push(concat!(
-            "UPDATE batches SET reserved = ",
-            greatest!(),
-            "(reserved - "
-        ));
-        update.push_bind(count(jobs.len())).push(", 0) WHERE id = ");
-        update.push_bind(batch.to_string());
-        update.push(" AND dropped = 0 RETURNING id");
-        let filled = statements.send().await?;
-        require_batch(batch, filled.iter().flatten().count() as u64)?;
-        let ended = insert_jobs(&mut statements, Some(batch), &jobs).await?;
-        statements.commit().await?;
-        Ok(ended)
+        engine::again(|| async move {
+            let jobs: Vec<_> = jobs
+                .iter()
+                .map(|(index, job)| (Some(*index), job))
+                .collect();
+            let mut statements = Statements::begin(&self.writer()).await?;
+            let update = statements.next();
+            update.push(concat!(
+                "UPDATE batches SET reserved = ",
+                greatest!(),
+                "(reserved - "
+            ));
+            update.push_bind(count(jobs.len())).push(", 0) WHERE id = ");
+            update.push_bind(batch.to_string());
+            update.push(" AND dropped = 0 RETURNING id");
+            let filled = statements.send().await?;
+            require_batch(batch, filled.iter().flatten().count() as u64)?;
+            let ended = insert_jobs(&mut statements, Some(batch), &jobs).await?;
+            statements.commit().await?;
+            Ok(ended)
+        })
+        .await
     }
 
-    /// Marks a batch as complete. Durable once it returns.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn complete_batch(&self, id: Uuid) -> Result<(), StoreError> {
-        let complete = sqlx::query(
-            "UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1 AND dropped = 0",
-        )
-        .bind(id.to_string())
-        .execute(&self.writer)
-        .await?;
-        require_batch(id, complete.rows_affected())
+    async fn complete_batch(&self, id: Uuid) -> Result<(), StoreError> {
+        engine::again(|| async move {
+            let complete = sqlx::query(
+                "UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1 AND dropped = 0",
+            )
+            .bind(id.to_string())
+            .execute(&self.writer)
+            .await?;
+            require_batch(id, complete.rows_affected())
+        })
+        .await
     }
 
-    /// Removes at most `limit` jobs of a batch that could not be completed, and the batch after its last job; `true` once
-    /// nothing is left. Its reservation and its key go first.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub(crate) async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool, StoreError> {
-        let mut transaction = engine::begin(&self.writer).await?;
-        for statement in [
-            "UPDATE batches SET reserved = 0, dropped = 1 WHERE id = $1 AND complete = 0 AND dropped = 0",
-            "DELETE FROM batch_keys WHERE batch_id = $1 \
-             AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0)",
-        ] {
-            sqlx::query(statement)
-                .bind(id.to_string())
-                .execute(&mut *transaction)
-                .await?;
-        }
-        let gone = sqlx::query(
-            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 ORDER BY id LIMIT $2) \
-             AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0) RETURNING blob_id",
-        )
-        .bind(id.to_string())
-        .bind(i64::from(limit))
-        .fetch_all(&mut *transaction)
-        .await?;
-        release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
-        let last = gone.len() < limit as usize;
-        if last {
-            sqlx::query("DELETE FROM batches WHERE id = $1 AND complete = 0")
-                .bind(id.to_string())
-                .execute(&mut *transaction)
-                .await?;
-        }
-        transaction.commit().await?;
-        Ok(last)
+    async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool, StoreError> {
+        engine::again(|| async move {
+            let mut transaction = engine::begin(&self.writer).await?;
+            for statement in [
+                "UPDATE batches SET reserved = 0, dropped = 1 WHERE id = $1 AND complete = 0 AND dropped = 0",
+                "DELETE FROM batch_keys WHERE batch_id = $1 \
+                 AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0)",
+            ] {
+                sqlx::query(statement)
+                    .bind(id.to_string())
+                    .execute(&mut *transaction)
+                    .await?;
+            }
+            let gone = sqlx::query(
+                "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 ORDER BY id LIMIT $2) \
+                 AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0) RETURNING blob_id",
+            )
+            .bind(id.to_string())
+            .bind(i64::from(limit))
+            .fetch_all(&mut *transaction)
+            .await?;
+            release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
+            let last = gone.len() < limit as usize;
+            if last {
+                sqlx::query("DELETE FROM batches WHERE id = $1 AND complete = 0")
+                    .bind(id.to_string())
+                    .execute(&mut *transaction)
+                    .await?;
+            }
+            transaction.commit().await?;
+            Ok(last)
+        })
+        .await
     }
 
-    /// The batches that are not complete.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError> {
-        let rows = sqlx::query(concat!(
-            "SELECT id FROM batches WHERE complete = 0 AND ",
-            being_filled!(),
-            " = 0"
-        ))
-        .fetch_all(&self.readers)
-        .await?;
-        rows.iter().map(read_id).collect()
+    async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError> {
+        engine::again(|| async move {
+            let rows = sqlx::query(concat!(
+                "SELECT id FROM batches WHERE complete = 0 AND ",
+                being_filled!(),
+                " = 0"
+            ))
+            .fetch_all(&self.readers)
+            .await?;
+            rows.iter().map(read_id).collect()
+        })
+        .await
     }
 
-    /// Cancels the queued ones among the next `limit` jobs of a batch that were not cancelled yet, and asks the workers of
-    /// the running ones to stop; returns both with their states.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub(crate) async fn cancel_batch(
+    async fn cancel_batch(
         &self,
         tenant: &str,
         id: Uuid,
         limit: u32,
         now: i64,
     ) -> Result<Vec<(Uuid, State)>, StoreError> {
-        let mut transaction = engine::begin(&self.writer).await?;
-        let rows = sqlx::query(CANCEL)
-            .bind(now)
+        engine::again(|| async move {
+            let mut transaction = engine::begin(&self.writer).await?;
+            let rows = sqlx::query(CANCEL)
+                .bind(now)
+                .bind(id.to_string())
+                .bind(i64::from(limit))
+                .bind(tenant)
+                .fetch_all(&mut *transaction)
+                .await?;
+            drop_slices_of_ended(&mut transaction, &rows).await?;
+            transaction.commit().await?;
+            rows.iter()
+                .map(|row| Ok((read_id(row)?, read_state(row)?)))
+                .collect()
+        })
+        .await
+    }
+
+    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool, StoreError> {
+        engine::again(|| async move {
+            let mut transaction = engine::begin(&self.writer).await?;
+            let gone = sqlx::query(
+                "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs \
+             WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $3) AND \
+             state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING blob_id",
+            )
             .bind(id.to_string())
             .bind(i64::from(limit))
             .bind(tenant)
             .fetch_all(&mut *transaction)
             .await?;
-        drop_slices_of_ended(&mut transaction, &rows).await?;
-        transaction.commit().await?;
-        rows.iter()
-            .map(|row| Ok((read_id(row)?, read_state(row)?)))
-            .collect()
-    }
-
-    /// Removes up to `limit` ended jobs of a batch, and the batch with its last job; `true` once no ended job is left.
-    pub(crate) async fn delete_batch(
-        &self,
-        tenant: &str,
-        id: Uuid,
-        limit: u32,
-    ) -> Result<bool, StoreError> {
-        let mut transaction = engine::begin(&self.writer).await?;
-        let gone = sqlx::query(
-            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs \
-             WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $3) AND \
-             state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING blob_id",
-        )
-        .bind(id.to_string())
-        .bind(i64::from(limit))
-        .bind(tenant)
-        .fetch_all(&mut *transaction)
-        .await?;
-        release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
-        let last = gone.len() < limit as usize;
-        if last {
-            sqlx::query(
-                "DELETE FROM batches WHERE id = $1 AND tenant = $2 AND complete = 1 \
+            release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
+            let last = gone.len() < limit as usize;
+            if last {
+                sqlx::query(
+                    "DELETE FROM batches WHERE id = $1 AND tenant = $2 AND complete = 1 \
                  AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)",
-            )
-            .bind(id.to_string())
-            .bind(tenant)
-            .execute(&mut *transaction)
-            .await?;
-        }
-        transaction.commit().await?;
-        Ok(last)
+                )
+                .bind(id.to_string())
+                .bind(tenant)
+                .execute(&mut *transaction)
+                .await?;
+            }
+            transaction.commit().await?;
+            Ok(last)
+        })
+        .await
     }
 
-    /// The next jobs of a batch in the order they were sent, with the solutions that lie in the database; reads no further once
-    /// these are `bytes` together.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn batch_items(
+    async fn batch_items(
         &self,
         tenant: &str,
         id: Uuid,
@@ -333,59 +315,61 @@ impl SqlStore {
         limit: u32,
         bytes: usize,
     ) -> Result<Vec<BatchItem>, StoreError> {
-        let mut rows = sqlx::query(concat!(
-            "SELECT ",
-            job_columns!(),
-            ", batch_index, outputs, blob_key, solution FROM jobs \
-             LEFT JOIN (SELECT id AS blob, key AS blob_key, solution FROM blobs) AS stored ON blob = blob_id \
-             WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $4) AND id > $2 ORDER BY id LIMIT $3"
-        ))
-        .bind(id.to_string())
-        .bind(after.map_or_else(String::new, |id| id.to_string()))
-        .bind(i64::from(limit))
-        .bind(tenant)
-        .fetch(&self.readers);
-        let mut items = Vec::new();
-        let mut read = 0;
-        while read < bytes
-            && let Some(row) = rows.try_next().await?
-        {
-            let solution: Option<Vec<u8>> = row.try_get("solution")?;
-            read += solution.as_ref().map_or(0, Vec::len);
-            let key: Option<String> = row.try_get("blob_key")?;
-            let inline = solution.map(|solution| ItemResult::Solution(solution.into()));
-            items.push(BatchItem {
-                index: read_small(&row, "batch_index")?,
-                job: read_job(&row)?,
-                outputs: row.try_get("outputs")?,
-                result: key.map(ItemResult::Stored).or(inline),
-            });
-        }
-        Ok(items)
+        engine::again(|| async move {
+            let mut rows = sqlx::query(concat!(
+                "SELECT ",
+                job_columns!(),
+                ", batch_index, outputs, blob_key, solution FROM jobs \
+                 LEFT JOIN (SELECT id AS blob, key AS blob_key, solution FROM blobs) AS stored ON blob = blob_id \
+                 WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $4) AND id > $2 ORDER BY id LIMIT $3"
+            ))
+            .bind(id.to_string())
+            .bind(after.map_or_else(String::new, |id| id.to_string()))
+            .bind(i64::from(limit))
+            .bind(tenant)
+            .fetch(&self.readers);
+            let mut items = Vec::new();
+            let mut read = 0;
+            while read < bytes
+                && let Some(row) = rows.try_next().await?
+            {
+                let solution: Option<Vec<u8>> = row.try_get("solution")?;
+                read += solution.as_ref().map_or(0, Vec::len);
+                let key: Option<String> = row.try_get("blob_key")?;
+                let inline = solution.map(|solution| ItemResult::Solution(solution.into()));
+                items.push(BatchItem {
+                    index: read_small(&row, "batch_index")?,
+                    job: read_job(&row)?,
+                    outputs: row.try_get("outputs")?,
+                    result: key.map(ItemResult::Stored).or(inline),
+                });
+            }
+            Ok(items)
+        })
+        .await
     }
 
-    /// The keys of the labels of the jobs of a batch, sorted, the first `limit`.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn batch_label_keys(
+    async fn batch_label_keys(
         &self,
         tenant: &str,
         id: Uuid,
         limit: u32,
     ) -> Result<Vec<String>, StoreError> {
-        let rows = sqlx::query(concat!(
-            "SELECT DISTINCT label.key AS key FROM jobs, ",
-            pairs_of_labels!(),
-            " AS label WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $2) ORDER BY label.key LIMIT $3"
-        ))
-        .bind(id.to_string())
-        .bind(tenant)
-        .bind(i64::from(limit))
-        .fetch_all(&self.readers)
-        .await?;
-        let keys = rows.iter().map(|row| Ok(row.try_get("key")?));
-        keys.collect()
+        engine::again(|| async move {
+            let rows = sqlx::query(concat!(
+                "SELECT DISTINCT label.key AS key FROM jobs, ",
+                pairs_of_labels!(),
+                " AS label WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $2) ORDER BY label.key LIMIT $3"
+            ))
+            .bind(id.to_string())
+            .bind(tenant)
+            .bind(i64::from(limit))
+            .fetch_all(&self.readers)
+            .await?;
+            let keys = rows.iter().map(|row| Ok(row.try_get("key")?));
+            keys.collect()
+        })
+        .await
     }
 }
 

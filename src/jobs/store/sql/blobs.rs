@@ -1,74 +1,74 @@
 //! Large results that nobody refers to any more.
 
 use super::blob_refs::{VALUES_PER_STATEMENT, leave_to_collector, push_keys};
-use super::engine::{Db, SqlStore};
+use super::engine::{self, Db, SqlStore};
 use super::rows::{push_list, read_id};
 use sqlx::QueryBuilder;
 use std::collections::HashSet;
 use uuid::Uuid;
 
+use async_trait::async_trait;
+
 use crate::jobs::store::Orphans;
+use crate::jobs::store::ResultKeys;
 use crate::jobs::store_error::StoreError;
 
-impl SqlStore {
-    /// Keys of large results that are to be removed, at most `limit`; those in `done` are forgotten first.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub(crate) async fn released_blobs(
-        &self,
-        done: &[String],
-        limit: u32,
-    ) -> Result<Vec<String>, StoreError> {
-        for some in done.chunks(VALUES_PER_STATEMENT) {
-            let mut forget = QueryBuilder::<Db>::new("DELETE FROM blob_outbox WHERE key IN (");
-            push_keys(&mut forget, some);
-            forget.build().execute(&self.writer).await?;
-        }
-        let keys = sqlx::query_scalar("SELECT key FROM blob_outbox ORDER BY key LIMIT $1")
-            .bind(i64::from(limit))
-            .fetch_all(&self.readers)
-            .await?;
-        Ok(keys)
+#[async_trait]
+impl ResultKeys for SqlStore {
+    async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>, StoreError> {
+        engine::again(|| async move {
+            for some in done.chunks(VALUES_PER_STATEMENT) {
+                let mut forget = QueryBuilder::<Db>::new("DELETE FROM blob_outbox WHERE key IN (");
+                push_keys(&mut forget, some);
+                forget.build().execute(&self.writer).await?;
+            }
+            let keys = sqlx::query_scalar("SELECT key FROM blob_outbox ORDER BY key LIMIT $1")
+                .bind(i64::from(limit))
+                .fetch_all(&self.readers)
+                .await?;
+            Ok(keys)
+        })
+        .await
     }
 
-    /// Leaves a result that was written and that no job will refer to, to be removed.
-    ///
-    /// # Errors
-    /// The database failed; the sweep at the next start will find the result.
-    pub(crate) async fn abandon_blob(&self, key: &str) -> Result<(), StoreError> {
-        let mut connection = self.writer.acquire().await?;
-        leave_to_collector(&mut connection, &[key.to_owned()]).await
+    async fn abandon_blob(&self, key: &str) -> Result<(), StoreError> {
+        engine::again(|| async move {
+            let mut connection = self.writer.acquire().await?;
+            leave_to_collector(&mut connection, &[key.to_owned()]).await
+        })
+        .await
+    }
+
+    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans, StoreError> {
+        engine::again(|| async move {
+            let mut orphans = Orphans::default();
+            for some in results.chunks(VALUES_PER_STATEMENT) {
+                // In this order: what a running job has written is known by its key before the job no longer runs.
+                let running = self.running(some).await?;
+                let mut query = QueryBuilder::<Db>::new("SELECT key FROM blobs WHERE key IN (");
+                let keys: Vec<String> = some.iter().map(|(_, key)| key.clone()).collect();
+                push_keys(&mut query, &keys);
+                let known: HashSet<String> = query
+                    .build_query_scalar::<String>()
+                    .fetch_all(&self.readers)
+                    .await?
+                    .into_iter()
+                    .collect();
+                for result in some.iter().filter(|(_, key)| !known.contains(key)) {
+                    if running.contains(&result.0) {
+                        orphans.undecided.push(result.clone());
+                    } else {
+                        orphans.certain.push(result.1.clone());
+                    }
+                }
+            }
+            Ok(orphans)
+        })
+        .await
     }
 }
 
 impl SqlStore {
-    /// Which of these large results no job refers to.
-    pub(crate) async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans, StoreError> {
-        let mut orphans = Orphans::default();
-        for some in results.chunks(VALUES_PER_STATEMENT) {
-            // In this order: what a running job has written is known by its key before the job no longer runs.
-            let running = self.running(some).await?;
-            let mut query = QueryBuilder::<Db>::new("SELECT key FROM blobs WHERE key IN (");
-            let keys: Vec<String> = some.iter().map(|(_, key)| key.clone()).collect();
-            push_keys(&mut query, &keys);
-            let known: HashSet<String> = query
-                .build_query_scalar::<String>()
-                .fetch_all(&self.readers)
-                .await?
-                .into_iter()
-                .collect();
-            for result in some.iter().filter(|(_, key)| !known.contains(key)) {
-                if running.contains(&result.0) {
-                    orphans.undecided.push(result.clone());
-                } else {
-                    orphans.certain.push(result.1.clone());
-                }
-            }
-        }
-        Ok(orphans)
-    }
-
     async fn running(&self, results: &[(Uuid, String)]) -> Result<HashSet<Uuid>, StoreError> {
         let mut query =
             QueryBuilder::<Db>::new("SELECT id FROM jobs WHERE state = 'running' AND id IN (");

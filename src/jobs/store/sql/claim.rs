@@ -5,7 +5,10 @@ use super::rows::{count, read_cache_key, read_count, read_flag, read_id, read_ki
 use sqlx::{QueryBuilder, Row};
 use std::sync::Arc;
 
+use async_trait::async_trait;
+
 use crate::jobs::model::kind::Queue;
+use crate::jobs::store::Claims;
 use crate::jobs::store::claim::{Claim, ClaimRequest, Lease};
 use crate::jobs::store_error::StoreError;
 
@@ -38,43 +41,41 @@ pub(crate) use claimed;
 /// Queues with jobs in them.
 pub(crate) const QUEUES: &str = "SELECT tenant, kind FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0 ORDER BY tenant, kind";
 
-impl SqlStore {
-    /// Queues with jobs in them.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn queues(&self) -> Result<Vec<Queue>, StoreError> {
-        if let Some(known) = self.known_queues() {
-            return Ok(known);
-        }
-        let rows = sqlx::query(QUEUES).fetch_all(&self.readers).await?;
-        let read = |row: &DbRow| {
-            Ok(Queue {
-                tenant: row.try_get::<String, _>("tenant")?.into(),
-                kind: read_kind(row)?,
-            })
-        };
-        let queues = rows
-            .iter()
-            .map(read)
-            .collect::<Result<Vec<_>, StoreError>>()?;
-        self.remember_queues(&queues);
-        Ok(queues)
+#[async_trait]
+impl Claims for SqlStore {
+    async fn queues(&self) -> Result<Vec<Queue>, StoreError> {
+        engine::again(|| async move {
+            if let Some(known) = self.known_queues() {
+                return Ok(known);
+            }
+            let rows = sqlx::query(QUEUES).fetch_all(&self.readers).await?;
+            let read = |row: &DbRow| {
+                Ok(Queue {
+                    tenant: row.try_get::<String, _>("tenant")?.into(),
+                    kind: read_kind(row)?,
+                })
+            };
+            let queues = rows
+                .iter()
+                .map(read)
+                .collect::<Result<Vec<_>, StoreError>>()?;
+            self.remember_queues(&queues);
+            Ok(queues)
+        })
+        .await
     }
 
-    /// Claims the first job of a queue together with those behind it that are as small, in their order: by
-    /// priority, then by age. A suspect comes alone.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub(crate) async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError> {
-        let mut claims = Vec::with_capacity(request.jobs);
-        for row in &self.claim_next(request, new_token()?).await? {
-            let rank: i64 = row.try_get("rank")?;
-            claims.push((rank, read_claim(row)?));
-        }
-        claims.sort_unstable_by_key(|(rank, claim)| (*rank, claim.id));
-        Ok(claims.into_iter().map(|(_, claim)| claim).collect())
+    async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError> {
+        engine::again(|| async move {
+            let mut claims = Vec::with_capacity(request.jobs);
+            for row in &self.claim_next(request, new_token()?).await? {
+                let rank: i64 = row.try_get("rank")?;
+                claims.push((rank, read_claim(row)?));
+            }
+            claims.sort_unstable_by_key(|(rank, claim)| (*rank, claim.id));
+            Ok(claims.into_iter().map(|(_, claim)| claim).collect())
+        })
+        .await
     }
 }
 

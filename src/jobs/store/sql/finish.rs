@@ -5,6 +5,8 @@ use super::blob_refs::{drop_slices_of_ended, leave_to_collector, release_blobs};
 use super::cached::{Pair, SOURCE, end_pairs};
 use super::engine::{self, Db, DbRow, SqlStore};
 use super::rows::{fence, read_cache_key, read_id, read_move, read_small, to_json};
+use async_trait::async_trait;
+
 use crate::jobs::store::submission::CacheKey;
 use sqlx::{QueryBuilder, Row};
 use std::collections::HashMap;
@@ -13,80 +15,12 @@ use std::collections::HashSet;
 use uuid::Uuid;
 
 use crate::jobs::model::job::State;
+use crate::jobs::store::Ends;
 use crate::jobs::store::claim::Claim;
 use crate::jobs::store::ending::{Ending, StoredResult};
 use crate::jobs::store_error::StoreError;
 
 impl SqlStore {
-    /// Ends jobs, all in one transaction. Returns those that ended; the others' leases were lost and nothing of them
-    /// changed.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub(crate) async fn finish(
-        &self,
-        ends: &[(Claim, Ending)],
-        now: i64,
-    ) -> Result<HashSet<Uuid>, StoreError> {
-        if ends.is_empty() {
-            return Ok(HashSet::new());
-        }
-        let pairs: Vec<Pair> = ends
-            .iter()
-            .filter_map(|(claim, ending)| match ending {
-                Ending::Cached { source } => Some(Pair {
-                    job: claim.id,
-                    source: *source,
-                    at: now,
-                    lease_token: Some(fence(claim)),
-                }),
-                _ => None,
-            })
-            .collect();
-        let rows = ends
-            .iter()
-            .filter(|(_, ending)| !matches!(ending, Ending::Cached { .. }))
-            .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
-            .collect::<Result<Vec<_>, StoreError>>()?;
-        let mut statements = Statements::begin(&self.writer()).await?;
-        let made = self.push_ends(&mut statements, &rows, now).await?;
-        let keys = |(claim, end): &(&Claim, EndRow<'_>)| match end.result {
-            Some(StoredResult::Blob(key, _)) => Some((claim.id, key.clone())),
-            _ => None,
-        };
-        let keys: Vec<(Uuid, String)> = rows.iter().filter_map(keys).collect();
-        let sliced = ends.iter().any(|(claim, _)| claim.slices > 0);
-        if Statements::EXCLUSIVE && pairs.is_empty() && keys.is_empty() && !sliced {
-            let results = statements.commit().await?;
-            let ended = results.last().map_or(&[] as &[DbRow], Vec::as_slice);
-            if ended
-                .iter()
-                .any(|row| read_small::<u32>(row, "slices").is_ok_and(|slices| slices > 0))
-            {
-                // Slices were stored since the claim was read.
-                let mut transaction = engine::begin(&self.writer).await?;
-                drop_slices_of_ended(&mut transaction, ended).await?;
-                transaction.commit().await?;
-            }
-            return read_ended(ended);
-        }
-        let results = statements.send().await?;
-        let rows_ended = results.last().map_or(&[] as &[DbRow], Vec::as_slice);
-        let connection = statements.connection();
-        drop_slices_of_ended(connection, rows_ended).await?;
-        let mut ended = read_ended(rows_ended)?;
-        if ended.len() < rows.len() {
-            // Results whose lease was lost meanwhile have no owner.
-            release_blobs(connection, made).await?;
-            let lost = keys.into_iter().filter(|(id, _)| !ended.contains(id));
-            let lost: Vec<String> = lost.map(|(_, key)| key).collect();
-            leave_to_collector(connection, &lost).await?;
-        }
-        ended.extend(end_pairs(connection, &pairs).await?);
-        statements.commit().await?;
-        Ok(ended)
-    }
-
     /// Writes the statements that end jobs with what their solves gave, as long as their leases are held; the ids of the blobs.
     async fn push_ends(
         &self,
@@ -140,34 +74,98 @@ fn read_ended(rows: &[DbRow]) -> Result<HashSet<Uuid>, StoreError> {
         .collect()
 }
 
-impl SqlStore {
-    /// For each of these keys that a succeeded job carries, one such job.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn cached(
+#[async_trait]
+impl Ends for SqlStore {
+    async fn finish(
         &self,
-        keys: &[CacheKey],
-    ) -> Result<HashMap<CacheKey, Uuid>, StoreError> {
-        if keys.is_empty() {
-            return Ok(HashMap::new());
-        }
-        let mut query = QueryBuilder::<Db>::new("WITH asked (cache_key) AS (");
-        query.push_values(keys, |mut row, key| {
-            row.push_bind(key.as_slice());
-        });
-        query.push(") SELECT cache_key, ").push(SOURCE);
-        query.push(" AS id FROM asked");
-        let rows = query.build().fetch_all(&self.readers).await?;
-        let mut sources = HashMap::new();
-        for row in &rows {
-            if row.try_get::<Option<&str>, _>("id")?.is_some()
-                && let Some(key) = read_cache_key(row)?
-            {
-                sources.insert(key, read_id(row)?);
+        ends: &[(Claim, Ending)],
+        now: i64,
+    ) -> Result<HashSet<Uuid>, StoreError> {
+        engine::again(|| async move {
+            if ends.is_empty() {
+                return Ok(HashSet::new());
             }
-        }
-        Ok(sources)
+            let pairs: Vec<Pair> = ends
+                .iter()
+                .filter_map(|(claim, ending)| match ending {
+                    Ending::Cached { source } => Some(Pair {
+                        job: claim.id,
+                        source: *source,
+                        at: now,
+                        lease_token: Some(fence(claim)),
+                    }),
+                    _ => None,
+                })
+                .collect();
+            let rows = ends
+                .iter()
+                .filter(|(_, ending)| !matches!(ending, Ending::Cached { .. }))
+                .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
+                .collect::<Result<Vec<_>, StoreError>>()?;
+            let mut statements = Statements::begin(&self.writer()).await?;
+            let made = self.push_ends(&mut statements, &rows, now).await?;
+            let keys = |(claim, end): &(&Claim, EndRow<'_>)| match end.result {
+                Some(StoredResult::Blob(key, _)) => Some((claim.id, key.clone())),
+                _ => None,
+            };
+            let keys: Vec<(Uuid, String)> = rows.iter().filter_map(keys).collect();
+            let sliced = ends.iter().any(|(claim, _)| claim.slices > 0);
+            if Statements::EXCLUSIVE && pairs.is_empty() && keys.is_empty() && !sliced {
+                let results = statements.commit().await?;
+                let ended = results.last().map_or(&[] as &[DbRow], Vec::as_slice);
+                if ended
+                    .iter()
+                    .any(|row| read_small::<u32>(row, "slices").is_ok_and(|slices| slices > 0))
+                {
+                    // Slices were stored since the claim was read.
+                    let mut transaction = engine::begin(&self.writer).await?;
+                    drop_slices_of_ended(&mut transaction, ended).await?;
+                    transaction.commit().await?;
+                }
+                return read_ended(ended);
+            }
+            let results = statements.send().await?;
+            let rows_ended = results.last().map_or(&[] as &[DbRow], Vec::as_slice);
+            let connection = statements.connection();
+            drop_slices_of_ended(connection, rows_ended).await?;
+            let mut ended = read_ended(rows_ended)?;
+            if ended.len() < rows.len() {
+                // Results whose lease was lost meanwhile have no owner.
+                release_blobs(connection, made).await?;
+                let lost = keys.into_iter().filter(|(id, _)| !ended.contains(id));
+                let lost: Vec<String> = lost.map(|(_, key)| key).collect();
+                leave_to_collector(connection, &lost).await?;
+            }
+            ended.extend(end_pairs(connection, &pairs).await?);
+            statements.commit().await?;
+            Ok(ended)
+        })
+        .await
+    }
+
+    async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, StoreError> {
+        engine::again(|| async move {
+            if keys.is_empty() {
+                return Ok(HashMap::new());
+            }
+            let mut query = QueryBuilder::<Db>::new("WITH asked (cache_key) AS (");
+            query.push_values(keys, |mut row, key| {
+                row.push_bind(key.as_slice());
+            });
+            query.push(") SELECT cache_key, ").push(SOURCE);
+            query.push(" AS id FROM asked");
+            let rows = query.build().fetch_all(&self.readers).await?;
+            let mut sources = HashMap::new();
+            for row in &rows {
+                if row.try_get::<Option<&str>, _>("id")?.is_some()
+                    && let Some(key) = read_cache_key(row)?
+                {
+                    sources.insert(key, read_id(row)?);
+                }
+            }
+            Ok(sources)
+        })
+        .await
     }
 }
 

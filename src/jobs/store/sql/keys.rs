@@ -1,8 +1,11 @@
 //! API keys in the embedded job table.
 
-use super::engine::{DbRow, SqlStore};
+use super::engine::{self, DbRow, SqlStore};
 use super::rows::{from_json, read_flag, to_json};
+use async_trait::async_trait;
+
 use crate::jobs::model::key::Key;
+use crate::jobs::store::KeyStore;
 use crate::jobs::store_error::StoreError;
 use sqlx::Row;
 use std::sync::Arc;
@@ -12,62 +15,59 @@ const ALL: &str =
 
 const ONE: &str = "SELECT id, hash, tenant, name, created_at, revoked_at, read_only, labels FROM api_keys WHERE id = $1";
 
-impl SqlStore {
-    /// Stores a key.
-    ///
-    /// # Errors
-    /// The database failed, or there is a key with this id.
-    pub(crate) async fn add_key(&self, key: &Key) -> Result<(), StoreError> {
-        sqlx::query(
-            "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only, labels) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
-        )
-        .bind(&key.id)
-        .bind(key.hash.as_bytes().as_slice())
-        .bind(&*key.tenant)
-        .bind(&key.name)
-        .bind(key.created_at)
-        .bind(key.revoked_at)
-        .bind(i64::from(key.read_only))
-        .bind(to_json(&*key.labels)?)
-        .execute(&self.writer)
-        .await?;
-        Ok(())
-    }
-
-    /// A key by its id.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn key(&self, id: &str) -> Result<Option<Key>, StoreError> {
-        let row = sqlx::query(ONE)
-            .bind(id)
-            .fetch_optional(&self.readers)
-            .await?;
-        row.as_ref().map(read_key).transpose()
-    }
-
-    /// All keys, oldest first, the revoked ones included.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn keys(&self) -> Result<Vec<Key>, StoreError> {
-        let rows = sqlx::query(ALL).fetch_all(&self.readers).await?;
-        let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
-        keys.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
-        Ok(keys)
-    }
-
-    /// Revokes a key; `None` if there is none. A key that was revoked before keeps its time.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, StoreError> {
-        sqlx::query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
-            .bind(now)
-            .bind(id)
+#[async_trait]
+impl KeyStore for SqlStore {
+    async fn add_key(&self, key: &Key) -> Result<(), StoreError> {
+        engine::again(|| async move {
+            sqlx::query(
+                "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only, labels) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
+            )
+            .bind(&key.id)
+            .bind(key.hash.as_bytes().as_slice())
+            .bind(&*key.tenant)
+            .bind(&key.name)
+            .bind(key.created_at)
+            .bind(key.revoked_at)
+            .bind(i64::from(key.read_only))
+            .bind(to_json(&*key.labels)?)
             .execute(&self.writer)
             .await?;
-        self.key(id).await
+            Ok(())
+        })
+        .await
+    }
+
+    async fn key(&self, id: &str) -> Result<Option<Key>, StoreError> {
+        engine::again(|| async move {
+            let row = sqlx::query(ONE)
+                .bind(id)
+                .fetch_optional(&self.readers)
+                .await?;
+            row.as_ref().map(read_key).transpose()
+        })
+        .await
+    }
+
+    async fn keys(&self) -> Result<Vec<Key>, StoreError> {
+        engine::again(|| async move {
+            let rows = sqlx::query(ALL).fetch_all(&self.readers).await?;
+            let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
+            keys.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
+            Ok(keys)
+        })
+        .await
+    }
+
+    async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, StoreError> {
+        engine::again(|| async move {
+            sqlx::query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
+                .bind(now)
+                .bind(id)
+                .execute(&self.writer)
+                .await?;
+            self.key(id).await
+        })
+        .await
     }
 }
 

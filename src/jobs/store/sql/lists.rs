@@ -1,13 +1,16 @@
 //! Lists of the embedded job table: one indexed statement per page and state, whatever the filter.
 
-use super::engine::{Db, DbRow, SqlStore};
+use super::engine::{self, Db, DbRow, SqlStore};
 use super::rows::{job_columns, read_count, read_id, read_job, read_kind};
 use sqlx::{QueryBuilder, Row};
 use std::cmp::Reverse;
 
 use uuid::Uuid;
 
+use async_trait::async_trait;
+
 use crate::jobs::model::job::{Job, State};
+use crate::jobs::store::JobLists;
 use crate::jobs::store::list::{Change, Filter, Page, Total};
 use crate::jobs::store_error::StoreError;
 
@@ -16,51 +19,84 @@ const EXAMINED_MAX: i64 = 20_000;
 /// How far the jobs of a list are counted.
 const COUNTED: i64 = 1_000;
 
-impl SqlStore {
-    /// One page of the list of a tenant, newest first, at most `limit` jobs.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn list(
+#[async_trait]
+impl JobLists for SqlStore {
+    async fn list(
         &self,
         tenant: &str,
         filter: &Filter,
         after: Option<Uuid>,
         limit: u32,
     ) -> Result<Page<Job>, StoreError> {
-        let (mut jobs, mut looked_to) = (Vec::new(), None);
-        for state in walked(filter) {
-            let mut query = page_query(tenant, filter, state, after, limit);
-            for row in &query.build().fetch_all(&self.readers).await? {
-                jobs.push(read_job(row)?);
+        engine::again(|| async move {
+            let (mut jobs, mut looked_to) = (Vec::new(), None);
+            for state in walked(filter) {
+                let mut query = page_query(tenant, filter, state, after, limit);
+                for row in &query.build().fetch_all(&self.readers).await? {
+                    jobs.push(read_job(row)?);
+                }
+                if filter.reads_jobs() {
+                    let mut query = end_query(tenant, filter, state, after);
+                    let end = query.build().fetch_optional(&self.readers).await?;
+                    looked_to = looked_to.max(end.as_ref().map(read_id).transpose()?);
+                }
             }
-            if filter.reads_jobs() {
-                let mut query = end_query(tenant, filter, state, after);
-                let end = query.build().fetch_optional(&self.readers).await?;
-                looked_to = looked_to.max(end.as_ref().map(read_id).transpose()?);
-            }
-        }
-        jobs.sort_unstable_by_key(|job| Reverse(job.id));
-        // Below, not every state was looked at.
-        jobs.retain(|job| looked_to.is_none_or(|to| job.id >= to));
-        // One job more than asked for was read: it says whether there is a next page.
-        let more = jobs.len() > limit as usize;
-        jobs.truncate(limit as usize);
-        let last = if more {
-            jobs.last().map(|job| job.id)
-        } else {
-            looked_to
-        };
-        Ok(Page {
-            next_cursor: last.map(|last| filter.cursor_after(last)),
-            total: match filter.reads_jobs() {
-                true => Total::AtLeast(jobs.len() as u64),
-                false => self.count(tenant, filter).await?,
-            },
-            entries: jobs,
+            jobs.sort_unstable_by_key(|job| Reverse(job.id));
+            // Below, not every state was looked at.
+            jobs.retain(|job| looked_to.is_none_or(|to| job.id >= to));
+            // One job more than asked for was read: it says whether there is a next page.
+            let more = jobs.len() > limit as usize;
+            jobs.truncate(limit as usize);
+            let last = if more {
+                jobs.last().map(|job| job.id)
+            } else {
+                looked_to
+            };
+            Ok(Page {
+                next_cursor: last.map(|last| filter.cursor_after(last)),
+                total: match filter.reads_jobs() {
+                    true => Total::AtLeast(jobs.len() as u64),
+                    false => self.count(tenant, filter).await?,
+                },
+                entries: jobs,
+            })
         })
+        .await
     }
 
+    async fn changes(
+        &self,
+        tenant: &str,
+        since: i64,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Vec<Change>, StoreError> {
+        engine::again(|| async move {
+            let rows = sqlx::query(CHANGES)
+                .bind(tenant)
+                .bind(since)
+                .bind(after.map_or_else(String::new, |id| id.to_string()))
+                .bind(i64::from(limit))
+                .fetch_all(&self.readers)
+                .await?;
+            let change = |row: &DbRow| {
+                let batch: Option<&str> = row.try_get("batch_id")?;
+                let batch = batch.map(Uuid::try_parse).transpose();
+                Ok(Change {
+                    id: read_id(row)?,
+                    batch: batch
+                        .map_err(|error| StoreError::Corrupt(format!("batch id: {error}")))?,
+                    kind: read_kind(row)?,
+                    at: row.try_get("updated_at")?,
+                })
+            };
+            rows.iter().map(change).collect()
+        })
+        .await
+    }
+}
+
+impl SqlStore {
     async fn count(&self, tenant: &str, filter: &Filter) -> Result<Total, StoreError> {
         let restricted = filter.batch.is_some()
             || !filter.labels.is_empty()
@@ -81,37 +117,6 @@ impl SqlStore {
             true => Total::Exactly(total),
             false => Total::AtLeast(total),
         })
-    }
-
-    /// Jobs of a tenant that changed at `since` or later, in the order of their changes, after the one given.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn changes(
-        &self,
-        tenant: &str,
-        since: i64,
-        after: Option<Uuid>,
-        limit: u32,
-    ) -> Result<Vec<Change>, StoreError> {
-        let rows = sqlx::query(CHANGES)
-            .bind(tenant)
-            .bind(since)
-            .bind(after.map_or_else(String::new, |id| id.to_string()))
-            .bind(i64::from(limit))
-            .fetch_all(&self.readers)
-            .await?;
-        let change = |row: &DbRow| {
-            let batch: Option<&str> = row.try_get("batch_id")?;
-            let batch = batch.map(Uuid::try_parse).transpose();
-            Ok(Change {
-                id: read_id(row)?,
-                batch: batch.map_err(|error| StoreError::Corrupt(format!("batch id: {error}")))?,
-                kind: read_kind(row)?,
-                at: row.try_get("updated_at")?,
-            })
-        };
-        rows.iter().map(change).collect()
     }
 }
 

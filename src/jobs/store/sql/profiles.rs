@@ -4,116 +4,112 @@ use super::engine::{self, DbRow, SqlStore};
 use super::rows::read_count;
 use sqlx::Row;
 
+use async_trait::async_trait;
+
+use crate::jobs::store::Profiles;
 use crate::jobs::store::profile::{ProfileKept, StoredProfile};
 use crate::jobs::store_error::StoreError;
 
-impl SqlStore {
-    /// Keeps a cross-section, unless the tenant has it already, or `max_bytes` would be passed with it.
-    ///
-    /// # Errors
-    /// The database failed; nothing was stored.
-    pub(crate) async fn add_profile(
+#[async_trait]
+impl Profiles for SqlStore {
+    async fn add_profile(
         &self,
         tenant: &str,
         new: &StoredProfile,
         max_bytes: u64,
     ) -> Result<ProfileKept, StoreError> {
-        let mut transaction = engine::begin(&self.writer).await?;
-        engine::admit_alone(&mut transaction).await?;
-        let known = sqlx::query(
-            "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2",
-        )
-        .bind(tenant)
-        .bind(&new.digest)
-        .fetch_optional(&mut *transaction)
-        .await?;
-        if let Some(row) = known {
-            return Ok(ProfileKept::Existing(read_profile(&row)?));
-        }
-        let row = sqlx::query(
-            "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM profiles WHERE tenant = $1",
-        )
-        .bind(tenant)
-        .fetch_one(&mut *transaction)
-        .await?;
-        let bytes = new.body.len() as u64;
-        if read_count(&row, "bytes")? + bytes > max_bytes {
-            return Ok(ProfileKept::Full);
-        }
-        sqlx::query(
-            "INSERT INTO profiles (tenant, digest, body, bytes, created_at) VALUES ($1, $2, $3, $4, $5)",
-        )
-        .bind(tenant)
-        .bind(&new.digest)
-        .bind(new.body.as_ref())
-        .bind(i64::try_from(bytes).unwrap_or(i64::MAX))
-        .bind(new.created_at)
-        .execute(&mut *transaction)
-        .await?;
-        transaction.commit().await?;
-        Ok(ProfileKept::Added)
+        engine::again(|| async move {
+            let mut transaction = engine::begin(&self.writer).await?;
+            engine::admit_alone(&mut transaction).await?;
+            let known = sqlx::query(
+                "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2",
+            )
+            .bind(tenant)
+            .bind(&new.digest)
+            .fetch_optional(&mut *transaction)
+            .await?;
+            if let Some(row) = known {
+                return Ok(ProfileKept::Existing(read_profile(&row)?));
+            }
+            let row = sqlx::query(
+                "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM profiles WHERE tenant = $1",
+            )
+            .bind(tenant)
+            .fetch_one(&mut *transaction)
+            .await?;
+            let bytes = new.body.len() as u64;
+            if read_count(&row, "bytes")? + bytes > max_bytes {
+                return Ok(ProfileKept::Full);
+            }
+            sqlx::query(
+                "INSERT INTO profiles (tenant, digest, body, bytes, created_at) VALUES ($1, $2, $3, $4, $5)",
+            )
+            .bind(tenant)
+            .bind(&new.digest)
+            .bind(new.body.as_ref())
+            .bind(i64::try_from(bytes).unwrap_or(i64::MAX))
+            .bind(new.created_at)
+            .execute(&mut *transaction)
+            .await?;
+            transaction.commit().await?;
+            Ok(ProfileKept::Added)
+        })
+        .await
     }
 
-    /// A cross-section of a tenant.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn profile(
+    async fn profile(
         &self,
         tenant: &str,
         digest: &str,
     ) -> Result<Option<StoredProfile>, StoreError> {
-        let row = sqlx::query(
-            "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2",
-        )
-        .bind(tenant)
-        .bind(digest)
-        .fetch_optional(&self.readers)
-        .await?;
-        row.as_ref().map(read_profile).transpose()
+        engine::again(|| async move {
+            let row = sqlx::query(
+                "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2",
+            )
+            .bind(tenant)
+            .bind(digest)
+            .fetch_optional(&self.readers)
+            .await?;
+            row.as_ref().map(read_profile).transpose()
+        })
+        .await
     }
 
-    /// Digests, sizes and times of the cross-sections of a tenant, newest first, at most `limit`.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn profiles(
+    async fn profiles(
         &self,
         tenant: &str,
         limit: u32,
     ) -> Result<Vec<(String, u64, i64)>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT digest, bytes, created_at FROM profiles WHERE tenant = $1 ORDER BY created_at DESC, digest LIMIT $2",
-        )
-        .bind(tenant)
-        .bind(i64::from(limit))
-        .fetch_all(&self.readers)
-        .await?;
-        let read = |row: &DbRow| {
-            Ok((
-                row.try_get("digest")?,
-                read_count(row, "bytes")?,
-                row.try_get("created_at")?,
-            ))
-        };
-        rows.iter().map(read).collect()
+        engine::again(|| async move {
+            let rows = sqlx::query(
+                "SELECT digest, bytes, created_at FROM profiles WHERE tenant = $1 ORDER BY created_at DESC, digest LIMIT $2",
+            )
+            .bind(tenant)
+            .bind(i64::from(limit))
+            .fetch_all(&self.readers)
+            .await?;
+            let read = |row: &DbRow| {
+                Ok((
+                    row.try_get("digest")?,
+                    read_count(row, "bytes")?,
+                    row.try_get("created_at")?,
+                ))
+            };
+            rows.iter().map(read).collect()
+        })
+        .await
     }
 
-    /// Removes a cross-section; `false` if there was none.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn delete_profile(
-        &self,
-        tenant: &str,
-        digest: &str,
-    ) -> Result<bool, StoreError> {
-        let gone = sqlx::query("DELETE FROM profiles WHERE tenant = $1 AND digest = $2")
-            .bind(tenant)
-            .bind(digest)
-            .execute(&self.writer)
-            .await?;
-        Ok(gone.rows_affected() > 0)
+    async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool, StoreError> {
+        engine::again(|| async move {
+            let gone = sqlx::query("DELETE FROM profiles WHERE tenant = $1 AND digest = $2")
+                .bind(tenant)
+                .bind(digest)
+                .execute(&self.writer)
+                .await?;
+            Ok(gone.rows_affected() > 0)
+        })
+        .await
     }
 }
 

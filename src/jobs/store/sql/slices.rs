@@ -2,13 +2,16 @@
 
 use super::super::statements::Statements;
 use super::blob_refs::release_blobs;
-use super::engine::SqlStore;
+use super::engine::{self, SqlStore};
 use super::rows::{count, fence, read_blob_ids, read_count, read_small};
 use sqlx::Row;
 use std::time::Duration;
 
 use uuid::Uuid;
 
+use async_trait::async_trait;
+
+use crate::jobs::store::Slices;
 use crate::jobs::store::claim::Claim;
 use crate::jobs::store::ending::{NewSlice, SliceRecord, StoredResult};
 use crate::jobs::store_error::StoreError;
@@ -19,114 +22,107 @@ pub(crate) const NOTES: &str =
 pub(crate) const RESULTS: &str = "SELECT key, bytes, solution, fields FROM job_slices JOIN blobs ON blobs.id = blob_id \
      WHERE job_id = $1 ORDER BY number";
 
-impl SqlStore {
-    /// Stores a solved slice of a claimed job in place of what there was from its number on; the same call again changes
-    /// nothing. Returns whether the lease was still held; otherwise nothing changed.
-    ///
-    /// # Errors
-    /// The database failed; nothing changed.
-    pub(crate) async fn add_slice(
-        &self,
-        claim: &Claim,
-        slice: &NewSlice,
-    ) -> Result<bool, StoreError> {
-        let id = claim.id.to_string();
-        let note = &slice.note;
-        let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
-        let mut statements = Statements::begin(&self.writer()).await?;
-        let add = statements.next();
-        // Attempts are counted from the last slice that was stored: who gets on is not what processes die of.
-        add.push("UPDATE jobs SET attempt = 1, version = version + 1, slices = ");
-        add.push_bind(i64::from(note.number) + 1).push(", done = ");
-        add.push_bind(slice.done).push(", progress = ");
-        add.push_bind(slice.done).push(", cost_us = ");
-        add.push_bind(count(slice.rest_us)).push(" WHERE id = ");
-        add.push_bind(&id).push(" AND lease_token = ");
-        add.push_bind(fence(claim))
-            .push(" AND state = 'running' RETURNING id");
-        let added = statements.send().await?;
-        if added.iter().flatten().count() == 0 {
-            return Ok(false);
-        }
-        let there = sqlx::query(
-            "SELECT 1 FROM job_slices WHERE job_id = $1 AND number = $2 AND digest = $3 AND spent_us = $4",
-        )
-        .bind(&id)
-        .bind(i64::from(note.number))
-        .bind(&note.digest)
-        .bind(spent_us)
-        .fetch_optional(statements.connection())
-        .await?;
-        if there.is_none() {
-            let replaced = sqlx::query(
-                "DELETE FROM job_slices WHERE job_id = $1 AND number >= $2 RETURNING blob_id",
+#[async_trait]
+impl Slices for SqlStore {
+    async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool, StoreError> {
+        engine::again(|| async move {
+            let id = claim.id.to_string();
+            let note = &slice.note;
+            let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
+            let mut statements = Statements::begin(&self.writer()).await?;
+            let add = statements.next();
+            // Attempts are counted from the last slice that was stored: who gets on is not what processes die of.
+            add.push("UPDATE jobs SET attempt = 1, version = version + 1, slices = ");
+            add.push_bind(i64::from(note.number) + 1).push(", done = ");
+            add.push_bind(slice.done).push(", progress = ");
+            add.push_bind(slice.done).push(", cost_us = ");
+            add.push_bind(count(slice.rest_us)).push(" WHERE id = ");
+            add.push_bind(&id).push(" AND lease_token = ");
+            add.push_bind(fence(claim))
+                .push(" AND state = 'running' RETURNING id");
+            let added = statements.send().await?;
+            if added.iter().flatten().count() == 0 {
+                return Ok(false);
+            }
+            let there = sqlx::query(
+                "SELECT 1 FROM job_slices WHERE job_id = $1 AND number = $2 AND digest = $3 AND spent_us = $4",
             )
             .bind(&id)
             .bind(i64::from(note.number))
-            .fetch_all(statements.connection())
-            .await?;
-            release_blobs(statements.connection(), read_blob_ids(&replaced)?).await?;
-            let blobs = self
-                .insert_blobs(&mut statements, &[(claim, &slice.result)])
-                .await?;
-            statements.send().await?;
-            sqlx::query(
-                "INSERT INTO job_slices (job_id, number, motions, digest, spent_us, blob_id) \
-                 VALUES ($1, $2, $3, $4, $5, $6)",
-            )
-            .bind(&id)
-            .bind(i64::from(note.number))
-            .bind(i64::from(note.motions))
             .bind(&note.digest)
             .bind(spent_us)
-            .bind(blobs.first())
-            .execute(statements.connection())
+            .fetch_optional(statements.connection())
             .await?;
-        }
-        statements.commit().await?;
-        Ok(true)
+            if there.is_none() {
+                let replaced = sqlx::query(
+                    "DELETE FROM job_slices WHERE job_id = $1 AND number >= $2 RETURNING blob_id",
+                )
+                .bind(&id)
+                .bind(i64::from(note.number))
+                .fetch_all(statements.connection())
+                .await?;
+                release_blobs(statements.connection(), read_blob_ids(&replaced)?).await?;
+                let blobs = self
+                    .insert_blobs(&mut statements, &[(claim, &slice.result)])
+                    .await?;
+                statements.send().await?;
+                sqlx::query(
+                    "INSERT INTO job_slices (job_id, number, motions, digest, spent_us, blob_id) \
+                     VALUES ($1, $2, $3, $4, $5, $6)",
+                )
+                .bind(&id)
+                .bind(i64::from(note.number))
+                .bind(i64::from(note.motions))
+                .bind(&note.digest)
+                .bind(spent_us)
+                .bind(blobs.first())
+                .execute(statements.connection())
+                .await?;
+            }
+            statements.commit().await?;
+            Ok(true)
+        })
+        .await
     }
 
-    /// What is known of the stored slices of a job, in their order.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>, StoreError> {
-        let rows = sqlx::query(NOTES)
-            .bind(id.to_string())
-            .fetch_all(&self.readers)
-            .await?;
-        rows.iter()
-            .map(|row| {
-                Ok(SliceRecord {
-                    number: read_small(row, "number")?,
-                    motions: read_small(row, "motions")?,
-                    digest: row.try_get("digest")?,
-                    spent: Duration::from_micros(read_count(row, "spent_us")?),
+    async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>, StoreError> {
+        engine::again(|| async move {
+            let rows = sqlx::query(NOTES)
+                .bind(id.to_string())
+                .fetch_all(&self.readers)
+                .await?;
+            rows.iter()
+                .map(|row| {
+                    Ok(SliceRecord {
+                        number: read_small(row, "number")?,
+                        motions: read_small(row, "motions")?,
+                        digest: row.try_get("digest")?,
+                        spent: Duration::from_micros(read_count(row, "spent_us")?),
+                    })
                 })
-            })
-            .collect()
+                .collect()
+        })
+        .await
     }
 
-    /// Where the parts of the answer of a job are kept, in their order.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, StoreError> {
-        let rows = sqlx::query(RESULTS)
-            .bind(id.to_string())
-            .fetch_all(&self.readers)
-            .await?;
-        rows.iter()
-            .map(|row| {
-                if let Some(key) = row.try_get::<Option<String>, _>("key")? {
-                    return Ok(StoredResult::Blob(key, read_count(row, "bytes")?));
-                }
-                Ok(StoredResult::inline(
-                    row.try_get("solution")?,
-                    row.try_get("fields")?,
-                ))
-            })
-            .collect()
+    async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, StoreError> {
+        engine::again(|| async move {
+            let rows = sqlx::query(RESULTS)
+                .bind(id.to_string())
+                .fetch_all(&self.readers)
+                .await?;
+            rows.iter()
+                .map(|row| {
+                    if let Some(key) = row.try_get::<Option<String>, _>("key")? {
+                        return Ok(StoredResult::Blob(key, read_count(row, "bytes")?));
+                    }
+                    Ok(StoredResult::inline(
+                        row.try_get("solution")?,
+                        row.try_get("fields")?,
+                    ))
+                })
+                .collect()
+        })
+        .await
     }
 }

@@ -1,14 +1,17 @@
 //! Statistics of the embedded job table: how many jobs, how old, how large; and what comes before a queued job.
 
-use super::engine::SqlStore;
+use super::engine::{self, SqlStore};
 use super::quota::stored;
 use super::rows::{read_count, read_state};
+use async_trait::async_trait;
+
 use crate::jobs::model::job::Job;
 use crate::jobs::store::claim::QueueAhead;
 use std::collections::{BTreeMap, HashSet};
 
 use crate::jobs::model::job::State;
 use crate::jobs::store::retention::{Stats, Usage};
+use crate::jobs::store::{Claims, Statistics};
 use crate::jobs::store_error::StoreError;
 
 pub(crate) const COUNT: &str =
@@ -29,88 +32,79 @@ pub(crate) const OLDEST: &str = "SELECT MIN(first) FROM (SELECT (SELECT created_
 pub(crate) const RESULT_BYTES: &str =
     "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM blobs WHERE key IS NOT NULL";
 
-impl SqlStore {
-    /// What a tenant has here with the chunks of its runs, read from what the database counts itself.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn usage(&self, tenant: &str) -> Result<Usage, StoreError> {
-        let rows = sqlx::query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state")
-            .bind(tenant)
-            .fetch_all(&self.readers)
-            .await?;
-        let mut usage = Usage::default();
-        for row in &rows {
-            usage
-                .jobs
-                .insert(read_state(row)?, read_count(row, "number")?);
-        }
-        let reserved = sqlx::query(
-            "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) AS reserved FROM batches WHERE complete = 0 AND tenant = $1",
-        );
-        let reserved = reserved.bind(tenant);
-        let row = reserved.fetch_one(&self.readers).await?;
-        usage.reserved = read_count(&row, "reserved")?;
-        usage.stored_bytes = stored(&mut *self.readers.acquire().await?, tenant).await?;
-        Ok(usage)
+#[async_trait]
+impl Statistics for SqlStore {
+    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError> {
+        engine::again(|| async move {
+            let rows = sqlx::query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state")
+                .bind(tenant)
+                .fetch_all(&self.readers)
+                .await?;
+            let mut usage = Usage::default();
+            for row in &rows {
+                usage
+                    .jobs
+                    .insert(read_state(row)?, read_count(row, "number")?);
+            }
+            let reserved = sqlx::query(
+                "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) AS reserved FROM batches WHERE complete = 0 AND tenant = $1",
+            );
+            let reserved = reserved.bind(tenant);
+            let row = reserved.fetch_one(&self.readers).await?;
+            usage.reserved = read_count(&row, "reserved")?;
+            usage.stored_bytes = stored(&mut *self.readers.acquire().await?, tenant).await?;
+            Ok(usage)
+        })
+        .await
     }
 
-    /// Counts and sizes as they are now.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn stats(&self) -> Result<Stats, StoreError> {
-        let rows = sqlx::query(COUNT).fetch_all(&self.readers).await?;
-        let mut jobs: BTreeMap<State, u64> =
-            State::ALL.into_iter().map(|state| (state, 0)).collect();
-        for row in &rows {
-            jobs.insert(read_state(row)?, read_count(row, "jobs")?);
-        }
-        let oldest_queued_at = sqlx::query_scalar(OLDEST).fetch_one(&self.readers).await?;
-        let mean_cost_us: f64 = sqlx::query_scalar(MEAN_COST)
-            .fetch_one(&self.readers)
-            .await?;
-        let result_bytes: i64 = sqlx::query_scalar(RESULT_BYTES)
-            .fetch_one(&self.readers)
-            .await?;
-        Ok(Stats {
-            jobs,
-            oldest_queued_at,
-            mean_cost_us,
-            database_bytes: self.database_bytes().await?,
-            result_bytes: u64::try_from(result_bytes).unwrap_or(0),
+    async fn stats(&self) -> Result<Stats, StoreError> {
+        engine::again(|| async move {
+            let rows = sqlx::query(COUNT).fetch_all(&self.readers).await?;
+            let mut jobs: BTreeMap<State, u64> =
+                State::ALL.into_iter().map(|state| (state, 0)).collect();
+            for row in &rows {
+                jobs.insert(read_state(row)?, read_count(row, "jobs")?);
+            }
+            let oldest_queued_at = sqlx::query_scalar(OLDEST).fetch_one(&self.readers).await?;
+            let mean_cost_us: f64 = sqlx::query_scalar(MEAN_COST)
+                .fetch_one(&self.readers)
+                .await?;
+            let result_bytes: i64 = sqlx::query_scalar(RESULT_BYTES)
+                .fetch_one(&self.readers)
+                .await?;
+            Ok(Stats {
+                jobs,
+                oldest_queued_at,
+                mean_cost_us,
+                database_bytes: self.database_bytes().await?,
+                result_bytes: u64::try_from(result_bytes).unwrap_or(0),
+            })
         })
+        .await
+    }
+
+    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError> {
+        engine::again(|| async move {
+            let row = sqlx::query(BEFORE)
+                .bind(&job.tenant)
+                .bind(job.priority.rank())
+                .bind(job.id.to_string())
+                .bind(i64::from(limit))
+                .fetch_one(&self.readers)
+                .await?;
+            let queues = self.queues().await?;
+            let tenants: HashSet<&str> = queues.iter().map(|queue| &*queue.tenant).collect();
+            Ok(QueueAhead {
+                jobs: read_count(&row, "jobs")?,
+                cost_us: read_count(&row, "cost_us")?,
+                tenants: tenants.len(),
+            })
+        })
+        .await
     }
 }
 
 /// Jobs of the tenant before one of this rank and id, and their expected µs; no further than the limit.
 pub(crate) const BEFORE: &str = "SELECT COUNT(*) AS jobs, CAST(COALESCE(SUM(cost_us), 0) AS bigint) AS cost_us FROM (SELECT cost_us FROM jobs \
      WHERE state = 'queued' AND tenant = $1 AND kind = 'case' AND (rank, id) < ($2, $3) LIMIT $4) AS before";
-
-impl SqlStore {
-    /// Number of queued jobs of a tenant that come before this one, and their expected solve time in µs, counted no
-    /// further than `limit` jobs; and the number of tenants with queued jobs.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn queued_before(
-        &self,
-        job: &Job,
-        limit: u32,
-    ) -> Result<QueueAhead, StoreError> {
-        let row = sqlx::query(BEFORE)
-            .bind(&job.tenant)
-            .bind(job.priority.rank())
-            .bind(job.id.to_string())
-            .bind(i64::from(limit))
-            .fetch_one(&self.readers)
-            .await?;
-        let queues = self.queues().await?;
-        let tenants: HashSet<&str> = queues.iter().map(|queue| &*queue.tenant).collect();
-        Ok(QueueAhead {
-            jobs: read_count(&row, "jobs")?,
-            cost_us: read_count(&row, "cost_us")?,
-            tenants: tenants.len(),
-        })
-    }
-}

@@ -10,11 +10,11 @@ use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::engine::{CLAIM_BEGUN, CLAIM_NEW};
 use crate::jobs::store::sqlite::sql::cached::SOURCE;
 use crate::jobs::store::sqlite::sql::claim::QUEUES;
-use crate::jobs::store::sqlite::sql::deadlines::{FAIL_LATE, LATE};
-use crate::jobs::store::sqlite::sql::expire::EXPIRED;
-use crate::jobs::store::sqlite::sql::reap::{REAP, REAP_BYSTANDERS};
 use crate::jobs::store::sqlite::sql::slices::{NOTES, RESULTS};
 use crate::jobs::store::sqlite::sql::stats::{BEFORE, COUNT, OLDEST, RESULT_BYTES};
+use crate::jobs::store::sqlite::sql::upkeep::EXPIRED;
+use crate::jobs::store::sqlite::sql::upkeep::{FAIL_LATE, LATE};
+use crate::jobs::store::sqlite::sql::upkeep::{REAP, REAP_BYSTANDERS};
 use crate::jobs::store::sqlite::sql::{batch_lists, lists};
 
 #[tokio::test]

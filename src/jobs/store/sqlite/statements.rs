@@ -103,3 +103,50 @@ impl Statements {
         &mut self.connection
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use sqlx::Row;
+
+    use super::*;
+    use crate::jobs::store::sqlite::database::SqliteStore;
+
+    fn bury(statements: &mut Statements, id: &str) {
+        let insert = statements.next();
+        insert.push("INSERT INTO tombstones (id, tenant, gone_at) VALUES (");
+        insert
+            .push_bind(id.to_owned())
+            .push(", 't', 0) RETURNING id");
+    }
+
+    async fn buried(store: &SqliteStore) -> Vec<String> {
+        let ids = sqlx::query_scalar("SELECT id FROM tombstones ORDER BY id");
+        ids.fetch_all(&store.readers).await.unwrap()
+    }
+
+    #[tokio::test]
+    async fn a_transaction_that_is_dropped_or_fails_changes_nothing_and_holds_nobody_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("jobs.db");
+        let store = SqliteStore::open(&file).await.unwrap();
+        let mut kept = Statements::begin(&store.writer()).await.unwrap();
+        bury(&mut kept, "a");
+        bury(&mut kept, "b");
+        let rows = kept.commit().await.unwrap();
+        let ids: Vec<&str> = rows.iter().map(|rows| rows[0].get("id")).collect();
+        assert_eq!(ids, ["a", "b"]);
+
+        let mut dropped = Statements::begin(&store.writer()).await.unwrap();
+        bury(&mut dropped, "c");
+        assert_eq!(dropped.send().await.unwrap().len(), 1);
+        drop(dropped);
+        let mut fails = Statements::begin(&store.writer()).await.unwrap();
+        bury(&mut fails, "d");
+        bury(&mut fails, "a");
+        fails.commit().await.unwrap_err();
+        let mut last = Statements::begin(&store.writer()).await.unwrap();
+        bury(&mut last, "e");
+        last.commit().await.unwrap();
+        assert_eq!(buried(&store).await, ["a", "b", "e"]);
+    }
+}
