@@ -2,11 +2,11 @@
 
 use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::model::kind::Queue;
-use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, ReleaseReason};
 use railhead::jobs::store::ending::{Ending, StoredResult};
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
+use railhead::jobs::store::{Claims, Ends, Leases};
 use sqlx::{Connection, PgConnection};
 
 use crate::postgres::database;
@@ -85,11 +85,11 @@ async fn claims_and_ends_do_not_walk_over_dead_rows_and_miss_nothing_that_came_b
         assert_eq!(claims.len(), GROUP);
         if group == GROUPS / 2 {
             // The next claim begins with them.
-            let back = Store::release(&store, &claims, ReleaseReason::NotBegun, 0).await;
+            let back = Leases::release(&store, &claims, ReleaseReason::NotBegun, 0).await;
             assert_eq!(back.unwrap().len(), GROUP);
             let again = store.claim(&request(&queue_of("north"))).await.unwrap();
             assert_eq!(again[0].id, claims[0].id);
-            Store::release(&store, &again, ReleaseReason::NotBegun, 0)
+            Leases::release(&store, &again, ReleaseReason::NotBegun, 0)
                 .await
                 .unwrap();
             continue;
@@ -99,7 +99,7 @@ async fn claims_and_ends_do_not_walk_over_dead_rows_and_miss_nothing_that_came_b
             .into_iter()
             .map(|claim| (claim, ending.clone()))
             .collect();
-        let ended = Store::finish(&store, &ends, 0).await.unwrap();
+        let ended = Ends::finish(&store, &ends, 0).await.unwrap();
         assert_eq!(ended.len(), GROUP);
     }
     assert_eq!(seen.len(), GROUP * (GROUPS - 1), "no job was claimed twice");
