@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use railhead::contact;
+use railhead::contact::case::known_pair::KnownPair;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::evaluate::answer::{RowStatus, RowsAnswer};
 use railhead::contact::evaluate::column::Column;
@@ -419,6 +420,7 @@ fn solved(template: &Value, columns: &[VariedColumn], starts: RowStarts) -> Many
         case: template,
         columns,
         profiles: &BTreeMap::new(),
+        known: &KnownPair::default(),
         limits: &Limits::default(),
         time_limit: Duration::from_secs(60),
         starts,

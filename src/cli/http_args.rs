@@ -146,6 +146,10 @@ pub(super) struct HttpArgs {
     #[arg(long, env = "RAILHEAD_TABLE_TIME_S", default_value_t = 300, value_name = "SECONDS",
           value_parser = clap::value_parser!(u32).range(1..))]
     pub table_time_s: u32,
+    /// Seconds in which the solver must answer the rows of one evaluation; beyond: 422.
+    #[arg(long, env = "RAILHEAD_EVALUATE_TIME_S", default_value_t = 10, value_name = "SECONDS",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub evaluate_time_s: u32,
     /// Names of the service, separated by commas, by which it may be asked without a key; addresses and `localhost` always
     /// may. Others are refused, as a web page could make its own name lead here.
     #[arg(
@@ -195,6 +199,7 @@ impl HttpArgs {
             run_max_rows: self.run_max_rows,
             trusted_proxies: self.trusted_proxies.as_slice().into(),
             table_time: seconds(self.table_time_s),
+            evaluate_time: seconds(self.evaluate_time_s),
             allowed_hosts: self.allowed_host.as_slice().into(),
             page_dir: self.page_dir.as_deref().map(Into::into),
             ..default

@@ -57,6 +57,8 @@ pub struct HttpOptions {
     pub evaluate_max_bytes: usize,
     /// Most rows of a body.
     pub evaluate_max_rows: usize,
+    /// Time in which the solver must answer the rows of an evaluation.
+    pub evaluate_time: Duration,
     /// Largest body of a run in bytes.
     pub run_max_bytes: u64,
     /// Most rows of a run.
@@ -107,6 +109,7 @@ impl Default for HttpOptions {
             batch_max_cases: 200_000,
             evaluate_max_bytes: 64 << 20,
             evaluate_max_rows: 1_000_000,
+            evaluate_time: Duration::from_secs(10),
             run_max_bytes: 1 << 30,
             run_max_rows: 10_000_000,
             // Ten times what the largest usual table takes on a slow core; a judgement.

@@ -46,6 +46,8 @@ pub struct Engine {
     pub solve: Arc<Solve>,
     /// What all solver threads share.
     pub operators: Arc<OperatorStore>,
+    /// Pairs of cross-sections that were read before, for all checks.
+    pub known: Arc<KnownPair>,
 }
 
 impl Engine {
@@ -60,15 +62,38 @@ impl Engine {
     pub fn with_operators(operators: OperatorStore) -> Engine {
         let operators = Arc::new(operators);
         let store = Arc::clone(&operators);
+        let known = Arc::new(KnownPair::default());
+        let pairs = Arc::clone(&known);
         Engine {
-            check: Arc::new(contact::check),
+            check: Arc::new(move |case, limits| contact::check_with(&pairs, case, limits)),
             check_next: Arc::new(contact::check_with),
             slices: Arc::new(slices),
             solve: Arc::new(move |checked, slice, monitor| {
                 solve_slice(&store, checked, slice, monitor)
             }),
             operators,
+            known,
         }
+    }
+
+    /// Solves a checked case, slice by slice.
+    ///
+    /// # Errors
+    /// Those of the solver.
+    pub fn solve_whole(
+        &self,
+        checked: &CheckedCase,
+        monitor: &dyn Monitor,
+    ) -> Result<Solution, SolveError> {
+        let mut whole: Option<Solution> = None;
+        for slice in (self.slices)(checked) {
+            let (solution, _) = (self.solve)(checked, slice, monitor)?;
+            match &mut whole {
+                None => whole = Some(solution),
+                Some(all) => all.append(solution),
+            }
+        }
+        whole.ok_or(SolveError::Cancelled)
     }
 
     /// The same with another solver, which solves every case at once.
@@ -90,6 +115,6 @@ impl Engine {
 
 impl fmt::Debug for Engine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Recipe")
+        f.write_str("Engine")
     }
 }

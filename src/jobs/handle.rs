@@ -86,6 +86,11 @@ impl Jobs {
         (self.shared.engine.check_next)(known, case, &self.shared.options.limits)
     }
 
+    /// Pairs of cross-sections that were read before.
+    pub(crate) fn known_pairs(&self) -> &KnownPair {
+        &self.shared.engine.known
+    }
+
     /// Solve time of a case on this machine, found by solving it for at most about `limit`.
     #[must_use]
     pub fn probe(&self, checked: &CheckedCase, limit: Duration) -> ProbedTime {

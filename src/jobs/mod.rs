@@ -49,6 +49,7 @@ pub mod codec;
 pub mod disk_reserve;
 pub mod engine;
 pub mod error;
+mod evaluation;
 pub mod expiry;
 pub mod handle;
 pub mod idempotency;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use railhead::contact::case::known_pair::KnownPair;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::evaluate::many::solve::solve_many;
 use railhead::contact::evaluate::many::task::{ManyTask, RowSolver, RowStarts};
@@ -56,6 +57,7 @@ pub fn solved_by(
         case,
         columns,
         profiles: &BTreeMap::new(),
+        known: &KnownPair::default(),
         limits: &Limits::default(),
         time_limit: Duration::from_secs(60),
         starts,

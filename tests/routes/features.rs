@@ -64,18 +64,10 @@ impl Feature {
     fn pulled(mut self, forces: &[RowColumn], given: Value) -> Feature {
         self.case["motion"] = given;
         self.motion_columns = forces.to_vec();
-        if self.expected(Route::Evaluate) != NOT_HERTZ {
-            self = self.but(
-                Route::Evaluate,
-                Expected::Refused("prescribed forces need a job"),
-            );
-        }
         self
     }
 }
 
-/// Other contacts than ellipses have no rows at once.
-const NOT_HERTZ: Expected = Expected::Refused("other contacts need a job");
 const SPEED: f64 = 20_000.0;
 const CREEPAGES: [RowColumn; 3] = [
     ("/motion/creepage_x", [1e-3, -5e-4, 3e-3]),
@@ -199,8 +191,7 @@ fn pressure_grid() -> Feature {
         .map(|y| x.iter().map(|x| pressure(*x, *y)).collect())
         .collect();
     let contact = json!({ "type": "pressure_grid", "x_mm": x, "y_mm": x, "pressure_mpa": rows });
-    let mut feature =
-        feature("pressure_grid", contact, Value::Null).but(Route::Evaluate, NOT_HERTZ);
+    let mut feature = feature("pressure_grid", contact, Value::Null);
     feature.case.as_object_mut().expect("a case").remove("load");
     feature
 }
@@ -209,8 +200,7 @@ fn gap_profile() -> Feature {
     let y: Vec<f64> = (-48..=48).map(|k| 0.25 * f64::from(k)).collect();
     let gap: Vec<f64> = y.iter().map(|y| y * y / 600.0 + 1e-6 * y.powi(4)).collect();
     let contact = json!({ "type": "gap_profile", "rolling_mm": 460, "y_mm": y, "gap_mm": gap });
-    let mut feature = feature("gap_profile", contact, json!({ "normal_force_n": 8e4 }))
-        .but(Route::Evaluate, NOT_HERTZ);
+    let mut feature = feature("gap_profile", contact, json!({ "normal_force_n": 8e4 }));
     feature.columns = vec![("/load/normal_force_n", [8e4, 8e4, 7e4])];
     feature
 }
@@ -222,7 +212,7 @@ fn gap_grid() -> Feature {
         .map(|y| x.iter().map(|x| x * x / 920.0 + y * y / 600.0).collect())
         .collect();
     let contact = json!({ "type": "gap_grid", "x_mm": x, "y_mm": x, "gap_mm": rows });
-    feature("gap_grid", contact, json!({ "normal_force_n": 8e4 })).but(Route::Evaluate, NOT_HERTZ)
+    feature("gap_grid", contact, json!({ "normal_force_n": 8e4 }))
 }
 
 fn wheel_on_rail() -> Value {
@@ -235,8 +225,7 @@ fn wheel_on_rail() -> Value {
 /// A wheel of S1002 on 60E1 under the sum of its normal forces.
 fn profiles() -> Feature {
     let contact = wheel_on_rail();
-    let mut feature = feature("profiles", contact, json!({ "normal_force_n": 75_000 }))
-        .but(Route::Evaluate, NOT_HERTZ);
+    let mut feature = feature("profiles", contact, json!({ "normal_force_n": 75_000 }));
     feature.motion_columns = vec![
         ("/motion/creepage_x", [1e-3, -5e-4, 2e-3]),
         ("/motion/creepage_y", [-2e-3, 1e-3, 0.0]),
@@ -288,7 +277,6 @@ fn wheelset() -> Feature {
             json!({ "wheelset": { "speed_mm_per_s": SPEED, "free_rolling_radius_mm": 460.2 } }),
         )
         .but(Route::Sweep, Expected::Absent)
-        .but(Route::Evaluate, NOT_HERTZ)
         .but(Route::TwoProfiles, Expected::Agrees);
     feature.motions = Motions::Wheelset;
     feature.motion_columns = vec![(
@@ -309,14 +297,13 @@ fn rubbing(mut feature: Feature, (name, friction): &(&'static str, Value)) -> Fe
         });
     }
     let plain = friction.get("coefficient").is_some() && friction.get("layer").is_none();
-    let evaluated = feature.expected(Route::Evaluate) == Expected::Agrees;
-    if plain && evaluated && friction["coefficient"] != json!(0.0) {
+    let elliptic = ["radii", "ellipse"]
+        .map(Value::from)
+        .contains(&feature.case["contact"]["type"]);
+    if plain && elliptic && friction["coefficient"] != json!(0.0) {
         feature
             .columns
             .push(("/friction/coefficient", [0.3, 0.25, 0.35]));
-    }
-    if !plain && evaluated {
-        feature = feature.but(Route::Evaluate, Expected::LeftToSolver);
     }
     let frictionless = friction["coefficient"] == json!(0.0);
     if frictionless && feature.expected(Route::List) == Expected::SharedPatches {
@@ -332,12 +319,6 @@ fn rubbing(mut feature: Feature, (name, friction): &(&'static str, Value)) -> Fe
 fn between(mut feature: Feature, (name, material): &(&'static str, Value)) -> Feature {
     feature.name = format!("{}, {name}", feature.name);
     feature.case["material"] = material.clone();
-    if feature.expected(Route::Evaluate) != NOT_HERTZ {
-        feature = feature.but(
-            Route::Evaluate,
-            Expected::Refused("bodies of unlike material"),
-        );
-    }
     feature
 }
 
@@ -345,8 +326,7 @@ fn between(mut feature: Feature, (name, material): &(&'static str, Value)) -> Fe
 fn questions() -> Vec<Feature> {
     let mut approached = radii()
         .named("an approach")
-        .with("/load", json!({ "approach_mm": 0.06 }))
-        .but(Route::Evaluate, Expected::Refused("`normal_force_n`"));
+        .with("/load", json!({ "approach_mm": 0.06 }));
     approached.columns = vec![("/load/approach_mm", [0.06, 0.05, 0.07])];
     let of_outputs = [
         json!(["zones"]),
@@ -368,12 +348,7 @@ fn questions() -> Vec<Feature> {
 fn methods() -> Vec<Feature> {
     let mesh = json!({ "strips": 8, "cells": 12 });
     let named = |name: &str, solver: Value| radii().named(name).with("/solver", solver);
-    let other = |name: &str, solver: Value| {
-        named(name, solver).but(
-            Route::Evaluate,
-            Expected::Refused("other methods need a job"),
-        )
-    };
+    let other = |name: &str, solver: Value| named(name, solver);
     let by_table = json!({ "method": "table", "target_error": 0.02 });
     vec![
         named("table", by_table.clone()),
@@ -396,8 +371,7 @@ fn methods() -> Vec<Feature> {
             "boundary_element on a mesh",
             json!({ "method": "boundary_element", "mesh": mesh }),
         ),
-        named("auto on a mesh", json!({ "mesh": mesh }))
-            .but(Route::Evaluate, Expected::Refused("which has no mesh")),
+        named("auto on a mesh", json!({ "mesh": mesh })),
         other(
             "liu_hsu",
             json!({ "method": "liu_hsu", "mesh": { "strips": 6, "cells": 8 } }),
@@ -412,7 +386,6 @@ fn histories() -> Vec<Feature> {
             .with("/motion", motion)
             .but(Route::List, Expected::Absent)
             .but(Route::Sweep, Expected::Absent)
-            .but(Route::Evaluate, Expected::Refused("histories"))
     };
     let one_point = |name: &str, start: &str| {
         let point = json!({ "distance_mm": [0.0], "creepage_x": [1e-3], "creepage_y": [-5e-4] });
@@ -426,7 +399,8 @@ fn histories() -> Vec<Feature> {
     let mut whole = of("a history", json!({ "history": several }))
         .but(Route::Run, several_points)
         .but(Route::RunFromNeighbours, several_points)
-        .but(Route::NearMotions, several_points);
+        .but(Route::NearMotions, several_points)
+        .but(Route::Evaluate, Expected::Refused("row 0 is refused"));
     whole.motion_columns = vec![("/motion/history/creepage_x", [1e-3, -5e-4, 2e-3])];
     vec![
         one_point("one point of a history", "steady"),

@@ -6,11 +6,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use railhead::contact;
+use railhead::contact::case::known_pair::KnownPair;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::error::CaseError;
-use railhead::contact::evaluate::answer::RowStatus;
 use railhead::contact::evaluate::column::Column;
-use railhead::contact::evaluate::many::solve::solve_many;
+use railhead::contact::evaluate::many::solve::{evaluate_at_once, solve_many};
 use railhead::contact::evaluate::many::task::{ManyTask, RowStarts};
 use railhead::contact::evaluate::rows::Rows;
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
@@ -61,8 +60,6 @@ pub enum Expected {
     Absent,
     /// The request is refused, with these words.
     Refused(&'static str),
-    /// `auto` leaves rows to the solver: no numbers.
-    LeftToSolver,
     /// The motions share the patches of the first, with a remark.
     SharedPatches,
 }
@@ -173,10 +170,6 @@ fn checked(
             Err("answered, although it is on the list of refused combinations".to_owned())
         }
         (_, Err(why)) => Err(format!("refused: {why}")),
-        (Expected::LeftToSolver, Ok(rows)) => match rows.iter().all(Option::is_none) {
-            true => Ok(Some((0, 0.0))),
-            false => Err("answered, although it is to be left to the solver".to_owned()),
-        },
         (Expected::SharedPatches, Ok(rows)) => {
             let said = rows.iter().flatten().all(|row| {
                 row.remarks
@@ -397,6 +390,7 @@ fn run(
         case: &feature.case_of_row(0, with_columns),
         columns: &columns,
         profiles: &BTreeMap::new(),
+        known: &KnownPair::default(),
         limits: &Limits::default(),
         time_limit: Duration::from_secs(600),
         starts,
@@ -428,42 +422,62 @@ fn run(
 }
 
 fn evaluated(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
+    let operators = Arc::new(OperatorStore::default());
     let case = feature.case_of_row(0, true);
-    let columns = feature
-        .varied_columns(true)
-        .into_iter()
-        .map(|column| Column {
-            pointer: column.pointer,
-            values: match column.values {
-                Values::Numbers(values) => values,
-                Values::Texts(_) => unreachable!("numbers"),
-            },
-        });
-    let told = |error: CaseError| error.to_string();
-    let checked = contact::check(&case, &Limits::default()).map_err(told)?;
-    let rows = Rows::new(&case, &checked, columns.collect()).map_err(told)?;
-    let (answer, patches) = rows.evaluate_with_patches();
+    let columns = feature.varied_columns(true);
+    let checked = contact::check(&case, &Limits::default()).map_err(|error| error.to_string())?;
+    let task = ManyTask {
+        case: &case,
+        columns: &columns,
+        profiles: &BTreeMap::new(),
+        known: &KnownPair::default(),
+        limits: &Limits::default(),
+        time_limit: Duration::from_secs(600),
+        starts: RowStarts::Own,
+    };
+    let solve = |checked: &CheckedCase, monitor: &dyn Monitor| {
+        contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)
+    };
+    let step = || Ok::<_, ()>(());
+    let answer = evaluate_at_once(&task, &checked, &solve, &Unmonitored, step);
+    let answer = answer.map_err(|error| format!("{error:?}"))?;
+    let columns: BTreeMap<_, _> = answer.columns().into_iter().collect();
+    // The table answers neither the normal force nor the error of the moment.
+    let patches = match columns.contains_key("normal_force_n") {
+        true => Vec::new(),
+        false => {
+            let columns = feature.varied_columns(true).into_iter();
+            let columns = columns.map(|column| Column {
+                pointer: column.pointer,
+                values: match column.values {
+                    Values::Numbers(values) => values,
+                    Values::Texts(_) => unreachable!("numbers"),
+                },
+            });
+            let rows = Rows::new(&case, &checked, columns.collect());
+            let rows = rows.map_err(|error| error.to_string())?;
+            rows.evaluate_with_patches().1
+        }
+    };
     let rows = (0..ROWS).map(|row| {
         let status = answer.status[row];
         if !status.has_answer() {
-            let left = status == RowStatus::NeedsSolver;
-            return if left {
-                Ok(None)
-            } else {
-                Err(format!("row {row} is {}", status.name()))
-            };
+            return Err(format!("row {row} is {}", status.name()));
         }
-        let error = answer.error_estimate[row];
-        let [normal, length] = patches[row];
+        let of = |name: &str| columns.get(name).map(|column| column[row]);
+        let number = |name: &str| of(name).unwrap_or(f64::NAN);
+        let error = number("error_estimate");
+        let patch = patches.get(row);
+        let normal = patch.map_or_else(|| number("normal_force_n"), |[normal, _]| *normal);
+        let of_moment = patch.map_or_else(
+            || number("moment_error_estimate"),
+            |[_, length]| length * error,
+        );
+        let [x, y, z] = ["force_x_n", "force_y_n", "moment_z_n_mm"].map(number);
         Ok(Some(Answer {
-            numbers: [
-                answer.force_x_n[row],
-                answer.force_y_n[row],
-                answer.moment_z_n_mm[row],
-                normal,
-            ],
-            errors: [error, error, length * error, 0.0],
-            creepages: [None; 2],
+            numbers: [x, y, z, normal],
+            errors: [error, error, of_moment, 0.0],
+            creepages: ["creepage_x", "creepage_y"].map(of),
             scales: [f64::NAN; 2],
             remarks: Vec::new(),
         }))

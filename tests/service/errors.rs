@@ -360,6 +360,7 @@ async fn every_kind_of_problem_explains_itself() {
         include_str!("caching.rs"),
         include_str!("crowds.rs"),
         include_str!("errors.rs"),
+        include_str!("evaluate.rs"),
         include_str!("kept_profiles.rs"),
         include_str!("order.rs"),
         include_str!("database_away.rs"),

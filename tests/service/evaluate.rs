@@ -301,15 +301,6 @@ async fn faults_of_rows_name_row_and_column_and_limits_hold() {
         assert_problem(&answer, 422, "faulty-case", "");
         assert_eq!(pointers(&answer), [pointer], "{}", answer.text);
     }
-    let mut slow = template("boundary_element");
-    slow["contact"] = json!({ "type": "ellipse", "a_mm": 5, "b_mm": 4 });
-    let answer = evaluate(&server, slow, columns()).await;
-    assert_eq!(
-        pointers(&answer),
-        ["/template/solver/method"],
-        "{}",
-        answer.text
-    );
     let text =
         json!({ "template": template("table"), "columns": { "/motion/creepage_x": [0, "a"] } });
     let answer = server.post("/v1/evaluate", &text).await;
@@ -327,4 +318,78 @@ async fn faults_of_rows_name_row_and_column_and_limits_hold() {
     )
     .await;
     assert_problem(&answer, 413, "body-too-large", "evaluate-max-mib");
+}
+
+/// The example of a wheel on a rail, with one row that is its own motion.
+fn wheel_on_rail() -> (Value, Value) {
+    let mut case = crate::server::example("wheel-rail.case.json");
+    case["outputs"] = json!(["resultants", "zones"]);
+    case["motion"] = json!({ "creepage_x": 0.001, "creepage_y": 0.0, "spin_per_mm": 0.0002 });
+    (case, json!({ "/motion/creepage_x": [0.001] }))
+}
+
+#[tokio::test]
+async fn any_case_is_answered_as_its_job_is() {
+    let server = Server::start().await;
+    let mut unlike = template("fastsim");
+    unlike["load"]["normal_force_n"] = json!(1e5);
+    unlike["motion"]["creepage_x"] = json!(0.001);
+    unlike["solver"] = json!({ "method": "boundary_element", "target_error": 0.02 });
+    unlike["outputs"] = json!(["resultants", "zones"]);
+    let (wheel, columns) = wheel_on_rail();
+    for case in [unlike, wheel] {
+        let job = server.solve(&case).await;
+        let total = &job["result"]["total"][0];
+        assert!(total["force_x_n"].is_number(), "{job}");
+        let answer = evaluate(&server, case, columns.clone()).await;
+        assert_eq!(answer.status, 200, "{}", answer.text);
+        let rows = &answer.json["columns"];
+        for name in ["force_x_n", "force_y_n", "moment_z_n_mm"] {
+            assert_eq!(rows[name][0], total[name], "{name}");
+        }
+        assert_eq!(rows["status"], json!(["ok"]));
+        assert!(rows["patches"][0].as_f64() >= Some(1.0));
+    }
+    assert_eq!(
+        server.get("/v1/jobs").await.json["jobs"]
+            .as_array()
+            .map(Vec::len),
+        Some(2)
+    );
+}
+
+#[tokio::test]
+async fn auto_solves_the_rows_that_the_table_leaves() {
+    let server = Server::idle().await;
+    let mut case = template("auto");
+    // Far beyond the table.
+    case["contact"] = json!({ "type": "ellipse", "a_mm": 12.0, "b_mm": 1.0 });
+    let columns = json!({ "/load/normal_force_n": [5e4], "/motion/creepage_x": [0.001] });
+    let answer = evaluate(&server, case, columns).await;
+    assert_eq!(answer.status, 200, "{}", answer.text);
+    let rows = &answer.json["columns"];
+    assert!(rows["force_x_n"][0].as_f64() > Some(1e3), "{}", answer.text);
+    assert_eq!(rows["status"], json!(["ok"]));
+}
+
+#[tokio::test]
+async fn rows_beyond_the_budget_of_the_solver_belong_to_a_run() {
+    let mut setup = Setup::new();
+    setup.working = false;
+    setup.http.evaluate_time = std::time::Duration::ZERO;
+    let server = setup.start().await;
+    let (case, columns) = wheel_on_rail();
+    let late = evaluate(&server, case.clone(), columns).await;
+    assert_problem(&late, 422, "evaluation-too-long", "/v1/runs");
+    let many: Vec<f64> = (0..201).map(|row| 1e-5 * f64::from(row)).collect();
+    let many = json!({ "/motion/creepage_x": many });
+    let answer = evaluate(&server, case, many).await;
+    assert_problem(&answer, 422, "evaluation-too-long", "201 rows");
+    // The table has no such limit.
+    let answer = evaluate(&server, template("table"), columns_of(201)).await;
+    assert_eq!(answer.status, 200, "{}", answer.text);
+}
+
+fn columns_of(rows: usize) -> Value {
+    json!({ "/load/normal_force_n": vec![1e5; rows], "/motion/creepage_x": vec![1e-3; rows] })
 }

@@ -199,16 +199,9 @@ async fn assert_rows(server: &Server, case: &Value, alone: &[[[f64; 2]; 2]]) {
         let of = |name: &str| columns[name][k].clone();
         json!({ "force_x_n": of("force_x_n"), "force_y_n": of("force_y_n"), "error_estimate": of("error_estimate") })
     };
-    // The table has a coefficient and a reduction; it leaves the others to the solver.
-    if friction.get("coefficient").is_some() && friction.get("layer").is_none() {
-        assert_eq!(columns["status"], json!(["ok", "ok"]));
-        let found = [0, 1].map(|k| of_row(&row(k)));
-        assert_agrees(&format!("evaluate, {friction}"), &found, alone);
-    } else {
-        let left = json!(["needs_solver", "needs_solver"]);
-        assert_eq!(columns["status"], left, "{friction}");
-        assert!(row(0)["force_x_n"].is_null(), "{}", answer.text);
-    }
+    assert_eq!(columns["status"], json!(["ok", "ok"]), "{friction}");
+    let found = [0, 1].map(|k| of_row(&row(k)));
+    assert_agrees(&format!("evaluate, {friction}"), &found, alone);
 }
 
 #[tokio::test]

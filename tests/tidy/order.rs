@@ -85,6 +85,7 @@ const ORDER: &[&str] = &[
     "jobs::keys",
     "jobs::result_cache",
     "jobs::profiles",
+    "jobs::evaluation",
     "jobs::submit",
     "jobs::notify",
     "jobs::results",

@@ -1,14 +1,18 @@
-//! The pair of cross-sections that was read last, for the next case of the same pair: rows of a run differ in the place of the wheelset, in the load
-//! and in the motion, far more often than in their profiles.
+//! Cache of the pairs of cross-sections that were read last.
+//!
+//! Rows of a run, and steps of a simulation, differ in placement, load and motion far more often than in their profiles.
 
-use std::cell::RefCell;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::contact::case::words::contact::CrossSection;
 use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 
-/// The pair that was read last; nothing at first.
+/// Pairs kept: those of a few vehicles, left and right, whose steps alternate.
+const PAIRS_MAX: usize = 16;
+
+/// The pairs read last, the most recent first.
 #[derive(Debug, Default)]
-pub struct KnownPair(RefCell<Option<PairRead>>);
+pub struct KnownPair(Mutex<Vec<Arc<PairRead>>>);
 
 /// A pair, and the words that it was read from.
 #[derive(Debug)]
@@ -19,7 +23,7 @@ struct PairRead {
     geometry: WheelRail,
 }
 
-/// Whether the track is the same, wherever the wheelset is. The back of the flange is compared as it was stated.
+/// Whether the track is the same, for any placement of the wheelset. The back of the flange is compared as it was stated.
 fn on_same_track(one: &Placement, other: &Placement) -> bool {
     let track = |placement: &Placement| Placement {
         lateral_shift: 0.0,
@@ -32,30 +36,30 @@ fn on_same_track(one: &Placement, other: &Placement) -> bool {
 }
 
 impl KnownPair {
-    /// The pair of rail and wheel in their places, if it was read last.
+    /// The pair of rail and wheel in their places, if it is kept.
     pub(crate) fn placed(
         &self,
         [rail, wheel]: [&CrossSection; 2],
         flange_back: Option<f64>,
         placement: &Placement,
     ) -> Option<WheelRail> {
-        let known = self.0.borrow();
-        let PairRead {
-            sections,
-            flange_back: back_before,
-            geometry,
-        } = known.as_ref()?;
-        let same = *back_before == flange_back
-            && on_same_track(&geometry.placement, placement)
-            && sections[0] == *rail
-            && sections[1] == *wheel;
+        let mut pairs = self.pairs();
+        let found = pairs.iter().position(|known| {
+            known.flange_back == flange_back
+                && on_same_track(&known.geometry.placement, placement)
+                && known.sections[0] == *rail
+                && known.sections[1] == *wheel
+        })?;
+        let pair = pairs.remove(found);
+        pairs.insert(0, pair.clone());
+        drop(pairs);
         let Placement {
             lateral_shift,
             yaw,
             roll,
             ..
         } = *placement;
-        same.then(|| geometry.posed(lateral_shift, yaw, roll))
+        Some(pair.geometry.posed(lateral_shift, yaw, roll))
     }
 
     /// Keeps a pair that was read without faults.
@@ -65,10 +69,17 @@ impl KnownPair {
         flange_back: Option<f64>,
         geometry: &WheelRail,
     ) {
-        *self.0.borrow_mut() = Some(PairRead {
+        let pair = Arc::new(PairRead {
             sections: sections.map(CrossSection::clone),
             flange_back,
             geometry: geometry.clone(),
         });
+        let mut pairs = self.pairs();
+        pairs.insert(0, pair);
+        pairs.truncate(PAIRS_MAX);
+    }
+
+    fn pairs(&self) -> MutexGuard<'_, Vec<Arc<PairRead>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

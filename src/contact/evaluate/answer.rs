@@ -1,5 +1,9 @@
 //! What rows are answered with: columns of numbers, and a word for each row.
 
+use std::collections::BTreeMap;
+
+use crate::contact::evaluate::many_answer::{GRADIENT_NAMES, ManyAnswer, ManyStatus};
+
 /// What became of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowStatus {
@@ -15,9 +19,21 @@ pub enum RowStatus {
     Refused,
     /// No resultants: some number of the answer is not finite.
     NotFinite,
+    /// No resultants: the solver failed.
+    Failed(ManyStatus),
 }
 
 impl RowStatus {
+    fn of_solver(status: ManyStatus) -> RowStatus {
+        match status {
+            ManyStatus::Ok => RowStatus::Ok,
+            ManyStatus::TargetMissed => RowStatus::TargetMissed,
+            ManyStatus::Refused => RowStatus::Refused,
+            ManyStatus::NotCovered => RowStatus::NotCovered,
+            failed => RowStatus::Failed(failed),
+        }
+    }
+
     /// The word that clients read.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -28,6 +44,7 @@ impl RowStatus {
             RowStatus::NotCovered => "not_covered",
             RowStatus::Refused => "refused",
             RowStatus::NotFinite => "not_finite",
+            RowStatus::Failed(status) => status.name(),
         }
     }
 
@@ -37,19 +54,6 @@ impl RowStatus {
         matches!(self, RowStatus::Ok | RowStatus::TargetMissed)
     }
 }
-
-/// Names of the columns of derivatives, in the order of [`RowsAnswer::gradients`].
-pub const GRADIENT_NAMES: [&str; 9] = [
-    "force_x_n_by_creepage_x",
-    "force_x_n_by_creepage_y",
-    "force_x_n_by_spin_per_mm",
-    "force_y_n_by_creepage_x",
-    "force_y_n_by_creepage_y",
-    "force_y_n_by_spin_per_mm",
-    "moment_z_n_mm_by_creepage_x",
-    "moment_z_n_mm_by_creepage_y",
-    "moment_z_n_mm_by_spin_per_mm",
-];
 
 /// The answers to rows, one number of each column for a row; not a number where a row has none.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -68,6 +72,8 @@ pub struct RowsAnswer {
     pub stick_share: Vec<f64>,
     /// Derivatives, if they were asked for, named by [`GRADIENT_NAMES`].
     pub gradients: Option<[Vec<f64>; 9]>,
+    /// Further columns of rows that need the solver, with their names.
+    pub more: Vec<(&'static str, Vec<f64>)>,
     /// What became of the rows.
     pub status: Vec<RowStatus>,
 }
@@ -113,6 +119,7 @@ impl RowsAnswer {
             friction_power_n: column(),
             stick_share: column(),
             gradients: gradients.then(|| std::array::from_fn(|_| column())),
+            more: Vec::new(),
             status: Vec::with_capacity(rows),
         }
     }
@@ -157,7 +164,69 @@ impl RowsAnswer {
             let named = GRADIENT_NAMES.iter().zip(gradients);
             columns.extend(named.map(|(name, column)| (*name, &column[..])));
         }
+        let more = self.more.iter();
+        columns.extend(more.map(|(name, column)| (*name, &column[..])));
         columns
+    }
+
+    /// All answers of the solver, with all of its columns.
+    pub(crate) fn of_solver(answer: ManyAnswer) -> RowsAnswer {
+        let rows = answer.status.len();
+        let mut columns: BTreeMap<_, _> = answer
+            .columns
+            .names()
+            .into_iter()
+            .zip(answer.numbers)
+            .collect();
+        let mut take = |name| {
+            let column = columns.remove(name);
+            column.unwrap_or_else(|| vec![f64::NAN; rows])
+        };
+        let gradients = answer.columns.gradients;
+        let solved = RowsAnswer {
+            force_x_n: take("force_x_n"),
+            force_y_n: take("force_y_n"),
+            moment_z_n_mm: take("moment_z_n_mm"),
+            error_estimate: take("error_estimate"),
+            friction_power_n: take("friction_power_n"),
+            stick_share: take("stick_share"),
+            gradients: gradients.then(|| GRADIENT_NAMES.map(&mut take)),
+            more: Vec::new(),
+            status: answer
+                .status
+                .into_iter()
+                .map(RowStatus::of_solver)
+                .collect(),
+        };
+        let names = answer.columns.names().into_iter();
+        RowsAnswer {
+            more: names
+                .filter_map(|name| Some((name, columns.remove(name)?)))
+                .collect(),
+            ..solved
+        }
+    }
+
+    /// Replaces rows by answers of the solver, in the same order.
+    pub(crate) fn replace(&mut self, rows: &[usize], solved: &RowsAnswer) {
+        let columns = [
+            (&mut self.force_x_n, &solved.force_x_n),
+            (&mut self.force_y_n, &solved.force_y_n),
+            (&mut self.moment_z_n_mm, &solved.moment_z_n_mm),
+            (&mut self.error_estimate, &solved.error_estimate),
+            (&mut self.friction_power_n, &solved.friction_power_n),
+            (&mut self.stick_share, &solved.stick_share),
+        ];
+        let gradients = self.gradients.iter_mut().flatten();
+        let gradients = gradients.zip(solved.gradients.iter().flatten());
+        for (column, numbers) in columns.into_iter().chain(gradients) {
+            for (row, number) in rows.iter().zip(numbers) {
+                column[*row] = *number;
+            }
+        }
+        for (row, status) in rows.iter().zip(&solved.status) {
+            self.status[*row] = *status;
+        }
     }
 }
 

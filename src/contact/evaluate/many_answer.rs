@@ -2,10 +2,22 @@
 
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::error::{CaseError, SolveError};
-use crate::contact::evaluate::answer::GRADIENT_NAMES;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::Problem;
 use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
+
+/// Names of the columns of derivatives, in the order of derivatives: forces and moment, each by both creepages and the spin.
+pub const GRADIENT_NAMES: [&str; 9] = [
+    "force_x_n_by_creepage_x",
+    "force_x_n_by_creepage_y",
+    "force_x_n_by_spin_per_mm",
+    "force_y_n_by_creepage_x",
+    "force_y_n_by_creepage_y",
+    "force_y_n_by_spin_per_mm",
+    "moment_z_n_mm_by_creepage_x",
+    "moment_z_n_mm_by_creepage_y",
+    "moment_z_n_mm_by_spin_per_mm",
+];
 
 /// What became of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -42,6 +42,19 @@ impl Values {
         self.len() == 0
     }
 
+    /// The values of these rows.
+    #[must_use]
+    pub fn pick(&self, rows: &[usize]) -> Values {
+        match self {
+            Values::Numbers(numbers) => {
+                Values::Numbers(rows.iter().map(|row| numbers[*row]).collect())
+            }
+            Values::Texts(texts) => {
+                Values::Texts(rows.iter().map(|row| texts[*row].clone()).collect())
+            }
+        }
+    }
+
     /// The value of a row as a case has it.
     #[must_use]
     pub fn value(&self, row: usize) -> Value {

@@ -57,26 +57,10 @@ pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes,
     Ok(text.into())
 }
 
-/// A template and columns from JSON, `{"template": …, "columns": {"<JSON pointer>": […], …}}`.
+/// A template and columns of numbers or texts from JSON, `{"template": …, "columns": {"<JSON pointer>": […], …}}`.
 ///
 /// # Errors
 /// `malformed-json` with its position, and with column and row where the fault is in a column.
-pub fn read_json(text: &[u8]) -> Result<(Value, Vec<Column>), ApiError> {
-    let (template, columns) = read_json_columns(text)?;
-    let numbers = columns.into_iter().map(|(pointer, values)| match values {
-        Values::Numbers(values) => Ok(Column { pointer, values }),
-        Values::Texts(_) => {
-            let detail = format!("column `{pointer}`, row 0: a text given; a number is needed");
-            Err(ApiError::malformed(&serde_json::Error::custom(detail)))
-        }
-    });
-    Ok((template, numbers.collect::<Result<_, _>>()?))
-}
-
-/// The same with columns of texts allowed beside those of numbers.
-///
-/// # Errors
-/// As [`read_json`].
 pub fn read_json_columns(text: &[u8]) -> Result<(Value, NamedValues), ApiError> {
     let read: RowsBody =
         serde_json::from_slice(text).map_err(|error| ApiError::malformed(&error))?;
@@ -416,8 +400,15 @@ mod tests {
     #[test]
     fn json_and_csv_of_the_same_rows_are_the_same_columns() {
         let json = br#"{"columns":{"/motion/creepage_x":[0.1,-2e-3],"/load/normal_force_n":[8e4,9]},"template":{"a":1}}"#;
-        let (template, columns) = read_json(json).unwrap();
+        let (template, columns) = read_json_columns(json).unwrap();
         assert_eq!(template, serde_json::json!({ "a": 1 }));
+        let columns = columns.into_iter();
+        let columns: Vec<Column> = columns
+            .map(|(pointer, values)| match values {
+                Values::Numbers(values) => Column { pointer, values },
+                Values::Texts(_) => unreachable!("numbers"),
+            })
+            .collect();
         let csv = "\u{feff}creepage_x, /load/normal_force_n\r\n0.1,80000\r\n-2e-3, 9 \r\n";
         assert_eq!(read_csv(csv.as_bytes()).unwrap(), columns);
         let units = "creepage_x;Normal force\n[%];[kN]\n10;80\n-0,2;0,009\n";
@@ -428,7 +419,7 @@ mod tests {
     fn faults_name_row_and_column() {
         let text = |error: ApiError| format!("{error:?}");
         let null = br#"{"template":{},"columns":{"/motion/creepage_x":[0.1,null]}}"#;
-        let fault = text(read_json(null).unwrap_err());
+        let fault = text(read_json_columns(null).unwrap_err());
         assert!(
             fault.contains("/motion/creepage_x") && fault.contains("row 1"),
             "{fault}"

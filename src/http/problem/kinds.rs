@@ -66,6 +66,7 @@ kinds! {
     QuotaExceeded 429 "quota-exceeded" "Too many jobs are waiting" "The tenant has as many queued jobs as it may; nothing was stored, try again after `Retry-After` seconds."
     StoredQuotaExceeded 507 "stored-quota-exceeded" "The tenant has stored as much as it may" "The cases, templates and results of the tenant take as many bytes as they may; nothing was stored, and nothing stored is removed. Delete ended jobs, batches or runs, then send it again."
     ProfilesFull 429 "profiles-full" "No more profiles are kept" "The profiles of the tenant take as many bytes as they may; delete some, then send it again."
+    EvaluationTooLong 422 "evaluation-too-long" "The rows take too long to answer at once" "The rows need the solver, and more time, memory or rows than one evaluation may take; the detail says which. Nothing was stored. Submit them to `/v1/runs`, which takes the same body and any number of rows, or one case to `/v1/jobs`."
     IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body, priority, deadline or `no-cache`; use a new key for a new case."
     Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
     QueueFull 503 "queue-full" "The queue is full" "The service holds as many unfinished jobs as it may; nothing was stored, try again after `Retry-After` seconds."

@@ -163,6 +163,7 @@ mod tests {
             friction_power_n: column(0.0),
             stick_share: column(1.0),
             gradients: None,
+            more: Vec::new(),
             status: vec![RowStatus::Ok; rows],
         };
         answer.stick_share[1] = f64::NAN;

@@ -300,6 +300,7 @@ impl RunDraft {
             case: &case,
             columns: &varied,
             profiles: &profiles,
+            known: self.jobs.known_pairs(),
             limits: &options.limits,
             time_limit: options.time_limit,
             starts: RowStarts::Own,

@@ -5,13 +5,11 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde_json::json;
 
-use crate::contact::error::SolveError;
 use crate::contact::evaluate::many::solve::{own_bytes, solve_many};
 use crate::contact::evaluate::many::task::ManyTask;
 use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::solution::words::answer::Solution;
 use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::attempts::outcome::{INTERNAL, Outcome};
 use crate::jobs::codec::parquet::encode;
@@ -44,12 +42,14 @@ pub(crate) fn solve_chunk(
         case: &head.case,
         columns: &varied,
         profiles: &head.profiles,
+        known: &shared.engine.known,
         limits,
         time_limit: shared.options.time_limit,
         starts: head.starts(),
     };
     control.begin(Duration::ZERO);
-    let solve = |checked: &CheckedCase, monitor: &dyn Monitor| solve_case(shared, checked, monitor);
+    let solve =
+        |checked: &CheckedCase, monitor: &dyn Monitor| shared.engine.solve_whole(checked, monitor);
     let solved = solve_many(&task, &solve, control);
     control.pause();
     let answer = match solved {
@@ -81,22 +81,6 @@ fn read(stored: &StoredCase) -> Result<(RunHead, RunChunk), JobsError> {
     )?;
     let chunk = RunChunk::read(&stored.body, &head.columns)?;
     Ok((head, chunk))
-}
-
-fn solve_case(
-    shared: &Shared,
-    checked: &CheckedCase,
-    monitor: &dyn Monitor,
-) -> Result<Solution, SolveError> {
-    let mut whole: Option<Solution> = None;
-    for slice in (shared.engine.slices)(checked) {
-        let (solution, _) = (shared.engine.solve)(checked, slice, monitor)?;
-        match &mut whole {
-            None => whole = Some(solution),
-            Some(all) => all.append(solution),
-        }
-    }
-    whole.ok_or(SolveError::Cancelled)
 }
 
 /// The answers in the order of [`RunHead::answers`].

@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
-use crate::contact::case::known_pair::KnownPair;
 use crate::contact::error::SolveError;
 use crate::contact::evaluate::many::near_rows::{Group, OpenGroups};
 use crate::contact::evaluate::many::task::{ManyTask, RowSolver, RowStarts};
@@ -21,7 +20,6 @@ pub(crate) struct RowsInWork<'a> {
     monitor: &'a dyn Monitor,
     /// Where their answers go.
     answer: &'a mut ManyAnswer,
-    known: KnownPair,
     /// Rows that are over, and all.
     done: usize,
     all: usize,
@@ -46,7 +44,6 @@ impl<'a> RowsInWork<'a> {
             solve,
             monitor,
             answer,
-            known: KnownPair::default(),
             done: 0,
             all: 0,
         }
@@ -63,7 +60,7 @@ impl<'a> RowsInWork<'a> {
             if self.watch(1).tick(0.0).is_break() {
                 return Err(SolveError::Cancelled);
             }
-            let checked = match self.task.checked(&self.known, *row) {
+            let checked = match self.task.checked(*row) {
                 Ok(checked) => checked,
                 Err(error) => {
                     self.end(*row, RowFailure::refused(&error));
@@ -114,7 +111,7 @@ impl<'a> RowsInWork<'a> {
                 Err(RowEnd::Failed(_)) => {
                     for member in members {
                         // A row of a group has no faults.
-                        if let Ok(checked) = self.task.checked(&self.known, member.row) {
+                        if let Ok(checked) = self.task.checked(member.row) {
                             self.alone(member.row, &checked)?;
                         }
                     }
@@ -126,7 +123,7 @@ impl<'a> RowsInWork<'a> {
 
     /// Solves a row by itself, where it chooses its own meshes, after it missed the target in its group.
     fn again(&mut self, row: usize) -> Result<(), SolveError> {
-        let Ok(checked) = self.task.checked(&self.known, row) else {
+        let Ok(checked) = self.task.checked(row) else {
             return Ok(());
         };
         match self.solved(&checked, 1) {

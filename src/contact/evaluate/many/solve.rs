@@ -7,7 +7,6 @@
 use std::cmp::Ordering;
 
 use crate::contact;
-use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::solve_time::TABLE_SECONDS;
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::error::SolveError;
@@ -35,7 +34,7 @@ pub fn solve_many(
     solve: &RowSolver,
     monitor: &dyn Monitor,
 ) -> Result<ManyAnswer, SolveError> {
-    let checked = contact::check(task.case, task.limits).ok();
+    let checked = contact::check_with(task.known, task.case, task.limits).ok();
     let columns = checked.as_ref().map(NumberColumns::of).unwrap_or_default();
     let mut answer = ManyAnswer::new(task.rows(), columns);
     let mut open: Vec<usize> = (0..task.rows()).collect();
@@ -50,19 +49,82 @@ pub fn solve_many(
     Ok(answer)
 }
 
+/// Most rows of one evaluation that the solver answers; the table and FASTSIM answer any number.
+pub const SOLVED_ROWS_MAX: usize = 200;
+
+/// Why rows are not answered at once.
+#[derive(Debug)]
+pub enum NotAtOnce<E> {
+    /// That many rows need the solver, more than [`SOLVED_ROWS_MAX`].
+    TooManyRows(usize),
+    /// The monitor stopped the solver.
+    Stopped,
+    /// The error of a step.
+    Step(E),
+}
+
+/// Answers rows at once, by the table or FASTSIM where they apply, and else by the solver. `checked` is the checked case of the task; `step` is
+/// called after each row of the former and may end the evaluation.
+///
+/// With `auto`, rows that the table leaves to the solver are solved too, if there are at most [`SOLVED_ROWS_MAX`]; otherwise their status is
+/// [`RowStatus::NeedsSolver`].
+///
+/// # Errors
+/// The rows exceed what one evaluation may take, or it was ended.
+pub fn evaluate_at_once<E>(
+    task: &ManyTask,
+    checked: &CheckedCase,
+    solve: &RowSolver,
+    monitor: &dyn Monitor,
+    step: impl FnMut() -> Result<(), E>,
+) -> Result<RowsAnswer, NotAtOnce<E>> {
+    let by_solver = |task: &ManyTask| {
+        let solved = solve_many(task, solve, monitor).map_err(|_| NotAtOnce::Stopped)?;
+        Ok(RowsAnswer::of_solver(solved))
+    };
+    let Some((rows, method)) = evaluable(task, checked) else {
+        return match task.rows() {
+            rows if rows > SOLVED_ROWS_MAX => Err(NotAtOnce::TooManyRows(rows)),
+            _ => by_solver(task),
+        };
+    };
+    let mut answer = rows.evaluate_stepwise(step).map_err(NotAtOnce::Step)?;
+    let open: Vec<usize> = (0..answer.status.len())
+        .filter(|row| match answer.status[*row] {
+            RowStatus::NeedsSolver => true,
+            RowStatus::NotCovered => method == MethodName::Auto,
+            _ => false,
+        })
+        .collect();
+    if !open.is_empty() && open.len() <= SOLVED_ROWS_MAX {
+        let columns = task.columns.iter();
+        let columns: Vec<VariedColumn> = columns
+            .map(|column| VariedColumn {
+                pointer: column.pointer.clone(),
+                values: column.values.pick(&open),
+            })
+            .collect();
+        let solved = by_solver(&ManyTask {
+            columns: &columns,
+            ..*task
+        })?;
+        answer.replace(&open, &solved);
+    }
+    Ok(answer)
+}
+
 /// How long the rows of a task take, in s on one core of the machine the figures were taken on; rough, and the same for the same rows.
 #[must_use]
 pub fn expected_seconds(task: &ManyTask) -> f64 {
     let rows = task.rows();
-    let Ok(checked) = contact::check(task.case, task.limits) else {
+    let Ok(checked) = contact::check_with(task.known, task.case, task.limits) else {
         return rows as f64 * REFUSED_SECONDS;
     };
     let Some((evaluable, method)) = evaluable(task, &checked) else {
-        let known = KnownPair::default();
         let step = rows.div_ceil(SAMPLED).max(1);
         let sampled: Vec<f64> = (0..rows)
             .step_by(step)
-            .map(|row| match task.checked(&known, row) {
+            .map(|row| match task.checked(row) {
                 Ok(checked) => checked.cost().seconds,
                 Err(_) => REFUSED_SECONDS,
             })
@@ -117,7 +179,10 @@ fn to_solve(status: RowStatus, method: MethodName) -> bool {
     match status {
         RowStatus::Ok | RowStatus::TargetMissed => false,
         RowStatus::NotCovered => method == MethodName::Auto,
-        RowStatus::NeedsSolver | RowStatus::Refused | RowStatus::NotFinite => true,
+        RowStatus::NeedsSolver
+        | RowStatus::Refused
+        | RowStatus::NotFinite
+        | RowStatus::Failed(_) => true,
     }
 }
 

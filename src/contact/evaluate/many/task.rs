@@ -8,6 +8,7 @@ use serde_json::Value;
 use crate::contact;
 use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
+use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault, SolveError};
 use crate::contact::evaluate::varied::{VariedColumn, case_of_row};
 use crate::contact::monitor::Monitor;
@@ -37,6 +38,8 @@ pub struct ManyTask<'a> {
     pub columns: &'a [VariedColumn],
     /// Cross-sections that rows name, by their names.
     pub profiles: &'a BTreeMap<String, Value>,
+    /// Pairs of cross-sections that were read before.
+    pub known: &'a KnownPair,
     /// What a row may use.
     pub limits: &'a Limits,
     /// Longest time for one row; a shorter one of the case counts.
@@ -55,13 +58,17 @@ impl ManyTask<'_> {
     ///
     /// # Errors
     /// Its faults.
-    pub(crate) fn checked(&self, known: &KnownPair, row: usize) -> Result<CheckedCase, CaseError> {
+    pub(crate) fn checked(&self, row: usize) -> Result<CheckedCase, CaseError> {
         let case = case_of_row(self.case, self.columns, self.profiles, row)
             .map_err(|(pointer, reason)| CaseError(vec![Fault::new(pointer, reason)]))?;
-        let mut checked = contact::check_with(known, &case, self.limits)?;
+        let mut checked = contact::check_with(self.known, &case, self.limits)?;
         if let Some(fault) = several_answers(&checked) {
             return Err(CaseError(vec![fault]));
         }
+        // Rows are answered with numbers alone.
+        let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
+        let outputs = &mut checked.run.outputs;
+        outputs.retain(|output| numbers.contains(output));
         let own = checked.run.time_limit;
         checked.run.time_limit = Some(own.map_or(self.time_limit, |own| own.min(self.time_limit)));
         Ok(checked)
