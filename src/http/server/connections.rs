@@ -333,11 +333,14 @@ mod tests {
         let next = (next.begin_request(), next);
         assert!(is_closed(&kept) && !is_closed(&busy));
         drop(first);
-        let reserve: Vec<_> = (0..RESERVE).map(|_| open(&table, 1)).collect();
-        assert!(reserve[0].probes_only() && !is_closed(&busy));
-        let requests: Vec<_> = reserve.iter().map(Connection::begin_request).collect();
+        let probe = |_| {
+            let connection = open(&table, 1);
+            (connection.begin_request(), connection)
+        };
+        let reserve: Vec<_> = (0..RESERVE).map(probe).collect();
+        assert!(reserve[0].1.probes_only() && !is_closed(&busy));
         assert!(table.open([192, 0, 2, 2].into(), true).is_none());
-        drop((reserve, requests, second, last, next));
+        drop((reserve, second, last, next));
         assert!(!open(&table, 1).probes_only());
     }
 
