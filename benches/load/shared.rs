@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use railhead::jobs::codec::result::EncodedResult;
+use railhead::jobs::model::kind::{Kind, Queue};
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease};
 use railhead::jobs::store::ending::{Ending, StoredResult};
@@ -59,9 +60,13 @@ async fn work(store: Arc<dyn Store>) -> usize {
         result: StoredResult::Inline(result),
         field_patches: 0,
     };
+    let queue = Queue {
+        tenant: TENANT.into(),
+        kind: Kind::Case,
+    };
     let request = ClaimRequest {
         worker: "w",
-        tenant: TENANT,
+        queue: &queue,
         kind: ClaimKind::New,
         jobs: GROUP,
         cost_us: u64::MAX,

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use bytes::Bytes;
 use railhead::jobs::State;
+use railhead::jobs::model::kind::{Kind, Queue};
 use railhead::jobs::model::submit_options::SubmitOptions;
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, ReleaseReason};
@@ -32,11 +33,15 @@ pub async fn claims() -> Vec<Row> {
     let store = open(folder.path()).await;
     fill(&*store, QUEUED).await;
     let (mut one, mut many) = (Vec::new(), Vec::new());
+    let queue = Queue {
+        tenant: TENANT.into(),
+        kind: Kind::Case,
+    };
     for number in 0..CLAIMS {
         for (workers, times) in [(1, &mut one), (64, &mut many)] {
             let request = ClaimRequest {
                 worker: "w",
-                tenant: TENANT,
+                queue: &queue,
                 kind: ClaimKind::New,
                 jobs: 256,
                 cost_us: 200_000,
@@ -169,6 +174,7 @@ pub async fn fill(store: &dyn Store, jobs: usize) -> Uuid {
     let batch = NewBatch {
         id: Uuid::now_v7(),
         tenant: TENANT.into(),
+        kind: Kind::Cases,
         created_at: 0,
         count: u32::try_from(jobs).expect("a count"),
         rejected: 0,
@@ -197,6 +203,7 @@ fn job() -> NewJob {
     NewJob {
         id: Uuid::now_v7(),
         tenant: TENANT.into(),
+        kind: Kind::Case,
         created_at: 0,
         name: None,
         labels: BTreeMap::from([("run".to_owned(), "big".to_owned())]),

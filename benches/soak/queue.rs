@@ -6,13 +6,14 @@ use std::time::{Duration, Instant};
 
 use railhead::jobs::State;
 use railhead::jobs::codec::result::EncodedResult;
-use railhead::jobs::store::Store;
+use railhead::jobs::model::kind::{Kind, Queue};
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease};
 use railhead::jobs::store::cluster::Cluster;
 use railhead::jobs::store::ending::{Ending, StoredResult};
 use railhead::jobs::store::list::Filter;
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
+use railhead::jobs::store::{Claims, Ends, Store};
 use sqlx::{Connection, PgConnection, PgPool};
 use tokio::task::JoinSet;
 
@@ -80,9 +81,13 @@ async fn work(store: Arc<PostgresStore>, until: Instant, group: usize) -> Work {
         result: StoredResult::Inline(result),
         field_patches: 0,
     };
+    let queue = Queue {
+        tenant: TENANT.into(),
+        kind: Kind::Case,
+    };
     let request = ClaimRequest {
         worker: "w",
-        tenant: TENANT,
+        queue: &queue,
         kind: ClaimKind::New,
         jobs: group,
         cost_us: u64::MAX,
@@ -103,10 +108,7 @@ async fn work(store: Arc<PostgresStore>, until: Instant, group: usize) -> Work {
             .map(|claim| (claim, ending.clone()))
             .collect();
         let began = Instant::now();
-        done.jobs += Store::finish(&*store, &ends, 0)
-            .await
-            .expect("an end")
-            .len();
+        done.jobs += store.finish(&ends, 0).await.expect("an end").len();
         done.ends.push(began.elapsed().as_secs_f64());
     }
     done
