@@ -158,7 +158,7 @@ async fn answers_are_packed_for_those_who_accept_it() {
     }
 }
 
-fn gzip(text: &[u8]) -> Vec<u8> {
+pub fn gzip(text: &[u8]) -> Vec<u8> {
     let mut encoder = flate2::read::GzEncoder::new(text, flate2::Compression::best());
     let mut out = Vec::new();
     encoder.read_to_end(&mut out).expect("gzip");

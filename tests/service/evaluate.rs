@@ -8,8 +8,9 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::batches::small;
+use crate::caching::gzip;
 use crate::errors::assert_problem;
-use crate::server::{Server, Setup};
+use crate::server::{Server, Setup, example};
 
 fn template(method: &str) -> Value {
     json!({
@@ -392,4 +393,27 @@ async fn rows_beyond_the_budget_of_the_solver_belong_to_a_run() {
 
 fn columns_of(rows: usize) -> Value {
     json!({ "/load/normal_force_n": vec![1e5; rows], "/motion/creepage_x": vec![1e-3; rows] })
+}
+
+/// A packed table claims the memory of the largest table until it is read; the solver's memory is claimed after that.
+#[tokio::test]
+async fn a_packed_table_leaves_memory_for_the_solver() {
+    let server = Server::start().await;
+    let mut case = example("hertz-steel.case.json");
+    case["solver"] = json!({ "method": "fastsim", "mesh": { "strips": 30, "cells": 30 } });
+    let location = server.submit(&case).await;
+    let id = location.rsplit('/').next().expect("an id");
+    for rows in [2, 1000] {
+        let row = |row: usize| format!("{}\n", 1e-6 * row as f64);
+        let table = format!("creepage_x\n{}", (0..rows).map(row).collect::<String>());
+        let table = gzip(table.as_bytes());
+        let shape = |request: reqwest::RequestBuilder| {
+            let request = request.header("content-type", "text/csv");
+            request.header("content-encoding", "gzip").body(table)
+        };
+        let path = format!("/v1/evaluate?template={id}");
+        let answer = server.send(Method::POST, &path, shape).await;
+        assert_eq!(answer.status, 200, "{rows} rows: {}", answer.text);
+        assert_eq!(answer.json["rows"], rows);
+    }
 }

@@ -218,6 +218,11 @@ pub(crate) async fn evaluate(
     };
     let mut share = memory.rows(jobs.tenant(), 2 * bytes).await?;
     let text = read_body(request, &options).await?;
+    if essence != NPZ
+        && let Some(share) = &mut share
+    {
+        share.keep(2 * text.len());
+    }
     let mut computation = memory.computation(jobs.tenant());
     let bytes_max = options.evaluate_max_bytes;
     let evaluation = Evaluation {
@@ -373,12 +378,17 @@ impl Evaluation {
             let pointer = format!("/template{}", fault.pointer);
             return Err(CaseError(vec![Fault { pointer, ..fault }]).into());
         }
-        let bytes = usize::try_from(checked.cost().own_bytes()).unwrap_or(usize::MAX);
-        if !self.memory.has_room_for(bytes) {
-            return Err(too_long(&format!("a row needs {bytes} bytes of memory")));
+        // Beyond this number of rows the solver is not used.
+        let solver_bytes = match rows <= SOLVED_ROWS_MAX {
+            true => usize::try_from(checked.cost().own_bytes()).unwrap_or(usize::MAX),
+            false => 0,
+        };
+        if !self.memory.has_room_for(solver_bytes) {
+            return Err(too_long(&format!(
+                "a row needs {solver_bytes} bytes of memory"
+            )));
         }
-        // The solver uses this memory, though the rows may not need it.
-        let _solver = self.memory.ready_answer(self.jobs.tenant(), bytes)?;
+        let _solver = self.memory.ready_answer(self.jobs.tenant(), solver_bytes)?;
         let pace = RefCell::new(pace);
         let watch = Watch {
             pace: &pace,

@@ -87,7 +87,7 @@ pub trait Cluster: Send + Sync + Debug {
     async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError>;
 
     /// Shows that these batches are still received or filled. A batch of which nobody has shown that for a minute is
-    /// [unfinished](crate::jobs::store::Store::unfinished_batches).
+    /// [unfinished](crate::jobs::store::Batches::unfinished_batches).
     async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError>;
 
     /// Removes large results that were written long ago and that no job refers to: what a node left that was killed between the

@@ -116,7 +116,7 @@ pub trait Batches: Send + Sync {
         bounds: QueueBounds,
     ) -> Result<Result<u32, Refusal>, StoreError>;
 
-    /// What [`Store::begin_batch`] would answer because of the idempotency key; `None` if the key is free.
+    /// What [`Batches::begin_batch`] would answer because of the idempotency key; `None` if the key is free.
     async fn batch_by_key(
         &self,
         new: &NewBatch,
