@@ -150,7 +150,7 @@ pub trait Batches: Send + Sync {
     /// The batches that are not acknowledged.
     async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError>;
 
-    /// The same for up to `limit` jobs of a batch; returns those that changed.
+    /// Cancels up to `limit` jobs of a batch; returns those that changed.
     async fn cancel_batch(
         &self,
         tenant: &str,

@@ -63,14 +63,14 @@ const PEEK_FROM: &str = concat!(
 /// left to whoever ends them, jobs of a batch that is not acknowledged to whoever fills it.
 const PEEK: &str = peek!("slices = 0", "$2");
 
-/// The same of those of which some slices are solved.
+/// Like `PEEK`, for jobs of which some slices are solved.
 pub(crate) const PEEK_BEGUN: &str = peek!("slices > 0", "$2");
 
 /// Jobs in a queue.
 const WAITING: &str = "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts \
      WHERE state = 'queued' AND tenant = $1 AND kind = $2";
 
-/// What is known of a queue.
+/// Number of waiting jobs of a queue, and where its last claims began.
 #[derive(Debug, Clone)]
 struct KnownQueue {
     waiting: i64,

@@ -16,7 +16,7 @@ pub(crate) struct Places {
     bounds: QueueBounds,
     /// Queued jobs of all tenants with the places that are reserved for batches being filled.
     all: u64,
-    /// The same of each tenant, and the bytes that it has stored.
+    /// Queued jobs and reserved places of each tenant, and its stored bytes.
     of_tenants: HashMap<String, (u64, u64)>,
 }
 
