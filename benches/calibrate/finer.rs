@@ -11,9 +11,8 @@ use railhead::contact::normal::normal_task::NormalTask;
 use railhead::contact::normal::patch::Patch;
 use railhead::contact::normal_stage;
 use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::mesh_plan::Regime;
-use railhead::contact::rolling::refinement::level_solve::{MotionTask, solve_level};
-use railhead::contact::rolling::refinement::regime::regime;
+use railhead::contact::rolling::refinement::mesh_family::MeshFamily;
+use railhead::contact::rolling::refinement::on_mesh::{MotionTask, solve_on_mesh};
 use railhead::contact::rolling::refinement::state::RefinementState;
 use railhead::contact::rolling::resolution::Resolution;
 use railhead::contact::rolling::resultants::Resultants;
@@ -129,25 +128,27 @@ fn one_mesh(
     };
     let task = exact.rolling_task(footprint);
     let mut state = RefinementState::new(&task, &Arc::default());
-    let plan = state.policy.plan(64, Regime::Unknown);
-    let mut solved = solve_level(&task, &mut state, asked, plan, None, &Unmonitored)?;
-    for cells in [256, cells] {
-        let level = state.levels.get(solved.point.level);
-        let spinning = asked.motion.spin_per_mm != 0.0;
-        let found = regime(&level, &solved.point.tangential, spinning);
-        let plan = state.policy.plan(cells, found);
-        solved = solve_level(
+    let family = MeshFamily::of(&task, &asked.motion);
+    let patches = footprint.patches().len() as f64;
+    let mut solved = None;
+    for cells in [64, 256, cells] {
+        let plan = family.mesh(f64::from(cells) / patches);
+        let found = solve_on_mesh(
             &task,
             &mut state,
             asked,
             plan,
-            Some(solved.point),
+            solved.as_ref(),
             &Unmonitored,
         )?;
+        solved = Some(found);
     }
+    let Some(solved) = solved else {
+        unreachable!("there are three meshes")
+    };
     let zero = Resultants::default();
-    let sum = solved.point.summed.iter().fold(zero, |sum, r| sum.plus(*r));
-    Ok((sum, state.levels.get(solved.point.level).mesh.cells()))
+    let sum = solved.resultants.iter().fold(zero, |sum, r| sum.plus(*r));
+    Ok((sum, solved.mesh.mesh.cells()))
 }
 
 /// Tangential resultants of a wheel on a rail, patch by patch, from a fine target.

@@ -124,7 +124,7 @@ fn tables(class: Class, truths: &Truths, each: bool) {
         for (number, truth) in known {
             let mut question = case(class, *number);
             assert_eq!(truth.print, truth::print(&question), "another population");
-            question["solver"] = json!({ "target_error": target });
+            question["solver"] = json!({ "method": "boundary_element", "target_error": target });
             let checked = contact::check(&question, &Limits::default()).expect("a sound case");
             let began = ThreadTime::now();
             let (solution, _) = match contact::solve(&checked, &Unmonitored) {

@@ -8,8 +8,8 @@ use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal_stage;
-use railhead::contact::rolling::refinement::level_solve::MotionTask;
-use railhead::contact::rolling::refinement::refine;
+use railhead::contact::rolling::refinement::adapt;
+use railhead::contact::rolling::refinement::on_mesh::MotionTask;
 use railhead::contact::rolling::refinement::state::RefinementState;
 use serde_json::json;
 
@@ -26,7 +26,7 @@ struct Size {
 
 pub fn section(lu: f64, pictures: &Path) -> String {
     let mut text = "## Growth with the number of cells\n\nCreepages and spin on a mirror-symmetric patch, explicit meshes, double precision, \
-                    from 1000 cells on started on meshes of half as many strips and cells. *Work*: entries of the influence, and those that products \
+                    with the meshes of a half and a quarter of the cells that the estimate needs. *Work*: entries of the influence, and those that products \
                     touched on all meshes.\n\n| cells × strips | cells | work | LU | influence, MB |\n|---|---|---|---|---|\n"
         .to_owned();
     let mut sizes = Vec::new();
@@ -50,7 +50,7 @@ pub fn section(lu: f64, pictures: &Path) -> String {
             .footprint;
         let task = checked.rolling_task(&footprint);
         let mut state = RefinementState::new(&task, &Arc::default());
-        let point = refine::solve(&task, &mut state, asked, &Unmonitored).expect("an answer");
+        let point = adapt::solve(&task, &mut state, asked, &Unmonitored).expect("an answer");
         let cells = (side * side) as usize;
         let bytes = operator::bytes(cells, side as usize, true, Precision::Double) as f64;
         let size = Size {

@@ -12,7 +12,7 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::evaluate::answer::{RowStatus, RowsAnswer};
 use railhead::contact::evaluate::column::Column;
 use railhead::contact::evaluate::many::solve::solve_many;
-use railhead::contact::evaluate::many::task::{ManyTask, RowStarts};
+use railhead::contact::evaluate::many::task::ManyTask;
 use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
 use railhead::contact::evaluate::rows::Rows;
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
@@ -27,7 +27,6 @@ use crate::random::Random;
 const TABLE: [usize; 2] = [40, 50];
 const EVALUATE: [usize; 2] = [60, 400];
 const RUNS: [usize; 2] = [24, 12];
-const NEAR: [usize; 2] = [40, 60];
 /// One row of the table in so many is solved as well.
 const SOLVED_EVERY: usize = 20;
 /// A second answer to the same question differs by no more, relative to μN: what the last bits of its numbers make of it.
@@ -152,8 +151,7 @@ pub fn table(seed: u64) -> String {
         "## The table, rows at once, many rows\n\nEllipses a/b 0.12 to 8, ν 0 to ½, loads, friction, creepages and spin over decades, with none of a motion's parts in some. *Laws*: \
          finite numbers, forces within μN and their bound, friction takes power, the reversed motion has the reversed answer; a row by the table \
          equals its case solved alone, and rows of a run equal their cases to the last bit, whatever stands beside them, faulty rows included. *Bound held*: \
-         the difference from `boundary_element` is at most the bound and the solver's own estimate; of runs whose rows start from their neighbours, the \
-         difference from the row by itself is at most both estimates.\n\n\
+         the difference from `boundary_element` is at most the bound and the solver's own estimate.\n\n\
          | rows | tried | answered | solved as well | bound held | largest difference over it | broken |\n|---|---|---|---|---|---|---|\n",
     );
     let mut troubles = String::new();
@@ -161,7 +159,6 @@ pub fn table(seed: u64) -> String {
         ("table", by_table as fn(u64) -> Class),
         ("evaluate", evaluated),
         ("runs", runs),
-        ("runs from neighbours", near),
     ] {
         let class = catch_unwind(AssertUnwindSafe(|| work(seed))).unwrap_or_else(|_| Class {
             broken: vec!["crashes".to_owned()],
@@ -239,9 +236,7 @@ fn by_table(seed: u64) -> Class {
 fn alone(case: &Value, class: &mut Class) -> Option<[[f64; 2]; 3]> {
     let solved = contact::check(case, &Limits::default())
         .map_err(|error| error.to_string())
-        .and_then(|mut checked| {
-            // A table is not judged by itself.
-            checked.run.compares_with_table = false;
+        .and_then(|checked| {
             contact::solve(&checked, &Unmonitored).map_err(|error| error.to_string())
         });
     match solved {
@@ -335,7 +330,7 @@ fn runs(seed: u64) -> Class {
         let faulty = 1 + random.below(RUNS[1] - 1);
         draw.columns[1].values[faulty] = [-1.0, 0.0, 1e9][random.below(3)];
         class.rows += RUNS[1];
-        let all = solved(&draw.template, &draw.varied(), RowStarts::Own);
+        let all = solved(&draw.template, &draw.varied());
         let backward: Vec<VariedColumn> = (draw.varied().into_iter())
             .map(|mut column| {
                 if let Values::Numbers(numbers) = &mut column.values {
@@ -344,7 +339,7 @@ fn runs(seed: u64) -> Class {
                 column
             })
             .collect();
-        let reversed = solved(&draw.template, &backward, RowStarts::Own);
+        let reversed = solved(&draw.template, &backward);
         for row in 0..RUNS[1] {
             let has = all.status[row].has_answer();
             class.answered += usize::from(has);
@@ -373,48 +368,7 @@ fn runs(seed: u64) -> Class {
     class
 }
 
-/// Runs on similar ellipses whose rows start from each other, beside the same rows by themselves.
-fn near(seed: u64) -> Class {
-    let mut class = Class::default();
-    let mut random = Random(seed ^ 0x4EA2);
-    for number in 0..NEAR[0] {
-        let mut draw = Draw::new(&mut random, "boundary_element", NEAR[1]);
-        draw.template["solver"]["target_error"] = json!([0.02, 0.005][number % 2]);
-        draw.columns
-            .retain(|column| column.pointer != "/contact/a_mm");
-        class.rows += NEAR[1];
-        let from = |starts| solved(&draw.template, &draw.varied(), starts);
-        let [own, near] = [RowStarts::Own, RowStarts::Neighbours].map(from);
-        let bits = |answer: &ManyAnswer| -> Vec<u64> {
-            let numbers = answer.numbers.iter().flatten();
-            numbers.map(|number| number.to_bits()).collect()
-        };
-        if bits(&near) != bits(&from(RowStarts::Neighbours)) {
-            let why = format!("the same rows have two answers: {}", draw.template);
-            class.broken.push(why);
-        }
-        for row in 0..NEAR[1] {
-            let numbers = |answer: &ManyAnswer| [1, 2, 4].map(|k| answer.numbers[k][row]);
-            let [[x, y, estimate], of_own] = [&near, &own].map(numbers);
-            let answered = near.status[row].has_answer();
-            class.answered += usize::from(answered);
-            let beyond = x.hypot(y) > draw.limit(row) + 1.5 * estimate;
-            if answered != own.status[row].has_answer() || answered && beyond {
-                let why = format!("{:?}, [{x}, {y}] N: {}", near.status[row], draw.case(row));
-                class.broken.push(why);
-            } else if answered {
-                let difference = (x - of_own[0]).abs().max((y - of_own[1]).abs());
-                let allowed = estimate + of_own[2];
-                class.solved += 1;
-                class.held += usize::from(difference <= allowed);
-                class.worst = class.worst.max(difference / allowed);
-            }
-        }
-    }
-    class
-}
-
-fn solved(template: &Value, columns: &[VariedColumn], starts: RowStarts) -> ManyAnswer {
+fn solved(template: &Value, columns: &[VariedColumn]) -> ManyAnswer {
     let operators = Arc::new(OperatorStore::default());
     let task = ManyTask {
         case: template,
@@ -423,7 +377,6 @@ fn solved(template: &Value, columns: &[VariedColumn], starts: RowStarts) -> Many
         known: &KnownPair::default(),
         limits: &Limits::default(),
         time_limit: Duration::from_secs(60),
-        starts,
     };
     let solve = |checked: &CheckedCase, monitor: &dyn Monitor| {
         contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)

@@ -44,9 +44,7 @@ pub fn solve(
         "motion": motions,
         "solver": { "method": "boundary_element", "target_error": target },
     });
-    let mut checked = contact::check(&case, &Limits::default()).expect("a sound case");
-    // A table is not judged by itself.
-    checked.run.compares_with_table = false;
+    let checked = contact::check(&case, &Limits::default()).expect("a sound case");
     let solution = match contact::solve_with(operators, &checked, &Unmonitored) {
         Ok((solution, _)) => solution,
         Err(error) if creepages.len() == 1 && target > 0.02 => {

@@ -22,10 +22,9 @@
 //!    rail by [`normal::wheel_height::search`], and each of its patches becomes a problem of its own in [`wheel_on_rail`].
 //! 5. **Take one motion after the other**: [`rolling_stage`]. [`rolling::force_control`] finds the creepages of a prescribed force; for
 //!    given creepages it passes the motion on. A history goes to [`rolling::history::solve`] instead.
-//! 6. **Refine**: [`rolling::refinement::refine`] solves the motion on a coarse mesh, chooses the next mesh by
-//!    [`rolling::refinement::mesh_policy`], and stops when the estimate meets the target.
-//! 7. **Solve one level**: [`rolling::refinement::level_solve`] chooses the start, calls the [method](rolling::methods), and collects what
-//!    [`rolling::refinement::error_estimate`] needs.
+//! 6. **Refine**: [`rolling::refinement::adapt`] solves the motion on the meshes of its [family](rolling::refinement::mesh_family), coarse to
+//!    fine, and stops when the [estimate](rolling::refinement::error_estimate) meets the target.
+//! 7. **Solve one mesh**: [`rolling::refinement::on_mesh`] chooses the start and calls the [method](rolling::methods).
 //! 8. **Answer**: [`solution::assemble`] turns the [`MotionAnswer`](rolling::motion_answer::MotionAnswer) into the words of the client, with
 //!    the outputs that were asked for ([`solution::maintain`]: stresses, damage, temperatures).
 //! 9. **Finish**: [`solution::finish`] distributes the time, adds remarks on implausible numbers, and refuses numbers that are not finite.

@@ -11,10 +11,7 @@ use crate::contact::rolling::history;
 use crate::contact::rolling::history::task::HistoryTask;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::lender::may_borrow;
-use crate::contact::rolling::refinement::level_solve::MotionTask;
 use crate::contact::rolling::refinement::state::RefinementState;
-use crate::contact::rolling::refinement::stretch::Stretch;
 use crate::contact::rolling::resolution::{RelativeTo, Resolution, TARGET_LEAST};
 use crate::contact::rolling::task::RollingTask;
 use crate::contact::solution::assemble::Assembly;
@@ -56,56 +53,22 @@ fn solve_motions(
         solve_history(&task, history, &mut state, &mut assembly, watch)?;
         return Ok(assembly.finish());
     }
-    let to_force = case.run.relative_to == RelativeTo::Force;
-    let mut before: Option<MotionAnswer> = None;
-    let mut stretch = Stretch::default();
-    let motions = case.problem.motions.len();
-    for index in 0..motions {
-        let mut found = match task.target() {
-            Some(target) if !to_force && may_borrow(&task, index) => {
-                let motion = task.motions[index];
-                let asked = MotionTask { index, motion };
-                let mut found = stretch.solve(&task, &mut state, asked, target, watch)?;
-                if index + 1 == motions {
-                    found.extend(stretch.end(&task, &mut state, target, watch)?);
-                }
-                found
-            }
-            target => {
-                let target = target.unwrap_or_default();
-                let mut found = stretch.end(&task, &mut state, target, watch)?;
-                let last = found.last().or(before.as_ref());
-                found.push(force_control::solve(&task, &mut state, index, last, watch)?);
-                found
-            }
+    for index in 0..case.problem.motions.len() {
+        let point = force_control::solve(&task, &mut state, index, watch)?;
+        let motion = StagedMotion {
+            operators,
+            case,
+            solved,
+            index,
+            watch,
         };
-        if to_force {
-            let rounds = ForceRounds {
-                operators,
-                case,
-                solved,
-                index,
-                watch,
-            };
-            for point in found {
-                before = Some(rounds.add(&mut assembly, &task, &state, point, 0)?);
+        match case.run.relative_to {
+            RelativeTo::FrictionLimit => {
+                motion.add(&mut assembly, &state, point)?;
             }
-            state.trim();
-            continue;
+            RelativeTo::Force => motion.add_to_force(&mut assembly, &task, &state, point, 0)?,
         }
-        for point in &mut found {
-            add_coupling_error(point, solved.coupling_error);
-            if assembly.is_empty() {
-                // What all motions share is charged to the first.
-                point.seconds += solved.report.map_or(0.0, |report| report.seconds);
-            }
-            assembly.add(&state.levels, point, watch)?;
-            watch.advance();
-        }
-        if stretch.is_settled() {
-            state.trim();
-        }
-        before = found.pop().or(before);
+        state.trim();
     }
     Ok(assembly.finish())
 }
@@ -141,9 +104,8 @@ const ROUNDS_MAX: u32 = 3;
 /// Part of the allowed error that is asked for, since the force may come out smaller.
 const AIMED: f64 = 0.9;
 
-/// Solves a motion to an error relative to its force, in rounds: each asks for the error relative to μN that follows from the force of the round
-/// before.
-struct ForceRounds<'a> {
+/// A motion on its way into the answer.
+struct StagedMotion<'a> {
     operators: &'a Arc<OperatorStore>,
     case: &'a CheckedCase,
     solved: &'a SolvedFootprint,
@@ -151,16 +113,34 @@ struct ForceRounds<'a> {
     watch: &'a TimeLimit<'a>,
 }
 
-impl ForceRounds<'_> {
-    /// Adds the motion to the answer once its error is small enough, or no target makes it smaller.
+impl StagedMotion<'_> {
+    /// Adds the motion to the answer.
     fn add(
+        &self,
+        assembly: &mut Assembly,
+        state: &RefinementState,
+        mut point: MotionAnswer,
+    ) -> Result<(), SolveError> {
+        add_coupling_error(&mut point, self.solved.coupling_error);
+        if assembly.is_empty() {
+            // What all motions share is charged to the first.
+            point.seconds += self.solved.report.map_or(0.0, |report| report.seconds);
+        }
+        assembly.add(&state.levels, &point, self.watch)?;
+        self.watch.advance();
+        Ok(())
+    }
+
+    /// Adds the motion once its error is small enough relative to its force, or no target makes it smaller. Each round asks for the error
+    /// relative to μN that follows from the force of the round before.
+    fn add_to_force(
         &self,
         assembly: &mut Assembly,
         task: &RollingTask,
         state: &RefinementState,
-        mut point: MotionAnswer,
+        point: MotionAnswer,
         round: u32,
-    ) -> Result<MotionAnswer, SolveError> {
+    ) -> Result<(), SolveError> {
         if let Some(target) = self.smaller_target(task, &point)
             && round < ROUNDS_MAX
         {
@@ -169,31 +149,21 @@ impl ForceRounds<'_> {
                 ..*task
             };
             let mut finer_state = RefinementState::new(&finer, self.operators);
-            let last = Some(&point);
-            let found =
-                force_control::solve(&finer, &mut finer_state, self.index, last, self.watch);
+            let found = force_control::solve(&finer, &mut finer_state, self.index, self.watch);
             match found {
                 Ok(mut found) => {
                     found.seconds += point.seconds;
-                    let residual = found.work.residual;
-                    found.work.add(point.work);
-                    found.work.residual = residual;
-                    return self.add(assembly, &finer, &finer_state, found, round + 1);
+                    found.work.add_lost(point.work);
+                    return self.add_to_force(assembly, &finer, &finer_state, found, round + 1);
                 }
                 // The answer of the round before stands, with its error.
                 Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => {}
                 Err(error) => return Err(error),
             }
         }
-        add_coupling_error(&mut point, self.solved.coupling_error);
-        if assembly.is_empty() {
-            point.seconds += self.solved.report.map_or(0.0, |report| report.seconds);
-        }
         // Levels of other rounds have numbers of their own.
         assembly.forget_levels();
-        assembly.add(&state.levels, &point, self.watch)?;
-        self.watch.advance();
-        Ok(point)
+        self.add(assembly, state, point)
     }
 
     /// The target relative to μN with which the error may be small enough; none if it is, or if no smaller one helps.

@@ -1,21 +1,19 @@
-//! Long sweeps in slices: cut at motions that depend on the case alone, each solved on its own, joined to the whole answer.
+//! Long sweeps in slices of about equally many motions, each solved on its own, joined to the whole answer.
 //!
-//! A slice knows nothing of the others: no start, mesh or creepage is carried over a cut. So an answer does not depend on when and where
-//! its slices were solved, or whether a restart came between: [`solve`](crate::contact::solve) takes the same slices one after the other.
+//! No start is carried over a cut, so that an answer does not depend on when and where its slices were solved, or whether a restart came
+//! between: [`solve`](crate::contact::solve) takes the same slices one after the other.
 
 use std::ops::Range;
 
-use crate::contact::case::solve_time::SolveTime;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::merged;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
 
-/// Estimated time of a slice in s: short for those who wait behind it, long beside what a cut costs (a first motion without a start,
-/// and region and pressure once more).
-const SLICE_SECONDS: f64 = 1.0;
-/// A slice takes at least so many times as long as finding region and pressure.
-const NORMAL_TIMES: f64 = 10.0;
+/// Most motions of a slice: few for those who wait behind it, many beside what a cut costs (region and pressure once more). Chosen by judgement.
+const MOTIONS_MAX: usize = 100;
+/// The same where bodies differ, so that every motion has region and pressure of its own.
+const MOTIONS_MAX_COUPLED: usize = 10;
 
 /// Where a case is cut: ranges of motions in order, one after the other, at least one. The same case gives the same slices, whatever the
 /// load, limits and machine.
@@ -26,11 +24,12 @@ pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
     if case.problem.history.is_some() || motions == 1 {
         return std::iter::once(0..motions).collect();
     }
-    let SolveTime { whole, normal } = case.solve_time();
-    let each = (whole - normal).max(0.0) / motions as f64;
-    let wanted = SLICE_SECONDS.max(NORMAL_TIMES * normal) / each.max(f64::MIN_POSITIVE);
     // Nearly equal parts, so that no short one is left over.
-    let parts = (motions as f64 / wanted).ceil().clamp(1.0, motions as f64) as usize;
+    let most = match case.problem.is_coupled(&case.run) {
+        true => MOTIONS_MAX_COUPLED,
+        false => MOTIONS_MAX,
+    };
+    let parts = motions.div_ceil(most).max(1);
     let start = |part: usize| part * motions / parts;
     (0..parts)
         .map(|part| start(part)..start(part + 1))

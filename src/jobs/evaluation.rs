@@ -8,7 +8,7 @@ use tokio::runtime::Handle;
 use crate::contact::error::CaseError;
 use crate::contact::evaluate::answer::RowsAnswer;
 use crate::contact::evaluate::many::solve::{NotAtOnce, evaluate_at_once};
-use crate::contact::evaluate::many::task::{ManyTask, RowStarts};
+use crate::contact::evaluate::many::task::ManyTask;
 use crate::contact::evaluate::request_faults::column_pointer;
 use crate::contact::evaluate::varied::{Values, VariedColumn};
 use crate::contact::monitor::Monitor;
@@ -66,7 +66,6 @@ impl Jobs {
             known: self.known_pairs(),
             limits: &options.limits,
             time_limit: options.time_limit,
-            starts: RowStarts::Own,
         };
         let solve = |checked: &CheckedCase, monitor: &dyn Monitor| {
             self.shared.engine.solve_whole(checked, monitor)

@@ -1,13 +1,12 @@
 //! A target relative to the tangential force: met by every kind of motion, or said to be missed; and what the answer says of a small force
 //! where the target is relative to the friction limit.
 
-use railhead::contact::evaluate::many::task::RowStarts;
 use railhead::contact::evaluate::many_answer::{ManyStatus, NUMBER_NAMES};
 use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, good, good_with, problem, with};
-use crate::many_rows::{case as rows_case, numbers, solved_from};
+use crate::many_rows::{case as rows_case, numbers, solved};
 use crate::profile_cases::{generated, put};
 use crate::reference::solve;
 
@@ -129,7 +128,7 @@ fn a_motion_without_a_force_ends() {
 
 #[test]
 fn an_error_that_is_large_beside_the_force_is_told() {
-    let small = good_with("/motion", json!({ "creepage_x": 1e-5 }));
+    let small = good_with("/motion", json!({ "creepage_x": 5e-6 }));
     let (solution, _) = solve(&with(&small, "/solver/target_error", Some(json!(0.02))));
     let point = &solution.patches[0].points[0];
     let relative = point.error_estimate.expect("an estimate").force_x_n / force(&solution, 0);
@@ -154,7 +153,7 @@ fn rows_by_the_table_count_their_bound_against_the_force() {
     case["motion"] = json!({ "creepage_x": 0, "creepage_y": 0 });
     case["solver"] = json!({ "method": "auto", "target_error": 0.02, "relative_to": "force" });
     let columns = [numbers("/motion/creepage_x", &[2e-5, 1e-4, 2e-3])];
-    let found = solved_from(&case, &columns, RowStarts::Own);
+    let found = solved(&case, &columns);
     for (row, status) in found.status.iter().enumerate() {
         assert_eq!(*status, ManyStatus::Ok, "{row}");
         let of = |name: &str| {

@@ -81,6 +81,7 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         // The trapezoid passes the residual of a cell on to its neighbours.
         tolerance: 0.01 * TOLERANCE_LEAST,
         steps_max: STEPS_MAX,
+        accepts_start: true,
     };
     let mut t = vec![0.0; 2 * padded];
     let report = newton.solve(&law, &mut t, &mut workspace, &Unmonitored);

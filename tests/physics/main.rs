@@ -47,7 +47,6 @@ mod liu_hsu_newton;
 mod maintenance;
 mod many_rows;
 mod memory;
-mod near_rows;
 mod paper_figures;
 #[path = "../../benches/calibrate/patches.rs"]
 mod patches;
@@ -98,7 +97,6 @@ mod subsurface;
 mod subsurface_passage;
 mod sweeps;
 mod table;
-mod table_check;
 mod table_rows;
 mod targets;
 #[path = "../../benches/calibrate/truth.rs"]

@@ -7,7 +7,7 @@ use std::time::Duration;
 use railhead::contact::case::known_pair::KnownPair;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::evaluate::many::solve::solve_many;
-use railhead::contact::evaluate::many::task::{ManyTask, RowSolver, RowStarts};
+use railhead::contact::evaluate::many::task::{ManyTask, RowSolver};
 use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::Unmonitored;
@@ -36,23 +36,14 @@ pub fn numbers(pointer: &str, values: &[f64]) -> VariedColumn {
     }
 }
 
-fn solved(case: &Value, columns: &[VariedColumn]) -> ManyAnswer {
-    solved_from(case, columns, RowStarts::Own)
-}
-
-pub fn solved_from(case: &Value, columns: &[VariedColumn], starts: RowStarts) -> ManyAnswer {
+pub fn solved(case: &Value, columns: &[VariedColumn]) -> ManyAnswer {
     let operators = Arc::new(OperatorStore::default());
-    solved_by(case, columns, starts, &|checked, monitor| {
+    solved_by(case, columns, &|checked, monitor| {
         contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)
     })
 }
 
-pub fn solved_by(
-    case: &Value,
-    columns: &[VariedColumn],
-    starts: RowStarts,
-    solve: &RowSolver,
-) -> ManyAnswer {
+fn solved_by(case: &Value, columns: &[VariedColumn], solve: &RowSolver) -> ManyAnswer {
     let task = ManyTask {
         case,
         columns,
@@ -60,7 +51,6 @@ pub fn solved_by(
         known: &KnownPair::default(),
         limits: &Limits::default(),
         time_limit: Duration::from_secs(60),
-        starts,
     };
     solve_many(&task, solve, &Unmonitored).expect("nobody stops it")
 }

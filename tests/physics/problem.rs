@@ -93,9 +93,9 @@ fn memory_estimates_grow_with_mesh_and_motions() {
     let (small, large, many) = (cost(10, 2), cost(40, 2), cost(10, 200));
     assert!(large.bytes > 7 * small.bytes && large.seconds > 10.0 * small.seconds);
     assert!(many.bytes > small.bytes && many.seconds > 50.0 * small.seconds);
-    // 10 × 20 cells: three kernels of N² doubles are 0.96 MB, of which mirror symmetry leaves half.
+    // 10 × 20 cells: three kernels of N² doubles are 0.96 MB, of which mirror symmetry leaves half; those of the coarser meshes take a third of it.
     assert!(
-        (960_000..2_000_000).contains(&small.bytes),
+        (960_000..2_600_000).contains(&small.bytes),
         "{}",
         small.bytes
     );

@@ -230,12 +230,11 @@ pub fn solve(case: &Value) -> (Solution, Fields) {
     contact::solve(&checked, &Unmonitored).unwrap_or_else(|e| panic!("{e}\n{case}"))
 }
 
-/// The same without a look at the table of creep forces.
-pub fn solve_without_table(case: &Value) -> (Solution, Fields) {
-    let mut checked =
-        contact::check(case, &Limits::default()).unwrap_or_else(|e| panic!("{e}\n{case}"));
-    checked.run.compares_with_table = false;
-    contact::solve(&checked, &Unmonitored).unwrap_or_else(|e| panic!("{e}\n{case}"))
+/// The same by the boundary-element method.
+pub fn solve_on_meshes(case: &Value) -> (Solution, Fields) {
+    let mut case = case.clone();
+    case["solver"]["method"] = "boundary_element".into();
+    solve(&case)
 }
 
 /// Middle value; the lower one of two.

@@ -150,6 +150,7 @@ impl Contact {
             scale: self.scale(rigid),
             tolerance,
             steps_max: STEPS_MAX,
+            accepts_start: true,
         }
     }
 

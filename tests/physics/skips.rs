@@ -15,7 +15,6 @@ use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWork
 use railhead::contact::rolling::methods::fastsim;
 use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
-use railhead::contact::rolling::start::Start;
 use railhead::contact::rolling::strip_mesh::StripMesh;
 use railhead::contact::rolling::task::RollingTask;
 use railhead::contact::solution::words::answer::PointSolution;
@@ -96,6 +95,7 @@ fn distance_on(nu: f64, asked: LevelTask) -> f64 {
             scale: 1.0,
             tolerance: 1e-9,
             steps_max: STEPS_MAX,
+            accepts_start: true,
         };
         let report = Newton::new(&equations)
             .solve(&law, &mut t, &mut workspace, &Unmonitored)
@@ -188,10 +188,7 @@ fn a_start_from_the_simplified_theory_saves_products_and_does_not_move_the_answe
         ] {
             let contact = Ellipse::steel(ratio, 0.28).normalised(x, y, spin);
             on_level(&contact, |task, asked| {
-                let simplified = Start {
-                    three_point: fastsim::tractions(task, asked.level, asked.motion),
-                    trapezoid: None,
-                };
+                let simplified = fastsim::tractions(task, asked.level, asked.motion);
                 let mut workspace = NewtonWorkspace::default();
                 let mut of = |start| {
                     boundary_element::solve(asked, start, &mut workspace, &Unmonitored)

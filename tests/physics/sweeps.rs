@@ -14,7 +14,7 @@ use railhead::contact::solution::words::fields::Fields;
 use railhead::contact::solve_slice;
 use serde_json::{Value, json};
 
-use crate::reference::{force_of_cells, solve, solve_without_table};
+use crate::reference::{force_of_cells, solve};
 
 fn case(motion: &Value, target: f64) -> Value {
     json!({
@@ -87,84 +87,6 @@ fn a_sweep_takes_fewer_products_than_its_motions_alone() {
             4 * together < 3 * alone,
             "{together} together, {alone} alone"
         );
-    }
-}
-
-/// A curve crosses the mesh on which it begins and comes back: the table tells where a finer one is needed and where no more.
-#[test]
-fn a_curve_changes_its_mesh_where_the_table_says_so_without_any_companion() {
-    let motions: Vec<Value> = (1..51)
-        .map(|k| json!({ "creepage_x": 1e-4 * f64::from(k) }))
-        .collect();
-    let (curve, _) = solve(&case(&json!(motions), 0.005));
-    let (finer, _) = solve(&case(&json!(motions), 0.0005));
-    let points = &curve.patches[0].points;
-    let cells = |k: usize| {
-        let mesh = points[k].solver.mesh.expect("a mesh");
-        mesh.strips * mesh.cells
-    };
-    let most = (0..points.len()).map(cells).max().expect("motions");
-    assert!(cells(0) < most && cells(points.len() - 1) < most, "{most}");
-    for (k, point) in points.iter().enumerate() {
-        let skipped = &point.solver.skipped;
-        assert!(
-            skipped.iter().any(|text| text.contains("table")),
-            "motion {k}: {skipped:?}"
-        );
-        let (here, there) = (&curve.total[k], &finer.total[k]);
-        let [estimate, truth] =
-            [here, there].map(|total| total.error_estimate.expect("an estimate").force_x_n);
-        let off = (here.force_x_n - there.force_x_n).abs();
-        assert!(off <= estimate + truth, "motion {k}: {off} of {estimate}");
-    }
-    let products: u32 = points.iter().map(|point| point.solver.products).sum();
-    assert!(products < 320, "{products}");
-}
-
-/// Motions of a curve whose error follows from their neighbours.
-fn borrowed(solution: &Solution) -> Vec<usize> {
-    let points = solution.patches[0].points.iter().enumerate();
-    let lent = |text: &String| text.contains("neighbours");
-    points
-        .filter(|(_, point)| point.solver.skipped.iter().any(lent))
-        .map(|(k, _)| k)
-        .collect()
-}
-
-#[test]
-fn near_motions_borrow_the_judgement_of_their_neighbours_and_are_as_right_as_alone() {
-    let at = |k: usize| json!({ "creepage_x": 1e-4 * k as f64, "creepage_y": 0.0004, "spin_per_mm": 0.0002 });
-    let motions: Vec<Value> = (0..51).map(at).collect();
-    let (sweep, _) = solve_without_table(&case(&json!(motions), 0.005));
-    let borrowed = borrowed(&sweep);
-    assert!(borrowed.len() > 20, "{borrowed:?}");
-    for k in borrowed.into_iter().step_by(2) {
-        let (alone, _) = solve_without_table(&case(&motions[k], 0.001));
-        let (here, there) = (&sweep.total[k], &alone.total[0]);
-        let [estimate, truth] =
-            [here, there].map(|total| total.error_estimate.expect("an estimate").force_x_n);
-        assert!(estimate <= 0.005 * 30_000.0, "{k}: {estimate}");
-        let off = [
-            here.force_x_n - there.force_x_n,
-            here.force_y_n - there.force_y_n,
-        ];
-        let off = off[0].hypot(off[1]);
-        assert!(
-            off <= estimate + truth,
-            "{k}: {off} of {estimate} and {truth}"
-        );
-    }
-}
-
-/// A sweep that jumps about has nothing to borrow, and neither has one whose forces are prescribed.
-#[test]
-fn motions_without_near_neighbours_on_their_line_borrow_nothing() {
-    let scattered = |k: usize| json!({ "creepage_x": 0.003 * ((7 * k) % 13) as f64 / 13.0, "creepage_y": 0.002 * ((5 * k) % 11) as f64 / 11.0 });
-    let forced = |k: usize| json!({ "force_x_n": 500.0 * k as f64, "creepage_y": 0.0004 });
-    for at in [&scattered as &dyn Fn(usize) -> Value, &forced] {
-        let motions: Vec<Value> = (0..12).map(at).collect();
-        let (sweep, _) = solve(&case(&json!(motions), 0.01));
-        assert_eq!(borrowed(&sweep), [0; 0]);
     }
 }
 
@@ -278,9 +200,9 @@ pub fn timeless((mut solution, fields): (Solution, Fields)) -> (Solution, Fields
 
 #[test]
 fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
-    // Slow by its estimate, fast in truth: most of it slips.
+    // Most of it slips, which is fast.
     let mut question = case(
-        &json!({ "sweep": { "creepage_x": { "from": 0.01, "to": 0.3, "points": 4500 } } }),
+        &json!({ "sweep": { "creepage_x": { "from": 0.01, "to": 0.3, "points": 450 } } }),
         0.0005,
     );
     question["outputs"] = json!(["resultants", "zones"]);
@@ -288,7 +210,7 @@ fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
     let checked = check(&question, &Limits::default()).expect("a valid case");
     let ranges = slices(&checked);
     assert!(ranges.len() > 2, "{ranges:?}");
-    assert_eq!((ranges[0].start, ranges[ranges.len() - 1].end), (0, 4500));
+    assert_eq!((ranges[0].start, ranges[ranges.len() - 1].end), (0, 450));
     assert!(ranges.windows(2).all(|pair| pair[0].end == pair[1].start));
     assert_eq!(ranges, slices(&checked));
     let mut parts: Vec<(Solution, Fields)> = ranges

@@ -14,7 +14,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::cases::assert_fault;
-use crate::reference::{Converged, assert_none, read, solve, solve_without_table};
+use crate::reference::{Converged, assert_none, read, solve, solve_on_meshes};
 use crate::sweeps::timeless;
 
 /// A contact solved elsewhere; forces over the friction limit, moment over that and `arm_mm`.
@@ -132,7 +132,7 @@ fn soft_on_rigid(id: &str) -> Reference {
 fn bodies_that_hardly_differ_give_the_forces_of_like_bodies() {
     let mut reference = soft_on_rigid("dis_poly_steel_ab1_mu0.6_mix");
     let forces = |reference: &Reference| {
-        let (solution, _) = solve_without_table(&reference.case(reference.one()));
+        let (solution, _) = solve_on_meshes(&reference.case(reference.one()));
         let point = &solution.patches[0].points[0];
         [point.force_x_n, point.force_y_n, point.moment_z_n_mm]
     };

@@ -398,8 +398,7 @@ fn histories() -> Vec<Feature> {
     let several_points = Expected::Refused("a row has one motion");
     let mut whole = of("a history", json!({ "history": several }))
         .but(Route::Run, several_points)
-        .but(Route::RunFromNeighbours, several_points)
-        .but(Route::NearMotions, several_points)
+        .but(Route::RunOfMotions, several_points)
         .but(Route::Evaluate, Expected::Refused("row 0 is refused"));
     whole.motion_columns = vec![("/motion/history/creepage_x", [1e-3, -5e-4, 2e-3])];
     vec![

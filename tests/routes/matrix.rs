@@ -10,7 +10,7 @@ use railhead::contact::case::known_pair::KnownPair;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::evaluate::column::Column;
 use railhead::contact::evaluate::many::solve::{evaluate_at_once, solve_many};
-use railhead::contact::evaluate::many::task::{ManyTask, RowStarts};
+use railhead::contact::evaluate::many::task::ManyTask;
 use railhead::contact::evaluate::rows::Rows;
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::{Monitor, Unmonitored};
@@ -28,12 +28,10 @@ pub enum Route {
     List,
     /// A job with a sweep.
     Sweep,
-    /// A run whose rows start from their own cases.
+    /// A run.
     Run,
-    /// A run whose rows start from each other.
-    RunFromNeighbours,
-    /// The same with rows that differ in their motions alone.
-    NearMotions,
+    /// A run with rows that differ in their motions alone.
+    RunOfMotions,
     /// Rows at once.
     Evaluate,
     /// Two wheels by themselves in the places of those of a wheelset.
@@ -41,12 +39,11 @@ pub enum Route {
 }
 
 /// All of them.
-pub const ROUTES: [Route; 7] = [
+pub const ROUTES: [Route; 6] = [
     Route::List,
     Route::Sweep,
     Route::Run,
-    Route::RunFromNeighbours,
-    Route::NearMotions,
+    Route::RunOfMotions,
     Route::Evaluate,
     Route::TwoProfiles,
 ];
@@ -184,7 +181,7 @@ fn checked(
         (_, Ok(rows)) => {
             let with_columns = match route {
                 Route::List | Route::Sweep => feature.motions == Motions::Wheelset,
-                Route::NearMotions => false,
+                Route::RunOfMotions => false,
                 _ => true,
             };
             let mut worst: f64 = 0.0;
@@ -337,9 +334,8 @@ fn through(feature: &Feature, route: Route) -> Result<Vec<Option<Answer>>, Strin
     match route {
         Route::List => of_motions(feature, false),
         Route::Sweep => of_motions(feature, true),
-        Route::Run => run(feature, RowStarts::Own, true),
-        Route::RunFromNeighbours => run(feature, RowStarts::Neighbours, true),
-        Route::NearMotions => run(feature, RowStarts::Neighbours, false),
+        Route::Run => run(feature, true),
+        Route::RunOfMotions => run(feature, false),
         Route::Evaluate => evaluated(feature),
         Route::TwoProfiles => two_profiles(feature),
     }
@@ -379,11 +375,7 @@ fn of_motions(feature: &Feature, sweep: bool) -> Result<Vec<Option<Answer>>, Str
     Ok(answers(&solution).into_iter().map(Some).collect())
 }
 
-fn run(
-    feature: &Feature,
-    starts: RowStarts,
-    with_columns: bool,
-) -> Result<Vec<Option<Answer>>, String> {
+fn run(feature: &Feature, with_columns: bool) -> Result<Vec<Option<Answer>>, String> {
     let operators = Arc::new(OperatorStore::default());
     let columns = feature.varied_columns(with_columns);
     let task = ManyTask {
@@ -393,7 +385,6 @@ fn run(
         known: &KnownPair::default(),
         limits: &Limits::default(),
         time_limit: Duration::from_secs(600),
-        starts,
     };
     let solve = |checked: &CheckedCase, monitor: &dyn Monitor| {
         contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)
@@ -433,7 +424,6 @@ fn evaluated(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
         known: &KnownPair::default(),
         limits: &Limits::default(),
         time_limit: Duration::from_secs(600),
-        starts: RowStarts::Own,
     };
     let solve = |checked: &CheckedCase, monitor: &dyn Monitor| {
         contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)

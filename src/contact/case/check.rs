@@ -136,7 +136,6 @@ fn run(case: &Case, limits: &Limits) -> Run {
         traction_bound: case.solver.traction_bound.unwrap_or_default().into(),
         resolution: resolution(&case.solver),
         relative_to: case.solver.relative_to.unwrap_or_default().into(),
-        compares_with_table: true,
         time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
         memory_bytes: limits.memory_bytes,
         operator_store_bytes: limits.operator_store_bytes,

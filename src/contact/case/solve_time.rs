@@ -21,7 +21,7 @@ use crate::contact::normal::wheel_height::wheelset_task::WheelsetMove;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::profile_points;
 use crate::contact::rolling::history::solve::usual_work;
-use crate::contact::rolling::refinement::mesh_policy::CELLS_MAX;
+use crate::contact::rolling::refinement::mesh_family::CELLS_MAX;
 use crate::contact::rolling::resolution::{RelativeTo, Resolution};
 use crate::contact::rolling::task::precision_of;
 

@@ -176,10 +176,10 @@ impl Found {
         }
     }
 
-    fn number(self, solution: &Solution, motion: usize) -> Option<f64> {
+    fn number(self, solution: &Solution) -> Option<f64> {
         let creepages = || {
             let patch = solution.patches.first()?;
-            Some(patch.points.get(motion)?.motion)
+            Some(patch.points.first()?.motion)
         };
         match self {
             Found::CreepageX => creepages().map(|motion| motion.creepage_x),
@@ -336,18 +336,12 @@ impl ManyAnswer {
         }
     }
 
-    /// Notes the answer to one motion of a solution, with its numbers as `of_row` makes them those of the row.
-    pub(crate) fn set_solution(
-        &mut self,
-        row: usize,
-        (solution, motion): (&Solution, usize),
-        of_row: impl FnOnce(&NumberColumns, &mut [f64]),
-    ) {
-        let Some(mut numbers) = numbers_of(solution, motion, &self.columns) else {
+    /// Notes the answer to the one motion of a row.
+    pub(crate) fn set_solution(&mut self, row: usize, solution: &Solution) {
+        let Some(numbers) = numbers_of(solution, &self.columns) else {
             return;
         };
-        of_row(&self.columns, &mut numbers);
-        let points = || points_of(solution, motion);
+        let points = || points_of(solution);
         let solved = SolvedRow {
             target_met: points().all(|point| point.target_met != Some(false)),
             method: points().next().map(|point| point.solver.method),
@@ -357,16 +351,16 @@ impl ManyAnswer {
     }
 }
 
-/// The points of a motion, patch by patch.
-fn points_of(solution: &Solution, motion: usize) -> impl Iterator<Item = &PointSolution> {
+/// The points of the only motion, patch by patch.
+fn points_of(solution: &Solution) -> impl Iterator<Item = &PointSolution> {
     let patches = solution.patches.iter();
-    patches.filter_map(move |patch| patch.points.get(motion))
+    patches.filter_map(|patch| patch.points.first())
 }
 
-/// The numbers of a motion, in the order of the names of the columns.
-fn numbers_of(solution: &Solution, motion: usize, columns: &NumberColumns) -> Option<Vec<f64>> {
-    let total = solution.total.get(motion)?;
-    let points = || points_of(solution, motion);
+/// The numbers of the only motion, in the order of the names of the columns.
+fn numbers_of(solution: &Solution, columns: &NumberColumns) -> Option<Vec<f64>> {
+    let total = solution.total.first()?;
+    let points = || points_of(solution);
     let sum = |of: fn(&PatchSolution) -> f64| solution.patches.iter().map(of).sum::<f64>();
     let area = sum(|patch| patch.area_mm2);
     let stick: Option<f64> = points().map(|point| point.stick_area_mm2).sum();
@@ -388,7 +382,7 @@ fn numbers_of(solution: &Solution, motion: usize, columns: &NumberColumns) -> Op
         f64::from(iterations),
     ];
     let found = columns.found.iter();
-    let found = found.map(|found| found.number(solution, motion).unwrap_or(f64::NAN));
+    let found = found.map(|found| found.number(solution).unwrap_or(f64::NAN));
     let only = points().next().filter(|_| solution.patches.len() == 1);
     let slopes = only.and_then(|point| point.gradients);
     let slopes = slopes.map_or([[f64::NAN; 3]; 3], |slopes| {

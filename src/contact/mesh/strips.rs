@@ -285,7 +285,7 @@ impl Mesh {
     }
 
     /// The y about which segment `j` is the mirror image of segment `m − 1 − j` for every `j`, if there is one and
-    /// no segment is its own image. Lengths are compared to 1e-10 of the mesh's extent.
+    /// no segment is its own image. Lengths are compared to 1e-9 of the extent of the mesh, so that rounding to single precision keeps the line.
     #[must_use]
     pub fn mirror_line(&self) -> Option<f64> {
         let m = self.segments.len();
@@ -298,7 +298,7 @@ impl Mesh {
             .segments
             .iter()
             .map(|s| (s.chord.y - line).abs().max(s.chord.right - s.chord.left));
-        let tolerance = 1e-10 * extent.fold(0.0, f64::max);
+        let tolerance = 1e-9 * extent.fold(0.0, f64::max);
         let alike = |j: usize| {
             let (a, b) = (&self.segments[j], &self.segments[m - 1 - j]);
             let close = |u: f64, v: f64| (u - v).abs() <= tolerance;

@@ -68,11 +68,9 @@ impl CheckedCase {
             forces: &problem.forces,
             speeds: &problem.speeds,
             first_motion: problem.part.before,
-            single_motion: problem.part.all == 1 || problem.is_coupled(run),
             method: run.method,
             traction_bound: run.traction_bound,
             resolution: run.resolution,
-            compares_with_table: run.compares_with_table,
             wants_slips: run.after.needs_power(&run.outputs),
         }
     }

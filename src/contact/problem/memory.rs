@@ -1,6 +1,7 @@
 //! How much memory a case will take, estimated from its finest mesh and from the operators that it leaves in the store of the process.
 
 use crate::contact::error::SolveError;
+use crate::contact::mesh::size::MeshSize;
 use crate::contact::method::Method;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::normal_task::NormalTask;
@@ -11,8 +12,9 @@ use crate::contact::rolling::history::task::HistoryStart;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::{OperatorKind, kept_bytes};
 use crate::contact::rolling::refinement::levels::LEVELS_KEPT;
-use crate::contact::rolling::refinement::mesh_policy::{CELLS_FIRST, CELLS_MAX, MeshPolicy};
-use crate::contact::rolling::refinement::refine::CELLS_NESTED;
+use crate::contact::rolling::refinement::mesh_family::{
+    CELLS_MAX, PATCH_CELLS_MAX_LEAST, fixed_meshes,
+};
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::task::precision_of;
 
@@ -22,15 +24,13 @@ const TARGET_CELLS: f64 = 160.0;
 const TARGET_CELLS_BY_TABLE: f64 = 64.0;
 /// Power by which they grow as the target falls.
 const TARGET_GROWTH: f64 = 0.65;
-/// Cells that a patch has at least.
-const PATCH_CELLS_MIN: f64 = 64.0;
 /// Dense square matrices the method of Liu and Hsu holds at once.
 const LIU_HSU_MATRICES: f64 = 4.0;
 /// Doubles per cell of the finest mesh that an iteration holds: the Krylov space, iterates and buffers.
 const VECTORS_PER_CELL: f64 = 64.0;
 /// Bytes per cell of a level that is kept: two meshes, pressure, area and bound, and what two motions left on it.
 const LEVEL_BYTES_PER_CELL: f64 = 200.0;
-/// Levels that one motion is solved on at most.
+/// Meshes that one motion is solved on, usually.
 const LEVELS_PER_MOTION: f64 = 4.0;
 /// Bytes of a motion in the answer, for each patch, and of its text.
 const MOTION_BYTES: f64 = 2000.0;
@@ -161,32 +161,32 @@ impl SizeInput {
         kind.bytes(segments.ceil() as usize, each as usize) as f64
     }
 
-    /// Bytes of all operators of the case that a store keeps, if it has room for them: of the mesh, or of the meshes that lead to a target and of their
-    /// companions; of these every motion with spin has its own.
+    /// Bytes of all operators of the case that a store keeps, if it has room for them: of the meshes of the method, or of those that lead to a target,
+    /// of which every motion with spin has its own.
     fn operators(&self) -> f64 {
         let (finest, segments) = self.finest();
-        let of = |cells: f64| {
-            let part = (cells / finest).sqrt();
-            kept_bytes(self.operator(cells, segments * part) as u64, self.store) as f64
+        let of = |cells: f64, segments: f64| {
+            kept_bytes(self.operator(cells, segments) as u64, self.store) as f64
         };
-        match (self.method, self.resolution) {
-            (Method::Fastsim | Method::Table, _) => 0.0,
-            (Method::BoundaryElement, Resolution::Mesh(_)) if finest >= CELLS_NESTED as f64 => {
-                of(finest) + of(finest / 4.0)
-            }
-            (_, Resolution::Mesh(_)) => of(finest),
-            (Method::LiuHsu, Resolution::Target(_)) => of(finest) + of(finest / 4.0),
-            (Method::BoundaryElement, Resolution::Target(_)) => {
-                let usual = self.usual_cells(finest);
-                let halves = std::iter::successors(Some(0.5 * usual), |cells| Some(0.5 * cells));
-                let coarser: f64 = halves
-                    .take_while(|cells| *cells >= CELLS_FIRST)
-                    .map(of)
-                    .sum();
-                let with_companions = of(usual) + 2.0 * of(0.5 * usual);
-                coarser + with_companions * self.spinning.max(1) as f64
-            }
+        if matches!(self.method, Method::Fastsim | Method::Table) {
+            return 0.0;
         }
+        if let Some(sizes) = fixed_meshes(self.resolution, self.method) {
+            let per_strip: f64 = self.segments.iter().sum();
+            let of_size = |size: &MeshSize| {
+                let segments = f64::from(size.strips) * per_strip;
+                of(segments * f64::from(size.cells), segments)
+            };
+            return sizes.iter().map(of_size).sum();
+        }
+        // Meshes of half, a quarter and so on of the cells precede the finest.
+        let usual = self.usual_cells(finest);
+        let halves = std::iter::successors(Some(usual), |cells| Some(0.5 * cells));
+        let chain: f64 = halves
+            .take(LEVELS_PER_MOTION as usize)
+            .map(|cells| of(cells, segments * (cells / finest).sqrt()))
+            .sum();
+        chain * self.spinning.max(1) as f64
     }
 
     /// Bytes that the case leaves in the store of operators.
@@ -213,14 +213,14 @@ impl SizeInput {
             return (0.0, 0.0);
         }
         let per_strip: f64 = self.segments.iter().sum();
-        let fixed = MeshPolicy::fixed_sizes(self.resolution, self.method);
+        let fixed = fixed_meshes(self.resolution, self.method);
         let size = match (self.resolution, fixed.as_deref().and_then(<[_]>::last)) {
             (_, Some(size)) => *size,
             (Resolution::Mesh(size), None) => size,
             (Resolution::Target(_), None) => {
                 // The cells are shared out among the patches; hollow ones have several segments in a strip.
                 let share =
-                    (f64::from(CELLS_MAX) / self.segments.len() as f64).max(PATCH_CELLS_MIN);
+                    (f64::from(CELLS_MAX) / self.segments.len() as f64).max(PATCH_CELLS_MAX_LEAST);
                 return (share * per_strip, share.sqrt() * per_strip);
             }
         };

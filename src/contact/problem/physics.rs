@@ -10,7 +10,7 @@ use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
+use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::rolling::history::task::HistoryTask;
 use crate::contact::rolling::methods::table::solve::{outside, unlike};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
@@ -56,15 +56,6 @@ pub struct MotionPart {
     pub all: usize,
 }
 
-/// The one motion of a question.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct RowMotion {
-    pub(crate) motion: Motion,
-    pub(crate) forces: PrescribedForces,
-    /// Rolling speed in mm/s.
-    pub(crate) speed: Option<f64>,
-}
-
 /// A contact whose forces follow from an ellipse, its load, one coefficient of friction, the elastic constants and the motion alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlainContact {
@@ -96,48 +87,6 @@ impl Problem {
             speeds: chosen.iter().map(|k| self.speeds[*k]).collect(),
             ..self.clone()
         }
-    }
-
-    /// The same question about these motions, none of which follows from another.
-    #[must_use]
-    pub(crate) fn of_rows(&self, rows: impl Iterator<Item = RowMotion>) -> Problem {
-        let rows: Vec<RowMotion> = rows.collect();
-        let part = MotionPart {
-            before: 0,
-            all: rows.len(),
-        };
-        Problem {
-            part,
-            motions: rows.iter().map(|row| row.motion).collect(),
-            forces: rows.iter().map(|row| row.forces).collect(),
-            speeds: rows.iter().map(|row| row.speed).collect(),
-            ..self.clone()
-        }
-    }
-
-    /// The motion, if the question has one alone that is not found in the balance of a wheel or wheelset.
-    pub(crate) fn row_motion(&self) -> Option<RowMotion> {
-        let (&[motion], &[forces], &[speed]) = (&*self.motions, &*self.forces, &*self.speeds)
-        else {
-            return None;
-        };
-        let by_balance = match &self.task {
-            NormalTask::Hertz(_) | NormalTask::Given(_) | NormalTask::Gap(_) => false,
-            // Friction carries a part of a vertical force, and with it the patches depend on the motion.
-            NormalTask::Wheel(wheel) => {
-                self.wheelset.is_some()
-                    || self.pull().is_some()
-                    || matches!(wheel.loading, WheelLoad::Vertical(_))
-                        && !self.friction.is_frictionless()
-            }
-            NormalTask::Wheelset(_) => true,
-        };
-        let row = RowMotion {
-            motion,
-            forces,
-            speed,
-        };
-        (self.history.is_none() && !by_balance).then_some(row)
     }
 
     /// The same question about a wheelset that moves in this way.

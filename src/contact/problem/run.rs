@@ -21,8 +21,6 @@ pub struct Run {
     pub resolution: Resolution,
     /// What the target is a share of.
     pub relative_to: RelativeTo,
-    /// See [`RollingTask::compares_with_table`](crate::contact::rolling::task::RollingTask::compares_with_table).
-    pub compares_with_table: bool,
     /// Time allowed for the whole case.
     pub time_limit: Option<Duration>,
     /// Memory the solve may use, in bytes.

@@ -10,7 +10,7 @@ use crate::contact::rolling::skip::Skip;
 pub struct LevelAnswer {
     /// Tractions along x and across, for forces.
     pub traction: [Vec<f64>; 2],
-    /// The tractions by a second discretisation rule, where the method has one; the difference of the two tells of the error.
+    /// The tractions by the three-point rule, where smooth slips were asked for or bounds depend on the slip.
     pub second: Option<[Vec<f64>; 2]>,
     /// Slips along x and across.
     pub slip: [Vec<f64>; 2],
@@ -24,15 +24,6 @@ pub struct LevelAnswer {
     pub skips: Vec<Skip>,
     /// Remarks for the client.
     pub remarks: Vec<Remark>,
-}
-
-impl LevelAnswer {
-    /// Was one rule solved alone, because that was enough? Its slips alternate from cell to cell.
-    #[must_use]
-    pub fn is_of_one_rule(&self) -> bool {
-        let failed = || self.remarks.contains(&Remark::SecondRuleFailed {});
-        self.exit == LevelExit::Solved && self.second.is_none() && !failed()
-    }
 }
 
 /// How the tractions of a level came about.

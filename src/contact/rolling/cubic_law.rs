@@ -2,7 +2,6 @@
 
 use crate::contact::numerics::bracketed_root::FRACTION_MAX;
 use crate::contact::rolling::linear_theory;
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::task::RollingTask;
 
 /// From this place on the cubic law is continued by its tangent. Chosen by judgement; how much it matters was not measured.
@@ -61,12 +60,5 @@ impl CubicLaw {
             0.0
         };
         [0, 1].map(|k| self.place(k, linear * force[k] / self.stiffness[k]))
-    }
-
-    pub(crate) fn places(&self, motion: &Motion) -> [f64; 2] {
-        [
-            self.place(0, motion.creepage_x),
-            self.place(1, motion.creepage_y),
-        ]
     }
 }

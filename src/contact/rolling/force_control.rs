@@ -1,10 +1,11 @@
-//! Which creepages give the tangential forces that were asked for?
+//! The creepages that give prescribed tangential forces.
 //!
 //! The friction law is monotone: while the other components are kept, a force grows with its creepage. A single force is therefore
 //! bracketed between a creepage that gives too little and one that gives too much; two forces are sought together, see
 //! `numerics::pair_root`. The unknown is not the creepage but its *place*, see `force_places`.
-
-use std::time::Duration;
+//!
+//! A rough search on the coarsest mesh finds where to begin. The adaptive solve of that motion fixes the meshes, on which value and estimate
+//! are one smooth function of the creepage.
 
 use crate::contact::error::SolveError;
 use crate::contact::method::Method;
@@ -17,19 +18,18 @@ use crate::contact::rolling::force_places::{ForcePlaces, total};
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::motion_answer::MotionAnswer;
-use crate::contact::rolling::refinement::level_solve::MotionTask;
-use crate::contact::rolling::refinement::refine;
+use crate::contact::rolling::refinement::adapt;
+use crate::contact::rolling::refinement::mesh_family::MeshFamily;
+use crate::contact::rolling::refinement::on_mesh::MotionTask;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resolution::Resolution;
-use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
 
 /// A prescribed force may be missed by this part of the target error. Chosen by judgement; how much it matters was not measured.
 const SHARE_OF_TARGET: f64 = 0.02;
-/// Smallest tolerance of a force with a target, relative to μN: ten times the residual to which tractions are solved, because a
-/// starting iterate that meets this residual is accepted unchanged.
+/// Smallest tolerance of a force with a target, relative to μN: ten times the least residual to which tractions are solved.
 const MISSED_FOR_TARGET: f64 = 1e-5;
-/// The same of the first search, on the coarsest level. 0.003 and 0.03 take 1 % more work on the 118 prescribed forces of `cargo bench --bench
+/// The same of the first search, on the coarsest mesh. 0.003 and 0.03 take 1 % more work on the 118 prescribed forces of `cargo bench --bench
 /// stress -- --only times`, and no such search five times as much, most of it in a few slender ellipses.
 const MISSED_ON_COARSEST: f64 = 0.01;
 /// Tolerance of a force on an explicit mesh and for the simplified theory, relative to μN.
@@ -40,14 +40,10 @@ const NEAR_LIMIT: f64 = 10.0;
 /// No force is sought more closely than this, relative to μN or, if they are smaller, to the forces of the first motion tried: where
 /// everything slips, elastic slip still turns the tractions by this much. Chosen by judgement; how much it matters was not measured.
 const MISSED_LEAST: f64 = 2e-7;
-/// How often the levels are chosen anew because the motion that was found does not meet its target on them. Keeps the numbers safe; not tuned.
-const LEVEL_CHOICES_MAX: u32 = 3;
-/// How often a search is corrected by what the answer judged at its end was extrapolated. Keeps the numbers safe; not tuned: the
-/// extrapolation changes by some per cent of the change of the force, so that two corrections suffice.
-const CORRECTIONS_MAX: u32 = 5;
+/// How often the meshes are chosen anew because the motion that was found does not meet its target on them. Keeps the numbers safe; not tuned.
+const MESH_CHOICES_MAX: u32 = 3;
 
-/// Solves motion `index` of a problem; where forces are prescribed, finds the creepages that give them. `before` is the answer to
-/// the motion before.
+/// Solves motion `index` of a problem; where forces are prescribed, finds the creepages that give them.
 ///
 /// # Errors
 /// Why there is no answer.
@@ -55,55 +51,52 @@ pub fn solve(
     task: &RollingTask,
     state: &mut RefinementState,
     index: usize,
-    before: Option<&MotionAnswer>,
     monitor: &dyn Monitor,
 ) -> Result<MotionAnswer, SolveError> {
     let motion = task.motions[index];
     if task.forces[index] == [None; 2] || task.friction.is_frictionless() {
-        return refine::solve(task, state, MotionTask { index, motion }, monitor);
+        return adapt::solve(task, state, MotionTask { index, motion }, monitor);
     }
     let began = monitor.elapsed();
     let mut search = ForceSearch::new(task, state, index, monitor);
-    let mut place = search.places.start(&task.motions[index], before);
-    if search.extrapolates && search.state.sweep.begin.is_none() {
+    let mut place = search.places.start(&motion);
+    if search.adapts {
         place = search.start_on_coarsest(place)?;
-    }
-    for _ in 0..LEVEL_CHOICES_MAX {
-        // Refinement chooses the levels; on them the force is one function of the creepage.
-        search.path.clear();
-        search.plain = false;
-        place = search.find_judged(place)?;
-        // Where the force jumps, or cannot be extrapolated, other levels do not help either.
-        let jumps = search.exit == RootExit::BracketClosed;
-        if search.met() || search.saturated || search.plain || jumps {
-            break;
+        for _ in 0..MESH_CHOICES_MAX {
+            search.choose_meshes(place)?;
+            place = search.find(place)?;
+            // Where the force jumps, other meshes do not help either.
+            let jumps = search.exit == RootExit::BracketClosed;
+            if search.met() || search.saturated || jumps {
+                break;
+            }
         }
+    } else {
+        place = search.find(place)?;
     }
-    search.finish(place, began)
+    let mut point = search.finish(place)?;
+    adapt::add_slips(task, state, index, &mut point, monitor)?;
+    point.seconds = (monitor.elapsed() - began).as_secs_f64();
+    Ok(point)
 }
 
 /// The search for the creepages of one motion.
-struct ForceSearch<'a, 'p> {
+struct ForceSearch<'a, 's, 'p> {
     task: &'a RollingTask<'a>,
-    state: &'a mut RefinementState<'p>,
+    state: &'s mut RefinementState<'p>,
     index: usize,
     monitor: &'a dyn Monitor,
     forces: PrescribedForces,
     /// μN of all patches in N.
     limit: f64,
     places: ForcePlaces<'a>,
-    /// The levels to solve on, coarse to fine; chosen by the next answer that is judged if empty.
-    path: Vec<MeshPlan>,
-    /// The forces of an answer are extrapolated from companion meshes.
-    extrapolates: bool,
-    /// By how much the forces of the answer judged last exceed those of its tractions, relative to μN. It hardly changes with
-    /// the motion, so that trials need no companions.
-    shift: [f64; 2],
-    /// Forces are sought on the coarsest level, to find where to begin.
+    /// The meshes of a trial, coarse to fine; those of the method if empty.
+    meshes: Vec<MeshPlan>,
+    /// The error decides the meshes.
+    adapts: bool,
+    /// Forces are sought on the coarsest mesh, to find where to begin.
     rough: bool,
-    /// Forces are not extrapolated, because a companion mesh has answers for some of the motions only.
-    plain: bool,
-    /// The answer nearest to the forces, and how far it is from them, relative to μN.
+    /// The answer nearest to the forces on these meshes, and how far it is from them, relative to μN.
     best: Option<(f64, MotionAnswer)>,
     /// Largest force of the first trial, relative to μN.
     first: Option<f64>,
@@ -113,13 +106,13 @@ struct ForceSearch<'a, 'p> {
     work: Work,
 }
 
-impl<'a, 'p> ForceSearch<'a, 'p> {
+impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
     fn new(
         task: &'a RollingTask<'a>,
-        state: &'a mut RefinementState<'p>,
+        state: &'s mut RefinementState<'p>,
         index: usize,
         monitor: &'a dyn Monitor,
-    ) -> ForceSearch<'a, 'p> {
+    ) -> ForceSearch<'a, 's, 'p> {
         let limit = task.friction.limit_of_all(task.footprint);
         ForceSearch {
             task,
@@ -129,12 +122,9 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
             monitor,
             forces: task.forces[index],
             limit,
-            path: Vec::new(),
-            extrapolates: task.method == Method::BoundaryElement
-                && matches!(task.resolution, Resolution::Target(_)),
-            shift: [0.0; 2],
+            meshes: Vec::new(),
+            adapts: task.method == Method::BoundaryElement && task.target().is_some(),
             rough: false,
-            plain: false,
             best: None,
             first: None,
             saturated: false,
@@ -143,14 +133,14 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         }
     }
 
-    /// Finds the places on the coarsest level, roughly; the start if they are not found there. The levels are then chosen, and the fine ones
-    /// solved, for a motion near the one that is sought.
+    /// Finds the places on the coarsest mesh, roughly; the start if they are not found there.
     fn start_on_coarsest(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
-        self.path = vec![self.state.policy.first()];
+        let family = MeshFamily::of(self.task, &self.motion(start));
+        self.meshes = vec![family.mesh(family.cells_first())];
         self.rough = true;
         let found = match self.find(start) {
             Ok(place) if self.exit == RootExit::Found => place,
-            // What the coarsest level cannot answer may have an answer all the same.
+            // What the coarsest mesh cannot answer may have an answer all the same.
             Ok(_) | Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => start,
             Err(error) => return Err(error),
         };
@@ -159,31 +149,15 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         Ok(found)
     }
 
-    /// Finds the places at which the forces are as prescribed, with an answer that is judged there.
-    fn find_judged(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
+    /// Chooses the meshes that the adaptive solve of the motion at two places compares.
+    fn choose_meshes(&mut self, place: [f64; 2]) -> Result<(), SolveError> {
+        let asked = self.asked(place);
+        let (point, meshes) = adapt::solve_forces(self.task, self.state, asked, self.monitor)?;
+        self.work.add(point.work);
+        self.first.get_or_insert(length(self.relative(&point)));
+        self.meshes = meshes;
         self.best = None;
-        if !self.extrapolates {
-            return self.find(start);
-        }
-        let mut place = start;
-        let mut off = self.judge(place)?;
-        for _ in 0..CORRECTIONS_MAX {
-            if length(off) <= self.tolerance() {
-                self.end(RootExit::Found);
-                return Ok(place);
-            }
-            let shift = self.shift;
-            place = self.find(place)?;
-            off = self.judge(place)?;
-            let corrected = length([0, 1].map(|k| self.shift[k] - shift[k]));
-            if self.exit != RootExit::Found && corrected <= self.tolerance() {
-                return Ok(place);
-            }
-        }
-        if self.exit == RootExit::Found && length(off) > self.tolerance() {
-            self.end(RootExit::TrialsUsedUp);
-        }
-        Ok(place)
+        Ok(())
     }
 
     /// Finds the places at which the forces are as prescribed, or as near to that as can be.
@@ -231,62 +205,22 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         })
     }
 
-    /// How far the forces of the tractions, moved by what the last judged answer was extrapolated, are from those prescribed, relative to
-    /// μN, at two places.
+    /// Solves the motion of two places; how far its forces are from those prescribed, relative to μN.
     fn trial(&mut self, place: [f64; 2]) -> Result<[f64; 2], SolveError> {
-        if !self.extrapolates {
-            return self.judge(place);
-        }
         let asked = self.asked(place);
-        let sums = self.sums(asked)?;
-        let forces = self.relative(&sums);
-        Ok(self.off([0, 1].map(|k| forces[k] + self.shift[k])))
-    }
-
-    /// Solves the motion of two places with an estimate of its error; how far its forces are from those prescribed, relative to μN.
-    fn judge(&mut self, place: [f64; 2]) -> Result<[f64; 2], SolveError> {
-        let asked = self.asked(place);
-        let path = &self.path;
-        let found = refine::on_levels(self.task, self.state, asked, path, self.monitor)?;
-        let (mut point, missing) = match found {
-            Some(found) => found,
-            None => (
-                refine::solve(self.task, self.state, asked, self.monitor)?,
-                false,
-            ),
+        let point = match &*self.meshes {
+            [] => adapt::solve_forces(self.task, self.state, asked, self.monitor)?.0,
+            meshes => adapt::solve_on_meshes(self.task, self.state, asked, meshes, self.monitor)?,
         };
-        if self.path.is_empty() {
-            let plan = |number: &usize| self.state.levels.get(*number).plan;
-            self.path = self.state.sweep.path.iter().map(plan).collect();
-        }
         self.work.add(point.work);
-        let forces = self.relative(&point.resultants);
+        let forces = self.relative(&point);
         self.first.get_or_insert(length(forces));
-        if self.extrapolates {
-            let sums = self.sums(asked)?;
-            // What was extrapolated at other places cannot be here.
-            self.plain |= missing && length(self.shift) > 0.0;
-            if self.plain {
-                point.resultants.clone_from(&sums);
-            }
-            let (found, summed) = (self.relative(&point.resultants), self.relative(&sums));
-            self.shift = [0, 1].map(|k| found[k] - summed[k]);
-        }
-        let off = self.off(self.relative(&point.resultants));
+        let off = [0, 1].map(|k| self.forces[k].map_or(0.0, |f| forces[k] - f / self.limit));
         let least = self.best.as_ref().map(|(least, _)| *least);
-        if self.plain || least.is_none_or(|least| length(off) <= least) {
+        if least.is_none_or(|least| length(off) <= least) {
             self.best = Some((length(off), point));
         }
         Ok(off)
-    }
-
-    /// Resultants of the tractions of a motion on the finest level of the path.
-    fn sums(&mut self, asked: MotionTask) -> Result<Vec<Resultants>, SolveError> {
-        let path = &self.path;
-        let (sums, work) =
-            refine::sums_on_finest(self.task, self.state, asked, path, self.monitor)?;
-        self.work.add(work);
-        Ok(sums)
     }
 
     fn asked(&self, place: [f64; 2]) -> MotionTask {
@@ -296,15 +230,10 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         }
     }
 
-    /// The sum of resultants, relative to μN.
-    fn relative(&self, resultants: &[Resultants]) -> [f64; 2] {
-        let sum = total(resultants);
+    /// The forces of an answer, relative to μN.
+    fn relative(&self, point: &MotionAnswer) -> [f64; 2] {
+        let sum = total(&point.resultants);
         [sum.force_x / self.limit, sum.force_y / self.limit]
-    }
-
-    /// How far forces are from those prescribed.
-    fn off(&self, forces: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|k| self.forces[k].map_or(0.0, |f| forces[k] - f / self.limit))
     }
 
     /// By how much forces may be missed, relative to μN.
@@ -332,27 +261,25 @@ impl<'a, 'p> ForceSearch<'a, 'p> {
         self.places.motion(place, &self.task.motions[self.index])
     }
 
-    /// Does the best answer meet the target? Yes if its method or an explicit mesh has none to meet.
+    /// Whether the best answer meets the target.
     fn met(&self) -> bool {
-        let Resolution::Target(target) = self.task.resolution else {
-            return true;
-        };
-        let chosen = self.task.method == Method::BoundaryElement;
         let error = self.best.as_ref().and_then(|(_, point)| point.error());
-        !chosen || error.is_some_and(|error| error <= target)
+        let target = self.task.target().unwrap_or(f64::INFINITY);
+        error.is_some_and(|error| error <= target)
     }
 
-    fn finish(mut self, place: [f64; 2], began: Duration) -> Result<MotionAnswer, SolveError> {
-        let asked = self.asked(place);
+    fn finish(mut self, place: [f64; 2]) -> Result<MotionAnswer, SolveError> {
         let inexact = self.inexact();
         let mut point = match self.best.take() {
             Some((_, point)) => point,
-            None => refine::solve(self.task, self.state, asked, self.monitor)?,
+            None => {
+                let asked = self.asked(place);
+                adapt::solve_forces(self.task, self.state, asked, self.monitor)?.0
+            }
         };
         point.remarks.extend(inexact);
         point.work = self.work;
         point.saturated = self.saturated;
-        point.seconds = (self.monitor.elapsed() - began).as_secs_f64();
         Ok(point)
     }
 }

@@ -8,7 +8,6 @@ use crate::contact::rolling::cubic_law::CubicLaw;
 use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
-use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
@@ -19,11 +18,7 @@ const TABLE_STEPS: u32 = 40;
 /// The start is good enough when the table misses the forces by no more than this, relative to μN: about what the table is off.
 const TABLE_MISSED: f64 = 1e-3;
 
-/// Largest correction of a starting place by what the cubic law was off at the motion before. Chosen by judgement; how much it matters was not
-/// measured.
-const CORRECTION_MAX: f64 = 0.3;
-
-/// What turns places into motions and back.
+/// The map between places and motions.
 pub(crate) struct ForcePlaces<'a> {
     task: &'a RollingTask<'a>,
     forces: PrescribedForces,
@@ -56,24 +51,10 @@ impl<'a> ForcePlaces<'a> {
         }
     }
 
-    /// Places to start from: those of the cubic law, corrected by what the law was off at the motion before.
-    pub(crate) fn start(&self, given: &Motion, before: Option<&MotionAnswer>) -> [f64; 2] {
+    /// Places to start from.
+    pub(crate) fn start(&self, given: &Motion) -> [f64; 2] {
         let wanted = self.forces.map(|f| f.unwrap_or(0.0) / self.limit);
-        let mut place = self.guess(wanted, given);
-        if let Some(before) = before.filter(|point| !point.saturated) {
-            let sum = total(&before.resultants);
-            let forces = [sum.force_x / self.limit, sum.force_y / self.limit];
-            let had = [0, 1].map(|k| self.forces[k].map_or(0.0, |_| forces[k]));
-            let guess = self.guess(had, &before.motion);
-            let found = self.law.places(&before.motion);
-            for k in 0..2 {
-                let correction = found[k] - guess[k];
-                if correction.abs() < CORRECTION_MAX {
-                    place[k] += correction;
-                }
-            }
-        }
-        place
+        self.guess(wanted, given)
     }
 
     /// Places of the creepages that give forces relative to μN: by the table with the rest of a motion, or by the cubic law without spin.

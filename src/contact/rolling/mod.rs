@@ -34,7 +34,6 @@ pub mod resultants;
 pub mod skip;
 pub mod slip_equations;
 pub mod slip_rules;
-pub mod start;
 pub mod strip_chords;
 pub mod strip_mesh;
 pub mod task;

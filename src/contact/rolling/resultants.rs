@@ -77,21 +77,6 @@ impl Resultants {
         }
     }
 
-    /// These resultants plus a share each of their changes from two coarser meshes, with a force no larger than `bound`.
-    #[must_use]
-    pub fn beyond_all(self, coarser: [(Resultants, f64); 2], bound: f64) -> Resultants {
-        let [(first, share), (second, other)] = coarser;
-        let middle = |of: fn(&Resultants) -> f64| {
-            (share * of(&first) + other * of(&second)) / (share + other)
-        };
-        let mean = Resultants {
-            force_x: middle(|r| r.force_x),
-            force_y: middle(|r| r.force_y),
-            moment_z: middle(|r| r.moment_z),
-        };
-        self.beyond(mean, share + other, bound)
-    }
-
     /// The same resultants with the moment about `point` instead of the origin.
     #[must_use]
     pub fn about(self, point: [f64; 2]) -> Resultants {

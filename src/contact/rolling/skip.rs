@@ -15,10 +15,6 @@ pub enum Skip {
     HalfTheCells,
     /// The patch alone is mirror-symmetric, so that half the operator is enough.
     HalfTheOperator,
-    /// Neighbours of a sweep were solved on the companions of the mesh, and lent what they told.
-    Companions,
-    /// The table of creep forces told the error.
-    CompanionsByTable,
 }
 
 impl Skip {
@@ -35,12 +31,6 @@ impl Skip {
             Skip::HalfTheCells => "mirror symmetry of patch and motion: half the cells",
             Skip::HalfTheOperator => {
                 "mirror symmetry of the patch: half of the influence matrix was computed"
-            }
-            Skip::Companions => {
-                "the error and the extrapolation of the resultants follow from neighbours in the sweep: no coarser mesh was solved"
-            }
-            Skip::CompanionsByTable => {
-                "the error follows from the distance to the table of creep forces: no coarser mesh was solved"
             }
         }
     }

@@ -162,12 +162,12 @@ impl StripMesh {
         } = *task.elasticity;
         let (footprint, patches) = (task.footprint, task.footprint.patches());
         let chords: Vec<Chord> = fitted.iter().map(|f| f.chord).collect();
-        let grading = match plan.pole() {
+        let grading = match plan.pole {
             Some([x, _]) => Grading::about(x, plan.size.cells as usize),
             None => Grading::cosine(plan.size.cells as usize),
         };
         let mut mesh = Mesh::new(&chords, &grading);
-        if plan.pole().is_some() {
+        if plan.pole.is_some() {
             // Where everything slips, the traction of a strip follows the slip at the centre of its load; sticking strips
             // follow their mid-lines.
             mesh.load_y = fitted.iter().map(|f| f.load_y).collect();
@@ -330,7 +330,7 @@ pub(crate) fn fitted_chords(
     let mut fitted = Vec::new();
     for (k, patch) in footprint.patches().iter().enumerate() {
         let [low, high] = [patch.extent[2], patch.extent[3]];
-        let edges = match plan.pole() {
+        let edges = match plan.pole {
             Some([_, y]) => strips_about(y, low, high, strips as usize),
             None => equal_strips(low, high, strips as usize),
         };

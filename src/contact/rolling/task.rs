@@ -16,9 +16,8 @@ const SINGLE_PRECISION_FROM: f64 = 5e-4;
 
 /// Residual to reach over the target error. Chosen by judgement; how much it matters was not measured.
 const RESIDUAL_OF_TARGET: f64 = 0.04;
-/// The same where forces are prescribed. A force is searched as a function of its creepage, and what the iteration leaves is noise to that
-/// search. It is less than a tenth of what a force may be missed by (`SHARE_OF_TARGET`), because a start that meets it is left as it is. Chosen
-/// by judgement; how much it matters was not measured.
+/// The same where forces are prescribed. The search finds the root of a force as a function of its creepage, and the residual is the noise of
+/// that function: less than a tenth of what a force may be missed by (`SHARE_OF_TARGET`). Chosen by judgement.
 const RESIDUAL_FOR_FORCES: f64 = 0.0015;
 /// Largest residual that any target allows, relative to the traction scale. Chosen by judgement; how much it matters was not measured.
 const TOLERANCE_LARGEST: f64 = 4e-4;
@@ -45,16 +44,12 @@ pub struct RollingTask<'a> {
     pub speeds: &'a [Option<f64>],
     /// The number of the first of these motions in its case.
     pub first_motion: usize,
-    /// Is there one motion alone on this footprint, whatever the case asks besides?
-    pub single_motion: bool,
     /// The method.
     pub method: Method,
     /// Where `fastsim` lets tractions slip.
     pub traction_bound: TractionBound,
     /// Target or mesh.
     pub resolution: Resolution,
-    /// Is the table of creep forces asked for the error, where it covers the contact? Not where the table itself is made or judged.
-    pub compares_with_table: bool,
     /// Are slips asked for, or what follows from them? Forces do not depend on it.
     pub wants_slips: bool,
 }
@@ -69,12 +64,13 @@ impl RollingTask<'_> {
         }
     }
 
-    /// Residual to reach: far below the target, but no further, because iterating further does not improve the answer.
+    /// Residual to reach for motion `index`: far below the target, but no further, because iterating further does not improve the answer.
     #[must_use]
-    pub fn tolerance(&self) -> f64 {
+    pub fn tolerance(&self, index: usize) -> f64 {
+        let is_prescribed = self.forces.get(index).is_some_and(|f| *f != [None; 2]);
         match self.resolution {
             Resolution::Target(target) => {
-                let part = if self.has_prescribed_forces() {
+                let part = if is_prescribed {
                     RESIDUAL_FOR_FORCES
                 } else {
                     RESIDUAL_OF_TARGET

@@ -6,7 +6,6 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::evaluate::many::task::RowStarts;
 use crate::http::dto::job::rfc3339;
 use crate::jobs::codec::table::TableKind;
 use crate::jobs::model::job::State as JobState;
@@ -66,8 +65,6 @@ pub(crate) struct RunAnswer {
     ended_at: Option<String>,
     /// The method asked for.
     method: String,
-    /// Where rows that are solved on a mesh start.
-    starts: RunStarts,
     /// Number of rows.
     rows: u64,
     /// Rows that are over.
@@ -85,34 +82,6 @@ pub(crate) struct RunAnswer {
     answers: Vec<AnswerColumn>,
     /// Where to go from here.
     links: BTreeMap<String, String>,
-}
-
-/// Where rows that are solved on a mesh start.
-#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum RunStarts {
-    /// From their own cases alone.
-    Own,
-    /// From rows that ask the same but for their motions, or that are similar.
-    Neighbours,
-}
-
-impl From<RowStarts> for RunStarts {
-    fn from(starts: RowStarts) -> RunStarts {
-        match starts {
-            RowStarts::Own => RunStarts::Own,
-            RowStarts::Neighbours => RunStarts::Neighbours,
-        }
-    }
-}
-
-/// Reads where rows start.
-pub(crate) fn starts_from_name(name: &str) -> Option<RowStarts> {
-    match name {
-        "own" => Some(RowStarts::Own),
-        "neighbours" => Some(RowStarts::Neighbours),
-        _ => None,
-    }
 }
 
 /// The pieces of a run.
@@ -211,7 +180,6 @@ impl From<Run> for RunAnswer {
             created_at: rfc3339(chunks.created_at),
             ended_at: chunks.last_ended_at.filter(|_| state.ended()).map(rfc3339),
             method: run.head.method.clone(),
-            starts: run.head.starts().into(),
             rows: run.head.rows,
             rows_done: run.rows_done(),
             rows_without_answer: run.without_answer,

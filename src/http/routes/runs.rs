@@ -8,8 +8,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::evaluate::many::task::RowStarts;
-use crate::http::dto::run::{RunAnswer, RunRequest, starts_from_name};
+use crate::http::dto::run::{RunAnswer, RunRequest};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::RunId;
 use crate::http::extract::labels::{name, new_label};
@@ -62,17 +61,12 @@ query! {
         carry: Vec<String> as String = reader("titles of columns with commas between", |text| {
             Some(text.split(',').map(|title| title.trim().to_owned()).collect())
         });
-        /// Where rows that are solved on a mesh start: `own`, each from its own case alone, also when left out; `neighbours`, from rows that ask
-        /// the same but for their motions, or that are similar, which takes less time where motions are near each other
-        #[param(pattern = "^(own|neighbours)$", example = "neighbours")]
-        starts: RowStarts as String = reader("`own`, `neighbours`", starts_from_name);
     }
 }
 
 /// Submits many rows as one run.
 ///
-/// A row is the template with the row's values in place of its own; it is solved as a case of its own would be, to the last bit, whatever stands
-/// beside it, unless `starts` is `neighbours`. With `auto`, a row takes the table of creep forces where its bound meets the target, and `boundary_element` elsewhere. The body is
+/// A row is the template with the row's values in place of its own; it is solved as a case of its own, to the last bit, whatever other rows there are. With `auto`, a row takes the table of creep forces where its bound meets the target, and `boundary_element` elsewhere. The body is
 /// JSON with `template` and `columns`, at most as large as one of `/v1/evaluate`, or a table with `?template=`, which is read as it arrives. A
 /// row that cannot be solved has a `status` in the results that says why, and does not affect other rows.
 #[utoipa::path(
@@ -116,7 +110,6 @@ pub(crate) async fn submit(
     let options_of_run = RunOptions {
         name: run.name,
         labels,
-        starts: run.starts.unwrap_or_default(),
         submit: submit.options(request.headers()),
         idempotency_key,
     };

@@ -9,7 +9,7 @@ use tokio::runtime::Handle;
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::many::solve::expected_seconds;
-use crate::contact::evaluate::many::task::{ManyTask, RowStarts, several_answers};
+use crate::contact::evaluate::many::task::{ManyTask, several_answers};
 use crate::contact::evaluate::many_answer::NumberColumns;
 use crate::contact::evaluate::request_faults::{column_pointer, of_first_row, of_values};
 use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
@@ -71,8 +71,6 @@ pub struct RunOptions {
     pub name: Option<String>,
     /// Labels of the client.
     pub labels: BTreeMap<String, String>,
-    /// Where rows start that are solved on a mesh.
-    pub starts: RowStarts,
     /// Priority and deadline.
     pub submit: SubmitOptions,
     /// The client's idempotency key.
@@ -136,7 +134,7 @@ impl Jobs {
         draft: RunDraft,
         options: RunOptions,
     ) -> Result<(Run, bool), JobsError> {
-        let finished = tokio::task::spawn_blocking(move || draft.finish(options.starts));
+        let finished = tokio::task::spawn_blocking(move || draft.finish());
         let mut upload = finished
             .await
             .map_err(|error| JobsError::Damaged(error.to_string()))??;
@@ -210,7 +208,7 @@ impl RunDraft {
     }
 
     /// Everything is there.
-    fn finish(mut self, starts: RowStarts) -> Result<BatchUpload, JobsError> {
+    fn finish(mut self) -> Result<BatchUpload, JobsError> {
         self.cut_all()?;
         if let Some(Begun {
             mut head,
@@ -219,7 +217,6 @@ impl RunDraft {
         }) = self.begun
         {
             head.rows = self.rows;
-            head.from_neighbours = starts == RowStarts::Neighbours;
             head.profiles = self.profiles.into_iter().collect();
             let whole = head.whole();
             let (common, own) = head.into_parts(&self.template, first_row);
@@ -303,7 +300,6 @@ impl RunDraft {
             known: self.jobs.known_pairs(),
             limits: &options.limits,
             time_limit: options.time_limit,
-            starts: RowStarts::Own,
         };
         let row_seconds = expected_seconds(&task) / rows as f64;
         let wanted = CHUNK_SECONDS / row_seconds;

@@ -7,7 +7,6 @@ use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::contact::evaluate::many::task::RowStarts;
 use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use crate::jobs::codec::table::{TableColumn, TableKind};
 use crate::jobs::error::JobsError;
@@ -91,9 +90,6 @@ pub struct RunHead {
     pub profiles: BTreeMap<String, Value>,
     /// The method asked for.
     pub method: String,
-    /// Rows start from rows that are like them.
-    #[serde(default)]
-    pub from_neighbours: bool,
     /// Answers have the column of reasons; those of older runs do not.
     #[serde(default)]
     pub with_reasons: bool,
@@ -124,20 +120,10 @@ impl RunHead {
             numbers,
             profiles: BTreeMap::new(),
             method,
-            from_neighbours: false,
             with_reasons: true,
             rows: 0,
             chunk_rows: 0,
             first_row: Vec::new(),
-        }
-    }
-
-    /// Where rows start that are solved on a mesh.
-    #[must_use]
-    pub fn starts(&self) -> RowStarts {
-        match self.from_neighbours {
-            true => RowStarts::Neighbours,
-            false => RowStarts::Own,
         }
     }
 

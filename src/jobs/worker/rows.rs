@@ -5,7 +5,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde_json::json;
 
-use crate::contact::evaluate::many::solve::{own_bytes, solve_many};
+use crate::contact::evaluate::many::solve::solve_many;
 use crate::contact::evaluate::many::task::ManyTask;
 use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::monitor::Monitor;
@@ -36,7 +36,7 @@ pub(crate) fn solve_chunk(
     let (varied, carried) = parted(&head, chunk);
     let limits = &shared.options.limits;
     if let Ok(checked) = (shared.engine.check)(&head.case, limits) {
-        control.set_memory_bytes(own_bytes(&checked, head.starts()));
+        control.set_memory_bytes(checked.cost().own_bytes());
     }
     let task = ManyTask {
         case: &head.case,
@@ -45,7 +45,6 @@ pub(crate) fn solve_chunk(
         known: &shared.engine.known,
         limits,
         time_limit: shared.options.time_limit,
-        starts: head.starts(),
     };
     control.begin(Duration::ZERO);
     let solve =

@@ -1,7 +1,5 @@
-//! Many rows with any column and any method: what they are, which of them are like each other, and how they are solved.
+//! Many rows with any column and any method: what they are, and how they are solved.
 
-mod likeness;
-mod near_rows;
 mod row_solver;
 pub mod solve;
 pub mod task;

@@ -1,14 +1,12 @@
-//! Solves rows on meshes, each by itself or as a motion of a case that it shares with rows like it.
+//! Solves rows, each as a case of its own.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use crate::contact::error::SolveError;
-use crate::contact::evaluate::many::near_rows::{Group, OpenGroups};
-use crate::contact::evaluate::many::task::{ManyTask, RowSolver, RowStarts};
+use crate::contact::evaluate::many::task::{ManyTask, RowSolver};
 use crate::contact::evaluate::many_answer::{ManyAnswer, ManyStatus, RowFailure};
-use crate::contact::method::Method;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::words::answer::Solution;
@@ -55,90 +53,22 @@ impl<'a> RowsInWork<'a> {
     /// [`SolveError::Cancelled`]: the monitor stopped the work.
     pub(crate) fn solve(mut self, rows: &[usize]) -> Result<(), SolveError> {
         self.all = rows.len();
-        let mut groups = OpenGroups::default();
         for row in rows {
-            if self.watch(1).tick(0.0).is_break() {
+            if self.watch().tick(0.0).is_break() {
                 return Err(SolveError::Cancelled);
             }
-            let checked = match self.task.checked(*row) {
-                Ok(checked) => checked,
-                Err(error) => {
-                    self.end(*row, RowFailure::refused(&error));
-                    continue;
-                }
-            };
-            let motion = checked.problem.row_motion();
-            let together = self.task.starts == RowStarts::Neighbours
-                && checked.run.method == Method::BoundaryElement
-                && !checked.problem.is_coupled(&checked.run);
-            match motion.filter(|_| together) {
-                None => self.alone(*row, &checked)?,
-                Some(motion) => {
-                    if let Some(group) = groups.add(*row, checked, motion) {
-                        self.together(&group)?;
-                    }
-                }
+            match self.task.checked(*row) {
+                Ok(checked) => self.alone(*row, &checked)?,
+                Err(error) => self.end(*row, RowFailure::refused(&error)),
             }
-        }
-        for group in groups.close() {
-            self.together(&group)?;
-        }
-        Ok(())
-    }
-
-    /// Solves the rows of a group, each started from the one before. Those that miss the target are solved by themselves as well, and so are all
-    /// where they have no answer as one case.
-    fn together(&mut self, group: &Group) -> Result<(), SolveError> {
-        if let [only] = &*group.members {
-            return self.alone(only.row, &group.head);
-        }
-        for (case, members) in group.parts() {
-            match self.solved(&case, members.len()) {
-                Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
-                Ok(solution) => {
-                    for (motion, member) in members.iter().enumerate() {
-                        let of_row = |columns: &_, numbers: &mut [f64]| {
-                            member.likeness.numbers(columns, numbers);
-                        };
-                        let answered = (&solution, motion);
-                        self.answer.set_solution(member.row, answered, of_row);
-                        self.done += 1;
-                        if self.answer.status[member.row] != ManyStatus::Ok {
-                            self.again(member.row)?;
-                        }
-                    }
-                }
-                Err(RowEnd::Failed(_)) => {
-                    for member in members {
-                        // A row of a group has no faults.
-                        if let Ok(checked) = self.task.checked(member.row) {
-                            self.alone(member.row, &checked)?;
-                        }
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Solves a row by itself, where it chooses its own meshes, after it missed the target in its group.
-    fn again(&mut self, row: usize) -> Result<(), SolveError> {
-        let Ok(checked) = self.task.checked(row) else {
-            return Ok(());
-        };
-        match self.solved(&checked, 1) {
-            Ok(solution) => self.answer.set_solution(row, (&solution, 0), |_, _| ()),
-            Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
-            // It keeps the answer of its group.
-            Err(RowEnd::Failed(_)) => {}
         }
         Ok(())
     }
 
     fn alone(&mut self, row: usize, checked: &CheckedCase) -> Result<(), SolveError> {
-        match self.solved(checked, 1) {
+        match self.solved(checked) {
             Ok(solution) => {
-                self.answer.set_solution(row, (&solution, 0), |_, _| ());
+                self.answer.set_solution(row, &solution);
                 self.done += 1;
             }
             Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
@@ -152,8 +82,8 @@ impl<'a> RowsInWork<'a> {
         self.done += 1;
     }
 
-    fn solved(&self, checked: &CheckedCase, rows: usize) -> Result<Solution, RowEnd> {
-        let watch = self.watch(rows);
+    fn solved(&self, checked: &CheckedCase) -> Result<Solution, RowEnd> {
+        let watch = self.watch();
         let solved = catch_unwind(AssertUnwindSafe(|| (self.solve)(checked, &watch)));
         match solved {
             Ok(Ok(solution)) => Ok(solution),
@@ -165,18 +95,18 @@ impl<'a> RowsInWork<'a> {
         }
     }
 
-    /// The monitor of the next rows.
-    fn watch(&self, rows: usize) -> RowMonitor<'a> {
+    /// The monitor of the next row.
+    fn watch(&self) -> RowMonitor<'a> {
         RowMonitor {
             inner: self.monitor,
             begun: self.monitor.elapsed(),
             before: self.done as f64 / self.all as f64,
-            own: rows as f64 / self.all as f64,
+            own: 1.0 / self.all as f64,
         }
     }
 }
 
-/// The monitor of some of the rows.
+/// The monitor of one row.
 struct RowMonitor<'a> {
     inner: &'a dyn Monitor,
     begun: Duration,

@@ -1,8 +1,7 @@
 //! Solves many rows: one case with columns of values in place of some of its members.
 //!
-//! Unless [`RowStarts::Neighbours`] says otherwise, a row's answer depends on its own case alone, to the last bit: not on the rows beside it,
-//! on their order or number, or on the machine's load. So nothing is started from another row. What rows share are operators of patches of one
-//! shape, and profiles that were read, which are equal whoever computed them; rows of one shape therefore follow each other.
+//! The answer to a row depends on its own case alone, to the last bit: not on other rows, their order or number, or the load of the machine.
+//! Rows share the operators of patches of one shape and the profiles that were read, so that rows of one shape follow each other.
 
 use std::cmp::Ordering;
 
@@ -12,9 +11,8 @@ use crate::contact::case::words::solver::MethodName;
 use crate::contact::error::SolveError;
 use crate::contact::evaluate::answer::{RowStatus, RowsAnswer};
 use crate::contact::evaluate::column::Column;
-use crate::contact::evaluate::many::near_rows::largest;
 use crate::contact::evaluate::many::row_solver::RowsInWork;
-use crate::contact::evaluate::many::task::{ManyTask, RowSolver, RowStarts};
+use crate::contact::evaluate::many::task::{ManyTask, RowSolver};
 use crate::contact::evaluate::many_answer::{
     ManyAnswer, ManyStatus, NumberColumns, RowFailure, RowNumbers, SolvedRow,
 };
@@ -42,9 +40,7 @@ pub fn solve_many(
         let (evaluated, patches) = evaluable.evaluate_with_patches();
         open.retain(|row| !take(&mut answer, *row, method, &evaluated, patches[*row]));
     }
-    if task.starts == RowStarts::Own {
-        open.sort_by(|a, b| near(task.columns, *a, *b));
-    }
+    open.sort_by(|a, b| near(task.columns, *a, *b));
     RowsInWork::new(task, solve, monitor, &mut answer).solve(&open)?;
     Ok(answer)
 }
@@ -139,17 +135,6 @@ pub fn expected_seconds(task: &ManyTask) -> f64 {
         _ => TABLE_SECONDS,
     };
     rows as f64 * each + left as f64 * checked.cost().seconds
-}
-
-/// Memory in bytes that rows of this case need at a time and share with nobody.
-#[must_use]
-pub fn own_bytes(checked: &CheckedCase, starts: RowStarts) -> u64 {
-    let together = match starts {
-        RowStarts::Own => None,
-        RowStarts::Neighbours => largest(checked),
-    };
-    let alone = checked.cost().own_bytes();
-    together.map_or(alone, |case| case.cost().own_bytes().max(alone))
 }
 
 /// Rows that [`expected_seconds`] looks at.

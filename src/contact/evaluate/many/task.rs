@@ -18,17 +18,6 @@ use crate::contact::solution::words::answer::Solution;
 /// Solves a checked case.
 pub type RowSolver<'a> = dyn Fn(&CheckedCase, &dyn Monitor) -> Result<Solution, SolveError> + 'a;
 
-/// Where the iteration of a row starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum RowStarts {
-    /// From its own case alone. The answer to a row is that of its case, to the last bit, whatever other rows there are.
-    #[default]
-    Own,
-    /// From rows that ask the same but for their motions, or that are similar. The answer to a row depends on the other rows of its task, within
-    /// its estimated error; the same task gives the same answers.
-    Neighbours,
-}
-
 /// Rows to solve.
 #[derive(Debug, Clone, Copy)]
 pub struct ManyTask<'a> {
@@ -44,8 +33,6 @@ pub struct ManyTask<'a> {
     pub limits: &'a Limits,
     /// Longest time for one row; a shorter one of the case counts.
     pub time_limit: Duration,
-    /// Where rows that are solved on a mesh start.
-    pub starts: RowStarts,
 }
 
 impl ManyTask<'_> {

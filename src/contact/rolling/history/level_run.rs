@@ -330,6 +330,7 @@ impl<'a> LevelRun<'a> {
             scale: 1.0,
             tolerance: self.tolerance[0],
             steps_max: STEPS_MAX,
+            accepts_start: true,
         };
         let mut tractions = self.state.guess.clone();
         let mut report = of

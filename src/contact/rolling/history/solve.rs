@@ -11,7 +11,7 @@ use crate::contact::rolling::history::smaller_self::SmallerSelf;
 use crate::contact::rolling::history::task::{HistoryStart, HistoryTask};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{HistoryAnswer, MotionAnswer, SolvedFields};
-use crate::contact::rolling::refinement::level_solve::named;
+use crate::contact::rolling::refinement::on_mesh::named;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::resultants::Resultants;
@@ -385,7 +385,7 @@ fn answers(
                 work.residual = residual;
             }
             let error =
-                |change: &f64| Some(ERROR_OVER_CHANGE * change + task.tolerance().max(MISSED));
+                |change: &f64| Some(ERROR_OVER_CHANGE * change + task.tolerance(k).max(MISSED));
             let forces = task.forces[k];
             let found = |changes: [f64; 2]| {
                 [0, 1].map(|k| forces[k].map(|_| CREEPAGE_ERROR_OVER_CHANGE * changes[k]))

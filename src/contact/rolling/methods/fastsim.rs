@@ -150,11 +150,9 @@ impl EllipseMesh {
             forces: &[],
             speeds: &[],
             first_motion: 0,
-            single_motion: true,
             method: Method::Fastsim,
             traction_bound: bound,
             resolution: Resolution::Mesh(size),
-            compares_with_table: false,
             wants_slips: false,
         };
         let level = StripMesh::new(&task, size)?;

@@ -1,6 +1,24 @@
-//! Nested start: the tractions of a coarse level as the first iterate of a finer one.
+//! Prolongation: the tractions on a coarse mesh as the first iterate on a finer one.
 
 use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::rolling::strip_mesh::StripMesh;
+
+/// Tractions on one mesh interpolated to another. Interpolated are their ratios to the friction bound, which vary less.
+pub(crate) fn prolonged(
+    from: &StripMesh,
+    traction: &[Vec<f64>; 2],
+    to: &StripMesh,
+) -> [Vec<f64>; 2] {
+    [0, 1].map(|k| {
+        let pairs = traction[k].iter().zip(&from.bound);
+        let relative: Vec<f64> = pairs
+            .map(|(t, g)| if *g > 0.0 { t / g } else { 0.0 })
+            .collect();
+        let mut values = interpolate(&from.mesh, &relative, &to.mesh);
+        values.iter_mut().zip(&to.bound).for_each(|(t, g)| *t *= g);
+        values
+    })
+}
 
 /// Interpolates `values` (one per coarse cell) to the cells of the fine mesh: linearly along the normalised chord,
 /// linearly in y between the coarse strips of the same patch. Cells beyond the outermost strip take its value.

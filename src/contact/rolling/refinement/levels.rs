@@ -24,7 +24,7 @@ struct KeptStrips([Option<(StripsKey, Vec<StripChord>)>; 2]);
 impl KeptStrips {
     /// The strips of a plan; they are made if they are not there.
     fn of(&mut self, task: &RollingTask, plan: &MeshPlan) -> Result<&[StripChord], SolveError> {
-        let key = (plan.size.strips, plan.pole().map(|pole| pole[1]));
+        let key = (plan.size.strips, plan.pole.map(|pole| pole[1]));
         let is_known =
             |kept: &Option<(StripsKey, _)>| matches!(kept, Some((made, _)) if *made == key);
         match self.0.iter().position(is_known) {

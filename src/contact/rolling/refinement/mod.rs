@@ -1,29 +1,19 @@
-//! From coarse to fine meshes until the estimate of the error meets the target.
+//! A motion on nested meshes, coarse to fine, until the estimate of the error meets the target.
+//!
+//! | question | where |
+//! |---|---|
+//! | which meshes, when to stop | [`adapt`] |
+//! | sizes and grading of the meshes of a motion | [`mesh_family`] |
+//! | one mesh: start, method, resultants | [`on_mesh`] |
+//! | error and extrapolated value | [`error_estimate`] |
+//! | starts from motions before and from coarser meshes | [`predictor`], [`interpolate`] |
+//! | meshes kept from one motion to the next | [`levels`], [`state`] |
 
-mod caution;
-pub mod companion_answer;
-pub mod companions;
-pub mod constants;
-mod distances;
+pub mod adapt;
 pub mod error_estimate;
-pub mod estimate_context;
-mod few_strips;
-mod finer_by_table;
 pub mod interpolate;
-pub mod lender;
-pub mod level_solve;
 pub mod levels;
-pub mod mesh_policy;
-mod one_rule;
-pub mod refine;
-pub mod regime;
-pub mod slender;
+pub mod mesh_family;
+pub mod on_mesh;
+pub mod predictor;
 pub mod state;
-pub mod stretch;
-mod sweep_line;
-mod swept_level;
-mod table_check;
-mod trials;
-mod waiting;
-pub mod warm_start;
-mod without_companions;

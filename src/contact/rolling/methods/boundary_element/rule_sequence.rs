@@ -37,9 +37,14 @@ const PASSAGE_FALL: f64 = 0.7;
 pub(super) struct ThreePointAnswer {
     pub(super) slip: [Vec<f64>; 2],
     pub(super) slips: Vec<bool>,
-    pub(super) by_fixed_point: bool,
     /// By how much a second solution differs, see [`RuleSequence::other_solution`].
     pub(super) other: Option<f64>,
+}
+
+/// Which cells slip under the trapezoid rule, and whether a fixed point found that.
+pub(super) struct TrapezoidAnswer {
+    pub(super) slips: Vec<bool>,
+    pub(super) by_fixed_point: bool,
 }
 
 /// With which buffers to solve, and who may stop it.
@@ -188,6 +193,8 @@ impl<'a> RuleSequence<'a> {
             scale: (largest * newton.compliance()).min(1.0),
             tolerance: self.tolerance,
             steps_max: self.steps_max,
+            // Starts of the trapezoid rule come from other meshes or motions; one step makes the answer independent of them.
+            accepts_start: falls,
         };
         let Control { workspace, monitor } = &mut self.control;
         let settled = if shortcut {
@@ -218,7 +225,7 @@ impl<'a> RuleSequence<'a> {
         let equations = self.equations(Rule::ThreePoint);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
-        let (mut report, by_fixed_point) = self.rule(&newton, &rigid, t, true)?;
+        let mut report = self.rule(&newton, &rigid, t, true)?.0;
         // The start may be what hinders the iteration.
         if !report.exit.converged() && started {
             t.fill(0.0);
@@ -253,7 +260,6 @@ impl<'a> RuleSequence<'a> {
         let found = ThreePointAnswer {
             slip: self.own_slip(),
             slips: self.zones(&newton, t),
-            by_fixed_point,
             other: None,
         };
         let Some(fall) = self.fall else {
@@ -363,72 +369,53 @@ impl<'a> RuleSequence<'a> {
         Ok(self.rule(&newton, &rigid, t, false)?.0.exit.converged())
     }
 
-    /// The trapezoid rule from `t` if few steps are enough; nothing otherwise, and `t` is as it was.
-    pub(super) fn few_steps(
-        &mut self,
-        t: &mut [f64],
-        steps_max: u32,
-    ) -> Result<Option<Vec<bool>>, Stop> {
-        let equations = self.equations(Rule::Trapezoid);
-        let rigid = self.rigid(&equations);
-        let newton = self.newton(&equations);
-        let mut found = t.to_vec();
-        self.steps_max = steps_max;
-        let report = self.rule(&newton, &rigid, &mut found, true)?.0;
-        self.steps_max = STEPS_MAX;
-        if !report.exit.converged() {
-            return Ok(None);
-        }
-        t.copy_from_slice(&found);
-        Ok(Some(self.zones(&newton, t)))
-    }
-
-    /// The trapezoid rule from a start of its own if there is one, else from the three-point solution in `t`, else from the
-    /// upwind solution; returns which cells slip. If no start leads to a solution `t` is as it was.
+    /// The trapezoid rule from `t` in at most `steps_max` Newton steps; `t` stays as it was if they do not suffice.
     pub(super) fn trapezoid(
         &mut self,
         t: &mut [f64],
-        warm: Option<Vec<f64>>,
-    ) -> Result<Option<Vec<bool>>, Stop> {
+        steps_max: u32,
+    ) -> Result<Option<TrapezoidAnswer>, Stop> {
+        let mut found = t.to_vec();
+        let answer = self.trapezoid_in_place(&mut found, steps_max, true)?;
+        if answer.is_some() {
+            t.copy_from_slice(&found);
+        }
+        Ok(answer)
+    }
+
+    /// The trapezoid rule from the upwind solution; `t` stays as it was if that leads to no solution.
+    pub(super) fn trapezoid_from_upwind(
+        &mut self,
+        t: &mut [f64],
+    ) -> Result<Option<TrapezoidAnswer>, Stop> {
+        let residual = self.work.residual;
+        let mut found = vec![0.0; t.len()];
+        self.upwind(&mut found)?;
+        let answer = self.trapezoid_in_place(&mut found, STEPS_MAX, false)?;
+        match answer {
+            Some(_) => t.copy_from_slice(&found),
+            // The tractions remain those of the three-point rule, and so does their residual.
+            None => self.work.residual = residual,
+        }
+        Ok(answer)
+    }
+
+    fn trapezoid_in_place(
+        &mut self,
+        t: &mut [f64],
+        steps_max: u32,
+        shortcut: bool,
+    ) -> Result<Option<TrapezoidAnswer>, Stop> {
         let equations = self.equations(Rule::Trapezoid);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
-        let residual = self.work.residual;
-        let mut converged = false;
-        let mut found = t.to_vec();
-        if let Some(warm) = warm {
-            found.copy_from_slice(&warm);
-            converged = self
-                .rule(&newton, &rigid, &mut found, true)?
-                .0
-                .exit
-                .converged();
-            if !converged {
-                found.copy_from_slice(t);
-            }
-        }
-        if !converged
-            && !self
-                .rule(&newton, &rigid, &mut found, true)?
-                .0
-                .exit
-                .converged()
-        {
-            found.fill(0.0);
-            self.upwind(&mut found)?;
-            if !self
-                .rule(&newton, &rigid, &mut found, false)?
-                .0
-                .exit
-                .converged()
-            {
-                // The answer is that of the three-point rule, and so is its residual.
-                self.work.residual = residual;
-                return Ok(None);
-            }
-        }
-        t.copy_from_slice(&found);
-        Ok(Some(self.zones(&newton, t)))
+        self.steps_max = steps_max;
+        let (report, by_fixed_point) = self.rule(&newton, &rigid, t, shortcut)?;
+        self.steps_max = STEPS_MAX;
+        Ok(report.exit.converged().then(|| TrapezoidAnswer {
+            slips: self.zones(&newton, t),
+            by_fixed_point,
+        }))
     }
 
     /// The slips of the rule that was solved last, over the whole mesh.

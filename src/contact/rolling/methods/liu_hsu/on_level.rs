@@ -138,6 +138,7 @@ impl<'a> DenseParts<'a> {
                 scale: self.scale,
                 tolerance,
                 steps_max: STEPS_MAX,
+                accepts_start: true,
             },
             nodes: (&self.level.normalised.node, &self.y),
             motion: self.motion,

@@ -146,23 +146,6 @@ pub(crate) fn forces(
     [limit * force[0], limit * force[1]]
 }
 
-/// Forces in N and moment in N mm about the origin of the case, as [`forces`] for an ellipse that the table covers, and their error bound
-/// relative to μN and μN√(ab).
-#[must_use]
-pub(crate) fn resultants(
-    shear_modulus: f64,
-    poisson_ratio: f64,
-    ellipse: &LoadEllipse,
-    limit: f64,
-    motion: &Motion,
-) -> (Resultants, f64) {
-    let creepage = dimensionless(shear_modulus, ellipse, limit, motion);
-    let Creep { force, bound, .. } = table()
-        .ellipse(ellipse.ratio(), poisson_ratio)
-        .creep(creepage);
-    (about_origin(ellipse, limit, force), bound)
-}
-
 /// `[F_x/(μN), F_y/(μN), M_z/(μN√(ab))]` about the centre of an ellipse as resultants about the origin of the case.
 fn about_origin(ellipse: &LoadEllipse, limit: f64, force: [f64; 3]) -> Resultants {
     let [x, y] = ellipse.centre;

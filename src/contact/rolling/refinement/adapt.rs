@@ -1,0 +1,272 @@
+//! The adaptive solve: one motion on the meshes of its family until the estimate of the error meets the target.
+
+use crate::contact::error::SolveError;
+use crate::contact::method::Method;
+use crate::contact::monitor::Monitor;
+use crate::contact::rolling::answer::Work;
+use crate::contact::rolling::mesh_plan::MeshPlan;
+use crate::contact::rolling::methods::table::solve as table;
+use crate::contact::rolling::motion_answer::{MotionAnswer, SolvedFields};
+use crate::contact::rolling::refinement::error_estimate::{Estimate, coarser};
+use crate::contact::rolling::refinement::mesh_family::{MeshFamily, fixed_meshes};
+use crate::contact::rolling::refinement::on_mesh::{
+    DiscreteSolution, MotionTask, add_smooth_slips, solve_on_mesh,
+};
+use crate::contact::rolling::refinement::state::RefinementState;
+use crate::contact::rolling::task::RollingTask;
+
+/// Next mesh over the last one.
+const DOUBLING: f64 = 2.0;
+/// Estimates up to this many times the target are followed by half a doubling.
+const HALF_DOUBLING_TO: f64 = 1.5;
+/// Where the estimate of the mesh before exceeds the target by no more than this part of it, the answer is a mean of both meshes, so that answers
+/// of near motions do not jump where the number of meshes changes.
+const BLENDED: f64 = 0.5;
+
+/// Estimate over the target of a mean of two meshes of which the finer meets it: just below 1, to leave room for rounding.
+const MET: f64 = 1.0 - 1e-9;
+
+/// Solves a motion by the method of the task.
+///
+/// # Errors
+/// Why there is no answer.
+pub fn solve(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    asked: MotionTask,
+    monitor: &dyn Monitor,
+) -> Result<MotionAnswer, SolveError> {
+    let mut found = solve_forces(task, state, asked, monitor)?.0;
+    add_slips(task, state, asked.index, &mut found, monitor)?;
+    Ok(found)
+}
+
+/// The same without slips for output, and the meshes that value and estimate follow from.
+pub(crate) fn solve_forces(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    asked: MotionTask,
+    monitor: &dyn Monitor,
+) -> Result<(MotionAnswer, Vec<MeshPlan>), SolveError> {
+    if task.method == Method::Table {
+        let found = table::solve(task, state.ellipses(), &asked.motion, monitor)?;
+        return Ok((found, Vec::new()));
+    }
+    let mut run = AdaptiveRun::new(task, state, asked, monitor);
+    let estimate = match (fixed_meshes(task.resolution, task.method), task.target()) {
+        (None, Some(target)) => run.to_target(target)?,
+        (sizes, _) => {
+            let sizes = sizes.unwrap_or_default();
+            let plans: Vec<MeshPlan> = sizes.into_iter().map(MeshPlan::from).collect();
+            run.on_meshes(&plans, false)?
+        }
+    };
+    let plans = run.compared();
+    Ok((run.finish(estimate), plans))
+}
+
+/// Solves a motion on given meshes, coarse to fine. Value and estimate are a smooth function of the motion.
+///
+/// # Errors
+/// Why there is no answer.
+pub(crate) fn solve_on_meshes(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    asked: MotionTask,
+    plans: &[MeshPlan],
+    monitor: &dyn Monitor,
+) -> Result<MotionAnswer, SolveError> {
+    let mut run = AdaptiveRun::new(task, state, asked, monitor);
+    let estimate = run.on_meshes(plans, true)?;
+    Ok(run.finish(estimate))
+}
+
+/// Adds smooth slips to an answer if they are asked for. Forces do not depend on it.
+///
+/// # Errors
+/// The monitor may stop the work.
+pub(crate) fn add_slips(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    index: usize,
+    found: &mut MotionAnswer,
+    monitor: &dyn Monitor,
+) -> Result<(), SolveError> {
+    if !task.wants_slips {
+        return Ok(());
+    }
+    let motion = found.motion;
+    let asked = MotionTask { index, motion };
+    if let Some(SolvedFields { level, tangential }) = &mut found.fields {
+        let work = add_smooth_slips(task, state, asked, *level, tangential, monitor)?;
+        found.work.add_lost(work);
+    }
+    Ok(())
+}
+
+/// The meshes of a motion that are solved.
+struct AdaptiveRun<'a, 's, 't> {
+    task: &'a RollingTask<'a>,
+    state: &'s mut RefinementState<'t>,
+    asked: MotionTask,
+    monitor: &'a dyn Monitor,
+    began: f64,
+    /// Coarse to fine.
+    solved: Vec<DiscreteSolution>,
+    /// The mesh before has no answer.
+    failed: bool,
+    work: Work,
+}
+
+impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
+    fn new(
+        task: &'a RollingTask<'a>,
+        state: &'s mut RefinementState<'t>,
+        asked: MotionTask,
+        monitor: &'a dyn Monitor,
+    ) -> AdaptiveRun<'a, 's, 't> {
+        AdaptiveRun {
+            task,
+            state,
+            asked,
+            monitor,
+            began: monitor.elapsed().as_secs_f64(),
+            solved: Vec::new(),
+            failed: false,
+            work: Work::default(),
+        }
+    }
+
+    /// Solves the meshes of the family until the estimate meets the target, or to the finest.
+    fn to_target(&mut self, target: f64) -> Result<Estimate, SolveError> {
+        let family = MeshFamily::of(self.task, &self.asked.motion);
+        let most = family.cells_max();
+        let mut cells = family.cells_first();
+        let mut before: Option<Estimate> = None;
+        loop {
+            let is_finest = cells > 0.999 * most;
+            let is_needed = is_finest && self.solved.is_empty();
+            self.add(family.mesh(cells), is_needed)?;
+            let mut times = DOUBLING;
+            let estimate = Estimate::of(self.task, self.asked.index, &self.solved, true);
+            let is_judged = self.compared().len() > 2;
+            if let Some(mut found) = estimate.filter(|_| is_judged || is_finest) {
+                let error = found.whole().unwrap_or(f64::INFINITY);
+                if error <= target || is_finest {
+                    if let Some(before) = &before {
+                        found.blend(before, target);
+                        // Tractions that a client sums are no farther from the resultants than the estimate.
+                        let finest = self.solved.last();
+                        found.cover(self.task, finest.map_or(&[], |mesh| &mesh.resultants));
+                    }
+                    return Ok(found);
+                }
+                if error < HALF_DOUBLING_TO * target {
+                    times = DOUBLING.sqrt();
+                }
+                before = Some(found);
+            }
+            cells = (times * cells).min(most);
+        }
+    }
+
+    /// Solves given meshes; those before the finest only as far as they have an answer.
+    fn on_meshes(
+        &mut self,
+        plans: &[MeshPlan],
+        extrapolates: bool,
+    ) -> Result<Estimate, SolveError> {
+        for (k, plan) in plans.iter().enumerate() {
+            self.add(*plan, k + 1 == plans.len())?;
+        }
+        let found = Estimate::of(self.task, self.asked.index, &self.solved, extrapolates);
+        let Some(found) = found else {
+            unreachable!("the finest mesh has an answer")
+        };
+        Ok(found)
+    }
+
+    /// Solves a mesh unless it is the last one. One that is not needed may have no answer, but not two in a row.
+    fn add(&mut self, plan: MeshPlan, is_needed: bool) -> Result<(), SolveError> {
+        let last = self.solved.last();
+        if last.is_some_and(|last| last.mesh.plan == plan) {
+            return Ok(());
+        }
+        let found = solve_on_mesh(self.task, self.state, self.asked, plan, last, self.monitor);
+        match found {
+            Ok(found) => {
+                self.work.add(found.tangential.work);
+                self.solved.push(found);
+                self.failed = false;
+            }
+            Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. })
+                if !is_needed && !self.failed =>
+            {
+                self.failed = true;
+            }
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// The meshes that the estimate compares: the finest, and up to two coarser ones, coarse to fine.
+    fn compared(&self) -> Vec<MeshPlan> {
+        let last = self.solved.len().checked_sub(1);
+        let next = |k: &usize| coarser(&self.solved, *k);
+        let chain = std::iter::successors(last, next).take(3);
+        let mut plans: Vec<MeshPlan> = chain.map(|k| self.solved[k].mesh.plan).collect();
+        plans.reverse();
+        plans
+    }
+
+    fn finish(mut self, estimate: Estimate) -> MotionAnswer {
+        let Some(DiscreteSolution {
+            number,
+            mut tangential,
+            ..
+        }) = self.solved.pop()
+        else {
+            unreachable!("an estimate belongs to a mesh")
+        };
+        MotionAnswer {
+            motion: self.asked.motion,
+            saturated: false,
+            resultants: estimate.resultants,
+            errors: estimate.errors,
+            skips: std::mem::take(&mut tangential.skips),
+            remarks: std::mem::take(&mut tangential.remarks),
+            fields: Some(SolvedFields {
+                level: number,
+                tangential,
+            }),
+            table: None,
+            history: None,
+            work: self.work,
+            method: self.task.method,
+            seconds: self.monitor.elapsed().as_secs_f64() - self.began,
+        }
+    }
+}
+
+impl Estimate {
+    /// Moves value and errors towards those of the mesh before, the more the closer its estimate was to the target.
+    fn blend(&mut self, before: &Estimate, target: f64) {
+        let excess = before
+            .whole()
+            .map_or(f64::INFINITY, |error| error / target - 1.0);
+        let weight = (excess / BLENDED).clamp(0.0, 1.0);
+        if weight == 1.0 {
+            return;
+        }
+        for (value, other) in self.resultants.iter_mut().zip(&before.resultants) {
+            *value = value.times(weight).plus(other.times(1.0 - weight));
+        }
+        for (error, other) in self.errors.iter_mut().zip(&before.errors) {
+            if let (Some(error), Some(other)) = (error, other) {
+                let mixed = weight * *error + (1.0 - weight) * other;
+                let met = *error <= target;
+                *error = error.max(if met { mixed.min(MET * target) } else { mixed });
+            }
+        }
+    }
+}

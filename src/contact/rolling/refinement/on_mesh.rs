@@ -1,0 +1,224 @@
+//! One motion on one mesh: start, method and resultants.
+
+use std::sync::Arc;
+
+use crate::contact::error::SolveError;
+use crate::contact::mesh::size::MeshSize;
+use crate::contact::method::Method;
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::patch::Patch;
+use crate::contact::rolling::answer::{LevelAnswer, LevelExit, LevelFailure, Work};
+use crate::contact::rolling::mesh_plan::MeshPlan;
+use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
+use crate::contact::rolling::methods::boundary_element::task::LevelTask;
+use crate::contact::rolling::methods::liu_hsu::on_level;
+use crate::contact::rolling::methods::{fastsim, full_slip};
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::refinement::interpolate::prolonged;
+use crate::contact::rolling::refinement::state::RefinementState;
+use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::task::RollingTask;
+
+/// The coarse mesh on which the method of Liu and Hsu finds its spin pole; they recommend fewer than 30 cells (see `liu_hsu`).
+const POLE_MESH: MeshSize = MeshSize {
+    strips: 5,
+    cells: 5,
+};
+/// If a solve does not converge, a patch longer along rolling than this many times its width is named as the likely reason; nearly all
+/// such patches are solved.
+const SLENDER: f64 = 20.0;
+
+/// A motion of a problem, and the creepages it is solved with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionTask {
+    /// The number of the motion.
+    pub index: usize,
+    /// Creepages and spin.
+    pub motion: Motion,
+}
+
+/// The answer for one motion on one mesh.
+#[derive(Debug, Clone)]
+pub struct DiscreteSolution {
+    /// The number of the mesh in the levels.
+    pub number: usize,
+    /// The mesh.
+    pub mesh: Arc<StripMesh>,
+    /// Tractions, slips and zones.
+    pub tangential: LevelAnswer,
+    /// Resultants of every patch about the origin of the case, as the tractions give them.
+    pub resultants: Vec<Resultants>,
+}
+
+impl DiscreteSolution {
+    /// The number of cells.
+    #[must_use]
+    pub fn cells(&self) -> f64 {
+        self.mesh.mesh.cells() as f64
+    }
+}
+
+/// Solves a motion on one mesh. The start is predicted from motions before, else prolonged from a coarser mesh, else that of the
+/// simplified theory.
+///
+/// # Errors
+/// Why there is no answer.
+pub fn solve_on_mesh(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    asked: MotionTask,
+    plan: MeshPlan,
+    coarser: Option<&DiscreteSolution>,
+    monitor: &dyn Monitor,
+) -> Result<DiscreteSolution, SolveError> {
+    let number = state.levels.level(plan)?;
+    let mesh = state.levels.get(number);
+    let tangential = match task.method {
+        // Tractions are 0, whatever the method.
+        _ if task.friction.is_frictionless() => {
+            Ok(full_slip::frictionless_answer(&mesh, &asked.motion))
+        }
+        Method::LiuHsu => {
+            let coarse = StripMesh::new(task, POLE_MESH).ok();
+            let tolerance = task.tolerance(asked.index);
+            on_level::solve(&mesh, coarse.as_ref(), &asked.motion, tolerance, monitor)
+        }
+        Method::Fastsim => {
+            let motion = mesh.scale.motion(&asked.motion);
+            Ok(fastsim::solve(task, &mesh, &motion))
+        }
+        Method::BoundaryElement | Method::Table => {
+            boundary_elements(task, state, asked, number, coarser, monitor)
+        }
+    };
+    let tangential =
+        tangential.map_err(|failure| named(failure, task, task.first_motion + asked.index))?;
+    let resultants = (0..task.footprint.patches().len())
+        .map(|patch| Resultants::of_patch(&mesh, &tangential.traction, patch))
+        .collect();
+    Ok(DiscreteSolution {
+        number,
+        mesh,
+        tangential,
+        resultants,
+    })
+}
+
+fn boundary_elements(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    asked: MotionTask,
+    number: usize,
+    coarser: Option<&DiscreteSolution>,
+    monitor: &dyn Monitor,
+) -> Result<LevelAnswer, LevelFailure> {
+    let mesh = state.levels.get(number);
+    let motion = mesh.scale.motion(&asked.motion);
+    let of_mesh = level_task(task, &mesh, &motion, asked.index);
+    let is_unique = of_mesh.fall.is_none() && of_mesh.passage.is_none();
+    // Which of several solutions is found depends on the start, which therefore has to be a function of the motion.
+    let predicted = match is_unique {
+        true => state.predictor.start(number, &motion, &mesh.bound),
+        false => None,
+    };
+    let start = match (predicted, coarser) {
+        (Some(start), _) => Some(start),
+        (None, Some(coarser)) => {
+            let traction = &coarser.tangential.traction;
+            Some(prolonged(&coarser.mesh, traction, &mesh))
+        }
+        (None, None) => is_unique.then(|| fastsim::tractions(task, &mesh, &motion)),
+    };
+    let found = boundary_element::solve(of_mesh, start.as_ref(), &mut state.workspace, monitor)?;
+    let is_predicting = task.motions.len() > 1 || task.forces[asked.index] != [None; 2];
+    if is_unique && is_predicting && found.exit == LevelExit::Solved {
+        state.predictor.remember(number, motion, &found.traction);
+    }
+    Ok(found)
+}
+
+/// Replaces the slips on a mesh by smooth ones where they are those of the trapezoid rule; where that has no answer, they stay. Returns the work.
+///
+/// # Errors
+/// The monitor may stop the work.
+pub(crate) fn add_smooth_slips(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    asked: MotionTask,
+    number: usize,
+    answer: &mut LevelAnswer,
+    monitor: &dyn Monitor,
+) -> Result<Work, SolveError> {
+    let is_smooth = answer.second.is_some() || answer.exit != LevelExit::Solved;
+    if task.method != Method::BoundaryElement || is_smooth {
+        return Ok(Work::default());
+    }
+    let mesh = state.levels.get(number);
+    let motion = mesh.scale.motion(&asked.motion);
+    let of_mesh = level_task(task, &mesh, &motion, asked.index);
+    let before = answer.work;
+    match boundary_element::smooth_slips(of_mesh, answer, &mut state.workspace, monitor) {
+        Ok(()) | Err(LevelFailure::NotConverged { .. }) => Ok(answer.work.since(before)),
+        Err(LevelFailure::Stopped(stop)) => Err(stop.into()),
+    }
+}
+
+/// The task of a motion on a mesh.
+fn level_task<'a>(
+    task: &'a RollingTask,
+    level: &'a StripMesh,
+    motion: &'a Motion,
+    index: usize,
+) -> LevelTask<'a> {
+    LevelTask {
+        level,
+        motion,
+        fall: task.bound_fall(index, level.scale.slip()),
+        passage: task.passage(index).map(|laws| level.scale.passage(&laws)),
+        tolerance: task.tolerance(index),
+    }
+}
+
+/// The error that a client reads about a failure at a point of the case.
+pub(crate) fn named(failure: LevelFailure, task: &RollingTask, point: usize) -> SolveError {
+    match failure {
+        LevelFailure::Stopped(stop) => stop.into(),
+        LevelFailure::NotConverged {
+            work,
+            tolerance,
+            advice,
+        } => SolveError::NotConverged {
+            method: task.method,
+            point,
+            iterations: work.iterations as usize,
+            residual: work.residual,
+            tolerance,
+            advice: match slender(task) {
+                Some(slender) => format!("{slender}; {advice}"),
+                None => advice,
+            },
+        },
+    }
+}
+
+/// A clause that names the patch of the largest ratio of length along rolling to width, if this may be why there is no answer.
+fn slender(task: &RollingTask) -> Option<String> {
+    let ratio = |patch: &Patch| {
+        let [x_min, x_max, y_min, y_max] = patch.extent;
+        (x_max - x_min) / (y_max - y_min)
+    };
+    let patches = task.footprint.patches();
+    let (number, patch) = patches
+        .iter()
+        .enumerate()
+        .max_by(|(_, a), (_, b)| ratio(a).total_cmp(&ratio(b)))?;
+    let [x_min, x_max, y_min, y_max] = patch.extent;
+    (ratio(patch) > SLENDER).then(|| {
+        format!(
+            "patch {number} at x {x_min:.2} to {x_max:.2} mm, y {y_min:.3} to {y_max:.3} mm is {:.0} times as long along \
+             rolling as wide, which fastsim solves in any case",
+            ratio(patch)
+        )
+    })
+}

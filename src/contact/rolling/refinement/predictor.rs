@@ -1,0 +1,166 @@
+//! Starts of a motion from the tractions of the last motions on the same mesh. They change the time of a solve, never its mesh or estimate.
+
+use crate::contact::numerics::length::length;
+use crate::contact::rolling::motion::Motion;
+
+/// Distance from the line through the last two motions, relative to the step, up to which a motion lies on it. Numeric safety, not tuned.
+const STRAIGHT: f64 = 1e-6;
+/// Longest step that is extrapolated, in steps between the last two motions. 1.1 and 2.5 are alike on sweeps of equal steps.
+const STEP_MAX: f64 = 1.5;
+/// Motions remembered on every mesh. Starts from three, by a parabola, take 8 to 15 % more products on creep curves and maps.
+const STEPS: usize = 2;
+/// Longest step, relative to the motion, over which the last tractions serve unchanged. On 12 sweeps of 9 motions on random ellipses 0.12 takes
+/// 6 % more products and 0.5 takes 6 % fewer.
+const NEAR: f64 = 0.25;
+
+/// Tractions of the last motions on every mesh.
+#[derive(Debug, Default)]
+pub struct Predictor {
+    /// The newest of a mesh last.
+    steps: Vec<Step>,
+}
+
+#[derive(Debug)]
+struct Step {
+    /// The number of the mesh.
+    mesh: usize,
+    /// Dimensionless, about the origin of the mesh.
+    motion: Motion,
+    traction: [Vec<f64>; 2],
+}
+
+impl Predictor {
+    /// Remembers the tractions of a motion in place of the oldest on the mesh, or of the same motion.
+    pub fn remember(&mut self, mesh: usize, motion: Motion, traction: &[Vec<f64>; 2]) {
+        self.steps
+            .retain(|step| step.mesh != mesh || step.motion != motion);
+        if self.steps.iter().filter(|step| step.mesh == mesh).count() == STEPS
+            && let Some(oldest) = self.steps.iter().position(|step| step.mesh == mesh)
+        {
+            self.steps.remove(oldest);
+        }
+        self.steps.push(Step {
+            mesh,
+            motion,
+            traction: traction.clone(),
+        });
+    }
+
+    /// Forgets a mesh.
+    pub fn forget(&mut self, mesh: usize) {
+        self.steps.retain(|step| step.mesh != mesh);
+    }
+
+    /// The tractions that are expected for a motion, within their bounds: on the line through the last two motions, on that through the
+    /// last one and rest, or those of the last one if it is near.
+    #[must_use]
+    pub fn start(&self, mesh: usize, motion: &Motion, bound: &[f64]) -> Option<[Vec<f64>; 2]> {
+        let mut steps = self.steps.iter().rev().filter(|step| step.mesh == mesh);
+        let last = steps.next()?;
+        let to_go = difference(motion, &last.motion);
+        let before = steps.next().and_then(|before| {
+            let along = on_line(to_go, difference(&last.motion, &before.motion))?;
+            (along > 0.0 && along <= STEP_MAX).then_some((before, along))
+        });
+        let mut start = match before {
+            Some((before, along)) => [0, 1].map(|k| {
+                let pairs = last.traction[k].iter().zip(&before.traction[k]);
+                pairs.map(|(t, before)| t + along * (t - before)).collect()
+            }),
+            None => {
+                let times = from_rest(motion, &last.motion)
+                    .or_else(|| is_near(motion, &last.motion).then_some(1.0))?;
+                let scaled = |values: &Vec<f64>| values.iter().map(|t| times * t).collect();
+                [scaled(&last.traction[0]), scaled(&last.traction[1])]
+            }
+        };
+        shrink(&mut start, bound);
+        Some(start)
+    }
+}
+
+/// `s` such that `to = s·step`, if the vectors are parallel.
+fn on_line(to: [f64; 3], step: [f64; 3]) -> Option<f64> {
+    let along = dot(to, step) / dot(step, step);
+    let aside = [0, 1, 2].map(|k| to[k] - along * step[k]);
+    (dot(aside, aside).sqrt() <= STRAIGHT * dot(to, to).sqrt()).then_some(along)
+}
+
+/// The ratio of a motion to the last one, if they are parallel and of similar size: tractions that stick grow in proportion.
+fn from_rest(motion: &Motion, last: &Motion) -> Option<f64> {
+    let along = on_line(components(motion), components(last))?;
+    (1.0 / (1.0 + STEP_MAX)..=1.0 + STEP_MAX)
+        .contains(&along)
+        .then_some(along)
+}
+
+/// Whether the tractions of the last motion serve as they are.
+fn is_near(motion: &Motion, last: &Motion) -> bool {
+    let (whole, to_go) = (components(motion), difference(motion, last));
+    dot(to_go, to_go) <= NEAR * NEAR * dot(whole, whole)
+}
+
+/// Brings tractions into their discs.
+fn shrink(traction: &mut [Vec<f64>; 2], bound: &[f64]) {
+    let [x, y] = traction;
+    for ((x, y), bound) in x.iter_mut().zip(y.iter_mut()).zip(bound) {
+        let long = length(*x, *y);
+        if long > *bound {
+            *x *= bound / long;
+            *y *= bound / long;
+        }
+    }
+}
+
+fn components(motion: &Motion) -> [f64; 3] {
+    [motion.creepage_x, motion.creepage_y, motion.spin_per_mm]
+}
+
+fn difference(a: &Motion, b: &Motion) -> [f64; 3] {
+    let (a, b) = (components(a), components(b));
+    [0, 1, 2].map(|k| a[k] - b[k])
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moving(creepage_x: f64, creepage_y: f64) -> Motion {
+        Motion {
+            creepage_x,
+            creepage_y,
+            spin_per_mm: 0.0,
+        }
+    }
+
+    fn of(values: [f64; 2]) -> [Vec<f64>; 2] {
+        values.map(|value| vec![value])
+    }
+
+    #[test]
+    fn motions_on_a_line_are_extrapolated_within_their_discs() {
+        let mut predictor = Predictor::default();
+        assert_eq!(predictor.start(0, &moving(1.0, 1.0), &[1.0]), None);
+        predictor.remember(0, moving(1.0, 1.0), &of([0.2, 0.0]));
+        predictor.remember(0, moving(2.0, 1.0), &of([0.3, 0.0]));
+        let near =
+            |a: Option<[Vec<f64>; 2]>, b: f64| a.is_some_and(|a| (a[0][0] - b).abs() < 1e-12);
+        assert!(near(predictor.start(0, &moving(3.0, 1.0), &[1.0]), 0.4));
+        assert!(near(predictor.start(0, &moving(3.0, 1.0), &[0.35]), 0.35));
+        assert_eq!(predictor.start(1, &moving(3.0, 1.0), &[1.0]), None);
+    }
+
+    #[test]
+    fn motions_beside_the_line_start_from_the_last_one_if_they_are_near() {
+        let mut predictor = Predictor::default();
+        predictor.remember(0, moving(1.0, 1.0), &of([0.2, 0.0]));
+        predictor.remember(0, moving(2.0, 1.0), &of([0.3, 0.0]));
+        let start = predictor.start(0, &moving(2.0, 1.1), &[1.0]);
+        assert_eq!(start, Some(of([0.3, 0.0])));
+        assert_eq!(predictor.start(0, &moving(2.0, 9.0), &[1.0]), None);
+    }
+}
