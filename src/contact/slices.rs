@@ -1,4 +1,4 @@
-//! Long sweeps in slices of about equally many motions, each solved on its own, joined to the whole answer.
+//! Cuts long sweeps into slices of about equal numbers of motions. Each slice is solved alone, and the answers are joined.
 //!
 //! No start is carried over a cut, so that an answer does not depend on when and where its slices were solved, or whether a restart came
 //! between: [`solve`](crate::contact::solve) takes the same slices one after the other.
@@ -7,13 +7,18 @@ use std::ops::Range;
 
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::merged;
+use crate::contact::rolling::resolution::Resolution;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
 
-/// Most motions of a slice: few for those who wait behind it, many beside what a cut costs (region and pressure once more). Chosen by judgement.
+/// Most motions of a slice. Few motions keep the time short that other jobs wait; each slice finds region and pressure again. Chosen by judgement.
 const MOTIONS_MAX: usize = 100;
-/// The same where bodies differ, so that every motion has region and pressure of its own.
-const MOTIONS_MAX_COUPLED: usize = 10;
+/// The same where a motion takes long: unlike bodies, whose motions each have a pressure of their own, and fine meshes.
+const MOTIONS_MAX_LONG: usize = 10;
+/// Targets below this one need fine meshes.
+const TARGET_FINE: f64 = 0.002;
+/// An explicit mesh is fine from this number of cells on.
+const CELLS_FINE: u32 = 1000;
 
 /// Where a case is cut: ranges of motions in order, one after the other, at least one. The same case gives the same slices, whatever the
 /// load, limits and machine.
@@ -25,8 +30,12 @@ pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
         return std::iter::once(0..motions).collect();
     }
     // Nearly equal parts, so that no short one is left over.
-    let most = match case.problem.is_coupled(&case.run) {
-        true => MOTIONS_MAX_COUPLED,
+    let is_fine = match case.run.least_resolution() {
+        Resolution::Target(target) => target < TARGET_FINE,
+        Resolution::Mesh(size) => size.strips * size.cells >= CELLS_FINE,
+    };
+    let most = match is_fine || case.problem.is_coupled(&case.run) {
+        true => MOTIONS_MAX_LONG,
         false => MOTIONS_MAX,
     };
     let parts = motions.div_ceil(most).max(1);

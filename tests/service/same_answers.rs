@@ -180,18 +180,14 @@ async fn assert_rows(server: &Server, case: &Value, alone: &[[[f64; 2]; 2]]) {
         "/motion/creepage_y": CREEPAGES.map(|creepages| creepages[1]),
     });
     let rows = json!({ "template": case, "columns": columns });
-    for starts in ["own", "neighbours"] {
-        let run = server
-            .post(&format!("/v1/runs?starts={starts}"), &rows)
-            .await;
-        assert_eq!(run.status, 202, "{}", run.text);
-        let run = run.header("location").expect("a location").to_owned();
-        ended(server, &run).await;
-        let answers = lines(&server.get(&format!("{run}/results")).await);
-        assert_forms(server, &run, &answers).await;
-        let found: Vec<_> = answers.iter().map(of_row).collect();
-        assert_agrees(&format!("run from {starts}, {friction}"), &found, alone);
-    }
+    let run = server.post("/v1/runs", &rows).await;
+    assert_eq!(run.status, 202, "{}", run.text);
+    let run = run.header("location").expect("a location").to_owned();
+    ended(server, &run).await;
+    let answers = lines(&server.get(&format!("{run}/results")).await);
+    assert_forms(server, &run, &answers).await;
+    let found: Vec<_> = answers.iter().map(of_row).collect();
+    assert_agrees(&format!("run, {friction}"), &found, alone);
     let answer = server.post("/v1/evaluate", &rows).await;
     assert_eq!(answer.status, 200, "{}", answer.text);
     let columns = &answer.json["columns"];

@@ -90,6 +90,9 @@ pub struct RunHead {
     pub profiles: BTreeMap<String, Value>,
     /// The method asked for.
     pub method: String,
+    /// Always false. Stored runs have the member, and a repeated submission is recognised by the bytes of its head.
+    #[serde(default)]
+    from_neighbours: bool,
     /// Answers have the column of reasons; those of older runs do not.
     #[serde(default)]
     pub with_reasons: bool,
@@ -120,6 +123,7 @@ impl RunHead {
             numbers,
             profiles: BTreeMap::new(),
             method,
+            from_neighbours: false,
             with_reasons: true,
             rows: 0,
             chunk_rows: 0,
