@@ -54,7 +54,7 @@ pub(crate) fn solve_forces(
     }
     let mut run = AdaptiveRun::new(task, state, asked, monitor);
     let estimate = match (fixed_meshes(task.resolution, task.method), task.target()) {
-        (None, Some(target)) => run.to_target(target)?,
+        (None, Some(target)) => run.meet_target(target)?,
         (sizes, _) => {
             let sizes = sizes.unwrap_or_default();
             let plans: Vec<MeshPlan> = sizes.into_iter().map(MeshPlan::from).collect();
@@ -138,7 +138,7 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
     }
 
     /// Solves the meshes of the family until the estimate meets the target, or to the finest.
-    fn to_target(&mut self, target: f64) -> Result<Estimate, SolveError> {
+    fn meet_target(&mut self, target: f64) -> Result<Estimate, SolveError> {
         let family = MeshFamily::of(self.task, &self.asked.motion);
         let most = family.cells_max();
         let mut cells = family.cells_first();
