@@ -26,7 +26,7 @@ fn main() {
     println!("|---|---|---|---|---|---|");
     let folder = concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/../../tests/data/gap_grids.json"
+        "/../tests/data/gap_grids.json"
     );
     let text = std::fs::read_to_string(folder).expect("reference data");
     let cases: Vec<Value> = serde_json::from_str(&text).expect("reference data are JSON");

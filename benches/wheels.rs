@@ -44,7 +44,7 @@ fn main() {
 
 fn example(name: &str) -> Value {
     let path = format!(
-        "{}/../../api/examples/{name}",
+        "{}/../api/examples/{name}",
         concat!(env!("CARGO_MANIFEST_DIR"))
     );
     let text = std::fs::read_to_string(path).expect("an example");

@@ -72,7 +72,7 @@ fn pair() -> Option<[Value; 2]> {
     let folder = folder.unwrap_or_else(|| {
         PathBuf::from(concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/../../../shared/reference"
+            "/../../shared/reference"
         ))
     });
     let file = |name: &str| {

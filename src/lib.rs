@@ -9,7 +9,7 @@
 //! | [`http`] | what may a client ask, and how is it answered? |
 //! | [`cli`] | what can be started, with which settings? Then `main` |
 //!
-//! [`telemetry`] decides where logs and spans go and is used by [`cli`] only.
+//! [`telemetry`] writes the log and [`otlp`] sends spans; only [`cli`] uses them.
 //!
 //! Inside [`contact`] a case passes these stages, each returns a type of its own; [`contact`] has the recipe:
 //!
@@ -32,6 +32,11 @@
 pub mod cli;
 pub mod http;
 pub mod jobs;
+#[cfg(feature = "otlp")]
+pub mod otlp;
+#[cfg(not(feature = "otlp"))]
+#[path = "no_otlp.rs"]
+pub mod otlp;
 pub mod telemetry;
 
 pub use railhead_contact::contact;

@@ -56,7 +56,7 @@ pub type Truths = BTreeMap<String, BTreeMap<usize, Truth>>;
 
 /// The file of truths.
 pub fn file() -> PathBuf {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("tests/data/finer_meshes.json")
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/data/finer_meshes.json")
 }
 
 /// The truths of the file; none if there is no file.

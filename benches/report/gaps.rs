@@ -204,7 +204,7 @@ fn wheels() -> String {
     let example = |name: &str| -> Value {
         let path = format!(
             "{}/api/examples/{name}",
-            concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+            concat!(env!("CARGO_MANIFEST_DIR"), "/..")
         );
         let text = std::fs::read_to_string(path).expect("an example");
         serde_json::from_str(&text).expect("an example is JSON")

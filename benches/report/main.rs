@@ -48,7 +48,7 @@ fn main() {
         1e3 * lu_seconds()
     );
     let cases = questions::hertz_cases();
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("docs");
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("docs");
     let pictures = folder.join("accuracy-and-speed");
     std::fs::create_dir_all(&pictures).expect("a folder for the pictures");
     text.push_str(&targets::section(&cases));

@@ -22,7 +22,7 @@ pub const CLASSES: [&str; 5] = [
 pub fn stored(name: &str) -> Vec<Value> {
     let path = format!(
         "{}/tests/data/{name}.json",
-        concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+        concat!(env!("CARGO_MANIFEST_DIR"), "/..")
     );
     let text = std::fs::read_to_string(path).expect("reference data");
     serde_json::from_str(&text).expect("reference data are JSON")

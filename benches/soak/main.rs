@@ -6,22 +6,22 @@
 //! then the nodes are replaced; `old=` names a program of an earlier version), `queue` (claims with 10⁴ and 10⁶ queued jobs), `snapshot`
 //! (claims while somebody holds an old snapshot), `rate` (8 workers), `simulation` (1 to 100 nodes with the costs measured here), `network` (hosts that are cut off; needs root or namespaces for users, `ip` and `nft`). Without a name nothing is run. A broken promise ends it with a panic. `--profile dev` takes the build of the tests.
 
-#[path = "../../tests/service/cable.rs"]
+#[path = "../../tests/service/cluster/cable.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
 mod cable;
-#[path = "../../tests/service/faketime.rs"]
+#[path = "../../tests/service/cluster/faketime.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
 mod faketime;
-#[path = "../../tests/service/faulty_server.rs"]
+#[path = "../../tests/service/cluster/faulty_server.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
 mod faulty_server;
-#[path = "../../tests/service/old_tables.rs"]
+#[path = "../../tests/service/cluster/old_tables.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
 mod old_tables;
-#[path = "../../tests/service/postgres.rs"]
+#[path = "../../tests/service/cluster/postgres.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
 mod postgres;
-#[path = "../../tests/service/seaweed.rs"]
+#[path = "../../tests/service/cluster/seaweed.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
 mod seaweed;
 #[path = "../../tests/service/support.rs"]

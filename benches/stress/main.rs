@@ -141,7 +141,7 @@ fn main() -> ExitCode {
     text.push_str(&maintenance::table(SEED));
     text.push_str(&histories::table(SEED));
     println!("{text}");
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/stability.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/stability.md");
     std::fs::write(path, text).expect("docs can be written");
     if troubles.failed.is_empty() && troubles.broken.is_empty() {
         ExitCode::SUCCESS

@@ -87,7 +87,7 @@ fn write() {
         "held_out": { "contacts": held_out::CONTACTS, "motions": held_out::MOTIONS, "target": held_out::TARGET },
         "bound": { "held": HELD, "laws": laws.iter().map(judge::Law::described).collect::<Vec<_>>() },
     });
-    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     let file = root.join("src/contact/rolling/methods/table/table.bin");
     std::fs::write(file, TableFile::write(&about, &values, &bounds)).expect("a file");
     std::fs::write(

@@ -83,7 +83,7 @@ pub fn solve(
 pub fn folder() -> PathBuf {
     // A bench runs in the folder of its own crate.
     let folder = std::env::var_os("RAILHEAD_TABLE_FOLDER").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/table"),
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/table"),
         PathBuf::from,
     );
     std::fs::create_dir_all(&folder).expect("a folder");

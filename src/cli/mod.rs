@@ -14,8 +14,10 @@ mod database_args;
 mod healthcheck;
 mod http_args;
 mod keys;
+#[cfg(feature = "cluster")]
 mod migrate;
 mod output;
+#[cfg(feature = "cluster")]
 mod relocate;
 mod serve;
 mod serve_args;
@@ -32,6 +34,8 @@ use crate::cli::commands::{Cli, Command};
 use crate::cli::output::{print, print_error, reasons};
 use crate::cli::serve::Role;
 use crate::http;
+#[cfg(not(feature = "cluster"))]
+use crate::jobs::JobsError;
 
 /// Reads the command line, does what it says, and returns the exit code.
 #[must_use]
@@ -42,7 +46,9 @@ pub fn run() -> ExitCode {
     let done = match cli.command {
         Command::Serve(args) => serve::run(&args, Role::Serve),
         Command::Worker(args) => serve::run(&args, Role::Work),
+        #[cfg(feature = "cluster")]
         Command::Migrate(args) => migrate::run(&args),
+        #[cfg(feature = "cluster")]
         Command::Doctor(args) => migrate::doctor(&args),
         Command::Solve(args) => solve::run(&args),
         Command::Config(args) => match (
@@ -52,8 +58,18 @@ pub fn run() -> ExitCode {
             (Some(command), Some(given)) => print(&config::describe(command, given, &args)),
             _ => unreachable!("the subcommand was read from these"),
         },
+        #[cfg(feature = "cluster")]
         Command::Move(args) => relocate::run(&args),
+        #[cfg(feature = "cluster")]
         Command::MoveResults(args) => relocate::run_results(&args),
+        #[cfg(not(feature = "cluster"))]
+        Command::Migrate(_) | Command::Doctor(_) | Command::Move(_) | Command::MoveResults(_) => {
+            Err(JobsError::NotBuilt {
+                what: "PostgreSQL",
+                feature: "cluster",
+            }
+            .into())
+        }
         Command::Backup(args) => backup::run(&args),
         Command::Keys(args) => keys::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args),

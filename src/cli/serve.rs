@@ -26,9 +26,9 @@ use crate::cli::values::Anonymous;
 use crate::http::{self, HttpOptions};
 use crate::jobs::attempts::heap;
 use crate::jobs::engine::Engine;
-use crate::jobs::trace::Tracer;
 use crate::jobs::{Jobs, Options};
-use crate::telemetry::{self, Traces};
+use crate::otlp::Traces;
+use crate::telemetry;
 
 const REQUEST_THREADS_MIN: usize = 4;
 /// Files that the process opens besides connections: job table, results, logs.
@@ -174,7 +174,7 @@ async fn open_jobs(args: &ServeArgs, traces: Option<&Traces>) -> anyhow::Result<
         retention: args.retention.0,
         tenant_queue_max: args.tenant_queue_max,
         tenant_profiles_max_bytes: u64::from(args.tenant_profiles_mb) << 20,
-        tracer: traces.map(|traces| Tracer::new(traces.tracer())),
+        tracer: traces.map(Traces::tracer),
         database: args.database.database(),
         results: args.database.results.place(),
         ..Options::new(&args.data_dir)

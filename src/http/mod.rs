@@ -48,9 +48,11 @@ use utoipa_swagger_ui::{Config, SwaggerUi};
 use crate::http::contract::Document;
 use crate::http::extract::{accept, query};
 use crate::http::layers::metrics::Metrics;
+#[cfg(feature = "otlp")]
+use crate::http::layers::otel;
 use crate::http::layers::{
     admission, catch_panic, client_address, compression, etag, final_newline, metrics,
-    origin_guard, otel, rate_limit, request_id, request_log, security_headers,
+    origin_guard, rate_limit, request_id, request_log, security_headers,
 };
 use crate::http::limits::holding_body;
 use crate::http::page::answers;
@@ -149,7 +151,9 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
         .layer(compression::compression_layer())
         .layer(from_fn(etag::complete))
         .layer(from_fn_with_state(metrics.clone(), metrics::count));
-    let router = otel::trace(router, jobs.tracer())
+    #[cfg(feature = "otlp")]
+    let router = otel::trace(router, jobs.tracer());
+    let router = router
         .layer(request_log::span_layer())
         .layer(from_fn(request_id::carry_request_id))
         .layer(from_fn(drain_body::drain_body))

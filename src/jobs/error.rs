@@ -156,6 +156,14 @@ pub enum JobsError {
     /// A data folder with jobs in it cannot be used beside a database.
     #[error("{} holds the jobs of a service without a database; use another --data-dir beside --database-url", .0.display())]
     DataDirOfEmbedded(PathBuf),
+    /// This program was built without a part that the settings need.
+    #[error("this program was built without {what}; `cargo build --release --features {feature}` builds one with it")]
+    NotBuilt {
+        /// The part.
+        what: &'static str,
+        /// The feature of Cargo that has it.
+        feature: &'static str,
+    },
     /// A data folder is moved only into a database without jobs.
     #[error(
         "the database has jobs or batches already; move into one that `railhead migrate` has just made"

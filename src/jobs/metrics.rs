@@ -91,6 +91,7 @@ struct RequestLabel {
 
 impl StoreRequests {
     /// A request was answered with this status, or not at all.
+    #[cfg(feature = "cluster")]
     pub(crate) fn count(&self, method: &str, status: Option<u16>) {
         let status = match status.map(|status| status / 100) {
             Some(2) => "2xx",

@@ -53,7 +53,6 @@ mod evaluation;
 pub mod expiry;
 pub mod handle;
 pub mod idempotency;
-pub mod job_trace;
 pub mod keys;
 pub mod lifecycle;
 pub mod maintenance;
@@ -65,6 +64,7 @@ pub mod open_store;
 pub mod options;
 pub mod profiles;
 pub mod recent_reads;
+#[cfg(feature = "cluster")]
 pub mod relocate;
 pub mod result_cache;
 pub mod result_place;
@@ -78,6 +78,10 @@ pub mod storage_health;
 pub mod store;
 pub mod store_error;
 pub mod submit;
+#[cfg(feature = "otlp")]
+pub mod trace;
+#[cfg(not(feature = "otlp"))]
+#[path = "no_trace.rs"]
 pub mod trace;
 pub mod worker;
 

@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use crate::jobs::disk_reserve;
 use crate::jobs::error::JobsError;
-use crate::jobs::options::Database;
+use crate::jobs::options::{Bells, Database};
 use crate::jobs::store::Store;
+#[cfg(feature = "cluster")]
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::sqlite::database::SqliteStore;
 
@@ -37,8 +38,21 @@ pub async fn open_for_service(
     if table.exists() {
         return Err(JobsError::DataDirOfEmbedded(table));
     }
+    open_database(database).await
+}
+
+#[cfg(feature = "cluster")]
+async fn open_database(database: &Database) -> Result<Arc<dyn Store>, JobsError> {
     let store = PostgresStore::open(&database.url, database.connections).await?;
     Ok(Arc::new(store.hearing(&database.bells)?))
+}
+
+#[cfg(not(feature = "cluster"))]
+async fn open_database(_: &Database) -> Result<Arc<dyn Store>, JobsError> {
+    Err(JobsError::NotBuilt {
+        what: "PostgreSQL",
+        feature: "cluster",
+    })
 }
 
 async fn open_embedded(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
@@ -72,7 +86,12 @@ pub async fn open_beside(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
 /// # Errors
 /// It cannot be reached, has no job table, or one of another version.
 pub async fn open_shared(url: &str) -> Result<Arc<dyn Store>, JobsError> {
-    Ok(Arc::new(PostgresStore::open(url, 1).await?))
+    open_database(&Database {
+        connections: 1,
+        bells: Bells::There,
+        url: url.to_owned(),
+    })
+    .await
 }
 
 /// Notes that the store was closed in good order.

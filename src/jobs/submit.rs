@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use opentelemetry::KeyValue;
 use serde_json::Value;
 
 use crate::contact::case::words::solver::Output;
@@ -16,6 +15,7 @@ use crate::jobs::model::job::{Job, created_at};
 use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds, Refusal};
+use crate::jobs::trace::KeyValue;
 
 impl Jobs {
     /// Checks a case and queues it. Once this returns the job survives the death of the process. If an identical case

@@ -1,17 +1,17 @@
 //! Reference files that may be read beside the checkout but not be copied into it. Tests that need them say that they are skipped
 //! where they are missing; others test the same on profiles that are made.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Text of a file in the folder `RAILHEAD_REFERENCE`, by default `../shared/reference` beside the checkout.
 pub fn reference_file(name: &str) -> Option<String> {
     let folder = std::env::var_os("RAILHEAD_REFERENCE").map(PathBuf::from);
-    let folder = folder.unwrap_or_else(|| {
-        PathBuf::from(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../../shared/reference"
-        ))
-    });
+    let beside = || {
+        let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut folders = package.ancestors().map(|above| above.join("shared/reference"));
+        folders.find(|folder| folder.is_dir())
+    };
+    let folder = folder.or_else(beside).unwrap_or_default();
     let text = std::fs::read_to_string(folder.join(name)).ok();
     if text.is_none() {
         eprintln!("SKIPPED: there is no {name}; RAILHEAD_REFERENCE names the folder that it is in");

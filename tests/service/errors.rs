@@ -363,7 +363,7 @@ async fn every_kind_of_problem_explains_itself() {
         include_str!("evaluate.rs"),
         include_str!("kept_profiles.rs"),
         include_str!("order.rs"),
-        include_str!("database_away.rs"),
+        include_str!("cluster/database_away.rs"),
         include_str!("requests.rs"),
         include_str!("retention.rs"),
         include_str!("runs.rs"),

@@ -5,9 +5,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
-use crate::postgres;
 use crate::server::{Server, Setup, example};
-use railhead::jobs::options::{Bells, Database};
 
 /// The shipped wheel on a rail, its two cross-sections and the same case without them.
 fn pair() -> (Value, Value, Value) {
@@ -30,16 +28,7 @@ fn forces(result: &Value) -> &Value {
 
 #[tokio::test]
 async fn a_case_that_names_its_profiles_is_the_case_with_their_points() {
-    let mut servers = vec![Server::start().await];
-    if let Some(url) = postgres::schema().await {
-        let mut setup = Setup::new();
-        setup.options.database = Some(Database {
-            url,
-            connections: 4,
-            bells: Bells::There,
-        });
-        servers.push(setup.start().await);
-    }
+    let servers = Server::on_every_store().await;
     for server in servers {
         let (case, rail, wheel) = pair();
         let (kept_rail, kept_wheel) = (keep(&server, &rail).await, keep(&server, &wheel).await);

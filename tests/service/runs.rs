@@ -5,12 +5,10 @@ use std::time::{Duration, Instant};
 use railhead::jobs::codec::arrow::read;
 use railhead::jobs::codec::parquet::TableReader;
 use railhead::jobs::codec::table::{RowTable, TableColumn};
-use railhead::jobs::options::{Bells, Database};
 use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
-use crate::postgres;
 use crate::server::{Answer, Server, Setup};
 
 /// Ends of a guard: something hangs.
@@ -38,20 +36,6 @@ pub fn columns(rows: usize) -> Value {
     })
 }
 
-/// Services on every kind of store that there is here.
-async fn services() -> Vec<Server> {
-    let mut services = vec![Server::start().await];
-    if let Some(url) = postgres::schema().await {
-        let mut setup = Setup::new();
-        setup.options.database = Some(Database {
-            url,
-            connections: 4,
-            bells: Bells::There,
-        });
-        services.push(setup.start().await);
-    }
-    services
-}
 
 pub async fn submit(server: &Server, body: &Value) -> String {
     let answer = server.post("/v1/runs", body).await;
@@ -162,7 +146,7 @@ async fn assert_row(server: &Server, run: &str, sent: &Value, line: &Value) {
 
 #[tokio::test]
 async fn a_run_answers_each_of_its_rows_once_in_every_format() {
-    for server in services().await {
+    for server in Server::on_every_store().await {
         let (rows, sent) = (120, columns(120));
         let run = submit(
             &server,
@@ -321,7 +305,7 @@ async fn a_row_that_cannot_be_solved_has_a_status_and_faults_of_a_run_are_named(
 
 #[tokio::test]
 async fn a_key_gives_the_run_again_and_a_cancelled_run_keeps_what_it_has() {
-    for server in services().await {
+    for server in Server::on_every_store().await {
         let body = json!({ "template": template("table"), "columns": columns(30) });
         let keyed = async |body: &Value| {
             let send = |request: reqwest::RequestBuilder| {

@@ -106,6 +106,22 @@ impl Server {
         Setup::new().start().await
     }
 
+    /// Services like [`Server::start`]: one on the embedded store and, where there is PostgreSQL, one on a database.
+    pub async fn on_every_store() -> Vec<Server> {
+        let embedded = Server::start().await;
+        #[cfg(feature = "cluster")]
+        if let Some(url) = crate::cluster::postgres::schema().await {
+            let mut setup = Setup::new();
+            setup.options.database = Some(railhead::jobs::options::Database {
+                url,
+                connections: 4,
+                bells: railhead::jobs::options::Bells::There,
+            });
+            return vec![embedded, setup.start().await];
+        }
+        vec![embedded]
+    }
+
     /// A service that takes jobs and never solves them.
     pub async fn idle() -> Server {
         let mut setup = Setup::new();

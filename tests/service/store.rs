@@ -15,6 +15,7 @@ use railhead::jobs::model::submit_options::SubmitOptions;
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, ReleaseReason, Renewal};
 use railhead::jobs::store::ending::{Ending, StoredResult};
+#[cfg(feature = "cluster")]
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::submission::{Enqueued, NewBatch, NewJob, QueueBounds};
 use railhead::jobs::{Failure, FailureKind, Job, State};
@@ -27,6 +28,7 @@ pub const LEASE: i64 = 1_000;
 #[derive(Debug, Clone, Copy)]
 pub enum StoreKind {
     Sqlite,
+    #[cfg(feature = "cluster")]
     Postgres,
 }
 
@@ -39,10 +41,11 @@ macro_rules! conformance {
                 super::$name(crate::store::StoreKind::Sqlite).await;
             })*
         }
+        #[cfg(feature = "cluster")]
         mod postgres {
             $(#[tokio::test]
             async fn $name() {
-                if crate::postgres::server().is_some() {
+                if crate::cluster::postgres::server().is_some() {
                     super::$name(crate::store::StoreKind::Postgres).await;
                 }
             })*
@@ -65,7 +68,8 @@ impl Table {
         let folder = tempfile::tempdir().unwrap();
         let url = match kind {
             StoreKind::Sqlite => None,
-            StoreKind::Postgres => crate::postgres::schema().await,
+            #[cfg(feature = "cluster")]
+            StoreKind::Postgres => crate::cluster::postgres::schema().await,
         };
         let store = open_store(kind, folder.path(), url.as_deref()).await;
         Table {
@@ -135,9 +139,14 @@ impl Table {
     }
 }
 
+#[cfg_attr(
+    not(feature = "cluster"),
+    expect(unused_variables, reason = "only a server has a URL")
+)]
 async fn open_store(kind: StoreKind, folder: &Path, url: Option<&str>) -> Arc<dyn Store> {
     match kind {
         StoreKind::Sqlite => open_beside(folder).await,
+        #[cfg(feature = "cluster")]
         StoreKind::Postgres => {
             let store = PostgresStore::open(url.expect("a server"), 8)
                 .await

@@ -4,13 +4,16 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use sqlx::{AssertSqlSafe, Connection, PgConnection, SqliteConnection};
+#[cfg(feature = "cluster")]
+use sqlx::{AssertSqlSafe, PgConnection};
+use sqlx::{Connection, SqliteConnection};
 use uuid::Uuid;
 
 use crate::model::Model;
 use crate::store::StoreKind;
 use crate::store_moves::Pair;
 
+#[cfg(feature = "cluster")]
 /// The tables of a PostgreSQL, those first that others refer to.
 const TABLES: [&str; 13] = [
     "templates",
@@ -43,6 +46,7 @@ impl Pair {
         ["jobs.db", "saved.db"].map(|name| self.table.folder.path().join(name))
     }
 
+    #[cfg(feature = "cluster")]
     async fn server(&self, statements: String) {
         let url = self.table.url.as_deref().expect("a server");
         let mut connection = PgConnection::connect(url).await.unwrap();
@@ -66,6 +70,7 @@ impl Pair {
                     .unwrap();
                 connection.close().await.unwrap();
             }
+            #[cfg(feature = "cluster")]
             StoreKind::Postgres => {
                 let copy = TABLES.map(|table| {
                     format!("DROP TABLE IF EXISTS saved_{table}; CREATE TABLE saved_{table} AS TABLE {table};")
@@ -96,6 +101,7 @@ impl Pair {
                 std::fs::copy(copy, file).unwrap();
                 self.store = self.table.open_again().await;
             }
+            #[cfg(feature = "cluster")]
             StoreKind::Postgres => {
                 let back =
                     TABLES.map(|table| format!("INSERT INTO {table} SELECT * FROM saved_{table};"));

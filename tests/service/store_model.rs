@@ -344,13 +344,14 @@ proptest! {
     }
 }
 
+#[cfg(feature = "cluster")]
 proptest! {
     // The statements are those of the embedded store; each case takes the tenth part of a second on a server.
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]
     fn the_shared_store_agrees_with_its_model(steps in prop::collection::vec(moves(), 1..80)) {
-        if crate::postgres::server().is_some() {
+        if crate::cluster::postgres::server().is_some() {
             agrees(StoreKind::Postgres, steps);
         }
     }

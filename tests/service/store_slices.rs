@@ -161,6 +161,7 @@ async fn the_end_releases_slices(kind: StoreKind, end: &str) {
     assert!(store.slices(id).await.unwrap().is_empty(), "{end}");
     assert_eq!(store.released_blobs(&[], 9).await.unwrap(), ["a"], "{end}");
     match kind {
+        #[cfg(feature = "cluster")]
         StoreKind::Postgres => {
             let url = table.url.as_deref().unwrap();
             let pool = sqlx::PgPool::connect(url).await.unwrap();

@@ -10,6 +10,7 @@ pub(super) mod etag;
 pub(super) mod final_newline;
 pub(super) mod metrics;
 pub(super) mod origin_guard;
+#[cfg(feature = "otlp")]
 pub(super) mod otel;
 pub(super) mod process_metrics;
 pub(super) mod rate_limit;

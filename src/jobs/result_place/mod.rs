@@ -7,20 +7,25 @@
 //! | what ties a database and the place of its results together | [`settle`] |
 //! | how all results go to another place | [`change`] |
 
+#[cfg(feature = "cluster")]
 pub mod change;
+#[cfg(feature = "cluster")]
 pub(crate) mod client;
 pub(crate) mod settle;
 pub mod url;
 
+#[cfg(feature = "cluster")]
 use crate::jobs::error::JobsError;
+#[cfg(feature = "cluster")]
 use crate::jobs::result_place::url::ResultsPlace;
-use crate::jobs::store::postgres::database::PostgresStore;
-use crate::jobs::store::postgres::doctor::Finding;
+#[cfg(feature = "cluster")]
+use crate::jobs::store::postgres::{database::PostgresStore, doctor::Finding};
 
 /// Examines the place of the results of a database.
 ///
 /// # Errors
 /// The database cannot be reached, or has no job table.
+#[cfg(feature = "cluster")]
 pub async fn examine_results(
     url: &str,
     place: Option<&ResultsPlace>,

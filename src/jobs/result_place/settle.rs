@@ -218,6 +218,7 @@ fn unusable(error: &Error) -> JobsError {
     JobsError::ResultPlace(error.to_string())
 }
 
+#[cfg(feature = "cluster")]
 /// Examines the place of the results of a database, and writes, reads and removes an object there.
 ///
 /// # Errors
@@ -248,6 +249,7 @@ pub(crate) async fn examine(
     })
 }
 
+#[cfg(feature = "cluster")]
 /// Checks whose results are there, and writes, reads and removes an object.
 async fn probe(deployment: &Deployment, url: &ResultsUrl) -> Result<(), JobsError> {
     let wrong = |why: String| Err(JobsError::ResultPlace(why));

@@ -4,23 +4,31 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
+#[cfg(feature = "cluster")]
 use std::time::Duration;
 
+#[cfg(feature = "cluster")]
 use object_store::aws::AmazonS3Builder;
 use object_store::local::LocalFileSystem;
 use object_store::prefix::PrefixStore;
-use object_store::{BackoffConfig, ObjectStore, RetryConfig};
+use object_store::ObjectStore;
+#[cfg(feature = "cluster")]
+use object_store::{BackoffConfig, RetryConfig};
 
 use crate::jobs::error::JobsError;
 use crate::jobs::metrics::StoreRequests;
+#[cfg(feature = "cluster")]
 use crate::jobs::result_place::client::Client;
 
+#[cfg(feature = "cluster")]
 /// Tries of a request that fails for a moment, beside the first.
 const RETRIES: usize = 5;
 
+#[cfg(feature = "cluster")]
 /// How long after the first try of a request another one may begin: a client waits for a result meanwhile.
 const RETRIED_WITHIN: Duration = Duration::from_secs(10);
 
+#[cfg(feature = "cluster")]
 /// Pauses between tries: the first, and the longest.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(2));
 
@@ -62,12 +70,13 @@ impl FromStr for ResultsUrl {
                 return Ok(ResultsUrl::Folder(PathBuf::from(rest)));
             }
             "file" => return Err("a folder is named from the root: file:///folder".to_owned()),
-            "s3" => "s3",
+            "s3" if cfg!(feature = "cluster") => "s3",
             "gs" if cfg!(feature = "gs") => "gs",
             "az" if cfg!(feature = "az") => "az",
-            "gs" | "az" => {
+            "s3" | "gs" | "az" => {
+                let feature = if scheme == "s3" { "cluster" } else { scheme };
                 return Err(format!(
-                    "this build cannot use {scheme}://; one with the feature `{scheme}` can (cargo build --release --features {scheme})"
+                    "this build cannot use {scheme}://; one with the feature `{feature}` can (cargo build --release --features {feature})"
                 ));
             }
             _ => return Err(shape.to_owned()),
@@ -131,7 +140,7 @@ impl ResultsUrl {
                 bucket,
                 prefix,
             } => {
-                let store = bucket_store(scheme, bucket, Client::new(requests)?)?;
+                let store = bucket_store(scheme, bucket, requests)?;
                 Ok(match prefix.is_empty() {
                     true => store,
                     false => Arc::new(PrefixStore::new(store, prefix.as_str())),
@@ -149,11 +158,25 @@ impl ResultsUrl {
     }
 }
 
+#[cfg(not(feature = "cluster"))]
+fn bucket_store(
+    _: &str,
+    _: &str,
+    _: StoreRequests,
+) -> Result<Arc<dyn ObjectStore>, JobsError> {
+    Err(JobsError::NotBuilt {
+        what: "object stores",
+        feature: "cluster",
+    })
+}
+
+#[cfg(feature = "cluster")]
 fn bucket_store(
     scheme: &str,
     bucket: &str,
-    client: Client,
+    requests: StoreRequests,
 ) -> Result<Arc<dyn ObjectStore>, JobsError> {
+    let client = Client::new(requests)?;
     let retry = RetryConfig {
         backoff: BackoffConfig {
             init_backoff: PAUSES.0,

@@ -20,7 +20,9 @@ pub mod claim;
 pub mod cluster;
 pub mod ending;
 pub mod list;
+#[cfg(feature = "cluster")]
 pub(crate) mod portion;
+#[cfg(feature = "cluster")]
 pub mod postgres;
 pub mod profile;
 pub mod retention;

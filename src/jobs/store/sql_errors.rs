@@ -3,6 +3,7 @@
 use std::io::ErrorKind;
 use std::sync::Arc;
 
+#[cfg(feature = "cluster")]
 use sqlx::postgres::PgDatabaseError;
 
 use crate::jobs::error::JobsError;
@@ -13,7 +14,10 @@ impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
         let fault = match &error {
             sqlx::Error::Database(cause) => {
+                #[cfg(feature = "cluster")]
                 let shared = cause.try_downcast_ref::<PgDatabaseError>().is_some();
+                #[cfg(not(feature = "cluster"))]
+                let shared = false;
                 let read = if shared { of_state } else { of_code };
                 cause.code().and_then(|code| read(&code))
             }

@@ -11,7 +11,7 @@ use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::attempts::gate::Gate;
 use crate::jobs::attempts::outcome::{Outcome, Work};
 use crate::jobs::attempts::solver_thread::{SolverThread, Task};
-use crate::jobs::job_trace::JobTrace;
+use crate::jobs::trace::JobTrace;
 use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::model::kind::Queue;
 use crate::jobs::shared::Shared;

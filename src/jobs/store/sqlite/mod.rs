@@ -5,6 +5,7 @@ mod tokens;
 
 pub mod database;
 pub mod engine;
+#[cfg(feature = "cluster")]
 mod export;
 #[cfg(test)]
 mod plans;

@@ -6,8 +6,8 @@ use std::process::Command;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use crate::postgres::database;
-use crate::seaweed::{railhead_at, server};
+use crate::cluster::postgres::database;
+use crate::cluster::seaweed::{railhead_at, server};
 use crate::support::{Service, case, endless_case, long_case, railhead};
 
 /// What the program says about a data folder and a database, and whether it succeeded.

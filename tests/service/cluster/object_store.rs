@@ -8,9 +8,9 @@ use reqwest::Method;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::faulty_server::FaultyServer;
-use crate::postgres::database;
-use crate::seaweed::{railhead_at, server};
+use crate::cluster::faulty_server::FaultyServer;
+use crate::cluster::postgres::database;
+use crate::cluster::seaweed::{railhead_at, server};
 use crate::support::{Service, long_case, pause};
 
 /// Ends of a guard: something hangs.

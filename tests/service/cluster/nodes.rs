@@ -8,8 +8,8 @@ use reqwest::Method;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::cable::Cable;
-use crate::postgres;
+use crate::cluster::cable::Cable;
+use crate::cluster::postgres;
 use crate::support::{Service, case, endless_case, long_case, pause, railhead};
 
 /// Ends of a guard: something hangs.

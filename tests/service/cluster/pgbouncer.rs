@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::postgres::{at_port, shell};
+use crate::cluster::postgres::{at_port, shell};
 use crate::support::skip;
 
 /// How long it may take to start.

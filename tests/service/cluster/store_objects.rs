@@ -9,7 +9,7 @@ use crate::store::{StoreKind, Table, new_job, success};
 
 #[tokio::test]
 async fn an_object_is_read_back_by_any_range_and_is_gone_once_removed() {
-    if crate::postgres::server().is_none() {
+    if crate::cluster::postgres::server().is_none() {
         return;
     }
     let table = Table::new(StoreKind::Postgres).await;
@@ -50,7 +50,7 @@ async fn an_object_is_read_back_by_any_range_and_is_gone_once_removed() {
 
 #[tokio::test]
 async fn old_objects_are_swept_if_no_job_refers_to_them() {
-    if crate::postgres::server().is_none() {
+    if crate::cluster::postgres::server().is_none() {
         return;
     }
     let table = Table::new(StoreKind::Postgres).await;

@@ -6,8 +6,8 @@ use railhead::jobs::store::postgres::schema::migrate;
 use reqwest::{Method, RequestBuilder};
 use serde_json::Value;
 
-use crate::cable::Cable;
-use crate::postgres::{at_port, database};
+use crate::cluster::cable::Cable;
+use crate::cluster::postgres::{at_port, database};
 use crate::support::{Service, case, long_case, pause};
 
 /// Ends of a guard: something hangs.

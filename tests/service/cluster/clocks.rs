@@ -8,8 +8,8 @@ use reqwest::Method;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::faketime::{library, set_ahead, with_clock};
-use crate::postgres::database;
+use crate::cluster::faketime::{library, set_ahead, with_clock};
+use crate::cluster::postgres::database;
 use crate::support::{Service, case, endless_case, railhead};
 
 /// The lease, in seconds.

@@ -6,7 +6,7 @@ use sqlx::postgres::PgConnection;
 
 /// The tables as the first version made them, with the row that says so.
 const FIRST_FORM: &str = concat!(
-    include_str!("../../src/jobs/store/postgres/schema.sql"),
+    include_str!("../../../src/jobs/store/postgres/schema.sql"),
     "INSERT INTO deployment (one, form) VALUES (1, 1);"
 );
 

@@ -12,7 +12,7 @@ use railhead::jobs::options::{Bells, Database};
 use railhead::jobs::{Jobs, Options};
 use sqlx::{Connection, PgConnection};
 
-use crate::postgres::schema;
+use crate::cluster::postgres::schema;
 use crate::support::{case, pause};
 
 /// Ends of a guard: something hangs.

@@ -4,7 +4,7 @@ use railhead::jobs::store::postgres::doctor::examine;
 use railhead::jobs::store::postgres::schema::migrate;
 use sqlx::{Connection, PgConnection};
 
-use crate::postgres::{database, encrypted, with_parameter};
+use crate::cluster::postgres::{database, encrypted, with_parameter};
 
 /// What the program says when it connects: nothing, or why it does not.
 async fn connect(url: &str) -> String {

@@ -6,8 +6,8 @@ use railhead::jobs::store::postgres::schema::migrate;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use crate::pgbouncer::Pooler;
-use crate::postgres::database;
+use crate::cluster::pgbouncer::Pooler;
+use crate::cluster::postgres::database;
 use crate::support::{Service, case, endless_case, railhead};
 
 /// Fewer sessions than the nodes have connections, so that they change hands all the time.

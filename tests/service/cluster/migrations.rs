@@ -6,8 +6,8 @@ use sqlx::{Connection, PgConnection};
 use tempfile::TempDir;
 use tokio::task::JoinSet;
 
-use crate::old_tables;
-use crate::postgres::database;
+use crate::cluster::old_tables;
+use crate::cluster::postgres::database;
 use crate::support::{Service, case, railhead};
 
 /// Starts five nodes at once, each as its unit file does: the tables first, then the node. What the commands said, and the nodes.

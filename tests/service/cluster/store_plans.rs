@@ -17,7 +17,7 @@ use serde_json::Value;
 use sqlx::PgPool;
 use uuid::Uuid;
 
-use crate::postgres::{database, log_lines, with_parameter};
+use crate::cluster::postgres::{database, log_lines, with_parameter};
 use crate::store::{new_job, queue_of, success};
 
 const TENANT: &str = "north";

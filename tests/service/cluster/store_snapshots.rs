@@ -9,7 +9,7 @@ use railhead::jobs::store::postgres::schema::migrate;
 use railhead::jobs::store::{Claims, Ends, Leases};
 use sqlx::{Connection, PgConnection};
 
-use crate::postgres::database;
+use crate::cluster::postgres::database;
 use crate::store::queue_of;
 
 const QUEUED: i64 = 9000;

@@ -10,7 +10,7 @@ use railhead::jobs::store::postgres::schema::migrate;
 use railhead::jobs::{Jobs, Options};
 use uuid::Uuid;
 
-use crate::postgres::database;
+use crate::cluster::postgres::database;
 use crate::support::case;
 
 fn folder_place(folder: &Path, shared: bool) -> ResultsPlace {
