@@ -10,13 +10,13 @@ COPY src/contact/Cargo.toml src/contact/
 COPY benches/Cargo.toml benches/
 RUN echo 'fn main() {}' > src/main.rs \
     && touch src/lib.rs src/contact/lib.rs \
-    && cargo build --profile image --locked --bin railhead
+    && cargo build --profile image --features cluster,otlp,gs,az --locked --bin railhead
 COPY api ./api
 COPY src ./src
 # Copied files keep their dates, which may be older than the empty program's: cargo must see that they are new.
 # The profile of the image is slower to build and makes a smaller program.
 RUN touch src/main.rs src/lib.rs src/contact/lib.rs \
-    && cargo build --profile image --locked --bin railhead \
+    && cargo build --profile image --features cluster,otlp,gs,az --locked --bin railhead \
     && install -d /out/data \
     && strip -o /out/railhead target/image/railhead
 

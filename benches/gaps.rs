@@ -24,10 +24,7 @@ fn main() {
     println!();
     println!("| case | normal, µs | tangential, µs | approach | area | largest pressure |");
     println!("|---|---|---|---|---|---|");
-    let folder = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../tests/data/gap_grids.json"
-    );
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/gap_grids.json");
     let text = std::fs::read_to_string(folder).expect("reference data");
     let cases: Vec<Value> = serde_json::from_str(&text).expect("reference data are JSON");
     let (mut normal, mut tangential) = (Vec::new(), Vec::new());

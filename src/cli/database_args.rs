@@ -29,7 +29,7 @@ pub(super) struct DataFolderArgs {
 #[derive(Debug, Clone, Args)]
 pub(super) struct DatabaseArgs {
     /// PostgreSQL 15 or later, in which jobs and results are kept and which any number of nodes share, such as
-    /// `postgres://user:password@host/database`; without it they are kept in the data folder.
+    /// `postgres://user:password@host/database`; without it they are kept in the data folder. Needs a build with the feature `cluster`.
     #[arg(
         long,
         env = "RAILHEAD_DATABASE_URL",
@@ -58,7 +58,7 @@ pub(super) struct DatabaseArgs {
 #[derive(Debug, Clone, Args)]
 pub(super) struct ResultsArgs {
     /// Where results above 32 KiB are kept beside a database: `s3://bucket/prefix` (keys, region and address by the usual `AWS_…`
-    /// variables) or `file:///folder`; without it in the database. Every node of a database names the same place.
+    /// variables) or `file:///folder`; without it in the database. Buckets need the feature `cluster`. Every node of a database names the same place.
     #[arg(long, env = "RAILHEAD_RESULTS_URL", value_name = "URL")]
     pub results_url: Option<ResultsUrl>,
     /// The folder that `--results-url` names is the same one on every node (a network file system).

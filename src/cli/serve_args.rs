@@ -105,7 +105,7 @@ pub(super) struct ServeArgs {
     #[arg(long, env = "RAILHEAD_CORS_ORIGIN", value_delimiter = ',', value_name = "ORIGIN", value_parser = origin)]
     pub cors_origin: Vec<String>,
     /// Collector that gets the spans of requests and jobs by OTLP over HTTP, such as `http://127.0.0.1:4318`; without it
-    /// none are made.
+    /// none are made. Needs a build with the feature `otlp`.
     #[arg(long, env = "RAILHEAD_OTLP_ENDPOINT", value_name = "URL")]
     pub otlp_endpoint: Option<Endpoint>,
     #[command(flatten)]

@@ -157,7 +157,9 @@ pub enum JobsError {
     #[error("{} holds the jobs of a service without a database; use another --data-dir beside --database-url", .0.display())]
     DataDirOfEmbedded(PathBuf),
     /// This program was built without a part that the settings need.
-    #[error("this program was built without {what}; `cargo build --release --features {feature}` builds one with it")]
+    #[error(
+        "this program was built without {what}; `cargo build --release --features {feature}` builds one with it"
+    )]
     NotBuilt {
         /// The part.
         what: &'static str,

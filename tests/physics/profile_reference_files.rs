@@ -8,7 +8,9 @@ pub fn reference_file(name: &str) -> Option<String> {
     let folder = std::env::var_os("RAILHEAD_REFERENCE").map(PathBuf::from);
     let beside = || {
         let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let mut folders = package.ancestors().map(|above| above.join("shared/reference"));
+        let mut folders = package
+            .ancestors()
+            .map(|above| above.join("shared/reference"));
         folders.find(|folder| folder.is_dir())
     };
     let folder = folder.or_else(beside).unwrap_or_default();

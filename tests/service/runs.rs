@@ -36,7 +36,6 @@ pub fn columns(rows: usize) -> Value {
     })
 }
 
-
 pub async fn submit(server: &Server, body: &Value) -> String {
     let answer = server.post("/v1/runs", body).await;
     assert_eq!(answer.status, 202, "{}", answer.text);

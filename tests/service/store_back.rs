@@ -13,8 +13,8 @@ use crate::model::Model;
 use crate::store::StoreKind;
 use crate::store_moves::Pair;
 
-#[cfg(feature = "cluster")]
 /// The tables of a PostgreSQL, those first that others refer to.
+#[cfg(feature = "cluster")]
 const TABLES: [&str; 13] = [
     "templates",
     "batches",

@@ -75,8 +75,8 @@ impl Service {
         Service::spawn(&mut program, "serve", data_dir, flags)
     }
 
-    #[cfg(feature = "cluster")]
     /// Starts `railhead worker` and returns when it can be asked how it is.
+    #[cfg(feature = "cluster")]
     pub fn start_worker(data_dir: &Path, flags: &[&str]) -> Service {
         Service::spawn(&mut railhead(), "worker", data_dir, flags)
     }

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use bytes::Bytes;
 use crate::jobs::batch::staging::StagedCase;
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::error::JobsError;
@@ -14,6 +13,7 @@ use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob};
 use crate::jobs::trace::KeyValue;
+use bytes::Bytes;
 
 /// Jobs queued in one transaction.
 const CHUNK_JOBS: usize = 1000;

@@ -7,11 +7,11 @@ use std::sync::Arc;
 #[cfg(feature = "cluster")]
 use std::time::Duration;
 
+use object_store::ObjectStore;
 #[cfg(feature = "cluster")]
 use object_store::aws::AmazonS3Builder;
 use object_store::local::LocalFileSystem;
 use object_store::prefix::PrefixStore;
-use object_store::ObjectStore;
 #[cfg(feature = "cluster")]
 use object_store::{BackoffConfig, RetryConfig};
 
@@ -20,16 +20,16 @@ use crate::jobs::metrics::StoreRequests;
 #[cfg(feature = "cluster")]
 use crate::jobs::result_place::client::Client;
 
-#[cfg(feature = "cluster")]
 /// Tries of a request that fails for a moment, beside the first.
+#[cfg(feature = "cluster")]
 const RETRIES: usize = 5;
 
-#[cfg(feature = "cluster")]
 /// How long after the first try of a request another one may begin: a client waits for a result meanwhile.
+#[cfg(feature = "cluster")]
 const RETRIED_WITHIN: Duration = Duration::from_secs(10);
 
-#[cfg(feature = "cluster")]
 /// Pauses between tries: the first, and the longest.
+#[cfg(feature = "cluster")]
 const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(2));
 
 /// Where large results are kept.
@@ -159,11 +159,7 @@ impl ResultsUrl {
 }
 
 #[cfg(not(feature = "cluster"))]
-fn bucket_store(
-    _: &str,
-    _: &str,
-    _: StoreRequests,
-) -> Result<Arc<dyn ObjectStore>, JobsError> {
+fn bucket_store(_: &str, _: &str, _: StoreRequests) -> Result<Arc<dyn ObjectStore>, JobsError> {
     Err(JobsError::NotBuilt {
         what: "object stores",
         feature: "cluster",
