@@ -1,13 +1,8 @@
 //! Stand-in for `trace` in a build without the feature `otlp`: there is no tracer, so that no span is ever made.
 
 use std::sync::Arc;
-use std::time::SystemTime;
 
-use crate::jobs::attempts::outcome::Outcome;
 use crate::jobs::error::JobsError;
-use crate::jobs::handle::Jobs;
-use crate::jobs::shared::Shared;
-use crate::jobs::store::claim::Claim;
 
 /// Makes spans; no value of it exists in this build.
 #[derive(Debug, Clone)]
@@ -36,39 +31,5 @@ impl SubmitSpan {
         _: impl FnOnce(&T) -> Vec<KeyValue>,
     ) -> Result<T, JobsError> {
         submitted
-    }
-}
-
-impl Jobs {
-    pub(crate) fn submit_span(&self) -> SubmitSpan {
-        SubmitSpan
-    }
-}
-
-impl Shared {
-    pub(crate) fn job_trace(&self, _: &Claim) -> Option<JobTrace> {
-        None
-    }
-}
-
-/// An attempt at a job whose trace is collected; no value of it exists in this build.
-#[derive(Debug, Clone)]
-pub(crate) enum JobTrace {}
-
-impl JobTrace {
-    pub(crate) fn solving(
-        _: Option<&JobTrace>,
-        _: bool,
-        solve: impl FnOnce() -> Outcome,
-    ) -> Outcome {
-        solve()
-    }
-
-    pub(crate) fn waited_until(&self, _: SystemTime) {
-        match *self {}
-    }
-
-    pub(crate) fn stored(&self, _: SystemTime, _: &'static str) {
-        match *self {}
     }
 }

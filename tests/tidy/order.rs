@@ -81,6 +81,8 @@ const ORDER: &[&str] = &[
     "jobs::bound_access",
     "jobs::expiry",
     "jobs::storage_health",
+    "jobs::no_job_trace",
+    "jobs::job_trace",
     "jobs::metrics_refresh",
     "jobs::keys",
     "jobs::result_cache",

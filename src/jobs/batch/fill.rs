@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use bytes::Bytes;
+
 use crate::jobs::batch::staging::StagedCase;
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::error::JobsError;
@@ -13,7 +15,6 @@ use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob};
 use crate::jobs::trace::KeyValue;
-use bytes::Bytes;
 
 /// Jobs queued in one transaction.
 const CHUNK_JOBS: usize = 1000;

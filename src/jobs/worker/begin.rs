@@ -11,11 +11,11 @@ use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::attempts::gate::Gate;
 use crate::jobs::attempts::outcome::{Outcome, Work};
 use crate::jobs::attempts::solver_thread::{SolverThread, Task};
+use crate::jobs::job_trace::JobTrace;
 use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::model::kind::Queue;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::claim::Claim;
-use crate::jobs::trace::JobTrace;
 use crate::jobs::worker::heartbeat;
 use crate::jobs::worker::solve::solve_guarded;
 
