@@ -54,9 +54,12 @@ impl TrueResultants {
 /// All truths that are known: by class, then by number.
 pub type Truths = BTreeMap<String, BTreeMap<usize, Truth>>;
 
-/// The file of truths.
+/// The file of truths, of the tests and of the bench, which are in different packages.
 pub fn file() -> PathBuf {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/data/finer_meshes.json")
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut folders = package.ancestors().map(|folder| folder.join("tests/data"));
+    let data = folders.find(|folder| folder.is_dir());
+    data.expect("a folder of data").join("finer_meshes.json")
 }
 
 /// The truths of the file; none if there is no file.
