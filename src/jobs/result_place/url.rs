@@ -215,20 +215,14 @@ mod tests {
 
     #[test]
     fn a_place_is_read_and_written_back() {
-        for text in [
-            "file:///srv/results",
-            #[cfg(feature = "cluster")]
-            "s3://bucket",
-            #[cfg(feature = "cluster")]
-            "s3://my-bucket/rail/head",
-        ] {
-            let url: ResultsUrl = text.parse().unwrap();
-            assert_eq!(url.to_string(), text);
-        }
+        let written_back = |text: &str| text.parse::<ResultsUrl>().unwrap().to_string();
+        assert_eq!(written_back("file:///srv/results"), "file:///srv/results");
         #[cfg(feature = "cluster")]
         {
-            let trimmed: ResultsUrl = "s3://bucket/a/".parse().unwrap();
-            assert_eq!(trimmed.to_string(), "s3://bucket/a");
+            for text in ["s3://bucket", "s3://my-bucket/rail/head"] {
+                assert_eq!(written_back(text), text);
+            }
+            assert_eq!(written_back("s3://bucket/a/"), "s3://bucket/a");
         }
     }
 
