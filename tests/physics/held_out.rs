@@ -4,7 +4,7 @@
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::monitor::Unmonitored;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::judge::judged;
 use crate::population::{Class, case};
@@ -157,4 +157,44 @@ fn the_moment_of_each_patch_of_a_wheel_on_a_rail_is_judged() {
         assert!(after > 0.4 - before, "{number}: {before} becomes {after}");
         assert!(before < 0.2, "{number}: {before}");
     }
+}
+
+#[test]
+fn estimates_on_few_given_cells_cover_the_error() {
+    // The floor of the estimate was read off another ellipse, without spin.
+    let (mut covered, mut all) = (0, 0);
+    for [a, b] in [[5.0, 8.0], [4.0, 4.0], [8.0, 3.0]] {
+        let contact = json!({ "type": "ellipse", "a_mm": a, "b_mm": b });
+        let motions: Vec<Value> = (1..=8)
+            .map(|k| json!({ "creepage_x": 5e-4 * f64::from(k), "creepage_y": 4e-4, "spin_per_mm": 2e-4 }))
+            .collect();
+        let forces = |solver: Value| {
+            let question = json!({
+                "material": { "young_modulus_mpa": 210_000, "poisson_ratio": 0.28 },
+                "friction": { "coefficient": 0.35 }, "contact": contact,
+                "load": { "normal_force_n": 90_000 }, "motion": motions,
+                "solver": solver, "outputs": ["resultants"],
+            });
+            let problem = contact::check(&question, &Limits::default()).expect("a sound case");
+            let (solution, _) = contact::solve(&problem, &Unmonitored).expect("an answer");
+            let totals = solution.total.into_iter();
+            let totals = totals.map(|t| {
+                (
+                    [t.force_x_n, t.force_y_n],
+                    t.error_estimate.map(|e| e.force_x_n),
+                )
+            });
+            totals.collect::<Vec<_>>()
+        };
+        let fine = forces(json!({ "method": "boundary_element", "target_error": 5e-4 }));
+        for strips in 3..=7 {
+            let coarse = forces(json!({ "mesh": { "strips": strips, "cells": strips } }));
+            for ((found, estimate), (truth, _)) in coarse.iter().zip(&fine) {
+                let off = (found[0] - truth[0]).abs().max((found[1] - truth[1]).abs());
+                all += 1;
+                covered += usize::from(off <= estimate.expect("an estimate"));
+            }
+        }
+    }
+    assert!(100 * covered >= 95 * all, "{covered} of {all}");
 }
