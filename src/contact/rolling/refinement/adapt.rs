@@ -41,7 +41,7 @@ pub fn solve(
     Ok(found)
 }
 
-/// The same without slips for output, and the meshes that value and estimate follow from.
+/// Solves a motion without slips for output. Also returns the meshes that its value and its estimate compare.
 pub(crate) fn solve_forces(
     task: &RollingTask,
     state: &mut RefinementState,

@@ -69,7 +69,7 @@ impl MeshFamily {
         }
     }
 
-    /// The mesh with about so many cells per patch and an even number of strips.
+    /// The mesh with approximately `cells` cells per patch and an even number of strips.
     #[must_use]
     pub fn mesh(&self, cells: f64) -> MeshPlan {
         let strips = (2.0 * (0.5 * (cells / self.shape).sqrt()).round()).max(SIDE_MIN);

@@ -1,4 +1,4 @@
-//! What is kept from one motion of a footprint to the next: meshes, tractions for predictions, and buffers.
+//! Meshes, tractions for predictions, and buffers, kept from one motion of a footprint to the next.
 
 use std::cell::OnceCell;
 use std::sync::Arc;
