@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use railhead::contact::solve;
 use railhead::jobs::{Jobs, Options, State};
-use sqlx::Connection;
 use uuid::Uuid;
 
 use crate::support::{case, open};
@@ -62,8 +61,8 @@ impl Shop {
         id
     }
 
-    fn table(&self) -> String {
-        format!("sqlite:{}", self.folder.path().join("jobs.db").display())
+    fn table(&self) -> rusqlite::Connection {
+        rusqlite::Connection::open(self.folder.path().join("jobs.db")).unwrap()
     }
 
     async fn succeeds_at_once(&self, id: Uuid) {
@@ -88,16 +87,12 @@ async fn results_that_cannot_be_stored_for_longer_than_a_lease_are_kept_under_it
     };
     std::fs::write(&results, b"no folder").unwrap();
     shop.let_go.store(true, Ordering::SeqCst);
-    let mut table = sqlx::SqliteConnection::connect(&shop.table())
-        .await
-        .unwrap();
+    let table = shop.table();
     let mut leases = Vec::new();
     for _ in 0..5 {
         tokio::time::sleep(LEASE).await;
-        let lease: Option<i64> = sqlx::query_scalar("SELECT lease_until FROM jobs")
-            .fetch_one(&mut table)
-            .await
-            .unwrap();
+        let lease = table.query_row("SELECT lease_until FROM jobs", (), |row| row.get(0));
+        let lease: Option<i64> = lease.unwrap();
         leases.push(lease.expect("it is still held"));
     }
     assert!(leases.is_sorted() && leases[0] < leases[4], "{leases:?}");
@@ -114,16 +109,11 @@ async fn a_table_that_is_locked_for_longer_than_a_lease_gives_no_job_away() {
     for solved_meanwhile in [false, true] {
         let shop = Shop::open().await;
         let id = shop.running().await;
-        let mut other = sqlx::SqliteConnection::connect(&shop.table())
-            .await
-            .unwrap();
-        sqlx::query("BEGIN IMMEDIATE")
-            .execute(&mut other)
-            .await
-            .unwrap();
+        let other = shop.table();
+        other.execute_batch("BEGIN IMMEDIATE").unwrap();
         shop.let_go.store(solved_meanwhile, Ordering::SeqCst);
         tokio::time::sleep(4 * LEASE).await;
-        sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
+        other.execute_batch("ROLLBACK").unwrap();
         // Some looks of whoever takes jobs from silent workers.
         tokio::time::sleep(2 * LEASE).await;
         shop.let_go.store(true, Ordering::SeqCst);

@@ -6,7 +6,6 @@ use std::time::Duration;
 use railhead::contact::solve;
 use railhead::jobs::{FailureKind, Jobs, JobsError, Options, State};
 use reqwest::Method;
-use sqlx::Connection;
 use tokio::sync::mpsc::unbounded_channel;
 
 use crate::store::claim_up_to;
@@ -240,14 +239,8 @@ async fn a_service_whose_table_hangs_is_gone_within_five_seconds_after_the_grace
     service.until(&id, "running").await;
     // Another process holds the only place for writers, so the running job cannot be handed back.
     let table = folder.path().join("jobs.db");
-    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(table);
-    let mut other = sqlx::SqliteConnection::connect_with(&options)
-        .await
-        .unwrap();
-    sqlx::query("BEGIN IMMEDIATE")
-        .execute(&mut other)
-        .await
-        .unwrap();
+    let other = rusqlite::Connection::open(table).unwrap();
+    other.execute_batch("BEGIN IMMEDIATE").unwrap();
     let start = std::time::Instant::now();
     service.signal("TERM");
     let status = tokio::task::spawn_blocking(|| service.wait())

@@ -1,12 +1,11 @@
 //! Is nothing lost, and everything said clearly, when the disk is full or cannot be written?
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
 use railhead::contact::case::limits::Limits;
 use reqwest::Method;
 use serde_json::{Value, json};
-use sqlx::Connection;
 use tempfile::TempDir;
 
 use crate::batches::small;
@@ -445,16 +444,12 @@ async fn a_table_locked_by_another_process_is_waited_for_and_then_told() {
     let service = Service::start(folder.path(), &[]);
     let before = service.submit(&case("before")).await;
     service.until(&before, "succeeded").await;
-    let file = url(&folder.path().join("jobs.db"));
-    let mut other = sqlx::SqliteConnection::connect(&file).await.unwrap();
-    sqlx::query("BEGIN IMMEDIATE")
-        .execute(&mut other)
-        .await
-        .unwrap();
+    let other = rusqlite::Connection::open(folder.path().join("jobs.db")).unwrap();
+    other.execute_batch("BEGIN IMMEDIATE").unwrap();
     let refusal = submit(&service, &case("refused")).await;
     assert_problem(&refusal, 503, "storage-unwritable", "");
     service.get(&format!("/v1/jobs/{before}/result")).await;
-    sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
+    other.execute_batch("ROLLBACK").unwrap();
     until_ready(&service).await;
     let mut another = case("after");
     another["load"]["normal_force_n"] = json!(70_000);
@@ -463,8 +458,4 @@ async fn a_table_locked_by_another_process_is_waited_for_and_then_told() {
     service
         .until(after.json["id"].as_str().unwrap(), "succeeded")
         .await;
-}
-
-fn url(file: &Path) -> String {
-    format!("sqlite:{}", file.display())
 }

@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 #[cfg(feature = "cluster")]
-use sqlx::{AssertSqlSafe, PgConnection};
-use sqlx::{Connection, SqliteConnection};
+use sqlx::{AssertSqlSafe, Connection, PgConnection};
 use uuid::Uuid;
 
 use crate::model::Model;
@@ -61,14 +60,10 @@ impl Pair {
             StoreKind::Sqlite => {
                 let [file, copy] = self.files();
                 let _ = std::fs::remove_file(&copy);
-                let url = format!("sqlite:{}", file.display());
-                let mut connection = SqliteConnection::connect(&url).await.unwrap();
-                sqlx::query("VACUUM INTO $1")
-                    .bind(copy.to_str())
-                    .execute(&mut connection)
-                    .await
+                let connection = rusqlite::Connection::open(file).unwrap();
+                connection
+                    .execute("VACUUM INTO ?", [copy.to_str()])
                     .unwrap();
-                connection.close().await.unwrap();
             }
             #[cfg(feature = "cluster")]
             StoreKind::Postgres => {

@@ -37,11 +37,8 @@ async fn claim_begun(store: &dyn Store, now: i64) -> Option<Claim> {
 }
 
 /// The file, for what no store tells.
-async fn other_connection(table: &Table) -> sqlx::SqlitePool {
-    let file = table.folder.path().join("jobs.db");
-    sqlx::SqlitePool::connect(&format!("sqlite:{}", file.display()))
-        .await
-        .unwrap()
+fn other_connection(table: &Table) -> rusqlite::Connection {
+    rusqlite::Connection::open(table.folder.path().join("jobs.db")).unwrap()
 }
 
 fn slice(number: u32, key: Option<&str>) -> NewSlice {
@@ -172,10 +169,10 @@ async fn the_end_releases_slices(kind: StoreKind, end: &str) {
             assert_eq!(blobs, i64::from(end == "succeeded"), "{end}");
         }
         StoreKind::Sqlite => {
-            let blobs: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM blobs")
-                .fetch_one(&other_connection(&table).await)
-                .await
-                .unwrap();
+            let blobs =
+                other_connection(&table)
+                    .query_row("SELECT COUNT(*) FROM blobs", (), |row| row.get(0));
+            let blobs: i64 = blobs.unwrap();
             assert_eq!(blobs, i64::from(end == "succeeded"), "{end}");
         }
     }

@@ -97,6 +97,7 @@ fn outside_libraries_stay_in_their_rooms() {
         (
             "src/http",
             &[
+                "rusqlite",
                 "sqlx",
                 "object_store",
                 "faer",
@@ -109,7 +110,7 @@ fn outside_libraries_stay_in_their_rooms() {
         ),
         (
             "src/cli",
-            &["sqlx", "object_store", "faer", "opentelemetry"],
+            &["rusqlite", "sqlx", "object_store", "faer", "opentelemetry"],
         ),
     ] {
         assert_free(room, forbidden);
@@ -119,7 +120,7 @@ fn outside_libraries_stay_in_their_rooms() {
 #[test]
 fn databases_stay_in_the_folders_of_their_stores() {
     let sources = Sources::below(&["src"]);
-    let found = mentions(&sources, "src/", &["sqlx", "SqlitePool", "SqliteRow"]);
+    let found = mentions(&sources, "src/", &["rusqlite", "sqlx", "SqliteRow"]);
     let inside = |place: &String| {
         let folders = ["sqlite/", "postgres/", "sql/", "sql_errors.rs"];
         place

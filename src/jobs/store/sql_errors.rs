@@ -1,26 +1,49 @@
 //! Errors of databases as those of a store.
 
+#[cfg(feature = "cluster")]
 use std::io::ErrorKind;
 use std::sync::Arc;
 
-#[cfg(feature = "cluster")]
-use sqlx::postgres::PgDatabaseError;
+use rusqlite::ErrorCode;
 
 use crate::jobs::error::JobsError;
+#[cfg(feature = "cluster")]
 use crate::jobs::storage_fault::of_io;
 use crate::jobs::store_error::{StorageFault, StoreError};
 
+impl From<rusqlite::Error> for StoreError {
+    fn from(error: rusqlite::Error) -> Self {
+        match error.sqlite_error_code().and_then(of_code) {
+            Some(fault) => StoreError::Away(fault, Arc::new(error)),
+            None => StoreError::Failed(Arc::new(error)),
+        }
+    }
+}
+
+impl From<rusqlite::Error> for JobsError {
+    fn from(error: rusqlite::Error) -> Self {
+        StoreError::from(error).into()
+    }
+}
+
+fn of_code(code: ErrorCode) -> Option<StorageFault> {
+    match code {
+        ErrorCode::DiskFull => Some(StorageFault::Full),
+        ErrorCode::DatabaseBusy
+        | ErrorCode::DatabaseLocked
+        | ErrorCode::ReadOnly
+        | ErrorCode::SystemIoFailure
+        | ErrorCode::CannotOpen => Some(StorageFault::Unwritable),
+        ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase => Some(StorageFault::Damaged),
+        _ => None,
+    }
+}
+
+#[cfg(feature = "cluster")]
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
         let fault = match &error {
-            sqlx::Error::Database(cause) => {
-                #[cfg(feature = "cluster")]
-                let shared = cause.try_downcast_ref::<PgDatabaseError>().is_some();
-                #[cfg(not(feature = "cluster"))]
-                let shared = false;
-                let read = if shared { of_state } else { of_code };
-                cause.code().and_then(|code| read(&code))
-            }
+            sqlx::Error::Database(cause) => cause.code().and_then(|code| of_state(&code)),
             sqlx::Error::PoolTimedOut | sqlx::Error::PoolClosed | sqlx::Error::Tls(_) => {
                 Some(StorageFault::Unwritable)
             }
@@ -34,6 +57,7 @@ impl From<sqlx::Error> for StoreError {
     }
 }
 
+#[cfg(feature = "cluster")]
 impl From<sqlx::Error> for JobsError {
     fn from(error: sqlx::Error) -> Self {
         StoreError::from(error).into()
@@ -41,6 +65,7 @@ impl From<sqlx::Error> for JobsError {
 }
 
 /// The server is away, or the way to it.
+#[cfg(feature = "cluster")]
 fn of_connection(error: &std::io::Error) -> Option<StorageFault> {
     match error.kind() {
         ErrorKind::ConnectionRefused
@@ -59,6 +84,7 @@ fn of_connection(error: &std::io::Error) -> Option<StorageFault> {
 }
 
 /// The state that PostgreSQL gives with an error; its first two characters are the class.
+#[cfg(feature = "cluster")]
 fn of_state(state: &str) -> Option<StorageFault> {
     const DISK_FULL: &str = "53100";
     // Cancelled by `statement_timeout`, or waited for a lock in vain.
@@ -74,28 +100,11 @@ fn of_state(state: &str) -> Option<StorageFault> {
     }
 }
 
-/// The low byte of a code of SQLite is its kind.
-fn of_code(code: &str) -> Option<StorageFault> {
-    const BUSY: u32 = 5;
-    const LOCKED: u32 = 6;
-    const READONLY: u32 = 8;
-    const IOERR: u32 = 10;
-    const FULL: u32 = 13;
-    const CORRUPT: u32 = 11;
-    const CANTOPEN: u32 = 14;
-    const NOTADB: u32 = 26;
-    match code.parse::<u32>().ok()? & 0xff {
-        FULL => Some(StorageFault::Full),
-        BUSY | LOCKED | READONLY | IOERR | CANTOPEN => Some(StorageFault::Unwritable),
-        CORRUPT | NOTADB => Some(StorageFault::Damaged),
-        _ => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    #[cfg(feature = "cluster")]
     #[test]
     fn a_server_that_stops_is_away_and_a_full_one_is_full() {
         let away = Some(StorageFault::Unwritable);
@@ -110,14 +119,18 @@ mod tests {
 
     #[test]
     fn extended_codes_are_recognised() {
-        assert_eq!(of_code("13"), Some(StorageFault::Full));
+        let fault_of = |code| {
+            let error = rusqlite::ffi::Error::new(code);
+            StoreError::from(rusqlite::Error::SqliteFailure(error, None)).storage_fault()
+        };
+        assert_eq!(fault_of(13), Some(StorageFault::Full));
         // SQLITE_IOERR_WRITE, SQLITE_READONLY_DBMOVED.
-        assert_eq!(of_code("778"), Some(StorageFault::Unwritable));
-        assert_eq!(of_code("1032"), Some(StorageFault::Unwritable));
+        assert_eq!(fault_of(778), Some(StorageFault::Unwritable));
+        assert_eq!(fault_of(1032), Some(StorageFault::Unwritable));
         // SQLITE_CORRUPT_INDEX, SQLITE_NOTADB.
-        assert_eq!(of_code("779"), Some(StorageFault::Damaged));
-        assert_eq!(of_code("26"), Some(StorageFault::Damaged));
+        assert_eq!(fault_of(779), Some(StorageFault::Damaged));
+        assert_eq!(fault_of(26), Some(StorageFault::Damaged));
         // SQLITE_CONSTRAINT_PRIMARYKEY.
-        assert_eq!(of_code("1555"), None);
+        assert_eq!(fault_of(1555), None);
     }
 }

@@ -1,7 +1,9 @@
 //! PostgreSQL as the shared statements see it.
 
-use sqlx::postgres::{PgConnection, PgPool, PgRow, Postgres};
-use sqlx::{QueryBuilder, Transaction};
+use futures_util::TryStreamExt;
+use sqlx::Transaction;
+use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow, Postgres};
+use sqlx::query::Query;
 use uuid::Uuid;
 
 use crate::jobs::model::kind::Queue;
@@ -13,10 +15,12 @@ use crate::jobs::store::postgres::connection::{ADMISSION, FOLD, LOCKS, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::postgres::sql::claim::{claimed, push_lease_until};
 use crate::jobs::store::postgres::sql::rows::{count, push_list, read_count, read_flag, read_id};
-use crate::jobs::store::postgres::statements::{Statements, Writer};
 use crate::jobs::store_error::StoreError;
 
+pub(crate) use sqlx::{Row, query, query_scalar};
+
 pub(crate) type Db = Postgres;
+pub(crate) type QueryBuilder = sqlx::QueryBuilder<Postgres>;
 pub(crate) type DbConnection = PgConnection;
 pub(crate) type DbPool = PgPool;
 pub(crate) type DbRow = PgRow;
@@ -34,6 +38,21 @@ const REPEATED: u32 = 4;
 /// Begins a transaction.
 pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, StoreError> {
     Ok(pool.begin().await?)
+}
+
+/// Passes each row of a statement on until `row` returns `false`.
+pub(crate) async fn for_each(
+    rows: Query<'_, Db, PgArguments>,
+    readers: &DbPool,
+    mut row: impl FnMut(&DbRow) -> Result<bool, StoreError> + Send,
+) -> Result<(), StoreError> {
+    let mut rows = rows.fetch(readers);
+    while let Some(next) = rows.try_next().await? {
+        if !row(&next)? {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// From here to the end of the transaction nobody else takes places in the queue or uses an idempotency key. What the one
@@ -69,22 +88,17 @@ pub(crate) async fn lock_blobs(
 }
 
 impl PostgresStore {
-    /// Where transactions that write begin.
-    pub(crate) fn writer(&self) -> Writer {
-        self.writer.clone()
-    }
-
     /// Ids for new blobs. They are given here, not by the insertion: rows of one statement may come back in any order.
     pub(crate) async fn new_blob_ids(
         &self,
-        statements: &mut Statements,
+        connection: &mut DbConnection,
         number: usize,
     ) -> Result<Vec<i64>, StoreError> {
         let ids = sqlx::query_scalar(
             "SELECT nextval('blob_ids') FROM generate_series(1, CAST($1 AS bigint))",
         )
         .bind(i64::try_from(number).unwrap_or(i64::MAX))
-        .fetch_all(statements.connection())
+        .fetch_all(connection)
         .await?;
         Ok(ids)
     }
@@ -117,7 +131,7 @@ impl PostgresStore {
             return Ok(Vec::new());
         }
         let ids = choose(&queued, request)?;
-        let mut update = QueryBuilder::<Db>::new(
+        let mut update = QueryBuilder::new(
             "UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = ",
         );
         update.push_bind(token).push(", lease_until = ");

@@ -25,5 +25,4 @@ pub mod schema;
     reason = "the shared statements are compiled once for each database"
 )]
 pub mod sql;
-pub(crate) mod statements;
 pub(crate) mod url;

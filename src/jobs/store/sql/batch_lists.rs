@@ -1,8 +1,7 @@
 //! Lists of batches, newest first, with the numbers of their jobs.
 
-use super::engine::{self, Db, DbRow, SqlStore};
+use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{from_json, push_list, read_count, read_id, read_kind, read_small, read_state};
-use sqlx::{QueryBuilder, Row};
 use std::collections::{BTreeMap, HashMap};
 
 use bytes::Bytes;
@@ -25,7 +24,7 @@ const COLUMNS: &str = "id, tenant, kind, created_at, count, rejected, name, labe
 
 impl SqlStore {
     async fn count_batches(&self, tenant: &str, filter: &BatchFilter) -> Result<Total, StoreError> {
-        let mut query = QueryBuilder::<Db>::new("SELECT COUNT(*) AS number FROM (");
+        let mut query = QueryBuilder::new("SELECT COUNT(*) AS number FROM (");
         push_page(&mut query, "id", tenant, filter, None);
         query.push(" LIMIT ").push_bind(EXAMINED_MAX);
         query.push(") AS counted");
@@ -42,7 +41,7 @@ impl SqlStore {
             return Ok(Vec::new());
         }
         let ids = rows.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
-        let mut query = QueryBuilder::<Db>::new(
+        let mut query = QueryBuilder::new(
             "SELECT batch_id AS id, state, COUNT(*) AS jobs FROM jobs WHERE batch_id IN (",
         );
         push_list(&mut query, &ids);
@@ -75,11 +74,7 @@ impl SqlStore {
     }
 }
 
-pub(crate) fn page_query(
-    tenant: &str,
-    filter: &BatchFilter,
-    after: Option<Uuid>,
-) -> QueryBuilder<Db> {
+pub(crate) fn page_query(tenant: &str, filter: &BatchFilter, after: Option<Uuid>) -> QueryBuilder {
     let mut query = QueryBuilder::new("");
     push_page(&mut query, COLUMNS, tenant, filter, after);
     query
@@ -87,7 +82,7 @@ pub(crate) fn page_query(
 
 /// Batches are few beside jobs: those of the tenant are walked from the newest.
 fn push_page(
-    query: &mut QueryBuilder<Db>,
+    query: &mut QueryBuilder,
     columns: &str,
     tenant: &str,
     filter: &BatchFilter,
@@ -162,7 +157,7 @@ impl BatchLists for SqlStore {
 
     async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError> {
         engine::again(|| async move {
-            let mut query = QueryBuilder::<Db>::new("SELECT ");
+            let mut query = QueryBuilder::new("SELECT ");
             query
                 .push(COLUMNS)
                 .push(" FROM batches WHERE complete = 1 AND id = ");
@@ -180,7 +175,7 @@ impl BatchLists for SqlStore {
 
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError> {
         engine::again(|| async move {
-            let row = sqlx::query(GET_RUN)
+            let row = query(GET_RUN)
                 .bind(id.to_string())
                 .bind(tenant)
                 .fetch_optional(&self.readers)

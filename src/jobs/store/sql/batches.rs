@@ -3,19 +3,16 @@
 //! No worker claims a job of a batch while it is being filled: the statement that claims leaves it out. A batch that a dead process left
 //! incomplete was never acknowledged and is removed with its jobs.
 
-use super::super::statements::Statements;
 use super::blob_refs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, DbConnection, SqlStore};
+use super::engine::{self, DbConnection, Row, SqlStore, query};
 use super::insert::insert_jobs;
 use super::quota::Places;
 use super::rows::{
     count, job_columns, read_blob_ids, read_count, read_flag, read_id, read_job, read_small,
     read_state, to_json,
 };
-use sqlx::Row;
 use std::sync::Arc;
 
-use futures_util::TryStreamExt;
 use uuid::Uuid;
 
 use async_trait::async_trait;
@@ -52,7 +49,7 @@ impl Batches for SqlStore {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
             engine::admit_alone(&mut transaction).await?;
-            let mut places = Places::of(&mut transaction, tenant, bounds).await?;
+            let mut places = Places::of(&mut transaction, [tenant], bounds).await?;
             let taken = places
                 .store(tenant, 0)
                 .and_then(|()| places.take(tenant, u64::from(most)));
@@ -60,7 +57,7 @@ impl Batches for SqlStore {
                 Ok(places) => u32::try_from(places).unwrap_or(most),
                 Err(refusal) => return Ok(Err(refusal)),
             };
-            sqlx::query(
+            query(
                 "INSERT INTO batches (id, tenant, created_at, reserved) VALUES ($1, $2, $3, $4) \
              ON CONFLICT (id) DO UPDATE SET reserved = batches.reserved + $4",
             )
@@ -100,7 +97,7 @@ impl Batches for SqlStore {
             if let Some(begun) = by_key(&mut transaction, new, filled_here).await? {
                 return Ok(begun);
             }
-            let reserved = sqlx::query("SELECT reserved FROM batches WHERE id = $1")
+            let reserved = query("SELECT reserved FROM batches WHERE id = $1")
                 .bind(new.id.to_string())
                 .fetch_optional(&mut *transaction)
                 .await?;
@@ -109,7 +106,7 @@ impl Batches for SqlStore {
                 None => 0,
             };
             let lacking = u64::from(new.count).saturating_sub(reserved);
-            let mut places = Places::of(&mut transaction, &new.tenant, bounds).await?;
+            let mut places = Places::of(&mut transaction, [&*new.tenant], bounds).await?;
             match places.take(&new.tenant, lacking) {
                 Ok(taken) if taken == lacking => {}
                 Ok(_) => return Ok(BatchBegun::Refused(places.refusal_of(&new.tenant))),
@@ -127,7 +124,7 @@ impl Batches for SqlStore {
                 return Ok(BatchBegun::Refused(refusal));
             }
             if let Some((digest, body)) = of_template {
-                sqlx::query(
+                query(
                     "INSERT INTO templates (tenant, digest, body) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
                 )
                 .bind(&*new.tenant)
@@ -136,7 +133,7 @@ impl Batches for SqlStore {
                 .execute(&mut *transaction)
                 .await?;
             }
-            sqlx::query(
+            query(
                 "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head, kind) \
                  VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9, $10) \
                  ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9, kind = $10",
@@ -170,20 +167,19 @@ impl Batches for SqlStore {
                 .iter()
                 .map(|(index, job)| (Some(*index), job))
                 .collect();
-            let mut statements = Statements::begin(&self.writer()).await?;
-            let update = statements.next();
-            update.push(concat!(
+            let mut transaction = engine::begin(&self.writer).await?;
+            let filled = query(concat!(
                 "UPDATE batches SET reserved = ",
                 greatest!(),
-                "(reserved - "
-            ));
-            update.push_bind(count(jobs.len())).push(", 0) WHERE id = ");
-            update.push_bind(batch.to_string());
-            update.push(" AND dropped = 0 RETURNING id");
-            let filled = statements.send().await?;
-            require_batch(batch, filled.iter().flatten().count() as u64)?;
-            let ended = insert_jobs(&mut statements, Some(batch), &jobs).await?;
-            statements.commit().await?;
+                "(reserved - $1, 0) WHERE id = $2 AND dropped = 0"
+            ))
+            .bind(count(jobs.len()))
+            .bind(batch.to_string())
+            .execute(&mut *transaction)
+            .await?;
+            require_batch(batch, filled.rows_affected())?;
+            let ended = insert_jobs(&mut transaction, Some(batch), &jobs).await?;
+            transaction.commit().await?;
             Ok(ended)
         })
         .await
@@ -191,7 +187,7 @@ impl Batches for SqlStore {
 
     async fn complete_batch(&self, id: Uuid) -> Result<(), StoreError> {
         engine::again(|| async move {
-            let complete = sqlx::query(
+            let complete = query(
                 "UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1 AND dropped = 0",
             )
             .bind(id.to_string())
@@ -210,12 +206,12 @@ impl Batches for SqlStore {
                 "DELETE FROM batch_keys WHERE batch_id = $1 \
                  AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0)",
             ] {
-                sqlx::query(statement)
+                query(statement)
                     .bind(id.to_string())
                     .execute(&mut *transaction)
                     .await?;
             }
-            let gone = sqlx::query(
+            let gone = query(
                 "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 ORDER BY id LIMIT $2) \
                  AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0) RETURNING blob_id",
             )
@@ -226,7 +222,7 @@ impl Batches for SqlStore {
             release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
             let last = gone.len() < limit as usize;
             if last {
-                sqlx::query("DELETE FROM batches WHERE id = $1 AND complete = 0")
+                query("DELETE FROM batches WHERE id = $1 AND complete = 0")
                     .bind(id.to_string())
                     .execute(&mut *transaction)
                     .await?;
@@ -239,7 +235,7 @@ impl Batches for SqlStore {
 
     async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError> {
         engine::again(|| async move {
-            let rows = sqlx::query(concat!(
+            let rows = query(concat!(
                 "SELECT id FROM batches WHERE complete = 0 AND ",
                 being_filled!(),
                 " = 0"
@@ -260,7 +256,7 @@ impl Batches for SqlStore {
     ) -> Result<Vec<(Uuid, State)>, StoreError> {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
-            let rows = sqlx::query(CANCEL)
+            let rows = query(CANCEL)
                 .bind(now)
                 .bind(id.to_string())
                 .bind(i64::from(limit))
@@ -279,7 +275,7 @@ impl Batches for SqlStore {
     async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool, StoreError> {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
-            let gone = sqlx::query(
+            let gone = query(
                 "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs \
              WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $3) AND \
              state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING blob_id",
@@ -292,7 +288,7 @@ impl Batches for SqlStore {
             release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
             let last = gone.len() < limit as usize;
             if last {
-                sqlx::query(
+                query(
                     "DELETE FROM batches WHERE id = $1 AND tenant = $2 AND complete = 1 \
                  AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)",
                 )
@@ -316,7 +312,7 @@ impl Batches for SqlStore {
         bytes: usize,
     ) -> Result<Vec<BatchItem>, StoreError> {
         engine::again(|| async move {
-            let mut rows = sqlx::query(concat!(
+            let rows = query(concat!(
                 "SELECT ",
                 job_columns!(),
                 ", batch_index, outputs, blob_key, solution FROM jobs \
@@ -326,24 +322,23 @@ impl Batches for SqlStore {
             .bind(id.to_string())
             .bind(after.map_or_else(String::new, |id| id.to_string()))
             .bind(i64::from(limit))
-            .bind(tenant)
-            .fetch(&self.readers);
+            .bind(tenant);
             let mut items = Vec::new();
             let mut read = 0;
-            while read < bytes
-                && let Some(row) = rows.try_next().await?
-            {
+            engine::for_each(rows, &self.readers, |row| {
                 let solution: Option<Vec<u8>> = row.try_get("solution")?;
                 read += solution.as_ref().map_or(0, Vec::len);
                 let key: Option<String> = row.try_get("blob_key")?;
                 let inline = solution.map(|solution| ItemResult::Solution(solution.into()));
                 items.push(BatchItem {
-                    index: read_small(&row, "batch_index")?,
-                    job: read_job(&row)?,
+                    index: read_small(row, "batch_index")?,
+                    job: read_job(row)?,
                     outputs: row.try_get("outputs")?,
                     result: key.map(ItemResult::Stored).or(inline),
                 });
-            }
+                Ok(read < bytes)
+            })
+            .await?;
             Ok(items)
         })
         .await
@@ -356,7 +351,7 @@ impl Batches for SqlStore {
         limit: u32,
     ) -> Result<Vec<String>, StoreError> {
         engine::again(|| async move {
-            let rows = sqlx::query(concat!(
+            let rows = query(concat!(
                 "SELECT DISTINCT label.key AS key FROM jobs, ",
                 pairs_of_labels!(),
                 " AS label WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $2) ORDER BY label.key LIMIT $3"
@@ -378,7 +373,7 @@ async fn keep_key(connection: &mut DbConnection, new: &NewBatch) -> Result<(), S
     let Some((key, digest)) = &new.idempotency else {
         return Ok(());
     };
-    sqlx::query(
+    query(
         "INSERT INTO batch_keys (of_tenant, key, digest, batch_id, kind) VALUES ($1, $2, $3, $4, $5) \
          ON CONFLICT (of_tenant, kind, key) DO UPDATE SET digest = $3, batch_id = $4",
     )
@@ -397,7 +392,7 @@ async fn has_template(
     tenant: &str,
     digest: &[u8],
 ) -> Result<bool, StoreError> {
-    let found = sqlx::query("SELECT 1 FROM templates WHERE tenant = $1 AND digest = $2")
+    let found = query("SELECT 1 FROM templates WHERE tenant = $1 AND digest = $2")
         .bind(tenant)
         .bind(digest)
         .fetch_optional(connection)
@@ -423,7 +418,7 @@ async fn by_key(
     let Some((key, digest)) = &new.idempotency else {
         return Ok(None);
     };
-    let row = sqlx::query(concat!(
+    let row = query(concat!(
         "SELECT digest, id, complete, ",
         being_filled!(),
         " AS filled FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id \

@@ -3,10 +3,8 @@
 //! A blob is a row. Jobs and stored slices refer to it; a job that shares a result is one more reference. [`release_blobs`] is
 //! the only place where a blob ends: it is called in every transaction that drops references.
 
-use super::super::statements::Statements;
-use super::engine::{self, Db, DbConnection, DbRow, SqlStore};
+use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore};
 use super::rows::{count, fence, push_list, read_blob_ids, read_id, read_small, read_state};
-use sqlx::{QueryBuilder, Row};
 
 use crate::jobs::store::claim::Claim;
 use crate::jobs::store::ending::StoredResult;
@@ -16,21 +14,22 @@ use crate::jobs::store_error::StoreError;
 pub(crate) const VALUES_PER_STATEMENT: usize = 250;
 
 impl SqlStore {
-    /// Stores results of claimed jobs whose leases are held, within the caller's transaction, which sends the statements; the ids of
-    /// their blobs are in the order of the results.
+    /// Stores results of claimed jobs whose leases are held, within the caller's transaction; the ids of their blobs are in the order of
+    /// the results.
     pub(crate) async fn insert_blobs(
         &self,
-        statements: &mut Statements,
+        connection: &mut DbConnection,
         results: &[(&Claim, &StoredResult)],
     ) -> Result<Vec<i64>, StoreError> {
         if results.is_empty() {
             return Ok(Vec::new());
         }
-        let ids = self.new_blob_ids(statements, results.len()).await?;
+        let ids = self.new_blob_ids(connection, results.len()).await?;
         let mut next = ids.iter();
         for some in results.chunks(VALUES_PER_STATEMENT) {
-            let insert = statements.next();
-            insert.push("WITH made (id, job, lease_token, key, bytes, solution, fields) AS (");
+            let mut insert = QueryBuilder::new(
+                "WITH made (id, job, lease_token, key, bytes, solution, fields) AS (",
+            );
             insert.push_values(some, |mut row, (claim, result)| {
                 let (key, inside) = match result {
                     StoredResult::Blob(key, _) => (Some(key.as_str()), None),
@@ -51,6 +50,7 @@ impl SqlStore {
                 unordered!("jobs.state"),
                 " = 'running'"
             ));
+            insert.build().execute(&mut *connection).await?;
         }
         Ok(ids)
     }
@@ -66,7 +66,7 @@ pub(crate) async fn release_blobs(
     for some in ids.chunks(VALUES_PER_STATEMENT) {
         // Of two transactions that drop the last two references, the later has to see that the other one is gone.
         engine::lock_blobs(connection, some).await?;
-        let mut free = QueryBuilder::<Db>::new("DELETE FROM blobs WHERE id IN (");
+        let mut free = QueryBuilder::new("DELETE FROM blobs WHERE id IN (");
         let mut list = free.separated(", ");
         for id in some {
             list.push_bind(*id);
@@ -99,7 +99,7 @@ pub(crate) async fn drop_slices_of_ended(
         }
     }
     for some in ids.chunks(VALUES_PER_STATEMENT) {
-        let mut drop = QueryBuilder::<Db>::new("DELETE FROM job_slices WHERE job_id IN (");
+        let mut drop = QueryBuilder::new("DELETE FROM job_slices WHERE job_id IN (");
         push_list(&mut drop, some);
         drop.push(") RETURNING blob_id");
         let gone = drop.build().fetch_all(&mut *connection).await?;
@@ -115,7 +115,7 @@ pub(crate) async fn leave_to_collector(
     keys: &[String],
 ) -> Result<(), StoreError> {
     for some in keys.chunks(VALUES_PER_STATEMENT) {
-        let mut leave = QueryBuilder::<Db>::new("WITH gone (key) AS (");
+        let mut leave = QueryBuilder::new("WITH gone (key) AS (");
         leave.push_values(some, |mut row, key| {
             row.push_bind(key);
         });
@@ -128,7 +128,7 @@ pub(crate) async fn leave_to_collector(
     Ok(())
 }
 
-pub(crate) fn push_keys(query: &mut QueryBuilder<Db>, keys: &[String]) {
+pub(crate) fn push_keys(query: &mut QueryBuilder, keys: &[String]) {
     let mut list = query.separated(", ");
     for key in keys {
         list.push_bind(key.clone());

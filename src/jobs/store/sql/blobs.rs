@@ -1,9 +1,8 @@
 //! Large results that nobody refers to any more.
 
 use super::blob_refs::{VALUES_PER_STATEMENT, leave_to_collector, push_keys};
-use super::engine::{self, Db, SqlStore};
+use super::engine::{self, QueryBuilder, Row, SqlStore, query_scalar};
 use super::rows::{push_list, read_id};
-use sqlx::QueryBuilder;
 use std::collections::HashSet;
 use uuid::Uuid;
 
@@ -18,11 +17,11 @@ impl ResultKeys for SqlStore {
     async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>, StoreError> {
         engine::again(|| async move {
             for some in done.chunks(VALUES_PER_STATEMENT) {
-                let mut forget = QueryBuilder::<Db>::new("DELETE FROM blob_outbox WHERE key IN (");
+                let mut forget = QueryBuilder::new("DELETE FROM blob_outbox WHERE key IN (");
                 push_keys(&mut forget, some);
                 forget.build().execute(&self.writer).await?;
             }
-            let keys = sqlx::query_scalar("SELECT key FROM blob_outbox ORDER BY key LIMIT $1")
+            let keys = query_scalar("SELECT key FROM blob_outbox ORDER BY key LIMIT $1")
                 .bind(i64::from(limit))
                 .fetch_all(&self.readers)
                 .await?;
@@ -45,15 +44,12 @@ impl ResultKeys for SqlStore {
             for some in results.chunks(VALUES_PER_STATEMENT) {
                 // In this order: what a running job has written is known by its key before the job no longer runs.
                 let running = self.running(some).await?;
-                let mut query = QueryBuilder::<Db>::new("SELECT key FROM blobs WHERE key IN (");
+                let mut query = QueryBuilder::new("SELECT key FROM blobs WHERE key IN (");
                 let keys: Vec<String> = some.iter().map(|(_, key)| key.clone()).collect();
                 push_keys(&mut query, &keys);
-                let known: HashSet<String> = query
-                    .build_query_scalar::<String>()
-                    .fetch_all(&self.readers)
-                    .await?
-                    .into_iter()
-                    .collect();
+                let known = query.build().fetch_all(&self.readers).await?;
+                let known = known.iter().map(|row| row.try_get("key"));
+                let known: HashSet<String> = known.collect::<Result<_, _>>()?;
                 for result in some.iter().filter(|(_, key)| !known.contains(key)) {
                     if running.contains(&result.0) {
                         orphans.undecided.push(result.clone());
@@ -71,7 +67,7 @@ impl ResultKeys for SqlStore {
 impl SqlStore {
     async fn running(&self, results: &[(Uuid, String)]) -> Result<HashSet<Uuid>, StoreError> {
         let mut query =
-            QueryBuilder::<Db>::new("SELECT id FROM jobs WHERE state = 'running' AND id IN (");
+            QueryBuilder::new("SELECT id FROM jobs WHERE state = 'running' AND id IN (");
         let ids: Vec<Uuid> = results.iter().map(|(id, _)| *id).collect();
         push_list(&mut query, &ids);
         query.push(")");

@@ -2,9 +2,8 @@
 //! job refers to it.
 
 use super::blob_refs::drop_slices_of_ended;
-use super::engine::{self, Db, DbConnection};
+use super::engine::{self, DbConnection, QueryBuilder};
 use super::rows::read_id;
-use sqlx::QueryBuilder;
 use uuid::Uuid;
 
 use crate::jobs::store::submission::NewJob;
@@ -68,7 +67,7 @@ pub(crate) async fn end_pairs(
     rows.iter().map(read_id).collect()
 }
 
-fn with_pairs<'a>(pairs: impl IntoIterator<Item = &'a Pair>) -> QueryBuilder<Db> {
+fn with_pairs<'a>(pairs: impl IntoIterator<Item = &'a Pair>) -> QueryBuilder {
     let mut query = QueryBuilder::new("WITH pairs (job, at, source, lease_token) AS (");
     query.push_values(pairs, |mut row, pair| {
         row.push_bind(pair.job.to_string())

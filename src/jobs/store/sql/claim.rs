@@ -1,8 +1,7 @@
 //! Claims: the next group of queued jobs of a tenant.
 
-use super::engine::{self, Db, DbRow, SqlStore};
+use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{count, read_cache_key, read_count, read_flag, read_id, read_kind, read_small};
-use sqlx::{QueryBuilder, Row};
 use std::sync::Arc;
 
 use async_trait::async_trait;
@@ -48,7 +47,7 @@ impl Claims for SqlStore {
             if let Some(known) = self.known_queues() {
                 return Ok(known);
             }
-            let rows = sqlx::query(QUEUES).fetch_all(&self.readers).await?;
+            let rows = query(QUEUES).fetch_all(&self.readers).await?;
             let read = |row: &DbRow| {
                 Ok(Queue {
                     tenant: row.try_get::<String, _>("tenant")?.into(),
@@ -86,7 +85,7 @@ fn new_token() -> Result<i64, StoreError> {
 }
 
 /// Writes when a lease that begins now runs out.
-pub(crate) fn push_lease_until(query: &mut QueryBuilder<Db>, store: &SqlStore, lease: Lease) {
+pub(crate) fn push_lease_until(query: &mut QueryBuilder, store: &SqlStore, lease: Lease) {
     query.push(engine::LEASE_NOW.0);
     query.push_bind(store.lease_now(lease.now));
     query.push(engine::LEASE_NOW.1).push(" + ");

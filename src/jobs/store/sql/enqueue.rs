@@ -1,7 +1,8 @@
 //! Submission of single jobs, and what their idempotency keys stand for.
 
-use super::engine::{self, SqlStore};
+use super::engine::{self, SqlStore, query};
 use super::group_commit::{Submission, by_key};
+use std::sync::Arc;
 use tokio::sync::oneshot;
 
 use async_trait::async_trait;
@@ -13,7 +14,11 @@ use crate::jobs::store_error::StoreError;
 #[async_trait]
 impl SubmitJobs for SqlStore {
     async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, StoreError> {
-        let gone = || StoreError::from(sqlx::Error::WorkerCrashed);
+        let gone = || {
+            StoreError::Failed(Arc::new(std::io::Error::other(
+                "the task that stores jobs has ended",
+            )))
+        };
         let (reply, answer) = oneshot::channel();
         let waiting = Submission {
             new: new.clone(),
@@ -30,7 +35,7 @@ impl SubmitJobs for SqlStore {
 
     async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), StoreError> {
         engine::again(|| async move {
-            sqlx::query("DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2")
+            query("DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2")
                 .bind(tenant)
                 .bind(key)
                 .execute(&self.writer)

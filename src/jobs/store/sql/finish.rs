@@ -1,14 +1,12 @@
 //! Ends of claimed jobs in the embedded job table: one transaction, and so one write to the disk, for all of them.
 
-use super::super::statements::Statements;
 use super::blob_refs::{drop_slices_of_ended, leave_to_collector, release_blobs};
 use super::cached::{Pair, SOURCE, end_pairs};
-use super::engine::{self, Db, DbRow, SqlStore};
-use super::rows::{fence, read_cache_key, read_id, read_move, read_small, to_json};
+use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore};
+use super::rows::{fence, read_cache_key, read_id, read_move, to_json};
 use async_trait::async_trait;
 
 use crate::jobs::store::submission::CacheKey;
-use sqlx::{QueryBuilder, Row};
 use std::collections::HashMap;
 use std::collections::HashSet;
 
@@ -21,25 +19,26 @@ use crate::jobs::store::ending::{Ending, StoredResult};
 use crate::jobs::store_error::StoreError;
 
 impl SqlStore {
-    /// Writes the statements that end jobs with what their solves gave, as long as their leases are held; the ids of the blobs.
-    async fn push_ends(
+    /// Ends jobs with what their solves gave, as long as their leases are held. Returns the ids of the blobs, and the rows of the jobs
+    /// that ended.
+    async fn end_solved(
         &self,
-        statements: &mut Statements,
+        connection: &mut DbConnection,
         rows: &[(&Claim, EndRow<'_>)],
         now: i64,
-    ) -> Result<Vec<i64>, StoreError> {
+    ) -> Result<(Vec<i64>, Vec<DbRow>), StoreError> {
+        if rows.is_empty() {
+            return Ok((Vec::new(), Vec::new()));
+        }
         let results = rows.iter();
         let results: Vec<_> = results
             .filter_map(|(claim, end)| Some((*claim, end.result?)))
             .collect();
-        let made = self.insert_blobs(statements, &results).await?;
-        let update = statements.next();
-        if rows.is_empty() {
-            update.push("SELECT id, state, slices FROM jobs WHERE 1 = 0");
-            return Ok(made);
-        }
+        let made = self.insert_blobs(connection, &results).await?;
         let mut blobs = made.iter();
-        update.push("WITH done (id, lease_token, state, remarks, failure, blob, patches) AS (");
+        let mut update = QueryBuilder::new(
+            "WITH done (id, lease_token, state, remarks, failure, blob, patches) AS (",
+        );
         update.push_values(rows, |mut row, (claim, end)| {
             row.push_bind(claim.id.to_string())
                 .push_bind(fence(claim))
@@ -63,7 +62,8 @@ impl SqlStore {
             unordered!("jobs.state"),
             " = 'running' RETURNING jobs.id AS id, jobs.state AS state, slices",
         ));
-        Ok(made)
+        let ended = update.build().fetch_all(connection).await?;
+        Ok((made, ended))
     }
 }
 
@@ -102,42 +102,22 @@ impl Ends for SqlStore {
                 .filter(|(_, ending)| !matches!(ending, Ending::Cached { .. }))
                 .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
                 .collect::<Result<Vec<_>, StoreError>>()?;
-            let mut statements = Statements::begin(&self.writer()).await?;
-            let made = self.push_ends(&mut statements, &rows, now).await?;
-            let keys = |(claim, end): &(&Claim, EndRow<'_>)| match end.result {
-                Some(StoredResult::Blob(key, _)) => Some((claim.id, key.clone())),
-                _ => None,
-            };
-            let keys: Vec<(Uuid, String)> = rows.iter().filter_map(keys).collect();
-            let sliced = ends.iter().any(|(claim, _)| claim.slices > 0);
-            if Statements::EXCLUSIVE && pairs.is_empty() && keys.is_empty() && !sliced {
-                let results = statements.commit().await?;
-                let ended = results.last().map_or(&[] as &[DbRow], Vec::as_slice);
-                if ended
-                    .iter()
-                    .any(|row| read_small::<u32>(row, "slices").is_ok_and(|slices| slices > 0))
-                {
-                    // Slices were stored since the claim was read.
-                    let mut transaction = engine::begin(&self.writer).await?;
-                    drop_slices_of_ended(&mut transaction, ended).await?;
-                    transaction.commit().await?;
-                }
-                return read_ended(ended);
-            }
-            let results = statements.send().await?;
-            let rows_ended = results.last().map_or(&[] as &[DbRow], Vec::as_slice);
-            let connection = statements.connection();
-            drop_slices_of_ended(connection, rows_ended).await?;
-            let mut ended = read_ended(rows_ended)?;
+            let mut transaction = engine::begin(&self.writer).await?;
+            let (made, rows_ended) = self.end_solved(&mut transaction, &rows, now).await?;
+            drop_slices_of_ended(&mut transaction, &rows_ended).await?;
+            let mut ended = read_ended(&rows_ended)?;
             if ended.len() < rows.len() {
                 // Results whose lease was lost meanwhile have no owner.
-                release_blobs(connection, made).await?;
-                let lost = keys.into_iter().filter(|(id, _)| !ended.contains(id));
-                let lost: Vec<String> = lost.map(|(_, key)| key).collect();
-                leave_to_collector(connection, &lost).await?;
+                release_blobs(&mut transaction, made).await?;
+                let lost = rows.iter().filter(|(claim, _)| !ended.contains(&claim.id));
+                let lost = lost.filter_map(|(_, end)| match end.result {
+                    Some(StoredResult::Blob(key, _)) => Some(key.clone()),
+                    _ => None,
+                });
+                leave_to_collector(&mut transaction, &lost.collect::<Vec<_>>()).await?;
             }
-            ended.extend(end_pairs(connection, &pairs).await?);
-            statements.commit().await?;
+            ended.extend(end_pairs(&mut transaction, &pairs).await?);
+            transaction.commit().await?;
             Ok(ended)
         })
         .await
@@ -148,7 +128,7 @@ impl Ends for SqlStore {
             if keys.is_empty() {
                 return Ok(HashMap::new());
             }
-            let mut query = QueryBuilder::<Db>::new("WITH asked (cache_key) AS (");
+            let mut query = QueryBuilder::new("WITH asked (cache_key) AS (");
             query.push_values(keys, |mut row, key| {
                 row.push_bind(key.as_slice());
             });

@@ -1,12 +1,10 @@
 //! Jobs submitted one by one, stored together: all that wait at a moment share one transaction, and so one write to the disk,
 //! which takes longer than everything else about them.
 
-use super::super::statements::{Statements, Writer};
-use super::engine::{self, DbConnection};
+use super::engine::{self, DbConnection, DbPool, Row, query};
 use super::insert::insert_jobs;
-use super::quota::{Places, push_succeeded, push_taken};
-use super::rows::{GET, job_columns, read_id, read_job};
-use sqlx::Row;
+use super::quota::{Places, succeeded};
+use super::rows::{GET, job_columns, read_job};
 use std::collections::{HashMap, HashSet};
 
 use tokio::sync::{mpsc, oneshot};
@@ -40,14 +38,14 @@ pub(crate) struct GroupCommit(pub(crate) mpsc::Sender<Submission>);
 
 impl GroupCommit {
     /// Starts the task.
-    pub(crate) fn start(writer: Writer) -> GroupCommit {
+    pub(crate) fn start(writer: DbPool) -> GroupCommit {
         let (sender, waiting) = mpsc::channel(GROUP_MAX);
         tokio::spawn(store_all(writer, waiting));
         GroupCommit(sender)
     }
 }
 
-async fn store_all(writer: Writer, mut waiting: mpsc::Receiver<Submission>) {
+async fn store_all(writer: DbPool, mut waiting: mpsc::Receiver<Submission>) {
     let mut group = Vec::with_capacity(GROUP_MAX);
     while waiting.recv_many(&mut group, GROUP_MAX).await > 0 {
         while !group.is_empty() {
@@ -71,7 +69,7 @@ fn set_aside_repeated_keys(group: &mut Vec<Submission>) -> Vec<Submission> {
         .collect()
 }
 
-async fn store_some(writer: &Writer, group: Vec<Submission>) {
+async fn store_some(writer: &DbPool, group: Vec<Submission>) {
     let jobs: Vec<&NewJob> = group.iter().map(|waiting| &waiting.new).collect();
     let Some(bounds) = group.first().map(|waiting| waiting.bounds) else {
         return;
@@ -104,29 +102,20 @@ async fn store_some(writer: &Writer, group: Vec<Submission>) {
 
 /// Stores jobs in one transaction; the answers are in their order. Idempotency keys must differ.
 async fn store_together(
-    writer: &Writer,
+    writer: &DbPool,
     jobs: &[&NewJob],
     bounds: QueueBounds,
 ) -> Result<Vec<Enqueued>, StoreError> {
-    let mut statements = Statements::begin(writer).await?;
-    engine::admit_alone(statements.connection()).await?;
+    let mut transaction = engine::begin(writer).await?;
+    engine::admit_alone(&mut transaction).await?;
     let tenants: HashSet<&str> = jobs.iter().map(|job| &*job.tenant).collect();
-    push_taken(statements.next(), tenants);
+    let mut places = Places::of(&mut transaction, tenants, bounds).await?;
     let sources: Vec<Uuid> = jobs.iter().filter_map(|job| Some(job.source?.0)).collect();
-    if !sources.is_empty() {
-        push_succeeded(statements.next(), &sources);
-    }
-    let mut read = statements.send().await?.into_iter();
-    let mut places = Places::read(&read.next().unwrap_or_default(), bounds)?;
-    let living = read.next().unwrap_or_default();
-    let living = living
-        .iter()
-        .map(read_id)
-        .collect::<Result<HashSet<_>, _>>()?;
+    let living = succeeded(&mut transaction, &sources).await?;
     let mut known = HashMap::new();
     for job in jobs {
         if let Some((key, digest)) = &job.idempotency
-            && let Some(found) = by_key(statements.connection(), &job.tenant, key, digest).await?
+            && let Some(found) = by_key(&mut transaction, &job.tenant, key, digest).await?
         {
             known.insert(job.id, found);
         }
@@ -152,29 +141,28 @@ async fn store_together(
     }
     added.retain(|(_, job)| !known.contains_key(&job.id));
     if added.is_empty() {
-        statements.commit().await?;
+        transaction.commit().await?;
         return answers(jobs, known);
     }
-    let ended = insert_jobs(&mut statements, None, &added).await?;
+    let ended = insert_jobs(&mut transaction, None, &added).await?;
     for (_, job) in added {
         if let Some((key, digest)) = &job.idempotency {
-            let insert = statements.next();
-            insert.push("INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) ");
-            insert.push_values([()], |mut row, ()| {
-                row.push_bind(&*job.tenant)
-                    .push_bind(key)
-                    .push_bind(digest.as_slice())
-                    .push_bind(job.id.to_string());
-            });
+            query("INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) VALUES ($1, $2, $3, $4)")
+                .bind(&*job.tenant)
+                .bind(key)
+                .bind(digest.as_slice())
+                .bind(job.id.to_string())
+                .execute(&mut *transaction)
+                .await?;
         }
         let as_it_is = if ended.contains(&job.id) {
-            read_back(statements.connection(), job).await?
+            read_back(&mut transaction, job).await?
         } else {
             queued(job)
         };
         known.insert(job.id, Enqueued::Created(as_it_is));
     }
-    statements.commit().await?;
+    transaction.commit().await?;
     answers(jobs, known)
 }
 
@@ -199,7 +187,7 @@ pub(crate) async fn by_key(
     key: &str,
     digest: &[u8; 32],
 ) -> Result<Option<Enqueued>, StoreError> {
-    let row = sqlx::query(BY_KEY)
+    let row = query(BY_KEY)
         .bind(tenant)
         .bind(key)
         .fetch_optional(connection)
@@ -214,7 +202,7 @@ pub(crate) async fn by_key(
 }
 
 async fn read_back(connection: &mut DbConnection, job: &NewJob) -> Result<Job, StoreError> {
-    let row = sqlx::query(GET)
+    let row = query(GET)
         .bind(job.id.to_string())
         .bind(&*job.tenant)
         .fetch_one(connection)

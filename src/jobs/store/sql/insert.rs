@@ -1,7 +1,7 @@
 //! New rows of the embedded job table: jobs with their cases and labels, many in one statement.
 
-use super::super::statements::Statements;
 use super::cached::end_with_sources;
+use super::engine::{DbConnection, QueryBuilder};
 use super::rows::{count, to_json};
 use uuid::Uuid;
 
@@ -11,10 +11,10 @@ use crate::jobs::store_error::StoreError;
 /// Jobs in one statement; with 20 values each far below the bound of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
-/// Queues jobs within the caller's transaction, which sends the statements, those of a batch with their places in it. Returns those that ended at
-/// once with the result of their source.
+/// Queues jobs within the caller's transaction, those of a batch with their places in it. Returns those that ended at once with the
+/// result of their source.
 pub(crate) async fn insert_jobs(
-    statements: &mut Statements,
+    connection: &mut DbConnection,
     batch: Option<Uuid>,
     jobs: &[(Option<u32>, &NewJob)],
 ) -> Result<Vec<Uuid>, StoreError> {
@@ -25,8 +25,7 @@ pub(crate) async fn insert_jobs(
             .iter()
             .map(|(_, job)| to_json(&job.labels))
             .collect::<Result<Vec<_>, _>>()?;
-        let rows = statements.next();
-        rows.push(
+        let mut rows = QueryBuilder::new(
             "INSERT INTO jobs (id, state, name, labels, method, created_at, updated_at, batch_id, batch_index, cost_us, slice_us, outputs, \
              cache_key, tenant, bypass_cache, rank, deadline, traceparent, case_bytes, kind) ",
         );
@@ -55,20 +54,21 @@ pub(crate) async fn insert_jobs(
                     .push_bind(job.kind.name());
             },
         );
-        let cases = statements.next();
-        cases.push("INSERT INTO cases (job_id, row, body) ");
+        rows.build().execute(&mut *connection).await?;
+        let mut cases = QueryBuilder::new("INSERT INTO cases (job_id, row, body) ");
         cases.push_values(some, |mut row, (_, job)| {
             row.push_bind(job.id.to_string())
                 .push_bind(i64::from(job.row))
                 .push_bind(job.body.as_ref());
         });
+        cases.build().execute(&mut *connection).await?;
         let labels: Vec<_> = some
             .iter()
             .flat_map(|(_, job)| job.labels.iter().map(move |label| (job, label)))
             .collect();
         for some in labels.chunks(ROWS_PER_STATEMENT) {
-            let rows = statements.next();
-            rows.push("INSERT INTO job_labels (of_tenant, key, value, job_id, state) ");
+            let mut rows =
+                QueryBuilder::new("INSERT INTO job_labels (of_tenant, key, value, job_id, state) ");
             rows.push_values(some, |mut row, (job, (key, value))| {
                 row.push_bind(&*job.tenant)
                     .push_bind(*key)
@@ -76,14 +76,10 @@ pub(crate) async fn insert_jobs(
                     .push_bind(job.id.to_string())
                     .push("'queued'");
             });
+            rows.build().execute(&mut *connection).await?;
         }
-        if some.iter().any(|(_, job)| job.source.is_some()) {
-            statements.send().await?;
-            let jobs = some.iter().map(|(_, job)| *job);
-            ended.extend(end_with_sources(statements.connection(), jobs).await?);
-        } else if jobs.len() > ROWS_PER_STATEMENT {
-            statements.send().await?;
-        }
+        let jobs = some.iter().map(|(_, job)| *job);
+        ended.extend(end_with_sources(&mut *connection, jobs).await?);
     }
     Ok(ended)
 }

@@ -1,7 +1,7 @@
 //! What clients ask of one job.
 
 use super::blob_refs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, SqlStore};
+use super::engine::{self, Row, SqlStore, query};
 use super::rows::{
     GET, job_columns, read_blob_id, read_count, read_flag, read_job, read_kind, read_small,
 };
@@ -10,7 +10,6 @@ use async_trait::async_trait;
 use crate::jobs::store::ending::StoredResult;
 use crate::jobs::store::submission::StoredCase;
 use bytes::Bytes;
-use sqlx::Row;
 
 use uuid::Uuid;
 
@@ -25,7 +24,7 @@ impl ClientJobs for SqlStore {
     async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>, StoreError> {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
-            let row = sqlx::query(concat!(
+            let row = query(concat!(
                 "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
                  ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
                  cancel_requested = 1, version = version + 1, updated_at = $1 \
@@ -51,7 +50,7 @@ impl ClientJobs for SqlStore {
     async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted, StoreError> {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
-            let gone = sqlx::query(
+            let gone = query(
                 "DELETE FROM jobs WHERE id = $1 AND tenant = $2 AND kind = 'case' AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id",
             )
             .bind(id.to_string())
@@ -72,7 +71,7 @@ impl ClientJobs for SqlStore {
 
     async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>, StoreError> {
         engine::again(|| async move {
-            let row = sqlx::query(GET)
+            let row = query(GET)
                 .bind(id.to_string())
                 .bind(tenant)
                 .fetch_optional(&self.readers)
@@ -88,7 +87,7 @@ impl ClientJobs for SqlStore {
         id: Uuid,
     ) -> Result<Option<(Job, Option<ResultRef>)>, StoreError> {
         engine::again(|| async move {
-            let row = sqlx::query(concat!(
+            let row = query(concat!(
                 "SELECT ",
                 job_columns!(),
                 ", blob_id, field_patches, outputs, blob_key, blob_bytes, solution, fields FROM jobs LEFT JOIN \
@@ -121,7 +120,7 @@ impl ClientJobs for SqlStore {
 
     async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>, StoreError> {
         engine::again(|| async move {
-            let row = sqlx::query(
+            let row = query(
                 "SELECT jobs.kind, cases.row, cases.body, head, templates.body AS template FROM jobs JOIN cases ON cases.job_id = jobs.id \
                  LEFT JOIN batches ON batches.id = jobs.batch_id \
                  LEFT JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \

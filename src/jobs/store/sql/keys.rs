@@ -1,13 +1,12 @@
 //! API keys in the embedded job table.
 
-use super::engine::{self, DbRow, SqlStore};
+use super::engine::{self, DbRow, Row, SqlStore, query};
 use super::rows::{from_json, read_flag, to_json};
 use async_trait::async_trait;
 
 use crate::jobs::model::key::Key;
 use crate::jobs::store::KeyStore;
 use crate::jobs::store_error::StoreError;
-use sqlx::Row;
 use std::sync::Arc;
 
 const ALL: &str =
@@ -19,7 +18,7 @@ const ONE: &str = "SELECT id, hash, tenant, name, created_at, revoked_at, read_o
 impl KeyStore for SqlStore {
     async fn add_key(&self, key: &Key) -> Result<(), StoreError> {
         engine::again(|| async move {
-            sqlx::query(
+            query(
                 "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only, labels) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
             )
             .bind(&key.id)
@@ -39,10 +38,7 @@ impl KeyStore for SqlStore {
 
     async fn key(&self, id: &str) -> Result<Option<Key>, StoreError> {
         engine::again(|| async move {
-            let row = sqlx::query(ONE)
-                .bind(id)
-                .fetch_optional(&self.readers)
-                .await?;
+            let row = query(ONE).bind(id).fetch_optional(&self.readers).await?;
             row.as_ref().map(read_key).transpose()
         })
         .await
@@ -50,7 +46,7 @@ impl KeyStore for SqlStore {
 
     async fn keys(&self) -> Result<Vec<Key>, StoreError> {
         engine::again(|| async move {
-            let rows = sqlx::query(ALL).fetch_all(&self.readers).await?;
+            let rows = query(ALL).fetch_all(&self.readers).await?;
             let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
             keys.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
             Ok(keys)
@@ -60,7 +56,7 @@ impl KeyStore for SqlStore {
 
     async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, StoreError> {
         engine::again(|| async move {
-            sqlx::query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
+            query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
                 .bind(now)
                 .bind(id)
                 .execute(&self.writer)

@@ -2,9 +2,8 @@
 
 use super::blob_refs::drop_slices_of_ended;
 use super::claim::push_lease_until;
-use super::engine::{self, Db, SqlStore};
+use super::engine::{self, QueryBuilder, Row, SqlStore, query};
 use super::rows::{count, fence, push_list, read_flag, read_id, read_kind, read_move};
-use sqlx::{QueryBuilder, Row};
 use std::collections::HashMap;
 
 use bytes::Bytes;
@@ -25,7 +24,7 @@ impl Leases for SqlStore {
             if ids.is_empty() {
                 return Ok(HashMap::new());
             }
-            let mut query = QueryBuilder::<Db>::new(
+            let mut query = QueryBuilder::new(
                 "SELECT id, kind, cases.row, body, batch_id, cancel_requested, CASE WHEN bypass_cache = 0 AND jobs.cache_key IS NOT NULL THEN \
                  (SELECT source.id FROM jobs AS source WHERE source.cache_key = jobs.cache_key AND source.state = 'succeeded' LIMIT 1) END AS source \
                  FROM cases JOIN jobs ON jobs.id = cases.job_id \
@@ -81,7 +80,7 @@ impl Leases for SqlStore {
             if claims.is_empty() {
                 return Ok(Vec::new());
             }
-            let mut query = QueryBuilder::<Db>::new("WITH held (id, lease_token, now_at) AS (");
+            let mut query = QueryBuilder::new("WITH held (id, lease_token, now_at) AS (");
             query.push_values(claims, |mut row, (claim, progress)| {
                 row.push_bind(claim.id.to_string())
                     .push_bind(fence(claim))
@@ -183,7 +182,7 @@ impl Leases for SqlStore {
 impl SqlStore {
     /// The template of a batch, and the head of a run.
     async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>, StoreError> {
-        let row = sqlx::query(
+        let row = query(
             "SELECT body, head FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
              WHERE batches.id = $1",
         )
@@ -204,7 +203,7 @@ const OF_HELD: &str = concat!(
     " = 'running' RETURNING "
 );
 
-fn with_held(claims: &[Claim]) -> QueryBuilder<Db> {
+fn with_held(claims: &[Claim]) -> QueryBuilder {
     let mut query = QueryBuilder::new("WITH held (id, lease_token) AS (");
     query.push_values(claims, |mut row, claim| {
         row.push_bind(claim.id.to_string()).push_bind(fence(claim));

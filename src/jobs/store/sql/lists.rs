@@ -1,8 +1,7 @@
 //! Lists of the embedded job table: one indexed statement per page and state, whatever the filter.
 
-use super::engine::{self, Db, DbRow, SqlStore};
+use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{job_columns, read_count, read_id, read_job, read_kind};
-use sqlx::{QueryBuilder, Row};
 use std::cmp::Reverse;
 
 use uuid::Uuid;
@@ -72,7 +71,7 @@ impl JobLists for SqlStore {
         limit: u32,
     ) -> Result<Vec<Change>, StoreError> {
         engine::again(|| async move {
-            let rows = sqlx::query(CHANGES)
+            let rows = query(CHANGES)
                 .bind(tenant)
                 .bind(since)
                 .bind(after.map_or_else(String::new, |id| id.to_string()))
@@ -139,7 +138,7 @@ pub(crate) fn page_query(
     state: Option<State>,
     after: Option<Uuid>,
     limit: u32,
-) -> QueryBuilder<Db> {
+) -> QueryBuilder {
     let most = i64::from(limit) + 1;
     if !filter.reads_jobs() {
         let mut query = QueryBuilder::new("");
@@ -179,14 +178,14 @@ fn end_query(
     filter: &Filter,
     state: Option<State>,
     after: Option<Uuid>,
-) -> QueryBuilder<Db> {
+) -> QueryBuilder {
     let mut query = QueryBuilder::new("");
     walk(&mut query, "id", tenant, filter, state, after);
     query.push(" LIMIT 1 OFFSET ").push_bind(EXAMINED_MAX - 1);
     query
 }
 
-fn count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuilder<Db> {
+fn count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuilder {
     let mut query = QueryBuilder::new("SELECT COUNT(*) AS number FROM (");
     walk(&mut query, "id", tenant, filter, state, None);
     query.push(" LIMIT ").push_bind(COUNTED);
@@ -195,7 +194,7 @@ fn count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuil
 }
 
 /// The counts that the database keeps itself.
-fn kept_count_query(tenant: &str, state: Option<State>) -> QueryBuilder<Db> {
+fn kept_count_query(tenant: &str, state: Option<State>) -> QueryBuilder {
     let mut query = QueryBuilder::new(
         "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts WHERE kind = 'case' AND tenant = ",
     );
@@ -209,7 +208,7 @@ fn kept_count_query(tenant: &str, state: Option<State>) -> QueryBuilder<Db> {
 /// Walks the jobs of a filter, as far as an index finds them, from the newest. Labels have a table of their own, sorted by job
 /// within each label, so that every kind of list walks an index and stops at its limit.
 fn walk(
-    query: &mut QueryBuilder<Db>,
+    query: &mut QueryBuilder,
     columns: &str,
     tenant: &str,
     filter: &Filter,
@@ -226,7 +225,7 @@ fn walk(
     };
     query.push("SELECT ").push(columns).push(source);
     let mut joint = " WHERE ";
-    let mut and = |query: &mut QueryBuilder<Db>, condition: &str, value: String| {
+    let mut and = |query: &mut QueryBuilder, condition: &str, value: String| {
         query.push(joint).push(condition).push_bind(value);
         joint = " AND ";
     };
@@ -276,12 +275,7 @@ fn walk(
 }
 
 /// Ids within a batch lie between its first and its last, so no more of a label is walked than was sent meanwhile.
-fn within_batch(
-    query: &mut QueryBuilder<Db>,
-    batch: Uuid,
-    from: Option<Uuid>,
-    before: Option<Uuid>,
-) {
+fn within_batch(query: &mut QueryBuilder, batch: Uuid, from: Option<Uuid>, before: Option<Uuid>) {
     let end = "(SELECT MAX(id) FROM jobs WHERE batch_id = ";
     let last = before.map_or(Uuid::max(), |id| {
         Uuid::from_u128(id.as_u128().saturating_sub(1))

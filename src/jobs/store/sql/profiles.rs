@@ -1,8 +1,7 @@
 //! Cross-sections that tenants keep.
 
-use super::engine::{self, DbRow, SqlStore};
+use super::engine::{self, DbRow, Row, SqlStore, query};
 use super::rows::read_count;
-use sqlx::Row;
 
 use async_trait::async_trait;
 
@@ -21,7 +20,7 @@ impl Profiles for SqlStore {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
             engine::admit_alone(&mut transaction).await?;
-            let known = sqlx::query(
+            let known = query(
                 "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2",
             )
             .bind(tenant)
@@ -31,7 +30,7 @@ impl Profiles for SqlStore {
             if let Some(row) = known {
                 return Ok(ProfileKept::Existing(read_profile(&row)?));
             }
-            let row = sqlx::query(
+            let row = query(
                 "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM profiles WHERE tenant = $1",
             )
             .bind(tenant)
@@ -41,7 +40,7 @@ impl Profiles for SqlStore {
             if read_count(&row, "bytes")? + bytes > max_bytes {
                 return Ok(ProfileKept::Full);
             }
-            sqlx::query(
+            query(
                 "INSERT INTO profiles (tenant, digest, body, bytes, created_at) VALUES ($1, $2, $3, $4, $5)",
             )
             .bind(tenant)
@@ -63,7 +62,7 @@ impl Profiles for SqlStore {
         digest: &str,
     ) -> Result<Option<StoredProfile>, StoreError> {
         engine::again(|| async move {
-            let row = sqlx::query(
+            let row = query(
                 "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2",
             )
             .bind(tenant)
@@ -81,7 +80,7 @@ impl Profiles for SqlStore {
         limit: u32,
     ) -> Result<Vec<(String, u64, i64)>, StoreError> {
         engine::again(|| async move {
-            let rows = sqlx::query(
+            let rows = query(
                 "SELECT digest, bytes, created_at FROM profiles WHERE tenant = $1 ORDER BY created_at DESC, digest LIMIT $2",
             )
             .bind(tenant)
@@ -102,7 +101,7 @@ impl Profiles for SqlStore {
 
     async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool, StoreError> {
         engine::again(|| async move {
-            let gone = sqlx::query("DELETE FROM profiles WHERE tenant = $1 AND digest = $2")
+            let gone = query("DELETE FROM profiles WHERE tenant = $1 AND digest = $2")
                 .bind(tenant)
                 .bind(digest)
                 .execute(&self.writer)

@@ -1,10 +1,9 @@
 //! How much of the queue is taken: counted by triggers of the database, compared with the bounds in the transaction that
 //! inserts.
 
-use super::engine::{Db, DbConnection, DbRow};
-use super::rows::{push_list, read_count};
-use sqlx::{QueryBuilder, Row};
-use std::collections::HashMap;
+use super::engine::{DbConnection, QueryBuilder, Row, query};
+use super::rows::{push_list, read_count, read_id};
+use std::collections::{HashMap, HashSet};
 
 use uuid::Uuid;
 
@@ -20,50 +19,36 @@ pub(crate) struct Places {
     of_tenants: HashMap<String, (u64, u64)>,
 }
 
-/// Writes a statement that reads what these tenants have taken.
-pub(crate) fn push_taken<'a>(
-    query: &mut QueryBuilder<Db>,
-    tenants: impl IntoIterator<Item = &'a str>,
-) {
-    query.push("WITH asked (tenant) AS (");
-    query.push_values(tenants, |mut row, tenant| {
-        row.push_bind(tenant);
-    });
-    query.push(
-        ") SELECT tenant, \
-         (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued' AND job_counts.tenant = asked.tenant) + \
-         (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND batches.tenant = asked.tenant) AS taken, \
-         (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued') + \
-         (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0) AS taken_by_all, \
-         (SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM stored_bytes WHERE stored_bytes.tenant = asked.tenant) AS stored FROM asked",
-    );
-}
-
 impl Places {
-    /// Reads the rows of [`push_taken`].
-    pub(crate) fn read(rows: &[DbRow], bounds: QueueBounds) -> Result<Places, StoreError> {
+    /// What these tenants have taken.
+    pub(crate) async fn of<'a>(
+        connection: &mut DbConnection,
+        tenants: impl IntoIterator<Item = &'a str>,
+        bounds: QueueBounds,
+    ) -> Result<Places, StoreError> {
+        let mut query = QueryBuilder::new("WITH asked (tenant) AS (");
+        query.push_values(tenants, |mut row, tenant| {
+            row.push_bind(tenant);
+        });
+        query.push(
+            ") SELECT tenant, \
+             (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued' AND job_counts.tenant = asked.tenant) + \
+             (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND batches.tenant = asked.tenant) AS taken, \
+             (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued') + \
+             (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0) AS taken_by_all, \
+             (SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM stored_bytes WHERE stored_bytes.tenant = asked.tenant) AS stored FROM asked",
+        );
         let mut places = Places {
             bounds,
             all: 0,
             of_tenants: HashMap::new(),
         };
-        for row in rows {
+        for row in &query.build().fetch_all(connection).await? {
             places.all = read_count(row, "taken_by_all")?;
             let of_tenant = (read_count(row, "taken")?, read_count(row, "stored")?);
             places.of_tenants.insert(row.try_get("tenant")?, of_tenant);
         }
         Ok(places)
-    }
-
-    /// What one tenant has taken.
-    pub(crate) async fn of(
-        connection: &mut DbConnection,
-        tenant: &str,
-        bounds: QueueBounds,
-    ) -> Result<Places, StoreError> {
-        let mut query = QueryBuilder::new("");
-        push_taken(&mut query, [tenant]);
-        Places::read(&query.build().fetch_all(connection).await?, bounds)
     }
 
     /// Takes as many places as there are, at most `most`; a refusal if there is not even one.
@@ -108,7 +93,7 @@ impl Places {
 
 /// Bytes of cases, templates and results that a tenant has stored.
 pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Result<u64, StoreError> {
-    let row = sqlx::query(
+    let row = query(
         "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM stored_bytes WHERE tenant = $1",
     )
     .bind(tenant)
@@ -117,13 +102,21 @@ pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Resul
     read_count(&row, "bytes")
 }
 
-/// Writes a statement that reads which of these jobs have succeeded.
-pub(crate) fn push_succeeded(query: &mut QueryBuilder<Db>, ids: &[Uuid]) {
-    query.push(concat!(
+/// Those of these jobs that have succeeded.
+pub(crate) async fn succeeded(
+    connection: &mut DbConnection,
+    ids: &[Uuid],
+) -> Result<HashSet<Uuid>, StoreError> {
+    if ids.is_empty() {
+        return Ok(HashSet::new());
+    }
+    let mut query = QueryBuilder::new(concat!(
         "SELECT id FROM jobs WHERE ",
         bare!("state"),
         " = 'succeeded' AND id IN ("
     ));
-    push_list(query, ids);
+    push_list(&mut query, ids);
     query.push(")");
+    let rows = query.build().fetch_all(connection).await?;
+    rows.iter().map(read_id).collect()
 }

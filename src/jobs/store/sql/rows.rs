@@ -1,10 +1,9 @@
 //! Rows of the job table as the words of this room, and back.
 
-use super::engine::{Db, DbRow};
+use super::engine::{DbRow, QueryBuilder, Row};
 use crate::jobs::store::claim::Claim;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use sqlx::{QueryBuilder, Row};
 use uuid::Uuid;
 
 use crate::jobs::model::job::{Job, State};
@@ -124,7 +123,7 @@ pub(crate) fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, StoreError
 }
 
 /// Ids as the list of an `IN`, without the brackets.
-pub(crate) fn push_list(query: &mut QueryBuilder<Db>, ids: &[Uuid]) {
+pub(crate) fn push_list(query: &mut QueryBuilder, ids: &[Uuid]) {
     if ids.is_empty() {
         // Some databases know no empty list; nothing is equal to this.
         query.push("NULL");

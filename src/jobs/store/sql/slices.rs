@@ -1,10 +1,8 @@
 //! Solved slices of jobs that are not solved whole.
 
-use super::super::statements::Statements;
 use super::blob_refs::release_blobs;
-use super::engine::{self, SqlStore};
+use super::engine::{self, Row, SqlStore, query};
 use super::rows::{count, fence, read_blob_ids, read_count, read_small};
-use sqlx::Row;
 use std::time::Duration;
 
 use uuid::Uuid;
@@ -29,44 +27,44 @@ impl Slices for SqlStore {
             let id = claim.id.to_string();
             let note = &slice.note;
             let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
-            let mut statements = Statements::begin(&self.writer()).await?;
-            let add = statements.next();
+            let mut transaction = engine::begin(&self.writer).await?;
             // Attempts are counted from the last slice that was stored: who gets on is not what processes die of.
-            add.push("UPDATE jobs SET attempt = 1, version = version + 1, slices = ");
-            add.push_bind(i64::from(note.number) + 1).push(", done = ");
-            add.push_bind(slice.done).push(", progress = ");
-            add.push_bind(slice.done).push(", cost_us = ");
-            add.push_bind(count(slice.rest_us)).push(" WHERE id = ");
-            add.push_bind(&id).push(" AND lease_token = ");
-            add.push_bind(fence(claim))
-                .push(" AND state = 'running' RETURNING id");
-            let added = statements.send().await?;
-            if added.iter().flatten().count() == 0 {
+            let added = query(
+                "UPDATE jobs SET attempt = 1, version = version + 1, slices = $1, done = $2, progress = $2, cost_us = $3 \
+                 WHERE id = $4 AND lease_token = $5 AND state = 'running'",
+            )
+            .bind(i64::from(note.number) + 1)
+            .bind(slice.done)
+            .bind(count(slice.rest_us))
+            .bind(&id)
+            .bind(fence(claim))
+            .execute(&mut *transaction)
+            .await?;
+            if added.rows_affected() == 0 {
                 return Ok(false);
             }
-            let there = sqlx::query(
+            let there = query(
                 "SELECT 1 FROM job_slices WHERE job_id = $1 AND number = $2 AND digest = $3 AND spent_us = $4",
             )
             .bind(&id)
             .bind(i64::from(note.number))
             .bind(&note.digest)
             .bind(spent_us)
-            .fetch_optional(statements.connection())
+            .fetch_optional(&mut *transaction)
             .await?;
             if there.is_none() {
-                let replaced = sqlx::query(
+                let replaced = query(
                     "DELETE FROM job_slices WHERE job_id = $1 AND number >= $2 RETURNING blob_id",
                 )
                 .bind(&id)
                 .bind(i64::from(note.number))
-                .fetch_all(statements.connection())
+                .fetch_all(&mut *transaction)
                 .await?;
-                release_blobs(statements.connection(), read_blob_ids(&replaced)?).await?;
+                release_blobs(&mut transaction, read_blob_ids(&replaced)?).await?;
                 let blobs = self
-                    .insert_blobs(&mut statements, &[(claim, &slice.result)])
+                    .insert_blobs(&mut transaction, &[(claim, &slice.result)])
                     .await?;
-                statements.send().await?;
-                sqlx::query(
+                query(
                     "INSERT INTO job_slices (job_id, number, motions, digest, spent_us, blob_id) \
                      VALUES ($1, $2, $3, $4, $5, $6)",
                 )
@@ -76,10 +74,10 @@ impl Slices for SqlStore {
                 .bind(&note.digest)
                 .bind(spent_us)
                 .bind(blobs.first())
-                .execute(statements.connection())
+                .execute(&mut *transaction)
                 .await?;
             }
-            statements.commit().await?;
+            transaction.commit().await?;
             Ok(true)
         })
         .await
@@ -87,7 +85,7 @@ impl Slices for SqlStore {
 
     async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>, StoreError> {
         engine::again(|| async move {
-            let rows = sqlx::query(NOTES)
+            let rows = query(NOTES)
                 .bind(id.to_string())
                 .fetch_all(&self.readers)
                 .await?;
@@ -107,7 +105,7 @@ impl Slices for SqlStore {
 
     async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, StoreError> {
         engine::again(|| async move {
-            let rows = sqlx::query(RESULTS)
+            let rows = query(RESULTS)
                 .bind(id.to_string())
                 .fetch_all(&self.readers)
                 .await?;

@@ -1,6 +1,6 @@
 //! Statistics of the embedded job table: how many jobs, how old, how large; and what comes before a queued job.
 
-use super::engine::{self, SqlStore};
+use super::engine::{self, SqlStore, query, query_scalar};
 use super::quota::stored;
 use super::rows::{read_count, read_state};
 use async_trait::async_trait;
@@ -36,7 +36,7 @@ pub(crate) const RESULT_BYTES: &str =
 impl Statistics for SqlStore {
     async fn usage(&self, tenant: &str) -> Result<Usage, StoreError> {
         engine::again(|| async move {
-            let rows = sqlx::query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state")
+            let rows = query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state")
                 .bind(tenant)
                 .fetch_all(&self.readers)
                 .await?;
@@ -46,7 +46,7 @@ impl Statistics for SqlStore {
                     .jobs
                     .insert(read_state(row)?, read_count(row, "number")?);
             }
-            let reserved = sqlx::query(
+            let reserved = query(
                 "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) AS reserved FROM batches WHERE complete = 0 AND tenant = $1",
             );
             let reserved = reserved.bind(tenant);
@@ -60,19 +60,15 @@ impl Statistics for SqlStore {
 
     async fn stats(&self) -> Result<Stats, StoreError> {
         engine::again(|| async move {
-            let rows = sqlx::query(COUNT).fetch_all(&self.readers).await?;
+            let rows = query(COUNT).fetch_all(&self.readers).await?;
             let mut jobs: BTreeMap<State, u64> =
                 State::ALL.into_iter().map(|state| (state, 0)).collect();
             for row in &rows {
                 jobs.insert(read_state(row)?, read_count(row, "jobs")?);
             }
-            let oldest_queued_at = sqlx::query_scalar(OLDEST).fetch_one(&self.readers).await?;
-            let mean_cost_us: f64 = sqlx::query_scalar(MEAN_COST)
-                .fetch_one(&self.readers)
-                .await?;
-            let result_bytes: i64 = sqlx::query_scalar(RESULT_BYTES)
-                .fetch_one(&self.readers)
-                .await?;
+            let oldest_queued_at = query_scalar(OLDEST).fetch_one(&self.readers).await?;
+            let mean_cost_us: f64 = query_scalar(MEAN_COST).fetch_one(&self.readers).await?;
+            let result_bytes: i64 = query_scalar(RESULT_BYTES).fetch_one(&self.readers).await?;
             Ok(Stats {
                 jobs,
                 oldest_queued_at,
@@ -86,7 +82,7 @@ impl Statistics for SqlStore {
 
     async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError> {
         engine::again(|| async move {
-            let row = sqlx::query(BEFORE)
+            let row = query(BEFORE)
                 .bind(&job.tenant)
                 .bind(job.priority.rank())
                 .bind(job.id.to_string())

@@ -1,9 +1,8 @@
 //! What ends or goes by itself: leases that run out, deadlines that pass, jobs that expire.
 
 use super::blob_refs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, Db, SqlStore};
+use super::engine::{self, QueryBuilder, SqlStore, query};
 use super::rows::{push_list, read_blob_ids, read_id, read_move, read_state, to_json};
-use sqlx::QueryBuilder;
 use uuid::Uuid;
 
 use async_trait::async_trait;
@@ -58,12 +57,12 @@ impl Upkeep for SqlStore {
             let late = match which {
                 Reap::Expired { now } => self.lease_now(now),
                 Reap::Dead => {
-                    let bystanders = sqlx::query(REAP_BYSTANDERS).bind(now);
+                    let bystanders = query(REAP_BYSTANDERS).bind(now);
                     rows = bystanders.fetch_all(&mut *transaction).await?;
                     Some(i64::MAX)
                 }
             };
-            let expired = sqlx::query(REAP)
+            let expired = query(REAP)
                 .bind(i64::from(attempts_max))
                 .bind(to_json(&Failure::worker_lost(attempts_max))?)
                 .bind(now)
@@ -88,7 +87,7 @@ impl Upkeep for SqlStore {
     ) -> Result<Overdue, StoreError> {
         engine::again(|| async move {
             // Late jobs are rare, and a read holds no writer up.
-            let rows = sqlx::query(LATE)
+            let rows = query(LATE)
                 .bind(moment.now)
                 .bind(moment.set_at)
                 .bind(moment.unset)
@@ -113,7 +112,7 @@ impl Upkeep for SqlStore {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
             let young = first_id_at(expiry.ended_before.saturating_add(1)).to_string();
-            let rows = sqlx::query(EXPIRED)
+            let rows = query(EXPIRED)
                 .bind(&young)
                 .bind(expiry.ended_before)
                 .bind(i64::from(expiry.jobs))
@@ -123,7 +122,7 @@ impl Upkeep for SqlStore {
             for some in rows.chunks(250) {
                 let ids = some.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
                 blobs.extend(read_blob_ids(some)?);
-                let mut bury = QueryBuilder::<Db>::new(
+                let mut bury = QueryBuilder::new(
                     "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, ",
                 );
                 bury.push_bind(expiry.now);
@@ -131,13 +130,13 @@ impl Upkeep for SqlStore {
                 push_list(&mut bury, &ids);
                 bury.push(") ON CONFLICT (id) DO NOTHING");
                 bury.build().execute(&mut *transaction).await?;
-                let mut delete = QueryBuilder::<Db>::new("DELETE FROM jobs WHERE id IN (");
+                let mut delete = QueryBuilder::new("DELETE FROM jobs WHERE id IN (");
                 push_list(&mut delete, &ids);
                 delete.push(")");
                 delete.build().execute(&mut *transaction).await?;
             }
             release_blobs(&mut transaction, blobs).await?;
-            sqlx::query(
+            query(
                 "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, $1 FROM batches \
                  WHERE id < $2 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id) \
                  ON CONFLICT (id) DO NOTHING",
@@ -146,14 +145,14 @@ impl Upkeep for SqlStore {
             .bind(&young)
             .execute(&mut *transaction)
             .await?;
-            sqlx::query(
+            query(
                 "DELETE FROM batches \
                  WHERE id < $1 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id)",
             )
             .bind(&young)
             .execute(&mut *transaction)
             .await?;
-            sqlx::query("DELETE FROM tombstones WHERE id < $1 AND gone_at <= $2")
+            query("DELETE FROM tombstones WHERE id < $1 AND gone_at <= $2")
                 .bind(first_id_at(expiry.forget_before.saturating_add(1)).to_string())
                 .bind(expiry.forget_before)
                 .execute(&mut *transaction)
@@ -166,7 +165,7 @@ impl Upkeep for SqlStore {
 
     async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool, StoreError> {
         engine::again(|| async move {
-            let found = sqlx::query("SELECT 1 FROM tombstones WHERE id = $1 AND tenant = $2")
+            let found = query("SELECT 1 FROM tombstones WHERE id = $1 AND tenant = $2")
                 .bind(id.to_string())
                 .bind(tenant)
                 .fetch_optional(&self.readers)
@@ -198,7 +197,7 @@ const AT_ONCE: i64 = 1000;
 impl SqlStore {
     async fn fail_late(&self, failure: &Failure, moment: Moment) -> Result<Vec<Uuid>, StoreError> {
         let mut transaction = engine::begin(&self.writer).await?;
-        let rows = sqlx::query(FAIL_LATE)
+        let rows = query(FAIL_LATE)
             .bind(moment.now)
             .bind(moment.set_at)
             .bind(moment.unset)

@@ -7,38 +7,31 @@
 
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use sqlx::sqlite::{
-    SqliteAutoVacuum, SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions,
-    SqliteSynchronous,
-};
-use sqlx::{Connection, SqliteConnection};
+use rusqlite::OpenFlags;
 
 use crate::jobs::error::JobsError;
+use crate::jobs::store::sqlite::connection::{Pool, query, query_scalar};
 use crate::jobs::store::sqlite::schema::{mark, migrate, require};
 use crate::jobs::store::sqlite::sql::group_commit::GroupCommit;
-use crate::jobs::store::sqlite::statements::Writer;
 use crate::jobs::store_error::StoreError;
 
 /// The write-ahead log is cut to this size when it was larger for a while.
-const LOG_BYTES: &str = "67108864";
+const LOG_BYTES: i64 = 64 << 20;
 
 const READERS: u32 = 4;
 
-const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
+/// How long an opening waits for another process that is opening the same file. Statements wait without a thread, see [`Pool`].
+const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The embedded job table.
 #[derive(Debug, Clone)]
 pub struct SqliteStore {
     pub(crate) file: PathBuf,
-    pub(crate) writer: SqlitePool,
-    pub(crate) readers: SqlitePool,
+    pub(crate) writer: Pool,
+    pub(crate) readers: Pool,
     pub(crate) group_commit: GroupCommit,
-    /// A transaction of the writing connection was begun and its end is not known.
-    pub(crate) interrupted: Arc<AtomicBool>,
 }
 
 impl SqliteStore {
@@ -48,7 +41,7 @@ impl SqliteStore {
     /// The file cannot be opened, or [`JobsError::OtherForm`].
     pub async fn open(file: &Path) -> Result<SqliteStore, JobsError> {
         make_private(file)?;
-        let store = SqliteStore::connect(file).await?;
+        let store = SqliteStore::connect(file)?;
         migrate(&store.writer).await?;
         Ok(store)
     }
@@ -62,50 +55,21 @@ impl SqliteStore {
             path: file.to_owned(),
             source,
         })?;
-        let store = SqliteStore::connect(file).await?;
+        let store = SqliteStore::connect(file)?;
         require(&store.readers).await?;
         Ok(store)
     }
 
-    async fn connect(file: &Path) -> Result<SqliteStore, JobsError> {
-        let options = SqliteConnectOptions::new()
-            .filename(file)
-            .journal_mode(SqliteJournalMode::Wal)
-            .synchronous(SqliteSynchronous::Full)
-            .pragma("journal_size_limit", LOG_BYTES)
-            .busy_timeout(BUSY_TIMEOUT)
-            .foreign_keys(true);
-        let pool = |connections: u32| {
-            SqlitePoolOptions::new()
-                .max_connections(connections)
-                .idle_timeout(None)
-                .max_lifetime(None)
-                .test_before_acquire(false)
-        };
-        let mut writing = options.clone();
-        // The mode stays with the file. Setting it again writes a page, which a full disk does not take.
-        if std::fs::metadata(file).is_ok_and(|about| about.len() == 0) {
-            writing = writing.auto_vacuum(SqliteAutoVacuum::Incremental);
-        }
-        let interrupted = Arc::new(AtomicBool::new(false));
-        let open = interrupted.clone();
-        let writer = pool(1)
-            .before_acquire(move |connection, _| {
-                let interrupted = open.swap(false, Ordering::AcqRel);
-                Box::pin(async move { Ok(!interrupted && is_free(connection).await?) })
-            })
-            .connect_with(writing)
-            .await?;
-        let readers = pool(READERS).connect_with(options.read_only(true)).await?;
+    fn connect(file: &Path) -> Result<SqliteStore, StoreError> {
+        let path = file.to_owned();
+        let writer = Pool::open(1, Box::new(move || open_writer(&path)))?;
+        let path = file.to_owned();
+        let readers = Pool::open(READERS, Box::new(move || open_reader(&path)))?;
         Ok(SqliteStore {
             file: file.to_owned(),
-            group_commit: GroupCommit::start(Writer {
-                pool: writer.clone(),
-                interrupted: interrupted.clone(),
-            }),
+            group_commit: GroupCommit::start(writer.clone()),
             writer,
             readers,
-            interrupted,
         })
     }
 
@@ -120,7 +84,7 @@ impl SqliteStore {
     /// # Errors
     /// [`JobsError::TableDamaged`], or the database failed.
     pub async fn check(&self) -> Result<(), JobsError> {
-        let found: String = sqlx::query_scalar("PRAGMA quick_check(1)")
+        let found: String = query_scalar("PRAGMA quick_check(1)")
             .fetch_one(&self.readers)
             .await?;
         match found.as_str() {
@@ -135,8 +99,8 @@ impl SqliteStore {
     /// The file is there already or cannot be written.
     pub async fn copy_into(&self, file: &Path) -> Result<(), JobsError> {
         make_private(file)?;
-        sqlx::query("VACUUM INTO $1")
-            .bind(file.to_string_lossy().into_owned())
+        query("VACUUM INTO $1")
+            .bind(file.to_string_lossy())
             .execute(&self.writer)
             .await?;
         Ok(())
@@ -145,9 +109,9 @@ impl SqliteStore {
     /// A round trip; with `write` it writes a page that stays as it was.
     pub(crate) async fn ready(&self, write: bool) -> Result<(), StoreError> {
         if write {
-            return Ok(mark(&self.writer).await?);
+            return mark(&self.writer).await;
         }
-        sqlx::query("SELECT 1 FROM jobs LIMIT 1")
+        query("SELECT 1 FROM jobs LIMIT 1")
             .fetch_optional(&self.readers)
             .await?;
         Ok(())
@@ -172,11 +136,30 @@ fn make_private(file: &Path) -> Result<(), JobsError> {
     }
 }
 
-/// A transaction that a full disk broke can leave its connection inside it for ever; such a connection is replaced.
-async fn is_free(connection: &mut SqliteConnection) -> sqlx::Result<bool> {
-    if connection.is_in_transaction() {
-        // A rollback may be on its way; it is done after a round trip.
-        connection.ping().await?;
+fn open_writer(file: &Path) -> rusqlite::Result<rusqlite::Connection> {
+    let empty = std::fs::metadata(file).is_ok_and(|about| about.len() == 0);
+    let connection = open(file, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
+    // The mode stays with the file. Setting it again writes a page, which a full disk does not take.
+    if empty {
+        connection.execute_batch("PRAGMA auto_vacuum = INCREMENTAL")?;
     }
-    Ok(!connection.is_in_transaction())
+    connection.execute_batch(&format!(
+        "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA journal_size_limit = {LOG_BYTES}; PRAGMA foreign_keys = ON"
+    ))?;
+    connection.busy_timeout(Duration::ZERO)?;
+    Ok(connection)
+}
+
+fn open_reader(file: &Path) -> rusqlite::Result<rusqlite::Connection> {
+    let connection = open(file, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
+    connection.busy_timeout(Duration::ZERO)?;
+    Ok(connection)
+}
+
+fn open(file: &Path, mode: OpenFlags) -> rusqlite::Result<rusqlite::Connection> {
+    // Each connection is used by one thread at a time.
+    let flags = mode | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let connection = rusqlite::Connection::open_with_flags(file, flags)?;
+    connection.busy_timeout(OPEN_TIMEOUT)?;
+    Ok(connection)
 }

@@ -3,23 +3,22 @@
 use std::ffi::OsString;
 use std::path::Path;
 
-use sqlx::sqlite::{Sqlite, SqliteConnection, SqlitePool, SqliteRow};
-use sqlx::{Row, Transaction};
 use uuid::Uuid;
 
 use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::{ClaimKind, ClaimRequest};
 use crate::jobs::store::cluster::Cluster;
+use crate::jobs::store::sqlite::connection::{Query, Transaction};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::sql::claim::{claimed, peek};
 use crate::jobs::store::sqlite::sql::rows::count;
-use crate::jobs::store::sqlite::statements::{Statements, Writer};
 use crate::jobs::store_error::StoreError;
 
-pub(crate) type Db = Sqlite;
-pub(crate) type DbConnection = SqliteConnection;
-pub(crate) type DbPool = SqlitePool;
-pub(crate) type DbRow = SqliteRow;
+pub(crate) use crate::jobs::store::sqlite::connection::{
+    Connection as DbConnection, Pool as DbPool, QueryBuilder, Row, SqliteRow as DbRow, query,
+    query_scalar,
+};
+
 pub(crate) type SqlStore = SqliteStore;
 
 /// What stands before and behind the present by which leases are judged, a value.
@@ -52,9 +51,18 @@ pub(crate) const CLAIM_NEW: &str = claim!(
 /// Claims the first job of a queue of which some slices are solved.
 pub(crate) const CLAIM_BEGUN: &str = claim!("slices > 0", "1");
 
-/// Begins a transaction that writes. One that reads first and then turns into a writer would fail at once beside another.
-pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, StoreError> {
-    Ok(pool.begin_with("BEGIN IMMEDIATE").await?)
+/// Begins a transaction that writes.
+pub(crate) async fn begin(writer: &DbPool) -> Result<Transaction, StoreError> {
+    writer.begin().await
+}
+
+/// Passes each row of a statement on until `row` returns `false`.
+pub(crate) async fn for_each(
+    rows: Query,
+    readers: &DbPool,
+    row: impl FnMut(&DbRow) -> Result<bool, StoreError> + Send,
+) -> Result<(), StoreError> {
+    rows.for_each(readers, row).await
 }
 
 /// From here to the end of the transaction nobody else takes places in the queue or uses an idempotency key: there is one
@@ -81,24 +89,14 @@ pub(crate) async fn again<T, F: Future<Output = Result<T, StoreError>>>(
 }
 
 impl SqliteStore {
-    /// Where transactions that write begin.
-    pub(crate) fn writer(&self) -> Writer {
-        Writer {
-            pool: self.writer.clone(),
-            interrupted: self.interrupted.clone(),
-        }
-    }
-
     /// Ids for new blobs. An id is never used twice, so that a reader cannot meet the result of another job under it.
     pub(crate) async fn new_blob_ids(
         &self,
-        statements: &mut Statements,
+        connection: &mut DbConnection,
         number: usize,
     ) -> Result<Vec<i64>, StoreError> {
-        let last = statements.next();
-        last.push("SELECT seq FROM sqlite_sequence WHERE name = 'blobs'");
-        let sent = statements.send().await?;
-        let last = sent.last().and_then(|rows| rows.first());
+        let last = query("SELECT seq FROM sqlite_sequence WHERE name = 'blobs'");
+        let last = last.fetch_optional(connection).await?;
         let last: i64 = last.map_or(Ok(0), |row| row.try_get("seq"))?;
         Ok((last + 1..).take(number).collect())
     }
@@ -113,7 +111,7 @@ impl SqliteStore {
             ClaimKind::New => CLAIM_NEW,
             ClaimKind::Begun => CLAIM_BEGUN,
         };
-        let rows = sqlx::query(claim)
+        let rows = query(claim)
             .bind(&*request.queue.tenant)
             .bind(count(request.jobs))
             .bind(request.late_before)
@@ -162,19 +160,17 @@ impl SqliteStore {
     /// # Errors
     /// The database failed.
     pub(crate) async fn compact(&self, spare: i64, step: u32) -> Result<bool, StoreError> {
-        let free: i64 = sqlx::query_scalar("PRAGMA freelist_count")
+        let free: i64 = query_scalar("PRAGMA freelist_count")
             .fetch_one(&self.readers)
             .await?;
         if free <= spare {
             return Ok(false);
         }
         let step = i64::from(step).min(free - spare);
-        sqlx::query(sqlx::AssertSqlSafe(format!(
-            "PRAGMA incremental_vacuum({step})"
-        )))
-        .fetch_all(&self.writer)
-        .await?;
-        let left: i64 = sqlx::query_scalar("PRAGMA freelist_count")
+        query(format!("PRAGMA incremental_vacuum({step})"))
+            .fetch_all(&self.writer)
+            .await?;
+        let left: i64 = query_scalar("PRAGMA freelist_count")
             .fetch_one(&self.writer)
             .await?;
         Ok(left < free)

@@ -1,11 +1,11 @@
 //! The rows of an embedded job table, for those who move them elsewhere.
 
-use futures_util::TryStreamExt;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{AssertSqlSafe, Row};
+use std::sync::Arc;
+
 use tokio::sync::mpsc;
 
 use crate::jobs::store::portion::{Portion, Values};
+use crate::jobs::store::sqlite::connection::{Row, SqliteRow, query, query_scalar};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store_error::StoreError;
 
@@ -35,32 +35,37 @@ impl SqliteStore {
         table: &'static str,
         sender: &mpsc::Sender<Result<Portion, StoreError>>,
     ) -> Result<(), StoreError> {
-        let columns: Vec<(String, String)> =
-            sqlx::query_as("SELECT name, type FROM pragma_table_info($1) ORDER BY cid")
-                .bind(table)
-                .fetch_all(&self.readers)
-                .await?;
-        let names: Vec<_> = columns
+        let columns = query("SELECT name, type FROM pragma_table_info($1) ORDER BY cid");
+        let columns = columns.bind(table).fetch_all(&self.readers).await?;
+        let columns = columns
             .iter()
-            .map(|(name, _)| format!("\"{name}\""))
-            .collect();
-        let statement = AssertSqlSafe(format!("SELECT {} FROM {table}", names.join(", ")));
-        let mut rows = sqlx::query(statement).fetch(&self.readers);
-        let (mut portion, mut bytes) = (empty(&columns), 0);
-        while let Some(row) = rows.try_next().await? {
-            bytes += add(&mut portion, &row)?;
-            if portion.rows == ROWS_MAX || bytes >= BYTES_MAX {
-                let full = std::mem::replace(&mut portion, empty(&columns));
-                bytes = 0;
-                if sender.send(Ok(full)).await.is_err() {
-                    return Ok(());
+            .map(|row| Ok((row.try_get("name")?, row.try_get("type")?)))
+            .collect::<Result<Vec<(String, String)>, StoreError>>()?;
+        let mut connection = self.readers.acquire().await?;
+        let sender = sender.clone();
+        let reading = tokio::task::spawn_blocking(move || {
+            let names: Vec<_> = columns
+                .iter()
+                .map(|(name, _)| format!("\"{name}\""))
+                .collect();
+            let rows = query(format!("SELECT {} FROM {table}", names.join(", ")));
+            let (mut portion, mut bytes) = (empty(&columns), 0);
+            rows.for_each_now(&mut connection, |row| {
+                bytes += add(&mut portion, row)?;
+                if portion.rows < ROWS_MAX && bytes < BYTES_MAX {
+                    return Ok(true);
                 }
+                bytes = 0;
+                let full = std::mem::replace(&mut portion, empty(&columns));
+                Ok(sender.blocking_send(Ok(full)).is_ok())
+            })?;
+            if portion.rows > 0 {
+                let _ = sender.blocking_send(Ok(portion));
             }
-        }
-        if portion.rows > 0 {
-            let _ = sender.send(Ok(portion)).await;
-        }
-        Ok(())
+            Ok(())
+        });
+        let ended = |error| StoreError::Failed(Arc::new(error));
+        reading.await.map_err(ended)?
     }
 }
 
@@ -106,7 +111,7 @@ fn add(portion: &mut Portion, row: &SqliteRow) -> Result<usize, StoreError> {
 impl SqliteStore {
     /// The keys of the large results that something refers to.
     pub(crate) async fn large_results(&self) -> Result<Vec<String>, StoreError> {
-        let keys = sqlx::query_scalar("SELECT DISTINCT key FROM blobs WHERE key IS NOT NULL");
-        Ok(keys.fetch_all(&self.readers).await?)
+        let keys = query_scalar("SELECT DISTINCT key FROM blobs WHERE key IS NOT NULL");
+        keys.fetch_all(&self.readers).await
     }
 }

@@ -3,6 +3,7 @@
 #[macro_use]
 mod tokens;
 
+pub(crate) mod connection;
 pub mod database;
 pub mod engine;
 #[cfg(feature = "cluster")]
@@ -12,4 +13,3 @@ mod plans;
 pub mod schema;
 #[path = "../sql/mod.rs"]
 pub mod sql;
-pub(crate) mod statements;

@@ -4,9 +4,9 @@
 //! `schema.sql` is its first form that later ones go on with. Every later one is a step, which is one transaction: a process that dies
 //! between two steps leaves a table that the next start brings forward.
 
-use sqlx::sqlite::{SqliteConnection, SqlitePool};
-
 use crate::jobs::error::JobsError;
+use crate::jobs::store::sqlite::connection::{Connection, Pool, query, query_scalar};
+use crate::jobs::store_error::StoreError;
 
 /// The statements that make an empty file a job table of the first form.
 const SCHEMA: &str = include_str!("schema.sql");
@@ -31,10 +31,10 @@ const FORM: i64 = STEPS[STEPS.len() - 1].0;
 ///
 /// # Errors
 /// [`JobsError::OtherForm`] if the file holds something else or is of a later version, or the database failed.
-pub(crate) async fn migrate(writer: &SqlitePool) -> Result<(), JobsError> {
+pub(crate) async fn migrate(writer: &Pool) -> Result<(), JobsError> {
     loop {
-        let mut transaction = writer.begin_with("BEGIN IMMEDIATE").await?;
-        let tables: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM sqlite_schema")
+        let mut transaction = writer.begin().await?;
+        let tables: i64 = query_scalar("SELECT COUNT(*) FROM sqlite_schema")
             .fetch_one(&mut *transaction)
             .await?;
         let step = match tables {
@@ -45,12 +45,10 @@ pub(crate) async fn migrate(writer: &SqlitePool) -> Result<(), JobsError> {
             },
         };
         let (reached, statements) = *step.ok_or(JobsError::OtherForm)?;
-        sqlx::raw_sql(statements).execute(&mut *transaction).await?;
-        let marks =
-            format!("PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {reached}");
-        sqlx::raw_sql(sqlx::AssertSqlSafe(marks))
-            .execute(&mut *transaction)
-            .await?;
+        transaction.batch(statements)?;
+        transaction.batch(&format!(
+            "PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {reached}"
+        ))?;
         transaction.commit().await?;
         tracing::debug!(form = reached, "the job table has a new form");
     }
@@ -60,7 +58,7 @@ pub(crate) async fn migrate(writer: &SqlitePool) -> Result<(), JobsError> {
 ///
 /// # Errors
 /// [`JobsError::OldFolder`], [`JobsError::OtherForm`], or the database failed.
-pub(crate) async fn require(pool: &SqlitePool) -> Result<(), JobsError> {
+pub(crate) async fn require(pool: &Pool) -> Result<(), JobsError> {
     match form(&mut *pool.acquire().await?).await? {
         FORM => Ok(()),
         FIRST_FORM..FORM => Err(JobsError::OldFolder),
@@ -69,20 +67,20 @@ pub(crate) async fn require(pool: &SqlitePool) -> Result<(), JobsError> {
 }
 
 /// The form of the tables.
-async fn form(connection: &mut SqliteConnection) -> Result<i64, JobsError> {
-    let application: i64 = sqlx::query_scalar("PRAGMA application_id")
+async fn form(connection: &mut Connection) -> Result<i64, JobsError> {
+    let application: i64 = query_scalar("PRAGMA application_id")
         .fetch_one(&mut *connection)
         .await?;
     if application != APPLICATION {
         return Err(JobsError::OtherForm);
     }
-    let form = sqlx::query_scalar("PRAGMA user_version");
+    let form = query_scalar("PRAGMA user_version");
     Ok(form.fetch_one(connection).await?)
 }
 
 /// Writes the number of the version again: a page that stays as it was.
-pub(crate) async fn mark(writer: &SqlitePool) -> sqlx::Result<()> {
-    sqlx::raw_sql(sqlx::AssertSqlSafe(format!("PRAGMA user_version = {FORM}")))
+pub(crate) async fn mark(writer: &Pool) -> Result<(), StoreError> {
+    query(format!("PRAGMA user_version = {FORM}"))
         .execute(writer)
         .await?;
     Ok(())
@@ -90,30 +88,21 @@ pub(crate) async fn mark(writer: &SqlitePool) -> sqlx::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
-
     use crate::jobs::store::sqlite::database::SqliteStore;
 
-    async fn write(file: &std::path::Path, statement: &'static str) {
-        let options = SqliteConnectOptions::new()
-            .filename(file)
-            .create_if_missing(true);
-        let pool = SqlitePoolOptions::new()
-            .connect_with(options)
-            .await
-            .unwrap();
-        sqlx::raw_sql(statement).execute(&pool).await.unwrap();
-        pool.close().await;
+    fn write(file: &std::path::Path, statement: &str) {
+        let connection = rusqlite::Connection::open(file).unwrap();
+        connection.execute_batch(statement).unwrap();
     }
 
     #[tokio::test]
     async fn a_table_of_another_version_is_refused_and_left_as_it_is() {
         let folder = tempfile::tempdir().unwrap();
         let old = folder.path().join("old.db");
-        write(&old, "CREATE TABLE jobs (id TEXT); PRAGMA user_version = 1").await;
+        write(&old, "CREATE TABLE jobs (id TEXT); PRAGMA user_version = 1");
         let newer = folder.path().join("newer.db");
         SqliteStore::open(&newer).await.unwrap().close().await;
-        write(&newer, "PRAGMA user_version = 1000").await;
+        write(&newer, "PRAGMA user_version = 1000");
         for file in [&old, &newer] {
             for opened in [
                 SqliteStore::open(file).await,
@@ -123,7 +112,7 @@ mod tests {
                 assert!(error.contains("another version of railhead"), "{error}");
             }
         }
-        write(&old, "INSERT INTO jobs VALUES ('still there')").await;
+        write(&old, "INSERT INTO jobs VALUES ('still there')");
     }
 
     #[tokio::test]

@@ -1,0 +1,685 @@
+//! Connections to SQLite, and statements in the form that the shared SQL uses for every database.
+//!
+//! A statement runs on the thread that asks for it: a page that is in memory is read in microseconds, and another thread would have to be
+//! woken twice. What may wait for the disk, a commit, is announced to the runtime as blocking.
+
+use std::borrow::Cow;
+use std::ops::{Deref, DerefMut};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use rusqlite::types::{ToSqlOutput, Value};
+use rusqlite::{ErrorCode, Statement, ToSql};
+use tokio::runtime::{Handle, RuntimeFlavor};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use crate::jobs::store_error::{StorageFault, StoreError};
+
+/// How long a statement waits for a lock that another process holds.
+const LOCK_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Time between two attempts to get that lock.
+const LOCK_RETRY: Duration = Duration::from_millis(5);
+
+/// Prepared statements that a connection keeps.
+const PREPARED: usize = 100;
+
+/// Longer statements, such as insertions of many rows, are not kept.
+const PREPARED_TEXT_MAX: usize = 4096;
+
+/// Opens a connection.
+type Open = Box<dyn Fn() -> rusqlite::Result<rusqlite::Connection> + Send + Sync>;
+
+/// Connections of one kind. Callers get them in the order in which they ask.
+#[derive(Clone)]
+pub(crate) struct Pool(Arc<Shared>);
+
+struct Shared {
+    free: Arc<Semaphore>,
+    connections: Mutex<Vec<rusqlite::Connection>>,
+    open: Open,
+    size: u32,
+}
+
+impl std::fmt::Debug for Pool {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Pool").finish_non_exhaustive()
+    }
+}
+
+impl Pool {
+    /// Opens the first of up to `size` connections; the others are opened when they are needed.
+    pub(crate) fn open(size: u32, open: Open) -> Result<Pool, StoreError> {
+        let pool = Shared {
+            free: Arc::new(Semaphore::new(size as usize)),
+            connections: Mutex::default(),
+            open,
+            size,
+        };
+        let first = pool.connect()?;
+        pool.give_back(first);
+        Ok(Pool(Arc::new(pool)))
+    }
+
+    /// Takes a connection once one is free.
+    pub(crate) async fn acquire(&self) -> Result<Pooled, StoreError> {
+        let permit = self.0.free.clone().acquire_owned().await;
+        let permit = permit.map_err(|_| closed())?;
+        let kept = lock(&self.0.connections).pop();
+        let connection = match kept {
+            Some(connection) => connection,
+            None => self.0.connect()?,
+        };
+        Ok(Pooled {
+            connection: Connection(Some(connection)),
+            pool: self.0.clone(),
+            _permit: permit,
+        })
+    }
+
+    /// Begins a transaction that writes. One that reads first and then turns into a writer would fail at once beside another.
+    pub(crate) async fn begin(&self) -> Result<Transaction, StoreError> {
+        let mut connection = self.acquire().await?;
+        unlocked(&mut connection, |connection| {
+            connection.execute_batch("BEGIN IMMEDIATE")
+        })
+        .await?;
+        Ok(Transaction(connection))
+    }
+
+    /// Closes every connection, once those that are in use are given back.
+    pub(crate) async fn close(&self) {
+        let _all = self.0.free.acquire_many(self.0.size).await;
+        self.0.free.close();
+        let connections = std::mem::take(&mut *lock(&self.0.connections));
+        blocking(|| drop(connections));
+    }
+}
+
+impl Shared {
+    fn connect(&self) -> Result<rusqlite::Connection, StoreError> {
+        let connection = blocking(|| (self.open)())?;
+        connection.set_prepared_statement_cache_capacity(PREPARED);
+        Ok(connection)
+    }
+
+    fn give_back(&self, connection: rusqlite::Connection) {
+        lock(&self.connections).push(connection);
+    }
+}
+
+fn closed() -> StoreError {
+    let cause = std::io::Error::other("the job table is closed");
+    StoreError::Away(StorageFault::Unwritable, Arc::new(cause))
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A connection in use. An open transaction is rolled back when it is given back.
+pub(crate) struct Pooled {
+    connection: Connection,
+    pool: Arc<Shared>,
+    _permit: OwnedSemaphorePermit,
+}
+
+impl Deref for Pooled {
+    type Target = Connection;
+
+    fn deref(&self) -> &Connection {
+        &self.connection
+    }
+}
+
+impl DerefMut for Pooled {
+    fn deref_mut(&mut self) -> &mut Connection {
+        &mut self.connection
+    }
+}
+
+impl Drop for Pooled {
+    fn drop(&mut self) {
+        if let Some(connection) = self.connection.0.take() {
+            if !connection.is_autocommit() {
+                // A full disk can leave a connection inside a transaction for ever; such a connection is closed.
+                let _ = connection.execute_batch("ROLLBACK");
+            }
+            if connection.is_autocommit() {
+                self.pool.give_back(connection);
+            }
+        }
+    }
+}
+
+/// A transaction that writes. Dropped without a commit, it changes nothing.
+pub(crate) struct Transaction(Pooled);
+
+impl Transaction {
+    pub(crate) async fn commit(mut self) -> Result<(), StoreError> {
+        self.0
+            .with(|connection| blocking(|| connection.execute_batch("COMMIT")))
+    }
+}
+
+impl Deref for Transaction {
+    type Target = Connection;
+
+    fn deref(&self) -> &Connection {
+        &self.0
+    }
+}
+
+impl DerefMut for Transaction {
+    fn deref_mut(&mut self) -> &mut Connection {
+        &mut self.0
+    }
+}
+
+/// One connection, until its pool takes it back.
+pub(crate) struct Connection(Option<rusqlite::Connection>);
+
+impl Connection {
+    fn with<T>(
+        &mut self,
+        call: impl FnOnce(&rusqlite::Connection) -> rusqlite::Result<T>,
+    ) -> Result<T, StoreError> {
+        Ok(call(self.0.as_ref().ok_or_else(closed)?)?)
+    }
+
+    /// Runs several statements that have no parameters.
+    pub(crate) fn batch(&mut self, statements: &str) -> Result<(), StoreError> {
+        self.with(|connection| connection.execute_batch(statements))
+    }
+}
+
+/// Where statements run: a connection, or one of a pool for a single statement.
+pub(crate) trait Executor: Send {
+    fn run<T: Send>(
+        self,
+        call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
+    ) -> impl Future<Output = Result<T, StoreError>> + Send;
+}
+
+impl Executor for &mut Connection {
+    async fn run<T: Send>(
+        self,
+        call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
+    ) -> Result<T, StoreError> {
+        self.with(call)
+    }
+}
+
+impl Executor for &Pool {
+    async fn run<T: Send>(
+        self,
+        mut call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
+    ) -> Result<T, StoreError> {
+        let mut connection = self.acquire().await?;
+        unlocked(&mut connection, |connection| blocking(|| call(connection))).await
+    }
+}
+
+/// Makes a call outside any transaction; repeats it for a while if another process holds a lock.
+async fn unlocked<T: Send>(
+    connection: &mut Connection,
+    mut call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
+) -> Result<T, StoreError> {
+    let start = Instant::now();
+    loop {
+        let done = connection.with(|connection| match call(connection) {
+            Err(error) if error.sqlite_error_code() == Some(ErrorCode::DatabaseBusy) => {
+                Ok(Err(error))
+            }
+            done => done.map(Ok),
+        })?;
+        match done {
+            Ok(done) => return Ok(done),
+            Err(locked) if start.elapsed() > LOCK_TIMEOUT => return Err(locked.into()),
+            Err(_) => tokio::time::sleep(LOCK_RETRY).await,
+        }
+    }
+}
+
+/// Makes a call that may wait for the disk, while another thread of the runtime takes over the tasks of this one.
+fn blocking<T>(call: impl FnOnce() -> T) -> T {
+    match Handle::try_current().map(|runtime| runtime.runtime_flavor()) {
+        Ok(RuntimeFlavor::MultiThread) => tokio::task::block_in_place(call),
+        _ => call(),
+    }
+}
+
+/// A statement with its parameters.
+pub(crate) struct Query {
+    text: Cow<'static, str>,
+    values: Vec<Value>,
+}
+
+/// A statement of a fixed text, whose parameters are `$1`, `$2` and so on.
+pub(crate) fn query(text: impl Into<Cow<'static, str>>) -> Query {
+    Query {
+        text: text.into(),
+        values: Vec::new(),
+    }
+}
+
+/// A statement of a fixed text whose rows have one column.
+pub(crate) fn query_scalar(text: impl Into<Cow<'static, str>>) -> ScalarQuery {
+    ScalarQuery(query(text))
+}
+
+fn value(value: impl ToSql) -> Value {
+    match value.to_sql() {
+        Ok(ToSqlOutput::Owned(value)) => value,
+        Ok(ToSqlOutput::Borrowed(value)) => value.try_into().unwrap_or(Value::Null),
+        // Numbers, texts and bytes are always borrowed or owned.
+        _ => Value::Null,
+    }
+}
+
+impl Query {
+    /// The next parameter.
+    pub(crate) fn bind(mut self, parameter: impl ToSql) -> Query {
+        self.values.push(value(parameter));
+        self
+    }
+
+    /// Runs the statement; how many rows it changed.
+    pub(crate) async fn execute(self, executor: impl Executor) -> Result<Done, StoreError> {
+        let mut none = |_| true;
+        let changed = executor.run(|connection| {
+            self.step(connection, &mut none)?;
+            Ok(connection.changes())
+        });
+        Ok(Done(changed.await?))
+    }
+
+    pub(crate) async fn fetch_all(
+        self,
+        executor: impl Executor,
+    ) -> Result<Vec<SqliteRow>, StoreError> {
+        executor
+            .run(|connection| {
+                let mut rows = Vec::new();
+                self.step(connection, &mut |row| {
+                    rows.push(row);
+                    true
+                })?;
+                Ok(rows)
+            })
+            .await
+    }
+
+    /// The first row. The statement runs to its end.
+    pub(crate) async fn fetch_optional(
+        self,
+        executor: impl Executor,
+    ) -> Result<Option<SqliteRow>, StoreError> {
+        Ok(self.fetch_all(executor).await?.into_iter().next())
+    }
+
+    pub(crate) async fn fetch_one(self, executor: impl Executor) -> Result<SqliteRow, StoreError> {
+        let none = || StoreError::Corrupt("a statement has no row".to_owned());
+        self.fetch_optional(executor).await?.ok_or_else(none)
+    }
+
+    /// Passes each row on until `row` returns `false`.
+    pub(crate) async fn for_each(
+        self,
+        executor: impl Executor,
+        mut row: impl FnMut(&SqliteRow) -> Result<bool, StoreError> + Send,
+    ) -> Result<(), StoreError> {
+        executor
+            .run(|connection| self.walk(connection, &mut row))
+            .await?
+    }
+
+    /// As [`Query::for_each`], on a thread that may block.
+    #[cfg(feature = "cluster")]
+    pub(crate) fn for_each_now(
+        self,
+        connection: &mut Connection,
+        mut row: impl FnMut(&SqliteRow) -> Result<bool, StoreError>,
+    ) -> Result<(), StoreError> {
+        connection.with(|connection| self.walk(connection, &mut row))?
+    }
+
+    fn walk(
+        &self,
+        connection: &rusqlite::Connection,
+        row: &mut dyn FnMut(&SqliteRow) -> Result<bool, StoreError>,
+    ) -> rusqlite::Result<Result<(), StoreError>> {
+        let mut done = Ok(());
+        self.step(connection, &mut |next| {
+            row(&next).unwrap_or_else(|error| {
+                done = Err(error);
+                false
+            })
+        })?;
+        Ok(done)
+    }
+
+    fn step(
+        &self,
+        connection: &rusqlite::Connection,
+        row: &mut dyn FnMut(SqliteRow) -> bool,
+    ) -> rusqlite::Result<()> {
+        if self.text.len() > PREPARED_TEXT_MAX {
+            return self.step_prepared(&mut connection.prepare(&self.text)?, row);
+        }
+        self.step_prepared(&mut *connection.prepare_cached(&self.text)?, row)
+    }
+
+    fn step_prepared(
+        &self,
+        statement: &mut Statement<'_>,
+        row: &mut dyn FnMut(SqliteRow) -> bool,
+    ) -> rusqlite::Result<()> {
+        for place in 1..=statement.parameter_count() {
+            let number = statement
+                .parameter_name(place)
+                .and_then(|name| name.strip_prefix('$')?.parse::<usize>().ok())
+                .unwrap_or(place);
+            statement.raw_bind_parameter(place, &self.values[number - 1])?;
+        }
+        let names = statement.column_names().into_iter().map(str::to_owned);
+        let names: Arc<[String]> = names.collect();
+        let mut rows = statement.raw_query();
+        while let Some(next) = rows.next()? {
+            let values = (0..names.len()).map(|place| next.get(place));
+            let values = values.collect::<rusqlite::Result<Vec<Value>>>()?;
+            let names = names.clone();
+            if !row(SqliteRow { names, values }) {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a statement did.
+pub(crate) struct Done(u64);
+
+impl Done {
+    pub(crate) fn rows_affected(&self) -> u64 {
+        self.0
+    }
+}
+
+/// A statement whose rows have one column.
+pub(crate) struct ScalarQuery(Query);
+
+impl ScalarQuery {
+    /// The next parameter.
+    pub(crate) fn bind(self, parameter: impl ToSql) -> ScalarQuery {
+        ScalarQuery(self.0.bind(parameter))
+    }
+
+    pub(crate) async fn fetch_one<T: for<'r> Decode<'r>>(
+        self,
+        executor: impl Executor,
+    ) -> Result<T, StoreError> {
+        self.0.fetch_one(executor).await?.try_get(0)
+    }
+
+    pub(crate) async fn fetch_all<T: for<'r> Decode<'r>>(
+        self,
+        executor: impl Executor,
+    ) -> Result<Vec<T>, StoreError> {
+        let rows = self.0.fetch_all(executor).await?;
+        rows.iter().map(|row| row.try_get(0)).collect()
+    }
+}
+
+/// A row with the names of its columns.
+#[derive(Debug)]
+pub(crate) struct SqliteRow {
+    names: Arc<[String]>,
+    values: Vec<Value>,
+}
+
+/// Access to the columns of a row.
+pub(crate) trait Row {
+    /// The value of a column, given by its name or its place.
+    fn try_get<'r, T: Decode<'r>, C: Column>(&'r self, column: C) -> Result<T, StoreError>;
+}
+
+impl Row for SqliteRow {
+    fn try_get<'r, T: Decode<'r>, C: Column>(&'r self, column: C) -> Result<T, StoreError> {
+        let value = column
+            .place(&self.names)
+            .and_then(|place| self.values.get(place));
+        value.and_then(T::decode).ok_or_else(|| {
+            let kind = std::any::type_name::<T>();
+            StoreError::Corrupt(format!("column {column:?} is no {kind}"))
+        })
+    }
+}
+
+/// The name or the place of a column.
+pub(crate) trait Column: std::fmt::Debug + Copy {
+    fn place(self, names: &[String]) -> Option<usize>;
+}
+
+impl Column for &str {
+    fn place(self, names: &[String]) -> Option<usize> {
+        names.iter().position(|name| name == self)
+    }
+}
+
+impl Column for usize {
+    fn place(self, _: &[String]) -> Option<usize> {
+        Some(self)
+    }
+}
+
+/// A type that a value of a column is read as.
+pub(crate) trait Decode<'r>: Sized {
+    fn decode(value: &'r Value) -> Option<Self>;
+}
+
+impl<'r> Decode<'r> for &'r str {
+    fn decode(value: &'r Value) -> Option<Self> {
+        match value {
+            Value::Text(text) => Some(text),
+            _ => None,
+        }
+    }
+}
+
+impl Decode<'_> for String {
+    fn decode(value: &Value) -> Option<Self> {
+        <&str>::decode(value).map(str::to_owned)
+    }
+}
+
+impl Decode<'_> for i64 {
+    fn decode(value: &Value) -> Option<Self> {
+        match value {
+            Value::Integer(number) => Some(*number),
+            _ => None,
+        }
+    }
+}
+
+impl Decode<'_> for f64 {
+    fn decode(value: &Value) -> Option<Self> {
+        match value {
+            Value::Real(number) => Some(*number),
+            Value::Integer(number) => Some(*number as f64),
+            _ => None,
+        }
+    }
+}
+
+impl Decode<'_> for Vec<u8> {
+    fn decode(value: &Value) -> Option<Self> {
+        match value {
+            Value::Blob(bytes) => Some(bytes.clone()),
+            _ => None,
+        }
+    }
+}
+
+impl<'r, T: Decode<'r>> Decode<'r> for Option<T> {
+    fn decode(value: &'r Value) -> Option<Self> {
+        match value {
+            Value::Null => Some(None),
+            value => T::decode(value).map(Some),
+        }
+    }
+}
+
+/// Builds a statement piece by piece.
+pub(crate) struct QueryBuilder {
+    text: String,
+    values: Vec<Value>,
+}
+
+impl QueryBuilder {
+    pub(crate) fn new(text: impl Into<String>) -> QueryBuilder {
+        QueryBuilder {
+            text: text.into(),
+            values: Vec::new(),
+        }
+    }
+
+    /// Adds a piece of the text.
+    pub(crate) fn push(&mut self, piece: impl AsRef<str>) -> &mut QueryBuilder {
+        self.text.push_str(piece.as_ref());
+        self
+    }
+
+    /// Adds a parameter.
+    pub(crate) fn push_bind(&mut self, parameter: impl ToSql) -> &mut QueryBuilder {
+        self.text.push('?');
+        self.values.push(value(parameter));
+        self
+    }
+
+    /// Adds `VALUES` with a row of parameters for each item.
+    pub(crate) fn push_values<I: IntoIterator>(
+        &mut self,
+        items: I,
+        mut row: impl FnMut(Separated<'_>, I::Item),
+    ) -> &mut QueryBuilder {
+        self.push("VALUES ");
+        for (number, item) in items.into_iter().enumerate() {
+            self.push(if number == 0 { "(" } else { ", (" });
+            row(self.separated(", "), item);
+            self.push(")");
+        }
+        self
+    }
+
+    /// A list within the statement.
+    pub(crate) fn separated(&mut self, separator: &'static str) -> Separated<'_> {
+        Separated {
+            query: self,
+            separator,
+            first: true,
+        }
+    }
+
+    /// The statement so far; the builder is empty afterwards.
+    pub(crate) fn build(&mut self) -> Query {
+        Query {
+            text: std::mem::take(&mut self.text).into(),
+            values: std::mem::take(&mut self.values),
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn sql(&self) -> &str {
+        &self.text
+    }
+}
+
+/// A list within a statement that is being built.
+pub(crate) struct Separated<'b> {
+    query: &'b mut QueryBuilder,
+    separator: &'static str,
+    first: bool,
+}
+
+impl Separated<'_> {
+    fn next(&mut self) -> &mut QueryBuilder {
+        if !std::mem::replace(&mut self.first, false) {
+            self.query.push(self.separator);
+        }
+        self.query
+    }
+
+    /// Adds a piece of text as an entry.
+    pub(crate) fn push(&mut self, piece: &str) -> &mut Self {
+        self.next().push(piece);
+        self
+    }
+
+    /// Adds a parameter as an entry.
+    pub(crate) fn push_bind(&mut self, parameter: impl ToSql) -> &mut Self {
+        self.next().push_bind(parameter);
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::store::sqlite::database::SqliteStore;
+
+    async fn bury(transaction: &mut Transaction, id: &str) -> Result<Done, StoreError> {
+        let insert = query("INSERT INTO tombstones (id, tenant, gone_at) VALUES ($2, $1, 0)");
+        insert.bind("t").bind(id).execute(&mut **transaction).await
+    }
+
+    async fn buried(store: &SqliteStore) -> Vec<String> {
+        let ids = query_scalar("SELECT id FROM tombstones ORDER BY id");
+        ids.fetch_all(&store.readers).await.unwrap()
+    }
+
+    #[tokio::test]
+    async fn a_transaction_that_is_dropped_or_fails_changes_nothing_and_holds_nobody_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("jobs.db");
+        let store = SqliteStore::open(&file).await.unwrap();
+        let mut kept = store.writer.begin().await.unwrap();
+        assert_eq!(bury(&mut kept, "a").await.unwrap().rows_affected(), 1);
+        bury(&mut kept, "b").await.unwrap();
+        kept.commit().await.unwrap();
+
+        let mut dropped = store.writer.begin().await.unwrap();
+        bury(&mut dropped, "c").await.unwrap();
+        drop(dropped);
+        let mut fails = store.writer.begin().await.unwrap();
+        bury(&mut fails, "d").await.unwrap();
+        assert!(bury(&mut fails, "a").await.is_err());
+        drop(fails);
+        let mut last = store.writer.begin().await.unwrap();
+        bury(&mut last, "e").await.unwrap();
+        last.commit().await.unwrap();
+        assert_eq!(buried(&store).await, ["a", "b", "e"]);
+        store.close().await;
+        assert!(store.writer.begin().await.is_err());
+    }
+
+    #[tokio::test]
+    async fn a_lock_of_another_process_is_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("jobs.db");
+        let store = SqliteStore::open(&file).await.unwrap();
+        let other = rusqlite::Connection::open(&file).unwrap();
+        other.execute_batch("BEGIN IMMEDIATE").unwrap();
+        let write = async {
+            let mut transaction = store.writer.begin().await.unwrap();
+            bury(&mut transaction, "a").await.unwrap();
+            transaction.commit().await.unwrap();
+        };
+        let leave = async {
+            tokio::time::sleep(5 * LOCK_RETRY).await;
+            other.execute_batch("ROLLBACK").unwrap();
+        };
+        tokio::join!(write, leave);
+        assert_eq!(buried(&store).await, ["a"]);
+    }
+}
