@@ -4,10 +4,11 @@ use std::fs::{File, TryLockError};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 use std::sync::atomic::{AtomicI64, AtomicUsize};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread::available_parallelism;
 use std::time::Duration;
 
+use tokio::runtime::Handle;
 use tokio::sync::{Notify, Semaphore, SetOnce, broadcast};
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
@@ -15,6 +16,7 @@ use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Uuid};
 
 use crate::jobs::attempts::fair_turns::FairTurns;
+use crate::jobs::attempts::lease::AllLeases;
 use crate::jobs::attempts::running::RunningAttempts;
 use crate::jobs::blobs::Blobs;
 use crate::jobs::clock_steps::ClockSteps;
@@ -89,6 +91,8 @@ impl Jobs {
                 wake: Notify::new(),
                 ended,
                 running: RunningAttempts::default(),
+                leases: AllLeases::default(),
+                heartbeat: OnceLock::new(),
                 draining: CancellationToken::new(),
                 stopping: CancellationToken::new(),
                 tasks: TaskTracker::new(),
@@ -134,7 +138,13 @@ impl Jobs {
     pub fn start(&self) -> Result<(), JobsError> {
         for number in 0..self.shared.options.workers {
             let worker = self.worker(&format!("solver-{number}"))?;
-            self.shared.tasks.spawn(worker.run());
+            let runs = self.shared.tasks.track_future(worker.run());
+            let runtime = Handle::current();
+            // A thread of its own may wait for the disk of the embedded table.
+            std::thread::Builder::new()
+                .name(format!("worker-{number}"))
+                .spawn(move || runtime.block_on(runs))
+                .map_err(JobsError::Thread)?;
         }
         self.shared
             .tasks

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::fs::File;
 use std::sync::atomic::{AtomicI64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use tokio::sync::{Notify, Semaphore, SetOnce, broadcast};
@@ -12,6 +12,7 @@ use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Timestamp, Uuid};
 
 use crate::jobs::attempts::fair_turns::FairTurns;
+use crate::jobs::attempts::lease::AllLeases;
 use crate::jobs::attempts::running::RunningAttempts;
 use crate::jobs::blobs::Blobs;
 use crate::jobs::clock_steps::{ClockStep, ClockSteps};
@@ -50,6 +51,9 @@ pub(crate) struct Shared {
     pub(crate) ended: broadcast::Sender<Uuid>,
     /// The attempts of this process.
     pub(crate) running: RunningAttempts,
+    /// The leases that this process holds, and its heartbeat once there was one.
+    pub(crate) leases: AllLeases,
+    pub(crate) heartbeat: OnceLock<()>,
     /// Set when the service is about to stop: no new claims, not ready, no more waiting.
     pub(crate) draining: CancellationToken,
     /// Set when the grace period is over: running jobs are handed back.

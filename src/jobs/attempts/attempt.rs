@@ -14,11 +14,11 @@
 //! ```
 
 use std::collections::HashMap;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use tokio::sync::mpsc::UnboundedReceiver;
+use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt_control::{AttemptControl, StopReason};
@@ -89,11 +89,16 @@ pub(crate) struct Attempt {
     pub(crate) solver: Option<Solver>,
 }
 
+/// Outcomes that the thread has left for its worker, with the places of their members.
+pub(crate) type Outcomes = Arc<Mutex<Vec<(usize, Outcome)>>>;
+
 /// What comes from the thread.
 #[derive(Debug)]
 pub(crate) struct Solver {
     pub(crate) thread: SolverThread,
-    pub(crate) outcomes: UnboundedReceiver<(usize, Outcome)>,
+    pub(crate) outcomes: Outcomes,
+    /// Set when there will be no more outcomes.
+    pub(crate) over: CancellationToken,
     /// Nothing more shall be begun.
     pub(crate) closed: Arc<AtomicBool>,
 }
@@ -111,30 +116,36 @@ impl Attempt {
         solving.map(|(place, _)| place).collect()
     }
 
-    /// Waits for the next outcome; `false` when there will be no more.
-    pub(crate) async fn next_outcome(&mut self) -> bool {
-        let Some(solver) = &mut self.solver else {
-            return false;
-        };
-        match solver.outcomes.recv().await {
-            Some((place, outcome)) => {
+    /// Takes the outcomes that there are.
+    pub(crate) fn take_outcomes(&mut self) {
+        if let Some(solver) = &self.solver {
+            let mut outcomes = solver
+                .outcomes
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            for (place, outcome) in outcomes.drain(..) {
                 self.members[place].phase = Phase::Solved(outcome);
-                self.lease.alive();
-                true
             }
-            None => false,
         }
+    }
+
+    /// Set when there will be no more outcomes.
+    pub(crate) fn over(&self) -> CancellationToken {
+        if let Some(solver) = &self.solver {
+            return solver.over.clone();
+        }
+        let none = CancellationToken::new();
+        none.cancel();
+        none
     }
 
     /// Nothing more is begun: what the thread has not taken up goes back to the queue. To be called while the thread waits
     /// at the gate, has ended, or is left behind.
     pub(crate) fn close(&mut self) {
-        if let Some(solver) = &mut self.solver {
+        if let Some(solver) = &self.solver {
             solver.closed.store(true, Ordering::Release);
-            while let Ok((place, outcome)) = solver.outcomes.try_recv() {
-                self.members[place].phase = Phase::Solved(outcome);
-            }
         }
+        self.take_outcomes();
         for member in &mut self.members {
             if matches!(member.phase, Phase::Solving) && !member.control.is_taken_up() {
                 member.phase = Phase::NotBegun;
@@ -281,14 +292,13 @@ mod tests {
                 sliced: None,
             }
         };
-        let heartbeat = tokio::spawn(std::future::pending::<()>()).abort_handle();
         Attempt {
             queue: Queue {
                 tenant: "t".into(),
                 kind: Kind::Case,
             },
             members: (0..jobs).map(|_| member(claim())).collect(),
-            lease: GroupLease::new(Arc::new(HeldLeases::new(Vec::new())), heartbeat),
+            lease: GroupLease(Arc::new(HeldLeases::new(Vec::new(), 0))),
             gate,
             suspect: false,
             on: TimeSpentOn::New,

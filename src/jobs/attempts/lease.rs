@@ -4,78 +4,98 @@
 //! the process lives. While it waits for its turn, and while results are stored, there is nothing to tick, and the leases
 //! are renewed all the same. A worker gives up by the process' own clock before the table would give its jobs away.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-use tokio::task::AbortHandle;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::store::claim::Claim;
 
-/// The heartbeat of some claimed jobs; it ends when this is dropped.
+/// The leases of an attempt. They are no longer renewed once this is dropped.
 #[derive(Debug)]
-pub(crate) struct GroupLease {
-    held: Arc<HeldLeases>,
-    heartbeat: AbortHandle,
-}
+pub(crate) struct GroupLease(pub(crate) Arc<HeldLeases>);
 
 #[derive(Debug)]
 pub(crate) struct HeldLeases {
     leases: Mutex<Vec<(Claim, Arc<AttemptControl>)>>,
     /// A solver works and has to tick.
     pub(crate) solving: AtomicBool,
-    /// Jobs begun: each is a sign of life like a tick.
-    begun: AtomicU64,
+    /// Solves that ended: each is a sign of life like a tick.
+    solved: AtomicU64,
+    /// Ticks at the last renewal.
+    pub(crate) seen: AtomicU64,
+    /// When the leases run out, by the steady clock in ms.
+    pub(crate) until: AtomicI64,
     /// The leases are over because the solver stands still.
     pub(crate) lost: CancellationToken,
 }
 
-impl GroupLease {
-    /// The leases that this heartbeat renews.
-    pub(crate) fn new(held: Arc<HeldLeases>, heartbeat: AbortHandle) -> GroupLease {
-        GroupLease { held, heartbeat }
+/// All leases that this process holds, for its heartbeat.
+#[derive(Debug, Default)]
+pub(crate) struct AllLeases(Mutex<Vec<Weak<HeldLeases>>>);
+
+impl AllLeases {
+    /// Adds the leases of an attempt until it is over.
+    pub(crate) fn add(&self, held: &Arc<HeldLeases>) {
+        self.lock().push(Arc::downgrade(held));
     }
 
+    /// Those that are still held.
+    pub(crate) fn held(&self) -> Vec<Arc<HeldLeases>> {
+        let mut all = self.lock();
+        all.retain(|held| held.strong_count() > 0);
+        all.iter().filter_map(Weak::upgrade).collect()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Weak<HeldLeases>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl GroupLease {
     /// From now on a solver has to tick, or need not.
     pub(crate) fn solving(&self, solving: bool) {
-        self.held.solving.store(solving, Ordering::Release);
-    }
-
-    /// A job was begun.
-    pub(crate) fn alive(&self) {
-        self.held.begun.fetch_add(1, Ordering::AcqRel);
+        self.0.solving.store(solving, Ordering::Release);
     }
 
     /// These jobs are no longer held: they ended or were given back.
     pub(crate) fn let_go(&self, ids: &[Uuid]) {
-        self.held
+        self.0
             .leases()
             .retain(|(claim, _)| !ids.contains(&claim.id));
     }
 
     /// Set once the leases are over because the solver stands still.
     pub(crate) fn lost(&self) -> &CancellationToken {
-        &self.held.lost
+        &self.0.lost
     }
 }
 
 impl Drop for GroupLease {
     fn drop(&mut self) {
-        self.heartbeat.abort();
+        // A solver thread that was left behind may keep the rest.
+        self.0.leases().clear();
     }
 }
 
 impl HeldLeases {
     /// Leases of jobs that were claimed just now.
-    pub(crate) fn new(leases: Vec<(Claim, Arc<AttemptControl>)>) -> HeldLeases {
+    pub(crate) fn new(leases: Vec<(Claim, Arc<AttemptControl>)>, until: i64) -> HeldLeases {
         HeldLeases {
             leases: Mutex::new(leases),
             solving: AtomicBool::new(false),
-            begun: AtomicU64::new(0),
+            solved: AtomicU64::new(0),
+            seen: AtomicU64::new(0),
+            until: AtomicI64::new(until),
             lost: CancellationToken::new(),
         }
+    }
+
+    /// A solve has ended.
+    pub(crate) fn alive(&self) {
+        self.solved.fetch_add(1, Ordering::AcqRel);
     }
 
     pub(crate) fn leases(&self) -> MutexGuard<'_, Vec<(Claim, Arc<AttemptControl>)>> {
@@ -88,6 +108,6 @@ impl HeldLeases {
             .iter()
             .map(|(_, control)| control.ticks())
             .sum();
-        ticks + self.begun.load(Ordering::Acquire)
+        ticks + self.solved.load(Ordering::Acquire)
     }
 }

@@ -1,12 +1,12 @@
 //! The beginning of an attempt: its jobs are listed as running, their leases kept, its work handed to a thread.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
-use tokio::sync::mpsc::unbounded_channel;
+use tokio_util::sync::CancellationToken;
 
-use crate::jobs::attempts::attempt::{Attempt, Member, Phase, Solver, TimeSpentOn};
+use crate::jobs::attempts::attempt::{Attempt, Member, Outcomes, Phase, Solver, TimeSpentOn};
 use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::attempts::gate::Gate;
 use crate::jobs::attempts::outcome::{Outcome, Work};
@@ -49,7 +49,7 @@ pub(crate) fn take_up(shared: &Arc<Shared>, queue: Queue, claims: Vec<Claim>) ->
         .map(|one| (one.claim.clone(), one.control.clone()));
     Attempt {
         queue,
-        lease: heartbeat::start(shared, held.collect()),
+        lease: heartbeat::keep(shared, held.collect()),
         members,
         gate,
         suspect,
@@ -68,7 +68,8 @@ pub(crate) fn begin(
     work: Vec<(usize, Work)>,
 ) {
     attempt.spent = Duration::ZERO;
-    let (reply, outcomes) = unbounded_channel();
+    let outcomes = Outcomes::default();
+    let over = CancellationToken::new();
     let closed = Arc::new(AtomicBool::new(false));
     let work: Vec<_> = work
         .into_iter()
@@ -81,7 +82,10 @@ pub(crate) fn begin(
         .collect();
     let task: Task = {
         let (shared, closed) = (shared.clone(), closed.clone());
+        let (lease, over) = (attempt.lease.0.clone(), over.clone().drop_guard());
+        let outcomes = outcomes.clone();
         Box::new(move || {
+            let _over = over;
             let start = Instant::now();
             for (number, (place, control, work, traced)) in work.into_iter().enumerate() {
                 let late = number > 0 && start.elapsed() > GROUP_TIME;
@@ -92,8 +96,9 @@ pub(crate) fn begin(
                 let from_queue = matches!(work, Work::New(..));
                 let solve = || solve_guarded(&shared, &control, work);
                 let outcome = JobTrace::solving(traced.as_ref(), from_queue, solve);
-                // Nothing receives the outcomes of an abandoned attempt.
-                let _ = reply.send((place, outcome));
+                let mut outcomes = outcomes.lock().unwrap_or_else(PoisonError::into_inner);
+                outcomes.push((place, outcome));
+                lease.alive();
             }
         })
     };
@@ -101,6 +106,7 @@ pub(crate) fn begin(
         attempt.solver = Some(Solver {
             thread,
             outcomes,
+            over,
             closed,
         });
         return;

@@ -166,12 +166,11 @@ impl Worker {
         let mut closed = false;
         let gate = attempt.gate.clone();
         let lost = attempt.lease.lost().clone();
+        let over = attempt.over();
         let turn = loop {
             tokio::select! {
                 biased;
-                more = attempt.next_outcome() => if !more {
-                    break Turn::Over;
-                },
+                () = over.cancelled() => break Turn::Over,
                 () = gate.reached(), if closed => break Turn::Held,
                 () = shared.stopping.cancelled(), if told.is_none() => {
                     attempt.stop(StopReason::Shutdown);
@@ -180,6 +179,7 @@ impl Worker {
                 }
                 () = lost.cancelled(), if told.is_none() => told = Some(Instant::now()),
                 _ = check.tick() => {
+                    attempt.take_outcomes();
                     shared.turns.charge(&attempt.queue, charged.elapsed(), spent);
                     charged = Instant::now();
                     unwanted = attempt.unwanted().map(|member| {
@@ -267,10 +267,12 @@ impl Worker {
         attempt.stop(StopReason::Shutdown);
         attempt.gate.open();
         if attempt.begun() {
-            let ended = async { while attempt.next_outcome().await {} };
-            if tokio::time::timeout(STOP_TIMEOUT, ended).await.is_err() {
+            let over = attempt.over();
+            let ended = tokio::time::timeout(STOP_TIMEOUT, over.cancelled()).await;
+            if ended.is_err() {
                 self.leave_behind(attempt.abandon());
             } else {
+                attempt.take_outcomes();
                 self.thread = attempt.take_thread();
             }
         }

@@ -4,7 +4,7 @@
 //! incomplete was never acknowledged and is removed with its jobs.
 
 use super::blob_refs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, DbConnection, Row, SqlStore, query};
+use super::engine::{self, DbConnection, DbRow, Row, SqlStore, query};
 use super::insert::insert_jobs;
 use super::quota::Places;
 use super::rows::{
@@ -361,8 +361,11 @@ impl Batches for SqlStore {
             .bind(i64::from(limit))
             .fetch_all(&self.readers)
             .await?;
-            let keys = rows.iter().map(|row| Ok(row.try_get("key")?));
-            keys.collect()
+            let key = |row: &DbRow| {
+                let key = row.try_get("key")?;
+                Ok(key)
+            };
+            rows.iter().map(key).collect()
         })
         .await
     }

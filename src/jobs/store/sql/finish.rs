@@ -134,7 +134,8 @@ impl Ends for SqlStore {
             });
             query.push(") SELECT cache_key, ").push(SOURCE);
             query.push(" AS id FROM asked");
-            let rows = query.build().fetch_all(&self.readers).await?;
+            let mut connection = self.readers.acquire().await?;
+            let rows = query.build().fetch_all(&mut *connection).await?;
             let mut sources = HashMap::new();
             for row in &rows {
                 if row.try_get::<Option<&str>, _>("id")?.is_some()

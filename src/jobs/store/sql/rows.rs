@@ -68,7 +68,8 @@ pub(crate) fn read_cache_key(row: &DbRow) -> Result<Option<CacheKey>, StoreError
 
 /// The blob a row refers to.
 pub(crate) fn read_blob_id(row: &DbRow) -> Result<Option<i64>, StoreError> {
-    Ok(row.try_get("blob_id")?)
+    let id = row.try_get("blob_id")?;
+    Ok(id)
 }
 
 /// The blobs that rows refer to.

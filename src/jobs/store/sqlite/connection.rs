@@ -195,8 +195,10 @@ impl Connection {
 
 /// Where statements run: a connection, or one of a pool for a single statement.
 pub(crate) trait Executor: Send {
+    /// Runs a statement; with `long` it may wait for the disk or read many rows.
     fn run<T: Send>(
         self,
+        long: bool,
         call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
     ) -> impl Future<Output = Result<T, StoreError>> + Send;
 }
@@ -204,6 +206,7 @@ pub(crate) trait Executor: Send {
 impl Executor for &mut Connection {
     async fn run<T: Send>(
         self,
+        _: bool,
         call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
     ) -> Result<T, StoreError> {
         self.with(call)
@@ -213,10 +216,15 @@ impl Executor for &mut Connection {
 impl Executor for &Pool {
     async fn run<T: Send>(
         self,
+        long: bool,
         mut call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
     ) -> Result<T, StoreError> {
         let mut connection = self.acquire().await?;
-        unlocked(&mut connection, |connection| blocking(|| call(connection))).await
+        unlocked(&mut connection, |connection| match long {
+            true => blocking(|| call(connection)),
+            false => call(connection),
+        })
+        .await
     }
 }
 
@@ -287,7 +295,7 @@ impl Query {
     /// Runs the statement; how many rows it changed.
     pub(crate) async fn execute(self, executor: impl Executor) -> Result<Done, StoreError> {
         let mut none = |_| true;
-        let changed = executor.run(|connection| {
+        let changed = executor.run(true, |connection| {
             self.step(connection, &mut none)?;
             Ok(connection.changes())
         });
@@ -299,7 +307,7 @@ impl Query {
         executor: impl Executor,
     ) -> Result<Vec<SqliteRow>, StoreError> {
         executor
-            .run(|connection| {
+            .run(true, |connection| {
                 let mut rows = Vec::new();
                 self.step(connection, &mut |row| {
                     rows.push(row);
@@ -310,17 +318,27 @@ impl Query {
             .await
     }
 
-    /// The first row. The statement runs to its end.
+    /// The first row of a statement that has few. It runs to its end.
     pub(crate) async fn fetch_optional(
         self,
         executor: impl Executor,
     ) -> Result<Option<SqliteRow>, StoreError> {
-        Ok(self.fetch_all(executor).await?.into_iter().next())
+        executor
+            .run(false, |connection| {
+                let mut first = None;
+                self.step(connection, &mut |row| {
+                    first.get_or_insert(row);
+                    true
+                })?;
+                Ok(first)
+            })
+            .await
     }
 
     pub(crate) async fn fetch_one(self, executor: impl Executor) -> Result<SqliteRow, StoreError> {
         let none = || StoreError::Corrupt("a statement has no row".to_owned());
-        self.fetch_optional(executor).await?.ok_or_else(none)
+        let rows = self.fetch_all(executor).await?;
+        rows.into_iter().next().ok_or_else(none)
     }
 
     /// Passes each row on until `row` returns `false`.
@@ -330,7 +348,7 @@ impl Query {
         mut row: impl FnMut(&SqliteRow) -> Result<bool, StoreError> + Send,
     ) -> Result<(), StoreError> {
         executor
-            .run(|connection| self.walk(connection, &mut row))
+            .run(true, |connection| self.walk(connection, &mut row))
             .await?
     }
 
