@@ -42,9 +42,14 @@ pub struct Usage {
 impl Service {
     /// Starts `railhead serve` and returns when it listens. Its log goes to a file, as on a real machine.
     pub fn start(workers: usize, flags: &[&str]) -> Service {
+        Service::start_program(env!("CARGO_BIN_EXE_railhead"), workers, flags)
+    }
+
+    /// As [`Service::start`], with another program.
+    pub fn start_program(program: &str, workers: usize, flags: &[&str]) -> Service {
         let folder = tempfile::tempdir().expect("a folder");
         let (data, log) = (folder.path().join("data"), folder.path().join("log"));
-        let child = Command::new(env!("CARGO_BIN_EXE_railhead"))
+        let child = Command::new(program)
             .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])
             .args(["--workers", &workers.to_string(), "--data-dir"])
             .arg(&data)
@@ -61,9 +66,14 @@ impl Service {
         }
     }
 
+    /// The process.
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
     /// What it uses now.
     pub fn usage(&self) -> Usage {
-        let process = PathBuf::from(format!("/proc/{}", self.child.id()));
+        let process = PathBuf::from(format!("/proc/{}", self.pid()));
         let status = std::fs::read_to_string(process.join("status")).expect("the process lives");
         let megabytes = |name: &str| {
             status

@@ -191,13 +191,15 @@ impl Jobs {
     }
 }
 
-/// Whether a case has so few values that its check takes microseconds. Profiles and long sweeps have more.
+/// Whether a case is so small that its check takes microseconds. Profiles and long sweeps are larger.
 fn is_small(case: &Value) -> bool {
     const VALUES_MAX: usize = 100;
+    const BYTES_PER_VALUE: usize = 16;
     fn count(value: &Value, most: usize) -> usize {
         let members: Box<dyn Iterator<Item = &Value>> = match value {
             Value::Array(values) => Box::new(values.iter()),
             Value::Object(members) => Box::new(members.values()),
+            Value::String(text) => return 1 + text.len() / BYTES_PER_VALUE,
             _ => return 1,
         };
         let mut counted = 1;

@@ -47,17 +47,26 @@ impl<'a> RowsInWork<'a> {
         }
     }
 
-    /// Solves rows.
+    /// Solves rows. The first row of the task is not checked again if its checked case is given.
     ///
     /// # Errors
     /// [`SolveError::Cancelled`]: the monitor stopped the work.
-    pub(crate) fn solve(mut self, rows: &[usize]) -> Result<(), SolveError> {
+    pub(crate) fn solve(
+        mut self,
+        rows: &[usize],
+        first: Option<&CheckedCase>,
+    ) -> Result<(), SolveError> {
         self.all = rows.len();
         for row in rows {
             if self.watch().tick(0.0).is_break() {
                 return Err(SolveError::Cancelled);
             }
-            match self.task.checked(*row) {
+            let known = first.filter(|_| *row == 0);
+            let checked = match known {
+                Some(checked) => Ok(self.task.as_row(checked.clone())),
+                None => self.task.checked(*row),
+            };
+            match checked {
                 Ok(checked) => self.alone(*row, &checked)?,
                 Err(error) => self.end(*row, RowFailure::refused(&error)),
             }

@@ -41,8 +41,24 @@ pub fn solve_many(
         open.retain(|row| !take(&mut answer, *row, method, &evaluated, patches[*row]));
     }
     open.sort_by(|a, b| near(task.columns, *a, *b));
-    RowsInWork::new(task, solve, monitor, &mut answer).solve(&open)?;
+    RowsInWork::new(task, solve, monitor, &mut answer).solve(&open, None)?;
     Ok(answer)
+}
+
+/// Solves every row as a case of its own. `checked` is the checked case of the task, and `first` that of its first row, if it is known.
+fn solve_rows<E>(
+    task: &ManyTask,
+    checked: &CheckedCase,
+    first: Option<&CheckedCase>,
+    solve: &RowSolver,
+    monitor: &dyn Monitor,
+) -> Result<RowsAnswer, NotAtOnce<E>> {
+    let mut answer = ManyAnswer::new(task.rows(), NumberColumns::of(checked));
+    let mut rows: Vec<usize> = (0..task.rows()).collect();
+    rows.sort_by(|a, b| near(task.columns, *a, *b));
+    let solved = RowsInWork::new(task, solve, monitor, &mut answer).solve(&rows, first);
+    solved.map_err(|_| NotAtOnce::Stopped)?;
+    Ok(RowsAnswer::of_solver(answer))
 }
 
 /// Most rows of one evaluation that the solver answers; the table and FASTSIM answer any number.
@@ -59,8 +75,8 @@ pub enum NotAtOnce<E> {
     Step(E),
 }
 
-/// Answers rows at once, by the table or FASTSIM where they apply, and else by the solver. `checked` is the checked case of the task; `step` is
-/// called after each row of the former and may end the evaluation.
+/// Answers rows at once, by the table or FASTSIM where they apply, and else by the solver. The case of the task is that of its first row, and
+/// `checked` is its checked form; `step` is called after each row of the former and may end the evaluation.
 ///
 /// With `auto`, rows that the table leaves to the solver are solved too, if there are at most [`SOLVED_ROWS_MAX`]; otherwise their status is
 /// [`RowStatus::NeedsSolver`].
@@ -74,15 +90,12 @@ pub fn evaluate_at_once<E>(
     monitor: &dyn Monitor,
     step: impl FnMut() -> Result<(), E>,
 ) -> Result<RowsAnswer, NotAtOnce<E>> {
-    let by_solver = |task: &ManyTask| {
-        let solved = solve_many(task, solve, monitor).map_err(|_| NotAtOnce::Stopped)?;
-        Ok(RowsAnswer::of_solver(solved))
-    };
     let Some((rows, method)) = evaluable(task, checked) else {
-        return match task.rows() {
-            rows if rows > SOLVED_ROWS_MAX => Err(NotAtOnce::TooManyRows(rows)),
-            _ => by_solver(task),
-        };
+        let rows = task.rows();
+        if rows > SOLVED_ROWS_MAX {
+            return Err(NotAtOnce::TooManyRows(rows));
+        }
+        return solve_rows(task, checked, Some(checked), solve, monitor);
     };
     let mut answer = rows.evaluate_stepwise(step).map_err(NotAtOnce::Step)?;
     let open: Vec<usize> = (0..answer.status.len())
@@ -100,10 +113,12 @@ pub fn evaluate_at_once<E>(
                 values: column.values.pick(&open),
             })
             .collect();
-        let solved = by_solver(&ManyTask {
+        let task = ManyTask {
             columns: &columns,
             ..*task
-        })?;
+        };
+        let first = Some(checked).filter(|_| open[0] == 0);
+        let solved = solve_rows(&task, checked, first, solve, monitor)?;
         answer.replace(&open, &solved);
     }
     Ok(answer)

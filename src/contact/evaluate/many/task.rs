@@ -48,17 +48,22 @@ impl ManyTask<'_> {
     pub(crate) fn checked(&self, row: usize) -> Result<CheckedCase, CaseError> {
         let case = case_of_row(self.case, self.columns, self.profiles, row)
             .map_err(|(pointer, reason)| CaseError(vec![Fault::new(pointer, reason)]))?;
-        let mut checked = contact::check_with(self.known, &case, self.limits)?;
-        if let Some(fault) = several_answers(&checked) {
-            return Err(CaseError(vec![fault]));
+        let checked = contact::check_with(self.known, &case, self.limits)?;
+        match several_answers(&checked) {
+            Some(fault) => Err(CaseError(vec![fault])),
+            None => Ok(self.as_row(checked)),
         }
+    }
+
+    /// A checked case with the outputs and the time limit of a row.
+    pub(crate) fn as_row(&self, mut checked: CheckedCase) -> CheckedCase {
         // Rows are answered with numbers alone.
         let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
         let outputs = &mut checked.run.outputs;
         outputs.retain(|output| numbers.contains(output));
         let own = checked.run.time_limit;
         checked.run.time_limit = Some(own.map_or(self.time_limit, |own| own.min(self.time_limit)));
-        Ok(checked)
+        checked
     }
 }
 
