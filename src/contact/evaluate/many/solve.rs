@@ -12,7 +12,7 @@ use crate::contact::error::SolveError;
 use crate::contact::evaluate::answer::{RowStatus, RowsAnswer};
 use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::many::row_solver::RowsInWork;
-use crate::contact::evaluate::many::task::{ManyTask, RowSolver};
+use crate::contact::evaluate::many::task::{ManyTask, RowSolver, several_answers};
 use crate::contact::evaluate::many_answer::{
     ManyAnswer, ManyStatus, NumberColumns, RowFailure, RowNumbers, SolvedRow,
 };
@@ -90,12 +90,13 @@ pub fn evaluate_at_once<E>(
     monitor: &dyn Monitor,
     step: impl FnMut() -> Result<(), E>,
 ) -> Result<RowsAnswer, NotAtOnce<E>> {
+    let first = Some(checked).filter(|checked| several_answers(checked).is_none());
     let Some((rows, method)) = evaluable(task, checked) else {
         let rows = task.rows();
         if rows > SOLVED_ROWS_MAX {
             return Err(NotAtOnce::TooManyRows(rows));
         }
-        return solve_rows(task, checked, Some(checked), solve, monitor);
+        return solve_rows(task, checked, first, solve, monitor);
     };
     let mut answer = rows.evaluate_stepwise(step).map_err(NotAtOnce::Step)?;
     let open: Vec<usize> = (0..answer.status.len())
@@ -117,7 +118,7 @@ pub fn evaluate_at_once<E>(
             columns: &columns,
             ..*task
         };
-        let first = Some(checked).filter(|_| open[0] == 0);
+        let first = first.filter(|_| open[0] == 0);
         let solved = solve_rows(&task, checked, first, solve, monitor)?;
         answer.replace(&open, &solved);
     }
