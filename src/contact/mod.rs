@@ -33,6 +33,7 @@ pub mod case;
 pub mod conventions;
 pub mod error;
 pub mod evaluate;
+pub mod facade;
 pub mod forecast;
 pub mod friction;
 pub mod geometry;

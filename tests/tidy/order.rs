@@ -41,6 +41,7 @@ const ORDER: &[&str] = &[
     "contact::slices",
     "contact::evaluate",
     "contact",
+    "contact::facade",
     "contact::evaluate::many",
     "contact::lib",
     "jobs::model",

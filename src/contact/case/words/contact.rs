@@ -286,7 +286,7 @@ impl Contact {
 }
 
 /// How hard the bodies are pressed together; exactly one member is given, for `wheelset` with `left_share` beside it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct Load {
     /// Normal force in N, more than 0. For `profiles` the sum over all patches, each along its own normal.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -23,7 +23,7 @@ pub struct MotionWords {
 
 /// A motion as a case gives it: creepages and spin. A tangential force may be given in place of a creepage; the creepage that gives this
 /// force is then found and reported in the answer.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema)]
 pub struct AskedMotion {
     /// Longitudinal creepage, dimensionless; 0 when left out.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,0 +1,462 @@
+//! Cases in Rust, without JSON: constructors and setters for the members of a [`Case`], and [`Case::solve`].
+//!
+//! A case that is built here passes the same checks as one that was read from JSON, and gives the same answer and the same digest.
+
+use std::collections::BTreeMap;
+
+use serde_json::to_value;
+use thiserror::Error;
+
+use crate::contact::case::limits::Limits;
+use crate::contact::case::words::contact::{
+    Contact, CrossSection, FormatName, Load, SideName, Smoothing,
+};
+use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::material::{Elastic, Material};
+use crate::contact::case::words::motion::{AskedMotion, Motions, Wheelset};
+use crate::contact::case::words::question::Case;
+use crate::contact::case::words::solver::{MethodName, Output, Solver};
+use crate::contact::error::{CaseError, Fault, SolveError};
+use crate::contact::monitor::Unmonitored;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::solution::words::answer::Solution;
+use crate::contact::{check, solve};
+
+/// Gauge of standard track in mm.
+const GAUGE: f64 = 1435.0;
+/// Distance of the backs of the flanges of a standard wheelset in mm.
+const FLANGE_BACK_DISTANCE: f64 = 1360.0;
+
+/// Why a case has no answer.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The case has faults.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// The case was solved without success.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+}
+
+impl Case {
+    /// A case without load and motion, to be solved by `auto` to the default target for resultants.
+    ///
+    /// ```
+    /// use railhead_contact::{Case, Contact, Friction, Load, Material, Motion};
+    ///
+    /// let contact = Contact::radii(460.0, 300.0);
+    /// let solution = Case::new(Material::steel(), Friction::coulomb(0.3), contact)
+    ///     .load(Load::normal_force(100e3))
+    ///     .motion(Motion::creepages(0.001, 0.0, 0.0001))
+    ///     .solve()?;
+    /// let patch = &solution.patches[0];
+    /// assert!((patch.pressure_max_mpa - 1226.8).abs() < 1.0);
+    /// assert!(patch.points[0].force_x_n > 0.0);
+    /// # Ok::<(), railhead_contact::Error>(())
+    /// ```
+    #[must_use]
+    pub fn new(material: Material, friction: Friction, contact: Contact) -> Case {
+        Case {
+            name: None,
+            labels: BTreeMap::new(),
+            material,
+            friction,
+            contact,
+            load: None,
+            motion: Motions::Many(Vec::new()),
+            solver: Solver::default(),
+            outputs: vec![Output::Resultants],
+            subsurface: None,
+            damage: None,
+            thermal: None,
+        }
+    }
+
+    /// Sets the load.
+    #[must_use]
+    pub fn load(mut self, load: Load) -> Case {
+        self.load = Some(load);
+        self
+    }
+
+    /// Sets the motion: an [`AskedMotion`], a `Vec` of them, a [`Wheelset`], or any other [`Motions`].
+    #[must_use]
+    pub fn motion(mut self, motion: impl Into<Motions>) -> Case {
+        self.motion = motion.into();
+        self
+    }
+
+    /// Sets the allowed error of the resultants relative to the friction limit μN, 1e-4 to 0.5.
+    ///
+    /// ```
+    /// use railhead_contact::{Case, Contact, Friction, Load, Material, Motion};
+    ///
+    /// let case = Case::new(Material::steel(), Friction::coulomb(0.3), Contact::ellipse(6.0, 4.0))
+    ///     .load(Load::normal_force(80e3))
+    ///     .motion(Motion::creepages(0.0005, 0.0005, 0.0))
+    ///     .target_error(0.001);
+    /// let point = &case.solve()?.patches[0].points[0];
+    /// assert_eq!(point.target_met, Some(true));
+    /// assert!(point.error_estimate.unwrap().force_x_n <= 0.001 * 0.3 * 80e3);
+    /// # Ok::<(), railhead_contact::Error>(())
+    /// ```
+    #[must_use]
+    pub fn target_error(mut self, target: f64) -> Case {
+        self.solver.target_error = Some(target);
+        self
+    }
+
+    /// Sets the method; its target or mesh stays.
+    ///
+    /// ```
+    /// use railhead_contact::{Case, Contact, Friction, Load, Material, Method, Motion};
+    ///
+    /// let case = Case::new(Material::steel(), Friction::coulomb(0.3), Contact::ellipse(6.0, 4.0))
+    ///     .load(Load::normal_force(80e3))
+    ///     .motion(Motion::creepages(0.001, 0.0, 0.0));
+    /// let force = |method| {
+    ///     let solution = case.clone().method(method).solve()?;
+    ///     Ok::<f64, railhead_contact::Error>(solution.total[0].force_x_n)
+    /// };
+    /// let (exact, table) = (force(Method::BoundaryElement)?, force(Method::Table)?);
+    /// assert!((table - exact).abs() < 0.02 * 0.3 * 80e3);
+    /// # Ok::<(), railhead_contact::Error>(())
+    /// ```
+    #[must_use]
+    pub fn method(mut self, method: MethodName) -> Case {
+        self.solver.method = method;
+        self
+    }
+
+    /// Sets what is computed.
+    ///
+    /// ```
+    /// use railhead_contact::{Case, Contact, Friction, Limits, Load, Material, Motion, Output, Unmonitored};
+    ///
+    /// let case = Case::new(Material::steel(), Friction::coulomb(0.3), Contact::ellipse(6.0, 4.0))
+    ///     .load(Load::normal_force(80e3))
+    ///     .motion(Motion::creepages(0.001, 0.0, 0.0))
+    ///     .outputs([Output::Resultants, Output::Tractions]);
+    /// let (_, fields) = railhead_contact::solve(&case.check(&Limits::default())?, &Unmonitored)?;
+    /// assert!(!fields.patches.is_empty());
+    /// # Ok::<(), railhead_contact::Error>(())
+    /// ```
+    #[must_use]
+    pub fn outputs(mut self, outputs: impl IntoIterator<Item = Output>) -> Case {
+        self.outputs = outputs.into_iter().collect();
+        self
+    }
+
+    /// Checks the case against physics and limits.
+    ///
+    /// # Errors
+    /// Every fault of the case at once.
+    ///
+    /// ```
+    /// use railhead_contact::{Case, Contact, Friction, Limits, Load, Material, Motion};
+    ///
+    /// let error = Case::new(Material::steel(), Friction::coulomb(-0.3), Contact::radii(460.0, -300.0))
+    ///     .load(Load::normal_force(100e3))
+    ///     .motion(Motion::creepages(0.001, 0.0, 0.0))
+    ///     .check(&Limits::default())
+    ///     .unwrap_err();
+    /// let pointers: Vec<&str> = error.0.iter().map(|fault| fault.pointer.as_str()).collect();
+    /// assert_eq!(pointers, ["/friction/coefficient", "/contact/lateral_mm"]);
+    /// ```
+    pub fn check(&self, limits: &Limits) -> Result<CheckedCase, CaseError> {
+        let value = to_value(self).map_err(|error| {
+            let fault = Fault::new("", error.to_string());
+            CaseError(vec![fault])
+        })?;
+        check(&value, limits)
+    }
+
+    /// Checks and solves the case within the default limits. [`solve`](crate::contact::solve) also gives the values per cell, and
+    /// can be followed and stopped.
+    ///
+    /// # Errors
+    /// The faults of the case, or why the solve gave no answer.
+    pub fn solve(&self) -> Result<Solution, Error> {
+        let (solution, _) = solve(&self.check(&Limits::default())?, &Unmonitored)?;
+        Ok(solution)
+    }
+}
+
+impl Material {
+    /// Steel on steel: G = 82 000 MPa, ν = 0.28.
+    #[must_use]
+    pub fn steel() -> Material {
+        Material::Same(Elastic::of_shear_modulus(82_000.0, 0.28))
+    }
+}
+
+impl Elastic {
+    /// From the shear modulus in MPa and Poisson's ratio.
+    #[must_use]
+    pub fn of_shear_modulus(shear_modulus_mpa: f64, poisson_ratio: f64) -> Elastic {
+        Elastic {
+            shear_modulus_mpa: Some(shear_modulus_mpa),
+            young_modulus_mpa: None,
+            poisson_ratio,
+        }
+    }
+
+    /// From Young's modulus in MPa and Poisson's ratio.
+    ///
+    /// ```
+    /// use railhead_contact::{Case, Contact, Elastic, Friction, Load, Material, Motion};
+    ///
+    /// let material = Material::Pair {
+    ///     lower: Elastic::of_young_modulus(210_000.0, 0.28),
+    ///     upper: Elastic::of_young_modulus(70_000.0, 0.33),
+    /// };
+    /// let solution = Case::new(material, Friction::coulomb(0.2), Contact::radii(50.0, 50.0))
+    ///     .load(Load::normal_force(1e3))
+    ///     .motion(Motion::creepages(0.001, 0.0, 0.0))
+    ///     .solve()?;
+    /// assert!(solution.material.difference_parameter != 0.0);
+    /// # Ok::<(), railhead_contact::Error>(())
+    /// ```
+    #[must_use]
+    pub fn of_young_modulus(young_modulus_mpa: f64, poisson_ratio: f64) -> Elastic {
+        Elastic {
+            shear_modulus_mpa: None,
+            young_modulus_mpa: Some(young_modulus_mpa),
+            poisson_ratio,
+        }
+    }
+}
+
+impl Friction {
+    /// Coulomb friction with a constant coefficient.
+    #[must_use]
+    pub fn coulomb(coefficient: f64) -> Friction {
+        Friction {
+            coefficient: Some(coefficient),
+            ..Friction::default()
+        }
+    }
+}
+
+impl Contact {
+    /// Bodies with the relative radii of curvature along and across the rolling direction, in mm.
+    #[must_use]
+    pub fn radii(rolling_mm: f64, lateral_mm: f64) -> Contact {
+        Contact::Radii {
+            rolling_mm,
+            lateral_mm,
+        }
+    }
+
+    /// An elliptic patch with the semi-axes along and across the rolling direction, in mm, under Hertz's pressure.
+    #[must_use]
+    pub fn ellipse(a_mm: f64, b_mm: f64) -> Contact {
+        Contact::Ellipse { a_mm, b_mm }
+    }
+
+    /// A wheel on a rail of standard track (gauge 1435 mm, backs of the flanges 1360 mm apart), in the middle of the track.
+    ///
+    /// ```
+    /// use railhead_contact::{Case, Contact, CrossSection, Format, Friction, Load, Material, Side, Wheelset};
+    ///
+    /// let rail = CrossSection::text(Format::Columns, include_str!("examples/60e1.txt"));
+    /// let wheel = CrossSection::text(Format::Columns, include_str!("examples/s1002.txt"));
+    /// let contact = Contact::profiles(rail, wheel, Side::Right, 460.0);
+    /// let solution = Case::new(Material::steel(), Friction::coulomb(0.3), contact)
+    ///     .load(Load::vertical_force(75e3))
+    ///     .motion(Wheelset::rolling_freely(20e3, 460.0))
+    ///     .solve()?;
+    /// assert!((solution.total[0].force_z_n.unwrap() + 75e3).abs() < 1.0);
+    /// # Ok::<(), railhead_contact::Error>(())
+    /// ```
+    #[must_use]
+    pub fn profiles(
+        rail: CrossSection,
+        wheel: CrossSection,
+        side: SideName,
+        rolling_radius_mm: f64,
+    ) -> Contact {
+        Contact::Profiles {
+            rail: Box::new(rail),
+            wheel: Box::new(wheel),
+            side,
+            rolling_radius_mm,
+            gauge_mm: Some(GAUGE),
+            gauge_height_mm: None,
+            rail_origin_mm: None,
+            cant_rad: 0.0,
+            flange_back_distance_mm: FLANGE_BACK_DISTANCE,
+            flange_back_position_mm: None,
+            lateral_shift_mm: 0.0,
+            yaw_rad: 0.0,
+            roll_rad: 0.0,
+            accept_rough_profiles: false,
+        }
+    }
+}
+
+impl CrossSection {
+    /// Points `[y, z]` in mm, in order along the cross-section; y positive to the field side, z positive down.
+    #[must_use]
+    pub fn points(points_mm: Vec<[f64; 2]>) -> CrossSection {
+        CrossSection {
+            points_mm: Some(points_mm),
+            ..CrossSection::empty()
+        }
+    }
+
+    /// The content of a file.
+    #[must_use]
+    pub fn text(format: FormatName, text: impl Into<String>) -> CrossSection {
+        CrossSection {
+            format: Some(format),
+            text: Some(text.into()),
+            ..CrossSection::empty()
+        }
+    }
+
+    fn empty() -> CrossSection {
+        CrossSection {
+            points_mm: None,
+            profile: None,
+            format: None,
+            text: None,
+            unit: None,
+            mirror_y: None,
+            mirror_z: None,
+            smoothing_mm: Smoothing::Length(0.0),
+        }
+    }
+}
+
+impl Load {
+    /// Normal force in N.
+    #[must_use]
+    pub fn normal_force(normal_force_n: f64) -> Load {
+        Load {
+            normal_force_n: Some(normal_force_n),
+            ..Load::default()
+        }
+    }
+
+    /// Vertical force of the wheel or the wheelset in N.
+    #[must_use]
+    pub fn vertical_force(vertical_force_n: f64) -> Load {
+        Load {
+            vertical_force_n: Some(vertical_force_n),
+            ..Load::default()
+        }
+    }
+
+    /// Approach of distant points in mm.
+    ///
+    /// ```
+    /// use railhead_contact::{Case, Contact, Friction, Load, Material, Motion};
+    ///
+    /// // The force of a Hertz contact grows with the approach to the power 3/2.
+    /// let force = |approach| {
+    ///     let solution = Case::new(Material::steel(), Friction::coulomb(0.3), Contact::radii(460.0, 300.0))
+    ///         .load(Load::approach(approach))
+    ///         .motion(Motion::creepages(0.001, 0.0, 0.0))
+    ///         .solve()?;
+    ///     Ok::<f64, railhead_contact::Error>(solution.patches[0].normal_force_n)
+    /// };
+    /// assert!((force(0.08)? / force(0.02)? - 8.0).abs() < 1e-6);
+    /// # Ok::<(), railhead_contact::Error>(())
+    /// ```
+    #[must_use]
+    pub fn approach(approach_mm: f64) -> Load {
+        Load {
+            approach_mm: Some(approach_mm),
+            ..Load::default()
+        }
+    }
+}
+
+impl AskedMotion {
+    /// Longitudinal and lateral creepage, and spin in 1/mm.
+    ///
+    /// ```
+    /// use railhead_contact::{Case, Contact, Friction, Load, Material, Motion};
+    ///
+    /// // A creep curve: the force grows with the creepage up to the friction limit.
+    /// let motions: Vec<Motion> =
+    ///     (1..=10).map(|k| Motion::creepages(0.0005 * f64::from(k), 0.0, 0.0)).collect();
+    /// let solution = Case::new(Material::steel(), Friction::coulomb(0.3), Contact::radii(460.0, 300.0))
+    ///     .load(Load::normal_force(100e3))
+    ///     .motion(motions)
+    ///     .solve()?;
+    /// let forces: Vec<f64> = solution.total.iter().map(|total| total.force_x_n).collect();
+    /// assert!(forces.is_sorted() && forces[9] <= 0.3 * 100e3);
+    /// # Ok::<(), railhead_contact::Error>(())
+    /// ```
+    #[must_use]
+    pub fn creepages(creepage_x: f64, creepage_y: f64, spin_per_mm: f64) -> AskedMotion {
+        AskedMotion {
+            creepage_x: Some(creepage_x),
+            creepage_y: Some(creepage_y),
+            spin_per_mm,
+            ..AskedMotion::default()
+        }
+    }
+
+    /// Longitudinal and lateral force on the lower body in N, and spin in 1/mm. The creepages are found.
+    ///
+    /// ```
+    /// use railhead_contact::{Case, Contact, Friction, Load, Material, Motion};
+    ///
+    /// let solution = Case::new(Material::steel(), Friction::coulomb(0.3), Contact::radii(460.0, 300.0))
+    ///     .load(Load::normal_force(100e3))
+    ///     .motion(Motion::forces(10e3, 0.0, 0.0))
+    ///     .solve()?;
+    /// let point = &solution.patches[0].points[0];
+    /// assert!(point.motion.creepage_x > 0.0 && (point.force_x_n - 10e3).abs() < 200.0);
+    /// # Ok::<(), railhead_contact::Error>(())
+    /// ```
+    #[must_use]
+    pub fn forces(force_x_n: f64, force_y_n: f64, spin_per_mm: f64) -> AskedMotion {
+        AskedMotion {
+            force_x_n: Some(force_x_n),
+            force_y_n: Some(force_y_n),
+            spin_per_mm,
+            ..AskedMotion::default()
+        }
+    }
+}
+
+impl Wheelset {
+    /// A wheelset at a speed in mm/s whose wheels roll freely at a radius in mm, without lateral velocity, yaw rate and roll rate.
+    #[must_use]
+    pub fn rolling_freely(speed_mm_per_s: f64, radius_mm: f64) -> Wheelset {
+        Wheelset {
+            speed_mm_per_s,
+            angular_velocity_rad_per_s: None,
+            free_rolling_radius_mm: Some(radius_mm),
+            drive_torque_n_mm: None,
+            force_x_n: None,
+            lateral_velocity_mm_per_s: None,
+            force_y_n: None,
+            yaw_rate_rad_per_s: 0.0,
+            roll_rate_rad_per_s: 0.0,
+        }
+    }
+}
+
+impl From<AskedMotion> for Motions {
+    fn from(motion: AskedMotion) -> Motions {
+        Motions::One(motion)
+    }
+}
+
+impl From<Vec<AskedMotion>> for Motions {
+    fn from(motions: Vec<AskedMotion>) -> Motions {
+        Motions::Many(motions)
+    }
+}
+
+impl From<Wheelset> for Motions {
+    fn from(wheelset: Wheelset) -> Motions {
+        Motions::Wheelset { wheelset }
+    }
+}
