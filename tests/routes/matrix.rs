@@ -77,7 +77,7 @@ struct Answer {
 
 /// Error of an answer without an estimate, relative to μN: one on a given mesh, solved to a residual.
 const WITHOUT_ESTIMATE: f64 = 1e-3;
-/// Rounding, relative to μN.
+/// Rounding, relative to the normal force.
 const ROUNDING: f64 = 1e-6;
 /// Normal forces of patches that are found agree so well, relative to themselves.
 const NORMAL: f64 = 2e-3;
@@ -166,7 +166,10 @@ fn checked(
         (Expected::Refused(_), Ok(_)) => {
             Err("answered, although it is on the list of refused combinations".to_owned())
         }
-        (_, Err(why)) => Err(format!("refused: {why}")),
+        (_, Err(why)) => match alone.is_refused_alike(&why, route) {
+            true => Ok(Some((0, 0.0))),
+            false => Err(format!("refused: {why}")),
+        },
         (Expected::SharedPatches, Ok(rows)) => {
             let said = rows.iter().flatten().all(|row| {
                 row.remarks
@@ -210,7 +213,9 @@ fn compare(found: &Answer, known: &Answer) -> Result<f64, String> {
             (_, true) => WITHOUT_ESTIMATE * scales[k],
             _ => answer.errors[k],
         };
-        let allowed = error(found) + error(known) + ROUNDING * scales[k];
+        // The lateral force of a wheel has a share of the normal forces, which is there without friction too.
+        let rounding = ROUNDING * scales[k].max(known.numbers[3]);
+        let allowed = error(found) + error(known) + rounding;
         let off = (a - b).abs();
         if off.is_nan() || off > allowed {
             let name = ["F_x", "F_y", "M_z", "N"][k];
@@ -258,6 +263,22 @@ impl Alone<'_> {
             .ok_or("alone: no answer")?;
         self.known.insert(key, answer.clone());
         Ok(answer)
+    }
+}
+
+impl Alone<'_> {
+    /// Is one of the cases refused alone for the same reason, apart from its numbers? Rows at once say only that they have no answer.
+    fn is_refused_alike(&mut self, why: &str, route: Route) -> bool {
+        let words =
+            |text: &str| text.replace(|c: char| c.is_ascii_digit() || "+-.".contains(c), "");
+        let keys = (0..ROWS).flat_map(|row| [(row, false), (row, true)]);
+        keys.into_iter().any(|(row, with_columns)| {
+            let refusal = self.answer(row, with_columns).err();
+            refusal.is_some_and(|refusal| match route {
+                Route::Evaluate => why.starts_with(&format!("row {row} is ")),
+                _ => words(&refusal).ends_with(&words(why)),
+            })
+        })
     }
 }
 
