@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::contact::case::words::solver::Output;
 use crate::contact::error::SolveError;
 use crate::contact::method::Method;
 use crate::contact::normal_stage::SolvedFootprint;
@@ -11,6 +12,7 @@ use crate::contact::rolling::history;
 use crate::contact::rolling::history::task::HistoryTask;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling::refinement::gradients::add_gradients;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resolution::{RelativeTo, Resolution, TARGET_LEAST};
 use crate::contact::rolling::task::RollingTask;
@@ -64,9 +66,9 @@ fn solve_motions(
         };
         match case.run.relative_to {
             RelativeTo::FrictionLimit => {
-                motion.add(&mut assembly, &state, point)?;
+                motion.add(&mut assembly, &task, &mut state, point)?;
             }
-            RelativeTo::Force => motion.add_to_force(&mut assembly, &task, &state, point, 0)?,
+            RelativeTo::Force => motion.add_to_force(&mut assembly, &task, &mut state, point, 0)?,
         }
         state.trim();
     }
@@ -118,9 +120,13 @@ impl StagedMotion<'_> {
     fn add(
         &self,
         assembly: &mut Assembly,
-        state: &RefinementState,
+        task: &RollingTask,
+        state: &mut RefinementState,
         mut point: MotionAnswer,
     ) -> Result<(), SolveError> {
+        if self.case.run.wants(Output::Gradients) && point.gradients.is_none() {
+            add_gradients(task, state, self.index, &mut point, self.watch)?;
+        }
         add_coupling_error(&mut point, self.solved.coupling_error);
         if assembly.is_empty() {
             // What all motions share is charged to the first.
@@ -137,7 +143,7 @@ impl StagedMotion<'_> {
         &self,
         assembly: &mut Assembly,
         task: &RollingTask,
-        state: &RefinementState,
+        state: &mut RefinementState,
         point: MotionAnswer,
         round: u32,
     ) -> Result<(), SolveError> {
@@ -154,7 +160,7 @@ impl StagedMotion<'_> {
                 Ok(mut found) => {
                     found.seconds += point.seconds;
                     found.work.add_lost(point.work);
-                    return self.add_to_force(assembly, &finer, &finer_state, found, round + 1);
+                    return self.add_to_force(assembly, &finer, &mut finer_state, found, round + 1);
                 }
                 // The answer of the round before stands, with its error.
                 Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => {}
@@ -163,7 +169,7 @@ impl StagedMotion<'_> {
         }
         // Levels of other rounds have numbers of their own.
         assembly.forget_levels();
-        self.add(assembly, state, point)
+        self.add(assembly, task, state, point)
     }
 
     /// The target relative to μN with which the error may be small enough; none if it is, or if no smaller one helps.

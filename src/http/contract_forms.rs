@@ -49,13 +49,18 @@ const MEMBERS: [(&str, usize, Option<usize>); 3] = [
 ];
 
 /// Members that are lists of so many numbers, or lists of those.
-const TUPLES: [(&str, &str, usize); 32] = [
+const TUPLES: [(&str, &str, usize); 37] = [
     ("ArchardFigures", "speeds_mm_per_s", 2),
     ("CrossSection", "points_mm", 2),
     ("EquivalentConicity", "turns_mm", 2),
     ("FirstTouch", "rail_mm", 2),
     ("FirstTouch", "track_mm", 3),
     ("FirstTouch", "wheel_mm", 2),
+    ("GradientErrors", "by_normal_force", 3),
+    ("GradientErrors", "force_x_n", 3),
+    ("GradientErrors", "force_y_n", 3),
+    ("GradientErrors", "moment_z_n_mm", 3),
+    ("Gradients", "by_normal_force", 3),
     ("Gradients", "force_x_n", 3),
     ("Gradients", "force_y_n", 3),
     ("Gradients", "moment_z_n_mm", 3),

@@ -32,6 +32,7 @@ mod gap_robustness;
 mod gap_samples;
 mod gap_two_patches;
 mod golden;
+mod gradients;
 mod held_out;
 mod hertz;
 mod histories;

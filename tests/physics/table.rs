@@ -364,9 +364,6 @@ fn what_the_table_does_not_cover_is_refused_with_the_reason() {
         "/outputs/0",
         &["zones", "resultants"],
     );
-    let mut other = with("/outputs", json!(["gradients"]));
-    other["solver"] = json!({ "method": "fastsim" });
-    assert_fault(&other, "/outputs/0", &["gradients", "table"]);
 }
 
 fn gap(across: &Across, motion: [f64; 3]) -> Value {

@@ -355,6 +355,10 @@ fn methods() -> Vec<Feature> {
         named("table with gradients", by_table)
             .with("/outputs", json!(["gradients", "resultants"])),
         named("fastsim", json!({ "method": "fastsim" })),
+        named("fastsim with gradients", json!({ "method": "fastsim" }))
+            .with("/outputs", json!(["gradients", "resultants"])),
+        named("auto with gradients", json!({ "method": "auto" }))
+            .with("/outputs", json!(["gradients", "resultants"])),
         named(
             "fastsim with a parabolic bound",
             json!({ "method": "fastsim", "traction_bound": "parabolic" }),

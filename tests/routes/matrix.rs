@@ -274,9 +274,9 @@ impl Alone<'_> {
         let keys = (0..ROWS).flat_map(|row| [(row, false), (row, true)]);
         keys.into_iter().any(|(row, with_columns)| {
             let refusal = self.answer(row, with_columns).err();
-            refusal.is_some_and(|refusal| match route {
-                Route::Evaluate => why.starts_with(&format!("row {row} is ")),
-                _ => words(&refusal).ends_with(&words(why)),
+            refusal.is_some_and(|refusal| {
+                let is_row = why.starts_with(&format!("row {row} is "));
+                route == Route::Evaluate && is_row || words(&refusal).ends_with(&words(why))
             })
         })
     }

@@ -384,7 +384,7 @@ fn numbers_of(solution: &Solution, columns: &NumberColumns) -> Option<Vec<f64>> 
     let found = columns.found.iter();
     let found = found.map(|found| found.number(solution).unwrap_or(f64::NAN));
     let only = points().next().filter(|_| solution.patches.len() == 1);
-    let slopes = only.and_then(|point| point.gradients);
+    let slopes = only.and_then(|point| point.gradients.as_deref());
     let slopes = slopes.map_or([[f64::NAN; 3]; 3], |slopes| {
         [slopes.force_x_n, slopes.force_y_n, slopes.moment_z_n_mm]
     });

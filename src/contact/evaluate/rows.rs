@@ -20,6 +20,7 @@ use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
 use crate::contact::rolling::methods::table::file::table;
 use crate::contact::rolling::methods::table::material::MaterialTable;
 use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
+use crate::contact::rolling::refinement::gradients::{STEP, slope};
 use crate::contact::rolling::resolution::{RelativeTo, Resolution};
 
 /// From so many rows on it is worth making the table of their material, which takes about as long as it saves here.
@@ -264,12 +265,28 @@ impl Rows {
         ];
         match &self.method {
             RowMethod::Fastsim(mesh, class) => {
-                let (force, stick) = mesh.creep(patch.ratio, patch.poisson, creepage);
-                RowCreep::ok(Creep {
+                let at = |creepage| mesh.creep(patch.ratio, patch.poisson, creepage);
+                let (force, stick) = at(creepage);
+                let found = RowCreep::ok(Creep {
                     force,
                     stick,
                     bound: *class,
-                })
+                });
+                if !self.gradients {
+                    return found;
+                }
+                let moved = |component: usize, times: f64| {
+                    let mut moved = creepage;
+                    moved[component] += times * STEP;
+                    at(moved).0
+                };
+                let values = [0, 1, 2].map(|j| [-2.0, -1.0, 1.0, 2.0].map(|times| moved(j, times)));
+                RowCreep {
+                    slopes: [0, 1, 2].map(|k| {
+                        [0, 1, 2].map(|j| slope(values[j].map(|force: [f64; 3]| force[k]), STEP).0)
+                    }),
+                    ..found
+                }
             }
             RowMethod::Table { .. } if !(RATIO_MIN..=RATIO_MAX).contains(&patch.ratio) => {
                 RowCreep::none(RowStatus::NotCovered)

@@ -72,6 +72,7 @@ impl CheckedCase {
             traction_bound: run.traction_bound,
             resolution: run.resolution,
             wants_slips: run.after.needs_power(&run.outputs),
+            is_differenced: false,
         }
     }
 }

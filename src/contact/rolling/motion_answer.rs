@@ -23,8 +23,10 @@ pub struct MotionAnswer {
     pub errors: RelativeErrors,
     /// Tractions, slips and zones; none from a method that knows resultants only ([`Method::has_fields`]).
     pub fields: Option<SolvedFields>,
-    /// What a table knows beside resultants, for every patch; nothing from other methods.
-    pub table: Option<Vec<TableAnswer>>,
+    /// Share of every patch that sticks, from methods without fields that know it.
+    pub stick: Option<Vec<f64>>,
+    /// Derivatives of the resultants of every patch, where they were asked for or come with the method.
+    pub gradients: Option<Vec<PatchGradients>>,
     /// What a history adds to a motion; nothing of steady rolling.
     pub history: Option<HistoryAnswer>,
     /// Work that was not needed.
@@ -56,13 +58,13 @@ pub struct HistoryAnswer {
     pub shift_errors: [Option<f64>; 2],
 }
 
-/// What a table knows of a patch beside its resultants.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TableAnswer {
-    /// Share of the patch that sticks, 0 to 1.
-    pub stick: f64,
-    /// Derivatives of F_x, F_y and M_z about the origin of the case by ν_x, ν_y and φ (per mm): `[resultant][creepage]` in N and mm.
-    pub gradients: [[f64; 3]; 3],
+/// Derivatives of F_x, F_y and M_z about the origin of the case by ν_x, ν_y and φ (per mm): `[resultant][creepage]` in N and mm.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PatchGradients {
+    /// The derivatives.
+    pub values: [[f64; 3]; 3],
+    /// Their estimated absolute errors, where they are known.
+    pub errors: Option<[[f64; 3]; 3]>,
 }
 
 /// The fields of a motion on the finest level it needed.

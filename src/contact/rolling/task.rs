@@ -16,7 +16,7 @@ const SINGLE_PRECISION_FROM: f64 = 5e-4;
 
 /// Residual to reach over the target error. Chosen by judgement; how much it matters was not measured.
 const RESIDUAL_OF_TARGET: f64 = 0.04;
-/// The same where forces are prescribed. The search finds the root of a force as a function of its creepage, and the residual is the noise of
+/// The same where forces are prescribed or differences are taken. The search finds the root of a force as a function of its creepage, and the residual is the noise of
 /// that function: less than a tenth of what a force may be missed by (`SHARE_OF_TARGET`). Chosen by judgement.
 const RESIDUAL_FOR_FORCES: f64 = 0.0015;
 /// Largest residual that any target allows, relative to the traction scale. Chosen by judgement; how much it matters was not measured.
@@ -52,6 +52,8 @@ pub struct RollingTask<'a> {
     pub resolution: Resolution,
     /// Are slips asked for, or what follows from them? Forces do not depend on it.
     pub wants_slips: bool,
+    /// Are differences of the resultants of near motions taken? They are solved to smaller residuals.
+    pub is_differenced: bool,
 }
 
 impl RollingTask<'_> {
@@ -67,7 +69,8 @@ impl RollingTask<'_> {
     /// Residual to reach for motion `index`: far below the target, but no further, because iterating further does not improve the answer.
     #[must_use]
     pub fn tolerance(&self, index: usize) -> f64 {
-        let is_prescribed = self.forces.get(index).is_some_and(|f| *f != [None; 2]);
+        let is_prescribed =
+            self.is_differenced || self.forces.get(index).is_some_and(|f| *f != [None; 2]);
         match self.resolution {
             Resolution::Target(target) => {
                 let part = if is_prescribed {

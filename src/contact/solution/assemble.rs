@@ -1,14 +1,16 @@
 //! Assembles the answer that a client reads from the results of the stages: with units, and only with the outputs requested.
 
 use crate::contact::case::words::solver::Output;
+use crate::contact::friction::law::FrictionLaw;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::motion_answer::{MotionAnswer, SolvedFields};
+use crate::contact::rolling::motion_answer::{MotionAnswer, PatchGradients, SolvedFields};
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::resolution::RelativeTo;
 use crate::contact::rolling::resultants::Resultants;
@@ -18,8 +20,8 @@ use crate::contact::solution::cell_values::{patch_cells, point_fields, traction_
 use crate::contact::solution::maintain;
 use crate::contact::solution::maintain::SolvedMotion;
 use crate::contact::solution::words::answer::{
-    CombinedMaterial, ErrorEstimate, Gradients, HistoryPoint, MeshReport, NormalisedMotion, Origin,
-    PatchSolution, PointSolution, Solution, SolverReport, Total,
+    CombinedMaterial, ErrorEstimate, GradientErrors, Gradients, HistoryPoint, MeshReport,
+    NormalisedMotion, Origin, PatchSolution, PointSolution, Solution, SolverReport, Total,
 };
 use crate::contact::solution::words::fields::{Fields, PatchFields, PointFields};
 
@@ -257,8 +259,8 @@ fn point_solution(
             let cells = level.patch_cells(index);
             zone_areas(level, patch, cells, &fields.tangential.slips)
         });
-    let table = point.table.as_ref().map(|table| table[index]);
-    let by_table = |share: fn(f64) -> f64| table.map(|table| share(table.stick) * patch.area);
+    let stick = point.stick.as_ref().map(|stick| stick[index]);
+    let by_table = |share: fn(f64) -> f64| stick.map(|stick| share(stick) * patch.area);
     let history = point.history.as_ref();
     let power_x = motion.creepage_x * found.force_x;
     let power_y = motion.creepage_y * found.force_y;
@@ -282,9 +284,20 @@ fn point_solution(
         slip_area_mm2: areas
             .map(|a| a.slip_area)
             .or_else(|| by_table(|stick| 1.0 - stick)),
-        gradients: table
+        gradients: point
+            .gradients
+            .as_ref()
             .filter(|_| case.run.wants(Output::Gradients))
-            .map(|table| Gradients::of(table.gradients)),
+            .map(|gradients| {
+                Box::new(gradient_words(
+                    case,
+                    patch,
+                    limit,
+                    point,
+                    index,
+                    gradients[index],
+                ))
+            }),
         stick_cells: areas.map(|a| a.stick_cells),
         slip_cells: areas.map(|a| a.slip_cells),
         traction_max_mpa: on_level.map(|(level, fields)| traction_max(level, fields, index)),
@@ -309,6 +322,66 @@ fn point_solution(
         damage: None,
         temperature: None,
         region: None,
+    }
+}
+
+/// Derivatives with those by the normal force where similarity gives them: of a Hertz contact F = μN f(ξ, η, ψ) and M = μN c m(ξ, η, ψ), where
+/// c ∝ N^⅓, ξ and η ∝ ν/N^⅓, and ψ does not depend on N.
+fn gradient_words(
+    case: &CheckedCase,
+    patch: &Patch,
+    limit: f64,
+    point: &MotionAnswer,
+    index: usize,
+    found: PatchGradients,
+) -> Gradients {
+    let problem = &case.problem;
+    let is_similar = matches!(problem.task, NormalTask::Hertz(_))
+        && matches!(problem.friction, FrictionLaw::Constant(_))
+        && problem.interface.layer == 0.0
+        && problem.interface.yielding.is_none()
+        && problem.elasticity.difference == 0.0;
+    let resultants = point.resultants[index];
+    let resultants = [resultants.force_x, resultants.force_y, resultants.moment_z];
+    let creepages = [point.motion.creepage_x, point.motion.creepage_y];
+    let powers = [1.0, 1.0, 4.0 / 3.0];
+    let by_normal_force = is_similar.then(|| {
+        [0, 1, 2].map(|row| {
+            let moved = creepages[0] * found.values[row][0] + creepages[1] * found.values[row][1];
+            (powers[row] * resultants[row] - moved / 3.0) / patch.normal_force
+        })
+    });
+    let [force_x_n, force_y_n, moment_z_n_mm] = found.values;
+    let error_estimate = found.errors.map(|errors| {
+        let of_resultants = point.errors[index].map_or(ErrorEstimate::default(), |error| {
+            absolute(std::slice::from_ref(patch), limit, error)
+        });
+        let of_resultants = [
+            of_resultants.force_x_n,
+            of_resultants.force_y_n,
+            of_resultants.moment_z_n_mm,
+        ];
+        let by_normal_force = is_similar.then(|| {
+            [0, 1, 2].map(|row| {
+                let moved =
+                    creepages[0].abs() * errors[row][0] + creepages[1].abs() * errors[row][1];
+                (powers[row] * of_resultants[row] + moved / 3.0) / patch.normal_force
+            })
+        });
+        let [force_x_n, force_y_n, moment_z_n_mm] = errors;
+        GradientErrors {
+            force_x_n,
+            force_y_n,
+            moment_z_n_mm,
+            by_normal_force,
+        }
+    });
+    Gradients {
+        force_x_n,
+        force_y_n,
+        moment_z_n_mm,
+        by_normal_force,
+        error_estimate,
     }
 }
 

@@ -180,10 +180,6 @@ pub(crate) fn read_outputs(
                     shown(element),
                     method.name()
                 ),
-                None if output == Output::Gradients => format!(
-                    "{} given; only \"method\": \"table\" computes them",
-                    shown(element)
-                ),
                 _ => return Some(output),
             };
             faults.add(pointer, detail);

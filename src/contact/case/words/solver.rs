@@ -110,7 +110,7 @@ pub enum Output {
     Damage,
     /// Temperature of both surfaces per cell, with the constants of `thermal`.
     Temperature,
-    /// Derivatives of forces and moment by creepages and spin, the creep coefficients; with `table` only.
+    /// Derivatives of forces and moment by creepages and spin, the creep coefficients.
     Gradients,
 }
 

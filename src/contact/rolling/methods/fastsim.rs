@@ -154,6 +154,7 @@ impl EllipseMesh {
             traction_bound: bound,
             resolution: Resolution::Mesh(size),
             wants_slips: false,
+            is_differenced: false,
         };
         let level = StripMesh::new(&task, size)?;
         let mut bounds = level.bound.clone();

@@ -7,10 +7,12 @@
 //! | one mesh: start, method, resultants | [`on_mesh`] |
 //! | error and extrapolated value | [`error_estimate`] |
 //! | starts from motions before and from coarser meshes | [`predictor`], [`interpolate`] |
+//! | derivatives by creepages and spin | [`gradients`] |
 //! | meshes kept from one motion to the next | [`levels`], [`state`] |
 
 pub mod adapt;
 pub mod error_estimate;
+pub mod gradients;
 pub mod interpolate;
 pub mod levels;
 pub mod mesh_family;

@@ -202,10 +202,10 @@ pub struct PointSolution {
     /// Area that slips in mm²; absent unless zones were asked for, but for `table`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub slip_area_mm2: Option<f64>,
-    /// Derivatives of the three resultants by the creepages and the spin; absent unless asked for.
+    /// Derivatives of the three resultants; absent unless asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
-    pub gradients: Option<Gradients>,
+    pub gradients: Option<Box<Gradients>>,
     /// Number of cells that stick; absent unless zones were asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub stick_cells: Option<u32>,
@@ -343,7 +343,8 @@ impl ErrorEstimate {
     }
 }
 
-/// Derivatives of the resultants of a patch, each by `[creepage_x, creepage_y, spin_per_mm]`: the creep coefficients.
+/// Derivatives of the resultants of a patch at constant region and pressure, each by `[creepage_x, creepage_y, spin_per_mm]`: the creep
+/// coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct Gradients {
     /// Of `force_x_n`, in N, N and N·mm.
@@ -352,17 +353,30 @@ pub struct Gradients {
     pub force_y_n: [f64; 3],
     /// Of `moment_z_n_mm`, in N·mm, N·mm and N·mm².
     pub moment_z_n_mm: [f64; 3],
+    /// Of the three resultants by the normal force at constant creepages: dimensionless, dimensionless and in mm. Only of Hertz contacts
+    /// of like bodies with a constant coefficient and without a layer, whose patch grows with the load.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub by_normal_force: Option<[f64; 3]>,
+    /// Estimated absolute errors; absent for the method `table`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub error_estimate: Option<GradientErrors>,
 }
 
-impl Gradients {
-    /// The rows of a matrix: of F_x, F_y and M_z.
-    pub(crate) fn of([force_x_n, force_y_n, moment_z_n_mm]: [[f64; 3]; 3]) -> Gradients {
-        Gradients {
-            force_x_n,
-            force_y_n,
-            moment_z_n_mm,
-        }
-    }
+/// Absolute errors of gradients, each in the unit of its quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct GradientErrors {
+    /// Of `force_x_n`.
+    pub force_x_n: [f64; 3],
+    /// Of `force_y_n`.
+    pub force_y_n: [f64; 3],
+    /// Of `moment_z_n_mm`.
+    pub moment_z_n_mm: [f64; 3],
+    /// Of `by_normal_force`.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub by_normal_force: Option<[f64; 3]>,
 }
 
 /// How a point was computed.

@@ -210,7 +210,7 @@ fn describe_output(output: Output) -> OutputCapability {
         ),
         Output::Gradients => (
             false,
-            "Derivatives of forces and moment by creepages and spin; with `table` only.",
+            "Derivatives of forces and moment by creepages and spin, and by the normal force of Hertz contacts; not of a `history`.",
         ),
     };
     OutputCapability {

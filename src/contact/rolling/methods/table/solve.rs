@@ -13,7 +13,7 @@ use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::table::evaluate::Creep;
 use crate::contact::rolling::methods::table::file::table;
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::motion_answer::{MotionAnswer, TableAnswer};
+use crate::contact::rolling::motion_answer::{MotionAnswer, PatchGradients};
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
 
@@ -71,7 +71,8 @@ pub fn solve(
         resultants: found.iter().map(|answer| answer.resultants).collect(),
         errors,
         fields: None,
-        table: Some(found.iter().map(|answer| answer.more).collect()),
+        stick: Some(found.iter().map(|answer| answer.stick).collect()),
+        gradients: Some(found.iter().map(|answer| answer.gradients).collect()),
         history: None,
         skips: Vec::new(),
         remarks: Vec::new(),
@@ -179,7 +180,8 @@ fn dimensionless(
 struct PatchAnswer {
     resultants: Resultants,
     error: f64,
-    more: TableAnswer,
+    stick: f64,
+    gradients: PatchGradients,
 }
 
 /// Forces in N on a patch that an ellipse stands for, about the origin of the case; `limit` is μN in N.
@@ -193,10 +195,8 @@ fn on_ellipse(
         return PatchAnswer {
             resultants: Resultants::default(),
             error: 0.0,
-            more: TableAnswer {
-                stick: if still(motion) { 1.0 } else { 0.0 },
-                gradients: [[0.0; 3]; 3],
-            },
+            stick: if still(motion) { 1.0 } else { 0.0 },
+            gradients: PatchGradients::default(),
         };
     }
     let c = ellipse.length();
@@ -222,9 +222,10 @@ fn on_ellipse(
     PatchAnswer {
         resultants: about_origin(ellipse, limit, force),
         error: bound,
-        more: TableAnswer {
-            stick,
-            gradients: [fx, fy, moment],
+        stick,
+        gradients: PatchGradients {
+            values: [fx, fy, moment],
+            errors: None,
         },
     }
 }

@@ -1,0 +1,119 @@
+//! Derivatives of the resultants by creepages and spin, by differences on the meshes of the answer.
+//!
+//! Region and pressure stay as they are, and so do the meshes, on which the resultants are smooth functions of the motion. Central differences
+//! of two steps are extrapolated to the step 0 (Richardson).
+
+use crate::contact::error::SolveError;
+use crate::contact::monitor::Monitor;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::motion_answer::{MotionAnswer, PatchGradients};
+use crate::contact::rolling::refinement::adapt::{solve_forces, solve_on_meshes};
+use crate::contact::rolling::refinement::on_mesh::MotionTask;
+use crate::contact::rolling::refinement::state::RefinementState;
+use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::task::RollingTask;
+
+/// The smaller step as a part of μN/(G c²), with c² = A/π. A creepage of that unit makes nearly everything slip, so that the force changes by about
+/// 0.04 μN; the noise of a solve, 1e-5 μN, then is far below the errors of the mesh.
+pub(crate) const STEP: f64 = 0.01;
+
+/// Adds the gradients to an answer.
+///
+/// # Errors
+/// Why a motion beside that of the answer has no answer; or the monitor stopped the work.
+pub(crate) fn add_gradients(
+    task: &RollingTask,
+    state: &mut RefinementState,
+    index: usize,
+    found: &mut MotionAnswer,
+    monitor: &dyn Monitor,
+) -> Result<(), SolveError> {
+    let patches = task.footprint.patches();
+    let limit = task.friction.limit_of_all(task.footprint);
+    if limit <= 0.0 {
+        found.gradients = Some(vec![PatchGradients::default(); patches.len()]);
+        return Ok(());
+    }
+    let began = monitor.elapsed();
+    let task = &RollingTask {
+        wants_slips: false,
+        is_differenced: true,
+        ..*task
+    };
+    let motion = found.motion;
+    let (_, meshes) = solve_forces(task, state, MotionTask { index, motion }, monitor)?;
+    let area: f64 = patches.iter().map(|patch| patch.area).sum();
+    let length = (area / std::f64::consts::PI).sqrt();
+    let modulus = task.interface.reduction * task.elasticity.shear_modulus;
+    let creepage = STEP * limit / (modulus * length * length);
+    let steps = [creepage, creepage, creepage / length];
+    // Where the mesh is the client's, resultants are not extrapolated.
+    let kind = usize::from(task.target().is_none());
+    let mut all = vec![PatchGradients::default(); patches.len()];
+    for (component, step) in steps.into_iter().enumerate() {
+        let mut at = |times: f64| {
+            let motion = moved(motion, component, times * step);
+            let asked = MotionTask { index, motion };
+            let answer = solve_on_meshes(task, state, asked, &meshes, monitor)?;
+            found.work.add_lost(answer.work);
+            let finest = answer.fields.as_ref().map(|fields| {
+                let mesh = state.levels.get(fields.level);
+                let traction = &fields.tangential.traction;
+                let of_patch = |patch| Resultants::of_patch(&mesh, traction, patch);
+                (0..patches.len()).map(of_patch).collect::<Vec<_>>()
+            });
+            Ok::<_, SolveError>([
+                answer.resultants.clone(),
+                finest.unwrap_or(answer.resultants),
+            ])
+        };
+        let values = [at(-2.0)?, at(-1.0)?, at(1.0)?, at(2.0)?];
+        for (
+            patch,
+            PatchGradients {
+                values: slopes,
+                errors,
+            },
+        ) in all.iter_mut().enumerate()
+        {
+            let errors = errors.get_or_insert_default();
+            let of = |kind: usize, row: usize| {
+                slope(
+                    [0, 1, 2, 3].map(|k| numbers(values[k][kind][patch])[row]),
+                    step,
+                )
+            };
+            for row in 0..3 {
+                let (value, by_step) = of(kind, row);
+                let (other, _) = of(1 - kind, row);
+                slopes[row][component] = value;
+                let noise = task.tolerance(index) * [limit, limit, limit * length][row] / step;
+                errors[row][component] = by_step + (value - other).abs() + noise;
+            }
+        }
+    }
+    found.gradients = Some(all);
+    found.seconds += (monitor.elapsed() - began).as_secs_f64();
+    Ok(())
+}
+
+/// The slope of a function at 0 and its error, from its values at -2, -1, 1 and 2 steps.
+pub(crate) fn slope(values: [f64; 4], step: f64) -> (f64, f64) {
+    let small = (values[2] - values[1]) / (2.0 * step);
+    let large = (values[3] - values[0]) / (4.0 * step);
+    (small + (small - large) / 3.0, (small - large).abs())
+}
+
+fn moved(motion: Motion, component: usize, step: f64) -> Motion {
+    let mut moved = motion;
+    *[
+        &mut moved.creepage_x,
+        &mut moved.creepage_y,
+        &mut moved.spin_per_mm,
+    ][component] += step;
+    moved
+}
+
+fn numbers(resultants: Resultants) -> [f64; 3] {
+    [resultants.force_x, resultants.force_y, resultants.moment_z]
+}

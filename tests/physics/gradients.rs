@@ -1,0 +1,211 @@
+//! Derivatives of forces and moment: Kalker's coefficients at rest, and secants of finer answers, each within the stated error.
+
+use railhead::contact::rolling::linear_theory::{coefficients, spin_coefficient};
+use railhead::contact::solution::words::answer::{Gradients, PointSolution};
+use serde_json::{Value, json};
+
+use crate::cases::{assert_fault, good_with};
+use crate::reference::{Ellipse, assert_none, solve};
+
+/// Targets of the answers, and of those that secants are taken from.
+const TARGETS: [f64; 2] = [0.02, 0.005];
+const FINE: f64 = 0.0005;
+/// Half of a secant as a part of μN/(G c²).
+const HALF: f64 = 0.02;
+/// What a secant may be off by, relative to G c².
+const SECANT: f64 = 0.03;
+/// States as `[a/b, ν, ξ, η, φ]`, creepages relative to those of full slip by the linear theory.
+const STATES: [[f64; 5]; 8] = [
+    [1.0, 0.28, 0.3, 0.0, 0.0],
+    [1.0, 0.28, 0.9, -0.4, 0.0],
+    [1.3, 0.28, 0.2, -0.3, 0.5],
+    [0.4, 0.28, 0.4, 0.3, -0.8],
+    [3.0, 0.28, -0.5, 0.2, 0.3],
+    [0.7, 0.0, 0.0, 0.5, 1.2],
+    [1.6, 0.45, 1.6, 0.5, 0.4],
+    [0.2, 0.28, 0.6, 0.6, 0.2],
+];
+
+fn case(contact: &Ellipse, solver: Value) -> Value {
+    let [x, y, spin] = contact.motion;
+    let mut case = contact.case(8, 8);
+    case["motion"] = json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": spin });
+    case["solver"] = solver;
+    case["outputs"] = json!(["resultants", "gradients"]);
+    case
+}
+
+fn to(target: f64) -> Value {
+    json!({ "method": "boundary_element", "target_error": target })
+}
+
+fn only(case: &Value) -> PointSolution {
+    solve(case).0.patches[0].points[0].clone()
+}
+
+fn rows(gradients: &Gradients) -> [[f64; 3]; 3] {
+    [
+        gradients.force_x_n,
+        gradients.force_y_n,
+        gradients.moment_z_n_mm,
+    ]
+}
+
+fn errors(gradients: &Gradients) -> [[f64; 3]; 3] {
+    let errors = gradients.error_estimate.expect("an error");
+    [errors.force_x_n, errors.force_y_n, errors.moment_z_n_mm]
+}
+
+/// Units of the gradients: G c² for forces by creepages, a length more for the moment and for the spin.
+fn units(contact: &Ellipse) -> [[f64; 3]; 3] {
+    let c = contact.c();
+    let force = contact.shear_modulus_mpa * c * c;
+    let row = [force, force, force * c];
+    [row, row, row.map(|unit| unit * c)]
+}
+
+#[test]
+fn gradients_at_rest_are_kalkers_coefficients_within_their_errors() {
+    let mut failures = Vec::new();
+    for (ratio, nu) in [(1.0, 0.28), (0.3, 0.28), (2.5, 0.1)] {
+        let contact = Ellipse::steel(ratio, nu).moving(0.0, 0.0, 0.0);
+        let [c11, c22, c23] = coefficients(ratio, nu);
+        let c33 = spin_coefficient(ratio, nu);
+        let unit = units(&contact);
+        for target in TARGETS {
+            let found = *only(&case(&contact, to(target)))
+                .gradients
+                .expect("gradients");
+            let (rows, errors) = (rows(&found), errors(&found));
+            let expected = [[c11, 0.0, 0.0], [0.0, c22, c23], [0.0, -c23, c33]];
+            for (k, j) in (0..9).map(|n| (n / 3, n % 3)) {
+                let off = (rows[k][j] / unit[k][j] - expected[k][j]).abs();
+                // The coefficients are known to 0.5 %.
+                let allowed = errors[k][j] / unit[k][j] + 0.005 * expected[k][j].abs() + 1e-3;
+                if off > allowed || errors[k][j] > unit[k][j] {
+                    failures.push(format!(
+                        "a/b {ratio}, {target}: {k} by {j}: {off} > {allowed}"
+                    ));
+                }
+            }
+        }
+    }
+    assert_none("gradients at rest", &failures);
+}
+
+#[test]
+fn gradients_are_secants_of_finer_answers_within_their_errors() {
+    let mut failures = Vec::new();
+    let mut compared = 0;
+    for [ratio, nu, x, y, spin] in STATES {
+        let contact = Ellipse::steel(ratio, nu).normalised(x, y, spin);
+        let (unit, c) = (units(&contact), contact.c());
+        let step = HALF * contact.limit() / unit[0][0];
+        let steps = [step, step, step / c];
+        let ahead_and_back = [0, 1, 2].map(|j| {
+            [1.0, -1.0].map(|sign| {
+                let mut motion = contact.motion;
+                motion[j] += sign * steps[j];
+                let [x, y, spin] = motion;
+                let mut case = case(&contact.moving(x, y, spin), to(FINE));
+                case["outputs"] = json!(["resultants"]);
+                let point = only(&case);
+                [point.force_x_n, point.force_y_n, point.moment_z_n_mm]
+            })
+        });
+        for target in TARGETS {
+            let found = *only(&case(&contact, to(target)))
+                .gradients
+                .expect("gradients");
+            let (rows, errors) = (rows(&found), errors(&found));
+            for (k, j) in (0..9).map(|n| (n / 3, n % 3)) {
+                let [ahead, back] = ahead_and_back[j];
+                let secant = (ahead[k] - back[k]) / (2.0 * steps[j]);
+                let off = (rows[k][j] - secant).abs() / unit[k][j];
+                let allowed = errors[k][j] / unit[k][j] + SECANT;
+                compared += 1;
+                if off > allowed {
+                    failures.push(format!(
+                        "{contact:?} {target}: {k} by {j}: {off} > {allowed}"
+                    ));
+                }
+            }
+        }
+    }
+    assert!(failures.len() * 20 <= compared, "{compared}: {failures:#?}");
+}
+
+#[test]
+fn the_gradient_by_the_normal_force_is_that_of_growing_loads() {
+    for solver in [
+        to(0.005),
+        json!({ "method": "table" }),
+        json!({ "method": "fastsim" }),
+    ] {
+        let load = |force: f64| {
+            let mut case = good_with("/load", json!({ "normal_force_n": force }));
+            case["contact"] = json!({ "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 });
+            case["motion"] =
+                json!({ "creepage_x": 0.0008, "creepage_y": -0.0005, "spin_per_mm": 0.0002 });
+            case["solver"] = solver.clone();
+            case["outputs"] = json!(["resultants", "gradients"]);
+            let point = only(&case);
+            let numbers = [point.force_x_n, point.force_y_n, point.moment_z_n_mm];
+            (numbers, *point.gradients.expect("gradients"))
+        };
+        let (back, ahead) = (load(78e3).0, load(82e3).0);
+        let (here, gradients) = load(80e3);
+        let by_normal_force = gradients.by_normal_force.expect("a Hertz contact");
+        for k in 0..3 {
+            let secant = (ahead[k] - back[k]) / 4e3;
+            let unit = here[k].abs() / 80e3;
+            let stated = gradients.error_estimate.map_or(0.0, |errors| {
+                errors.by_normal_force.expect("a Hertz contact")[k]
+            });
+            let off = (by_normal_force[k] - secant).abs();
+            assert!(
+                off < stated + 0.02 * unit,
+                "{solver}: {k}: {} against {secant}, stated {stated}",
+                by_normal_force[k]
+            );
+        }
+    }
+}
+
+#[test]
+fn every_method_and_contact_gives_gradients_with_their_error() {
+    let pressed = json!({
+        "type": "gap_profile",
+        "rolling_mm": 460.0,
+        "y_mm": (-20..=20).map(f64::from).collect::<Vec<_>>(),
+        "gap_mm": (-20..=20).map(|y| f64::from(y * y) / 600.0).collect::<Vec<_>>(),
+    });
+    for solver in [
+        to(0.02),
+        json!({ "method": "auto" }),
+        json!({ "method": "fastsim" }),
+        json!({ "method": "liu_hsu", "mesh": { "strips": 5, "cells": 5 } }),
+        json!({ "method": "boundary_element", "mesh": { "strips": 8, "cells": 12 } }),
+    ] {
+        let mut case = good_with("/contact", pressed.clone());
+        case["solver"] = solver.clone();
+        case["outputs"] = json!(["resultants", "gradients"]);
+        let point = only(&case);
+        let gradients = point.gradients.expect("gradients");
+        assert!(gradients.force_x_n[0] > 0.0, "{solver}: {gradients:?}");
+        assert!(gradients.by_normal_force.is_none(), "{solver}");
+        case["outputs"] = json!(["resultants"]);
+        let without = only(&case);
+        assert!(without.gradients.is_none());
+        let forces =
+            |point: &PointSolution| [point.force_x_n, point.force_y_n, point.moment_z_n_mm];
+        assert_eq!(forces(&point), forces(&without), "{solver}");
+    }
+}
+
+#[test]
+fn a_history_has_no_gradients() {
+    let mut case = good_with("/outputs", json!(["gradients"]));
+    case["motion"] = json!({ "history": { "distance_mm": [1.0], "creepage_x": [0.001] } });
+    assert_fault(&case, "/outputs/0", &["gradients", "history"]);
+}
