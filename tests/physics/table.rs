@@ -279,7 +279,7 @@ fn an_answer_has_gradients_areas_and_no_mesh() {
     );
     let areas = [point.stick_area_mm2, point.slip_area_mm2].map(|area| area.expect("an area"));
     assert!((areas[0] + areas[1] - patch.area_mm2).abs() < 1e-9 * patch.area_mm2 && areas[0] > 1.0);
-    let gradients = point.gradients.expect("gradients");
+    let gradients = point.gradients.as_deref().expect("gradients");
     let [x, y, z] = contact.motion;
     let forces = |motion: [f64; 3]| {
         let [x, y, z] = motion;

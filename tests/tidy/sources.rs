@@ -52,6 +52,7 @@ impl Sources {
         let files = self.within("src/");
         files
             .filter(|(path, _)| *path != "src/main.rs" && !path.ends_with("/tests.rs"))
+            .filter(|(path, _)| !path.contains("/examples/"))
             .map(|(path, text)| (module(path), code(text)))
             .collect()
     }
