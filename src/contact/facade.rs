@@ -172,7 +172,7 @@ impl Case {
         check(&value, limits)
     }
 
-    /// Checks and solves the case within the default limits. [`solve`](crate::contact::solve) also gives the values per cell, and
+    /// Checks and solves the case within the default limits. [`solve`](crate::contact::solve()) also gives the values per cell, and
     /// can be followed and stopped.
     ///
     /// # Errors
