@@ -3,39 +3,53 @@ import assert from 'node:assert/strict';
 import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
-import { drawn, example, OUTPUT, setUp } from './harness.mjs';
+import { ALL, drawn, dropFiles, example, OUTPUT, setUp } from './harness.mjs';
 
 const { service, onPage } = setUp();
 const EXAMPLES = readdirSync(new URL('../../../api/examples/', import.meta.url)).filter((name) => name.endsWith('.case.json'));
 
 /** @param {import('playwright-core').Page} page */
 const json = async (page) => JSON.parse(await page.locator('.code textarea').inputValue());
+/** @param {string[]} [asked] */
+const withAll = (asked = []) => [...ALL, ...asked.filter((output) => !ALL.includes(output))];
 /** @param {import('playwright-core').Page} page */
 const sound = (page) => page.locator('.verdict .checked').waitFor();
 /** @param {import('playwright-core').Page} page @param {string} file */
-const choose = (page, file) => page.locator('select').first().selectOption(file);
+const choose = (page, file) => page.locator('.start select').selectOption(file);
+/** The JSON is folded. @param {import('playwright-core').Page} page @param {string} text */
+const write = async (page, text) => {
+  if (!(await page.locator('.code textarea').isVisible())) await page.locator('.code summary').click();
+  await page.locator('.code textarea').fill(text);
+};
+/** Opens an example and waits for it. @param {import('playwright-core').Page} page @param {string} name */
+const begin = async (page, name) => {
+  await sound(page);
+  await choose(page, name);
+  await page.waitForFunction((title) => document.querySelector('#h-drawing')?.textContent === title, example(name).name);
+  await sound(page);
+};
 
 test('every example can be chosen, is drawn, and is solved to a picture or a curve', () => onPage('', async (page) => {
   await sound(page);
-  const offered = await page.locator('select').first().locator('option').evaluateAll((all) => all.map((option) => /** @type {HTMLOptionElement} */ (option).value));
+  const offered = await page.locator('.start option').evaluateAll((all) => all.map((option) => /** @type {HTMLOptionElement} */ (option).value));
   assert.deepEqual(offered.filter(Boolean).sort(), EXAMPLES.map((name) => name.replace('.case.json', '')).filter((name) => name !== 'faulty').sort());
   for (const file of offered.filter(Boolean)) {
     await page.goto(`${service.base}/#/compose`);
     await choose(page, file);
     await page.waitForFunction((name) => document.querySelector('#h-drawing')?.textContent === name, example(file).name);
-    assert.deepEqual(await json(page), example(file), file);
+    // Fields are asked for, so that there is something to look at.
+    assert.deepEqual(await json(page), { ...example(file), outputs: withAll(example(file).outputs) }, file);
     await sound(page);
     // Where a wheelset stands on its rails is found by the solve.
     if (example(file).contact.type !== 'wheelset') await page.locator('.figure svg.drawing, .figure value-grid canvas').first().waitFor();
     await page.getByRole('button', { name: /^Solve/ }).click();
-    if ((example(file).outputs ?? ['resultants', 'zones']).length > 1) await drawn(page);
-    else await page.locator('creep-curve canvas').waitFor();
+    await drawn(page);
     assert.equal(await page.locator('h1').textContent(), example(file).name);
   }
 }));
 
 test('faults stand at their fields and in a list that leads to them', () => onPage('', async (page) => {
-  await page.locator('.code textarea').fill(JSON.stringify(example('faulty')));
+  await write(page, JSON.stringify(example('faulty')));
   await page.locator('.verdict .faults li').nth(4).waitFor();
   assert.match(await page.locator('.verdict').innerText(), /5 faults/);
   for (const id of ['material-shear_modulus_mpa', 'material-poisson_ratio', 'friction-coefficient', 'load-normal_force_n']) {
@@ -58,10 +72,10 @@ test('faults stand at their fields and in a list that leads to them', () => onPa
 }));
 
 test('rolling that changes is written in the form, and its forces stand over the distance rolled', () => onPage('', async (page) => {
-  await sound(page);
-  await page.locator('.seg').filter({ hasText: 'While it rolls' }).click();
+  await begin(page, 'hertz-steel');
+  await page.locator('.seg').filter({ hasText: 'Over a distance' }).click();
   await page.getByLabel('Distances rolled').fill('0  1; 2 4,5 9');
-  await page.getByLabel('Creepage along').fill('0 0,2 0.2 0.2 0');
+  await page.getByLabel('Creepage x').fill('0 0,2 0.2 0.2 0');
   await page.locator('#field-motion-history-spin_per_mm').fill('0.2');
   await page.screenshot({ path: join(OUTPUT, 'compose-history.png'), fullPage: true });
   await page.locator('.seg').filter({ hasText: 'Steady rolling' }).click();
@@ -85,13 +99,13 @@ test('rolling that changes is written in the form, and its forces stand over the
 test('a wheel on a rail moves across and rolls through a history in the form', () => onPage('', async (page) => {
   // Before that the first example may still come and take the place of what is written.
   await sound(page);
-  await page.locator('.code textarea').fill(JSON.stringify({ ...example('wheel-rail-flange'), load: { normal_force_n: 75_000 } }));
+  await write(page, JSON.stringify({ ...example('wheel-rail-flange'), load: { normal_force_n: 75_000 } }));
   await page.getByLabel('Lateral velocity').fill('-40');
   assert.equal((await json(page)).motion.wheelset.lateral_velocity_mm_per_s, -40);
   await sound(page);
-  await page.locator('.seg').filter({ hasText: 'While it rolls' }).click();
+  await page.locator('.seg').filter({ hasText: 'Over a distance' }).click();
   await sound(page);
-  assert.equal(await page.getByLabel('or force along').count(), 0, 'patches share their creepages');
+  assert.equal(await page.getByLabel('or force Fx').count(), 0, 'patches share their creepages');
   await page.getByRole('button', { name: /^Solve/ }).click();
   const curve = page.locator('creep-curve');
   await curve.locator('canvas').waitFor();
@@ -101,7 +115,8 @@ test('a wheel on a rail moves across and rolls through a history in the form', (
 }));
 
 test('form and JSON are faces of one document, and broken JSON loses nothing', () => onPage('', async (page) => {
-  await sound(page);
+  await begin(page, 'hertz-steel');
+  await page.locator('.code summary').click();
   await page.getByLabel('Normal force').fill('123.5');
   assert.equal((await json(page)).load.normal_force_n, 123_500);
   assert.deepEqual((await json(page)).labels, example('hertz-steel').labels, 'what the form does not show stays');
@@ -127,25 +142,10 @@ test('form and JSON are faces of one document, and broken JSON loses nothing', (
   await page.locator('#field-friction-coefficient-fault').waitFor();
 }));
 
-/**
- * Drops files as the browser does.
- * @param {import('playwright-core').Page} page
- * @param {string} place
- * @param {Record<string, string | number[]>} files Text, or bytes.
- */
-async function drop(page, place, files) {
-  const dataTransfer = await page.evaluateHandle((given) => {
-    const data = new DataTransfer();
-    for (const [name, content] of Object.entries(given)) data.items.add(new File([typeof content === 'string' ? content : new Uint8Array(content)], name));
-    return data;
-  }, files);
-  await page.dispatchEvent(place, 'drop', { dataTransfer });
-}
-
 test('files of profiles go where they belong, also when they are dropped anywhere', () => onPage('', async (page) => {
   await sound(page);
   const files = { 'worn.ban': example('wheel-rail-flange').contact.rail.text, 'worn.whl': example('wheel-rail-flange').contact.wheel.text };
-  await drop(page, '.stage', files);
+  await dropFiles(page, '.stage', files);
   await page.locator('svg[aria-label^="Wheel on rail"] .rail').waitFor();
   const { contact } = await json(page);
   assert.equal(contact.type, 'profiles');
@@ -165,11 +165,11 @@ test('files dropped on the header or on another view are taken and lead to the c
     await page.goto(`${service.base}/#/${view}`);
     await page.locator(`nav a[aria-current=page], main`).first().waitFor();
     await page.evaluate(() => sessionStorage.clear());
-    await drop(page, place, files);
+    await dropFiles(page, place, files);
     await page.waitForFunction(() => location.hash.startsWith('#/compose') && document.querySelector('#h-drawing')?.textContent === 'a on a');
     await sound(page);
     // Another name, so that the next drop shows.
-    await page.locator('.code textarea').fill(JSON.stringify({ ...(await json(page)), name: 'a on a', contact: { type: 'radii', rolling_mm: 460, lateral_mm: 300 } }));
+    await write(page, JSON.stringify({ ...(await json(page)), name: 'a on a', contact: { type: 'radii', rolling_mm: 460, lateral_mm: 300 } }));
   }
   // The browser does not open a file that nothing takes.
   const prevented = await page.evaluate(() => {
@@ -183,19 +183,19 @@ test('files dropped on the header or on another view are taken and lead to the c
 test('two files dropped together replace both, and one file of unknown body is asked for', () => onPage('', async (page) => {
   const { contact } = example('wheel-rail-flange');
   await sound(page);
-  await drop(page, '.form', { 'old.ban': miniprof(contact.rail.text), 'old.whl': miniprof(contact.wheel.text) });
+  await dropFiles(page, '.form', { 'old.ban': miniprof(contact.rail.text), 'old.whl': miniprof(contact.wheel.text) });
   await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'old on old');
   const rows = { rail: contact.rail.text, wheel: contact.wheel.text };
-  await drop(page, '.form', { 'SUIC519A.dat': rows.rail, 'RUIC519A.dat': rows.wheel });
+  await dropFiles(page, '.form', { 'SUIC519A.dat': rows.rail, 'RUIC519A.dat': rows.wheel });
   await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'RUIC519A on SUIC519A');
   const after = (await json(page)).contact;
   assert.deepEqual([after.rail, after.wheel], [{ format: 'columns', text: rows.rail }, { format: 'columns', text: rows.wheel }]);
   // The name of an example says nothing of other files.
   await choose(page, 'wheel-rail');
   await page.waitForFunction((name) => document.querySelector('#h-drawing')?.textContent === name, example('wheel-rail').name);
-  await drop(page, '.form', { 'SUIC519A.dat': rows.rail, 'RUIC519A.dat': rows.wheel });
+  await dropFiles(page, '.form', { 'SUIC519A.dat': rows.rail, 'RUIC519A.dat': rows.wheel });
   await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'RUIC519A on SUIC519A');
-  await drop(page, '.form', { 'RUIC519A.dat': rows.wheel });
+  await dropFiles(page, '.form', { 'RUIC519A.dat': rows.wheel });
   await page.getByText('RUIC519A.dat does not say whether it is a rail or a wheel').waitFor();
   assert.deepEqual((await json(page)).contact.rail, after.rail);
   assert.deepEqual((await json(page)).contact.wheel, after.wheel);
@@ -209,7 +209,7 @@ test('files in UTF-16 and with letters of Windows are read by the readers of the
   const rail = `\ufeff! Größe\r\n${contact.rail.text.trim().replaceAll('.', ',')}`;
   const units = [...rail].flatMap((c) => [c.charCodeAt(0) & 255, c.charCodeAt(0) >> 8]);
   const wheel = [...`% Größe\r${contact.wheel.text.trim().replaceAll('\n', '\r')}\r`].map((c) => c.charCodeAt(0));
-  await drop(page, '.form', { 'rail.csv': units, 'wheel.csv': wheel });
+  await dropFiles(page, '.form', { 'rail.csv': units, 'wheel.csv': wheel });
   await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'wheel on rail');
   await sound(page);
   assert.ok((await json(page)).contact.wheel.text.startsWith('% Größe'));
@@ -220,7 +220,7 @@ test('a case with warnings is not called ready', () => onPage('', async (page) =
   assert.match(await page.locator('.verdict .good').innerText(), /^Ready to solve\. About /);
   const { contact } = example('wheel-rail-flange');
   const rail = miniprof(contact.rail.text).replace(/XYPoints=\d+/, 'XYPoints=7');
-  await drop(page, '.form', { 'a.ban': rail, 'a.whl': miniprof(contact.wheel.text) });
+  await dropFiles(page, '.form', { 'a.ban': rail, 'a.whl': miniprof(contact.wheel.text) });
   await page.getByText('1 warning.').waitFor();
   assert.equal(await page.locator('.verdict .good').count(), 0);
   await page.getByText('while the header of the file states 7').waitFor();
@@ -237,7 +237,7 @@ test('two files dropped and one click lead from an empty service to the patch', 
   const { contact } = example('wheel-rail-flange');
   const files = { 'mine.ban': miniprof(contact.rail.text), 'mine.whl': miniprof(contact.wheel.text) };
   await sound(page);
-  await drop(page, '.form', files);
+  await dropFiles(page, '.form', files);
   await page.locator('svg[aria-label*="first touch"] .rail').waitFor();
   await sound(page);
   await page.getByRole('button', { name: /^Solve/ }).click();
@@ -249,6 +249,7 @@ test('two files dropped and one click lead from an empty service to the patch', 
 test('profiles are asked for without a fault, one after the other, and the case is called after their files', () => onPage('', async (page) => {
   const { contact } = example('wheel-rail-flange');
   await sound(page);
+  await begin(page, 'hertz-steel');
   await page.getByRole('radio', { name: 'Profiles' }).check();
   await page.getByText('Next: the file of the rail and the file of the wheel.').waitFor();
   assert.equal(await page.locator('.fault').count(), 0);
@@ -260,7 +261,7 @@ test('profiles are asked for without a fault, one after the other, and the case 
   await choose('wheel', 'axle 4.whl');
   await sound(page);
   assert.equal((await json(page)).name, 'axle 4 on km 37');
-  assert.match(await page.locator('.drop').first().innerText(), /km 37\.ban: miniprof/);
+  assert.match(await page.locator('.form .drop').first().innerText(), /km 37\.ban: miniprof/);
 }));
 
 test('gaps and pressures are taken from tables', () => onPage('', async (page) => {
@@ -299,6 +300,7 @@ async function previewed(page, before, forces) {
 }
 
 test('a cheap case is solved while it is written, and leaves no job behind', () => onPage('', async (page) => {
+  await begin(page, 'hertz-steel');
   const before = (await service.ask('/v1/jobs?limit=1000')).jobs.length;
   await previewed(page, '', ['', '100.1', '100.2', '100.3', '100.4']);
   await previewed(page, await page.locator('.preview').innerText(), ['60', '60.1', '60.2', '60.3', '60.4']);

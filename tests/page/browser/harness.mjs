@@ -149,3 +149,18 @@ export const readout = (page, selector = 'field-map.main') => page.locator(`${se
 
 /** A number as the page writes it. @param {string | undefined} text */
 export const parsed = (text) => Number((text ?? '').replace(/\u2212/g, '-').replace(/\u2009/g, '').replace(/ .*/, ''));
+
+/**
+ * Drops files as the browser does.
+ * @param {import('playwright-core').Page} page
+ * @param {string} place
+ * @param {Record<string, string | number[]>} files Text, or bytes.
+ */
+export async function dropFiles(page, place, files) {
+  const dataTransfer = await page.evaluateHandle((given) => {
+    const data = new DataTransfer();
+    for (const [name, content] of Object.entries(given)) data.items.add(new File([typeof content === 'string' ? content : new Uint8Array(content)], name));
+    return data;
+  }, files);
+  await page.dispatchEvent(place, 'drop', { dataTransfer });
+}

@@ -94,6 +94,7 @@ test('the page is quick: first load, solving, drawing', () => onPage('#/compose'
   const waits = [];
   for (let round = 0; round < 7; round += 1) {
     await page.goto(`${service.base}/#/compose`);
+    if (!round) await page.locator('.start select').selectOption('hertz-steel');
     await page.getByLabel('Normal force').fill(String(80 + round));
     await page.locator('.verdict .good').waitFor();
     await page.waitForTimeout(400);

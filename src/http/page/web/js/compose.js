@@ -1,18 +1,21 @@
-// Compose: form, JSON and curl line of one and the same case, its drawing, and what the service says of it.
+// The first view: how to begin, the form of a case, its drawing, what the service says of it, and the same case as JSON.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { apiKey } from './api.js';
-import { at, placeInText } from './document.js';
+import { takeProfiles } from './contactform.js';
+import { at, numberAt, placeInText } from './document.js';
 import { drawEllipse } from './drawing/patch.js';
 import { drawGapCurve, drawGrid } from './drawing/gaps.js';
-import { drawGap, drawProfiles } from './drawing/profiles.js';
-import { editText, openExample, queue, solve, solveLive } from './editing.js';
+import { drawGap, drawProfiles, drawSection } from './drawing/profiles.js';
+import { editText, isUntouched, openExample, queue, solve, solveLive } from './editing.js';
 import { offered, rangeOf } from './field/quantities.js';
 import { fieldId } from './field.js';
 import { caseForm } from './form.js';
-import { count, number, seconds, withError } from './format.js';
+import { count, fixed, number, seconds, withError } from './format.js';
 import { placed } from './placing.js';
-import { lacksSection } from './starts.js';
+import { remarkList } from './remarks.js';
+import { hasSections, lacksSection } from './starts.js';
+import { flangeAngle, nadal, wheelLoads } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./state.js').Compose} Compose */
@@ -23,33 +26,52 @@ import { lacksSection } from './starts.js';
 export function compose(app) {
   const state = app.store.get().compose;
   const busy = state.solving || state.unreadable !== '' || !state.document;
-  return html`<h1 class="visually-hidden">Compose a case</h1>
+  return html`${intro(app, state)}
     <div class="compose">
       <section class="panel form" aria-labelledby="h-form">
-        <header class="bar"><h2 id="h-form">Case</h2>${examplePicker(app)}</header>
+        <header class="bar"><h2 id="h-form">Input</h2></header>
         <div class="scroll">${caseForm(app)}</div>
       </section>
-      <section class="panel stage" aria-labelledby="h-drawing">
-        <header class="bar"><h2 id="h-drawing">${String(state.document?.name ?? 'Drawing')}</h2></header>
-        <div class="figure">${state.document ? drawing(state, state.document) : nothing}</div>
-        <div class="verdict" role="status">${verdict(state)}</div>
-        ${previewOf(state)}
-        <div class="actions">
-          <button class="primary" ?disabled=${busy} @click=${() => solve(app)}>${state.solving ? 'Solving …' : 'Solve'}<kbd>Ctrl ↵</kbd></button>
-          <button ?disabled=${busy} @click=${() => queue(app)}>Queue</button>
-          <label class="live"><input type="checkbox" .checked=${state.live}
-            @change=${(/** @type {Event} */ event) => solveLive(app, /** @type {HTMLInputElement} */ (event.target).checked)}> result while typing</label>
-        </div>
-      </section>
-      ${codePanel(app, state)}
+      <div class="beside">
+        <section class="panel stage" aria-labelledby="h-drawing">
+          <header class="bar"><h2 id="h-drawing">${String(state.document?.name ?? 'Drawing')}</h2>
+            <div class="actions">
+              <label class="live"><input type="checkbox" .checked=${state.live}
+                @change=${(/** @type {Event} */ event) => solveLive(app, /** @type {HTMLInputElement} */ (event.target).checked)}> result while typing</label>
+              <button ?disabled=${busy} @click=${() => queue(app)}>Add to queue</button>
+              <button class="primary" ?disabled=${busy} @click=${() => solve(app)}>${state.solving ? 'Solving …' : 'Solve'}<kbd>Ctrl ↵</kbd></button>
+            </div></header>
+          <div class="figure">${state.document ? drawing(state, state.document) : nothing}</div>
+          <div class="verdict" role="status">${verdict(app, state)}</div>
+          ${previewOf(state)}
+        </section>
+        ${codePanel(app, state)}
+      </div>
     </div>`;
+}
+
+/** What the page is for, and the two ways to begin: files of one's own, or an example. @param {App} app @param {Compose} state */
+function intro(app, state) {
+  const chosen = (/** @type {Event} */ event) => {
+    const input = /** @type {HTMLInputElement} */ (event.target);
+    if (input.files?.length) takeProfiles(app, [...input.files]).catch(app.refused);
+    input.value = '';
+  };
+  const over = (/** @type {boolean} */ on) => (/** @type {DragEvent} */ event) => /** @type {HTMLElement} */ (event.currentTarget).classList.toggle('over', on);
+  return html`<header class=${isUntouched(state) ? 'intro' : 'intro compact'}>
+    <div class="purpose"><h1>Wheel–rail contact</h1>
+      <p>Find where a wheel and a rail touch, the pressure and friction between them, and the wear, fatigue and heat that follow.</p></div>
+    <label class="drop big" @dragenter=${over(true)} @dragleave=${over(false)} @drop=${over(false)}><strong>Drop a rail and a wheel profile</strong>
+      <span class="quiet">anywhere on the page, or choose the files: MiniProf, Simpack, CSV or text</span>
+      <input type="file" multiple class="visually-hidden" id="files" aria-label="Files of a rail and a wheel profile" @change=${chosen}></label>
+    ${examplePicker(app)}</header>`;
 }
 
 /** @param {App} app */
 function examplePicker(app) {
   const { example, examples } = app.store.get().compose;
   const open = (/** @type {Event} */ event) => openExample(app, /** @type {HTMLSelectElement} */ (event.target).value);
-  return html`<label class="inline">Example <select @change=${open}>
+  return html`<label class="inline start">or start from an example <select @change=${open}>
     ${example ? nothing : html`<option value="" selected>–</option>`}
     ${examples.map(({ name, summary }) => html`<option value=${name} ?selected=${example === name}>${summary}</option>`)}</select></label>`;
 }
@@ -58,8 +80,9 @@ function examplePicker(app) {
 let placedBefore = null;
 
 /** What the case is about: what the service understood of it, or the numbers that it brings. @param {Compose} state @param {JsonObject} document */
-function drawing({ understood }, document) {
+function drawing({ understood, lone }, document) {
   const type = at(document, '/contact/type');
+  if (lone && hasSections(type)) return drawSection(lone.body, lone.line);
   const known = understood && understood.type === type ? understood.of : null;
   switch (type) {
     case 'radii':
@@ -76,7 +99,7 @@ function drawing({ understood }, document) {
     case 'pressure_grid':
       return drawGrid(document);
     case 'wheelset':
-      return html`<p class="pad hint">Both wheels on both rails: the patches of every position are drawn with the result.</p>`;
+      return html`<p class="pad hint">The patches of both wheels are drawn with the result.</p>`;
     default:
       return nothing;
   }
@@ -84,8 +107,8 @@ function drawing({ understood }, document) {
 
 const BODIES = /** @type {const} */ (['rail', 'wheel']);
 
-/** @param {Compose} state */
-function verdict(state) {
+/** @param {App} app @param {Compose} state */
+function verdict(app, state) {
   const { unreadable, faults, refusal, checked, document } = state;
   if (unreadable) return html`<p class="fault big">${unreadable}</p>`;
   if (refusal) return html`<p class="fault big">${refusal}</p>`;
@@ -93,53 +116,69 @@ function verdict(state) {
   const wrong = faults.filter(({ pointer }) => !lacking.some((body) => pointer?.startsWith(`/contact/${body}/`)));
   const wanted = lacking.length ? html`<p class="big">Next: ${lacking.map((body) => `the file of the ${body}`).join(' and ')}.</p>` : nothing;
   if (lacking.length && !wrong.length) return wanted;
-  if (faults.length) {
+  if (wrong.length) {
     return html`${wanted}<p class="fault big">${wrong.length === 1 ? 'One fault' : `${wrong.length} faults`}</p>
       <ul class="faults">${wrong.map((fault) => html`<li>
-        <button class="link" @click=${() => lead(fault.pointer ?? '')}>${fault.pointer || 'case'}</button> ${fault.detail}</li>`)}</ul>`;
+        <button class="link" @click=${() => lead(app, fault.pointer ?? '')}>${fault.pointer || 'case'}</button> ${fault.detail}${excerpt(state, fault)}</li>`)}</ul>`;
   }
   if (!checked) return html`<p class="quiet">Checking …</p>`;
   const motions = checked.motions > 1 ? `${count(checked.motions)} motions, about` : 'About';
   const warnings = checked.remarks.filter(({ severity }) => severity === 'warning').length;
   const told = warnings === 0 ? 'Ready to solve' : warnings === 1 ? '1 warning' : `${warnings} warnings`;
   return html`<p class=${warnings ? 'checked warn' : 'checked good'}>${told}. ${motions} ${seconds(checked.estimate.seconds)}.</p>
-    ${profileQuality(checked)}
-    ${checked.remarks.map((remark) => html`<p class=${remark.severity === 'warning' ? 'warn' : 'quiet'}>${remark.detail}</p>`)}`;
+    ${remarkList(checked.remarks)}`;
 }
 
-/** How far the points of the profiles can be trusted. @param {CheckedCase} checked */
-function profileQuality({ quality }) {
-  if (!quality) return nothing;
-  return html`<dl class="quality">${BODIES.map((body) => {
-    const of = quality[body];
-    if (!of) return nothing;
-    const noise = typeof of.noise_um === 'number' ? `, noise ${number(of.noise_um, 2)} μm` : '';
-    const smoothing = of.smoothing_suggested_mm ? `, smoothing of ${number(of.smoothing_suggested_mm, 2)} mm suggested` : '';
-    return html`<div><dt>${body}</dt><dd>${count(of.points)} points every ${number(of.spacing_mm, 2)} mm${noise}${smoothing}</dd></div>`;
-  })}</dl>`;
+/** Lines shown before and after the line at fault. */
+const AROUND = 2;
+
+/** The line of a file that a fault names, between its neighbours. @param {Compose} state @param {import('./api.js').Fault} fault */
+function excerpt({ document, files }, { pointer, detail }) {
+  const body = BODIES.find((known) => pointer === `/contact/${known}/text`);
+  const number = Number(/\bline (\d+)/.exec(detail)?.[1]);
+  const text = body && at(document ?? undefined, `/contact/${body}/text`);
+  if (!body || !number || typeof text !== 'string') return nothing;
+  const lines = text.split(/\r\n?|\n/);
+  const from = Math.max(0, number - 1 - AROUND);
+  return html`<figure class="excerpt"><figcaption>${files[body]?.text === text ? files[body].name : `the file of the ${body}`}</figcaption>
+    <ol start=${from + 1}>${lines.slice(from, number + AROUND).map((line, place) => html`<li class=${from + place === number - 1 ? 'at-fault' : ''}><code>${line || ' '}</code></li>`)}</ol></figure>`;
 }
 
-/** The result while typing: forces with their errors, and the field of the first patch. @param {Compose} state */
-function previewOf({ preview, document, checked }) {
-  if (!preview || preview.digest !== checked?.digest) return nothing;
-  const { result, field } = preview;
-  const point = result.patches[0]?.points[0];
-  if (!point) return nothing;
-  const errors = point.error_estimate;
-  /** @type {[string, number, number | null | undefined, string][]} */
-  const rows = [
-    ['F along', point.force_x_n / 1000, errors && errors.force_x_n / 1000, 'kN'],
-    ['F across', point.force_y_n / 1000, errors && errors.force_y_n / 1000, 'kN'],
-    ['p max', result.patches[0].pressure_max_mpa, undefined, 'MPa'],
+/** The result while typing: the numbers of the wheel, and the field of the patch that carries most. @param {Compose} state */
+function previewOf({ preview, document, understood }) {
+  if (!preview?.result) return nothing;
+  const { result, patch, point, field } = preview;
+  const { patches } = result;
+  const of = patches[patch].points[point];
+  const [load] = patches.length && !result.wheelset ? wheelLoads(result, document, point) : [];
+  const placement = understood?.of.placement;
+  const angle = load && placement ? flangeAngle(/** @type {import('./placing.js').Place[]} */ (placement.wheel_mm), load.side) : NaN;
+  const friction = numberAt(document ?? undefined, '/friction/coefficient');
+  /** @type {[unknown, number, number | null | undefined, string][]} */
+  const rows = load ? [
+    ['Q', load.q_n / 1000, undefined, 'kN'],
+    ['Y, outward', load.y_n / 1000, load.y_error_n && load.y_error_n / 1000, 'kN'],
+    [Number.isFinite(angle) ? `Y/Q, Nadal ${fixed(nadal(angle, friction), 2)}` : 'Y/Q', load.y_n / load.q_n, undefined, ''],
+    [html`F<sub>x</sub>`, load.x_n / 1000, result.total[point]?.error_estimate?.force_x_n && result.total[point].error_estimate.force_x_n / 1000, 'kN'],
+  ] : [
+    ['N', patches[patch].normal_force_n / 1000, undefined, 'kN'],
+    [html`F<sub>x</sub>`, of.force_x_n / 1000, of.error_estimate && of.error_estimate.force_x_n / 1000, 'kN'],
+    [html`F<sub>y</sub>`, of.force_y_n / 1000, of.error_estimate && of.error_estimate.force_y_n / 1000, 'kN'],
   ];
-  const shown = field && thumbnail(field, Number(at(document ?? undefined, '/friction/coefficient')));
+  rows.push([html`p<sub>max</sub>`, Math.max(...patches.map((each) => each.pressure_max_mpa)), undefined, 'MPa'],
+    ['area', patches[patch].area_mm2, undefined, 'mm²']);
+  const shown = field && thumbnail(field, friction);
+  const notes = [
+    patches.length > 1 ? `${patches.length} patches; the one drawn carries ${number(patches[patch].normal_force_n / 1000, 3)} kN` : '',
+    patches[patch].points.length > 1 ? `motion ${point + 1} of ${patches[patch].points.length}` : '',
+  ].filter(Boolean).join('; ');
   return html`<section class="preview" aria-label="Result while typing">
     ${shown ? html`<field-map .shown=${shown}></field-map>` : nothing}
     <dl>${rows.map(([name, value, error, unit]) => {
       const text = withError(value, error);
       return html`<div><dt>${name}</dt><dd>${text.value}${text.error ? html`<span class="err"> ± ${text.error}</span>` : nothing} ${unit}</dd></div>`;
     })}</dl>
-    ${result.patches.length > 1 ? html`<span class="quiet">patch 0 of ${result.patches.length}</span>` : nothing}
+    ${notes ? html`<span class="quiet">${notes}</span>` : nothing}
   </section>`;
 }
 
@@ -154,7 +193,8 @@ function thumbnail(field, friction) {
 }
 
 /** @param {App} app @param {Compose} state */
-function codePanel(app, { text }) {
+function codePanel(app, state) {
+  const { text } = state;
   const address = `${location.origin}/v1/jobs`;
   const key = apiKey() ? ' -H "Authorization: Bearer $KEY"' : '';
   const curl = `curl -s ${address} -H 'Prefer: wait=10'${key} --json @-`;
@@ -162,22 +202,28 @@ function codePanel(app, { text }) {
   const copy = async (/** @type {string} */ copied) => {
     await navigator.clipboard.writeText(copied).then(() => app.say('Copied'), () => app.say('The browser does not allow copying here.'));
   };
-  return html`<section class="panel code" aria-labelledby="h-code">
-    <header class="bar"><h2 id="h-code">JSON</h2><button class="small" aria-label="Copy the JSON" @click=${() => copy(text)}>Copy</button></header>
+  const toggle = (/** @type {Event} */ event) => app.compose({ code: /** @type {HTMLDetailsElement} */ (event.target).open });
+  return html`<details class="panel code" ?open=${state.code || state.unreadable !== ''} @toggle=${toggle}><summary class="bar"><h2 id="h-code">JSON and curl, for programs</h2></summary>
+    <header class="bar sub"><h3>The case as JSON</h3><button class="small" aria-label="Copy the JSON" @click=${() => copy(text)}>Copy</button></header>
     <textarea spellcheck="false" aria-label="The case as JSON" .value=${text}
       @input=${(/** @type {Event} */ event) => editText(app, /** @type {HTMLTextAreaElement} */ (event.target).value)}></textarea>
-    <header class="bar sub"><h2>curl</h2><button class="small" aria-label="Copy the curl command with the case" @click=${() => copy(whole)}>Copy</button></header>
+    <header class="bar sub"><h3>curl</h3><button class="small" aria-label="Copy the curl command with the case" @click=${() => copy(whole)}>Copy</button></header>
     <pre tabindex="0" aria-label="curl command">${curl} &lt;&lt;'CASE' …</pre>
-  </section>`;
+  </details>`;
 }
 
-/** To the field of a fault, or to its place in the JSON. @param {string} pointer */
-function lead(pointer) {
+/** To the field of a fault, or to its place in the JSON. @param {App} app @param {string} pointer */
+function lead(app, pointer) {
   const input = document.getElementById(fieldId(pointer));
   if (input) {
+    const folded = input.closest('details');
+    if (folded) folded.open = true;
     input.focus();
     return;
   }
+  const code = /** @type {HTMLDetailsElement | null} */ (document.querySelector('details.code'));
+  if (code) code.open = true;
+  app.compose({ code: true });
   const area = /** @type {HTMLTextAreaElement | null} */ (document.querySelector('.code textarea'));
   if (!area) return;
   const span = placeInText(area.value, pointer);

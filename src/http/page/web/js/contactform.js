@@ -2,12 +2,13 @@
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt, put } from './document.js';
-import { change, editDocument } from './editing.js';
-import { hasSections, lacksSection, withContact, withoutNameOf } from './starts.js';
-import { faultAt, field, fieldId } from './field.js';
-import { number } from './format.js';
+import { change, editDocument, isUntouched } from './editing.js';
+import { hasSections, lacksSection, PROFILES, standardSection, withContact, withEverything, withoutNameOf } from './starts.js';
+import { choice, faultAt, field, fieldId } from './field.js';
+import { count, number } from './format.js';
 import { bodiesOf, decoded, profileKind } from './files.js';
 import { parseGapCurve, parseGrid } from './tables.js';
+import { inclinationText, parse, parseInclination } from './written.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./document.js').JsonObject} JsonObject */
@@ -16,15 +17,13 @@ import { parseGapCurve, parseGrid } from './tables.js';
 
 const BODIES = /** @type {const} */ (['rail', 'wheel']);
 
-const DROP_HINT = html`<p class="hint">Or drop the measured files of a rail and a wheel anywhere here.</p>`;
-
 /** @param {App} app @param {string} type */
 export function contactFields(app, type) {
   switch (type) {
     case 'radii':
-      return html`<div class="pair">${field(app, '/contact/rolling_mm', 'Relative radius along', 'mm')}${field(app, '/contact/lateral_mm', 'across', 'mm')}</div>${DROP_HINT}`;
+      return html`<div class="pair">${field(app, '/contact/rolling_mm', 'Relative radius along', 'mm')}${field(app, '/contact/lateral_mm', 'across', 'mm')}</div>`;
     case 'ellipse':
-      return html`<div class="pair">${field(app, '/contact/a_mm', 'Semi-axis along', 'mm')}${field(app, '/contact/b_mm', 'across', 'mm')}</div>${DROP_HINT}`;
+      return html`<div class="pair">${field(app, '/contact/a_mm', 'Semi-axis along', 'mm')}${field(app, '/contact/b_mm', 'across', 'mm')}</div>`;
     case 'profiles':
       return profileFields(app);
     case 'gap_profile':
@@ -38,14 +37,13 @@ export function contactFields(app, type) {
     case 'wheelset':
       return wheelsetFields(app);
     default:
-      return html`<p class="hint">Choose a kind of contact, or drop the files of a rail and a wheel anywhere here.</p>`;
+      return html`<p class="hint">Choose a kind of contact, or drop a rail and a wheel profile.</p>`;
   }
 }
 
 /** @param {App} app */
 function profileFields(app) {
   const document = app.store.get().compose.document ?? {};
-  const cant = numberAt(document, '/contact/cant_rad');
   const shift = numberAt(document, '/contact/lateral_shift_mm') || 0;
   const slide = (/** @type {Event} */ event) =>
     change(app, '/contact/lateral_shift_mm', Number(/** @type {HTMLInputElement} */ (event.target).value));
@@ -54,10 +52,29 @@ function profileFields(app) {
     ${sectionZones(app)}
     <div class="segs" role="group" aria-label="Side of the track">${['left', 'right'].map((name) => html`<label class="seg">
       <input type="radio" name="side" .checked=${side === name} @change=${() => change(app, '/contact/side', name)}><span>${name} rail</span></label>`)}</div>
-    <div class="pair">${field(app, '/contact/rolling_radius_mm', 'Rolling radius', 'mm')}
-      ${field(app, '/contact/cant_rad', 'Rail inclination', 'rad', { hint: cant ? `1 : ${number(1 / cant, 3)}` : '1 : 40 is 0.025' })}</div>
-    <label class="slide"><span>Wheelset shift to the left <output>${number(shift, 3)} mm</output></span>
-      <input type="range" min="-8" max="8" step="0.05" .value=${String(shift)} @input=${slide}></label>`;
+    <label class="slide"><span>Lateral shift of the wheelset, to the left <output>${number(shift, 3)} mm</output></span>
+      <input type="range" min="-8" max="8" step="0.05" .value=${String(shift)} @input=${slide}></label>
+    <div class="triple">${field(app, '/contact/lateral_shift_mm', 'Lateral shift', 'mm', { empty: '0' })}
+      ${field(app, '/contact/yaw_rad', 'Angle of attack', 'mrad', { factor: 0.001, empty: '0' })}
+      ${field(app, '/contact/roll_rad', 'Roll', 'mrad', { factor: 0.001, empty: '0' })}</div>
+    ${trackFields(app)}`;
+}
+
+/** Dimensions of the track and of the wheelset. @param {App} app */
+function trackFields(app) {
+  const { document, checked } = app.store.get().compose;
+  const found = checked?.remarks.find(({ code }) => code === 'flange-back-found');
+  const position = found && 'position_mm' in found ? Number(found.position_mm) : -70;
+  const stated = Number.isFinite(numberAt(document ?? undefined, '/contact/flange_back_position_mm'));
+  const byOrigin = at(document ?? undefined, '/contact/rail_origin_mm') !== undefined;
+  return html`<div class="pair">${field(app, '/contact/rolling_radius_mm', 'Wheel radius', 'mm')}
+      ${field(app, '/contact/cant_rad', 'Rail inclination', '', { format: inclinationText, read: parseInclination, empty: '0', hint: 'such as 1:40, or in rad' })}</div>
+    <div class="pair">${byOrigin ? field(app, '/contact/rail_origin_mm', 'Rail origin from track centre', 'mm')
+      : html`${field(app, '/contact/gauge_mm', 'Track gauge', 'mm', { empty: '1435' })}${field(app, '/contact/gauge_height_mm', 'measured below the top', 'mm', { empty: '14' })}`}</div>
+    <div class="pair">${field(app, '/contact/flange_back_distance_mm', 'Flange back distance', 'mm', { empty: '1360' })}
+      ${field(app, '/contact/flange_back_position_mm', 'Flange back at y', 'mm', {
+        empty: number(position, 3), hint: stated ? '' : found ? `${number(position, 3)} mm was found in the wheel file` : 'usual: −70 mm',
+      })}</div>`;
 }
 
 /** @param {App} app */
@@ -75,18 +92,50 @@ function wheelsetFields(app) {
     change(app, '/contact/kinematics', /** @type {HTMLInputElement} */ (event.target).checked ? {} : undefined);
   return html`
     ${sectionZones(app)}
-    <div class="pair">${field(app, '/contact/rolling_radius_mm', 'Rolling radius', 'mm')}${field(app, '/contact/gauge_mm', 'Gauge', 'mm', { empty: '1435' })}</div>
     ${place('lateral_shift_mm', 'Shift to the left', 'mm')}${place('yaw_rad', 'Yaw', 'mrad', 0.001)}
+    ${trackFields(app)}
     <div class="checks"><label><input type="checkbox" .checked=${asked} @change=${ask}> Δr and equivalent conicity</label></div>
-    ${at(document, '/contact/right') === undefined ? nothing : html`<p class="hint">What differs on the right is changed in the JSON.</p>`}`;
+    ${at(document, '/contact/right') === undefined ? nothing : html`<p class="hint">The right side has values of its own; change them in the JSON.</p>`}`;
 }
 
 /** @param {App} app */
 function sectionZones(app) {
   const { document } = app.store.get().compose;
-  const both = document && BODIES.every((body) => isObject(at(document, `/contact/${body}`)) && !lacksSection(document, body));
+  const there = BODIES.filter((body) => document && isObject(at(document, `/contact/${body}`)) && !lacksSection(document, body));
   return html`<div class="pair">${sectionZone(app, 'rail')}${sectionZone(app, 'wheel')}</div>
-    ${both ? html`<button class="link" @click=${() => exchange(app)}>Exchange rail and wheel</button>` : nothing}`;
+    ${there.length === 2 ? html`<button class="link" @click=${() => exchange(app)}>Exchange rail and wheel</button>` : nothing}
+    ${there.map((body) => readingFields(app, body))}`;
+}
+
+const UNITS = /** @type {const} */ ([[undefined, 'as in the file, else mm'], ['mm', 'mm'], ['cm', 'cm'], ['m', 'm'], ['inch', 'inch']]);
+
+/** Bodies whose reading is unfolded. @type {Set<Body>} */
+const unfolded = new Set();
+
+/** How the file of a body is read: its unit, its senses with what was found, smoothing with what is advised. @param {App} app @param {Body} body */
+function readingFields(app, body) {
+  const { document, checked, faults } = app.store.get().compose;
+  const pointer = `/contact/${body}`;
+  const remarks = (checked?.remarks ?? []).filter((remark) => remark.pointer === pointer || remark.pointer?.startsWith(`${pointer}/`));
+  const mirrored = (/** @type {'y' | 'z'} */ axis) => remarks.find(({ code }) => code === `profile-${axis}-mirrored`);
+  const found = (/** @type {'y' | 'z'} */ axis) => !checked ? 'found from the shape' : mirrored(axis) ? 'found: not the usual sense' : 'found: the usual sense of the format';
+  const quality = checked?.quality?.[body];
+  const smoothing = at(document ?? undefined, `${pointer}/smoothing_mm`);
+  const advised = quality?.smoothing_suggested_mm ?? 0;
+  const told = [
+    quality ? `${count(quality.points)} points every ${number(quality.spacing_mm, 2)} mm` : '',
+    typeof quality?.noise_um === 'number' && quality.noise_um >= 0.1 ? `noise ${number(quality.noise_um, 2)} μm` : '',
+    advised && smoothing !== advised && smoothing !== 'auto' ? `smoothing of ${number(advised, 2)} mm advised` : '',
+  ].filter(Boolean).join(', ');
+  const needed = ['unit', 'mirror_y', 'mirror_z', 'smoothing_mm'].some((member) => at(document ?? undefined, `${pointer}/${member}`) !== undefined)
+    || faults.some((fault) => fault.pointer?.startsWith(pointer) && /mirror|unit/.test(fault.detail));
+  const toggled = (/** @type {Event} */ event) => (/** @type {HTMLDetailsElement} */ (event.target).open ? unfolded.add(body) : unfolded.delete(body));
+  return html`<details class="reading" ?open=${needed || unfolded.has(body)} @toggle=${toggled}><summary>How the ${body} is read <span class="hint">${told}</span></summary>
+    <div class="pair">${choice(app, `${pointer}/unit`, 'Unit', UNITS)}
+      ${field(app, `${pointer}/smoothing_mm`, 'Smoothing', 'mm', { empty: '0 = none', hint: advised ? '' : 'none is needed', read: (text) => (/^\s*auto\s*$/i.test(text) ? 'auto' : parse(text)) })}</div>
+    ${advised && smoothing !== advised ? html`<button class="link" @click=${() => change(app, `${pointer}/smoothing_mm`, advised)}>Smooth by ${number(advised, 2)} mm, as advised</button>` : nothing}
+    <div class="pair">${choice(app, `${pointer}/mirror_y`, 'y is positive', [[undefined, found('y')], [false, 'to the field side'], [true, 'to the track centre']])}
+      ${choice(app, `${pointer}/mirror_z`, 'z is positive', [[undefined, found('z')], [false, 'down'], [true, 'up']])}</div></details>`;
 }
 
 /** @param {App} app @param {Body} body */
@@ -96,7 +145,8 @@ function sectionZone(app, body) {
   const title = body === 'rail' ? 'Rail' : 'Wheel';
   const take = (/** @type {File} */ file) => void takeProfiles(app, [file], body).catch(app.refused);
   if (!document || lacksSection(document, body)) {
-    return dropZone(title, '', `/contact/${body}`, app, take, 'drop or choose a file: MiniProf, Simpack or columns of y and z');
+    return html`<div>${dropZone(title, '', `/contact/${body}`, app, take, 'drop or choose a file: MiniProf, Simpack or columns of y and z')}
+      <button class="link" @click=${() => useStandard(app, body)}>Use a new ${STANDARD_NAMES[body]}</button></div>`;
   }
   const file = files[body];
   const what = !isObject(section) ? ''
@@ -104,6 +154,15 @@ function sectionZone(app, body) {
     : typeof section.text !== 'string' ? ''
     : `${section.text === file?.text ? `${file.name}: ` : ''}${section.format}, ${section.text.split('\n').filter((line) => line.trim()).length} lines`;
   return dropZone(title, what, `/contact/${body}`, app, take);
+}
+
+const STANDARD_NAMES = { rail: '60E1 rail', wheel: 'S1002 wheel' };
+
+/** The cross-section of an example of the service in place of one that is missing. @param {App} app @param {Body} body */
+function useStandard(app, body) {
+  const { document, examples } = app.store.get().compose;
+  const section = standardSection(examples, body);
+  if (section) editDocument(app, put(document ?? {}, `/contact/${body}`, section));
 }
 
 /** @param {App} app @param {string} pointer */
@@ -181,10 +240,11 @@ function nameOf({ wheel, rail }) {
 export async function takeProfiles(app, files, onto) {
   const read = await Promise.all(files.map(async (file) => ({ name: file.name, text: decoded(await file.arrayBuffer()) }))).catch(() => null);
   if (!read) return app.say('A file cannot be read. Is it a folder?');
-  const { document: before, files: taken, example, examples } = app.store.get().compose;
-  const fresh = !before || !hasSections(at(before, '/contact/type'));
+  const state = app.store.get().compose;
+  const { document: before, files: taken, example, examples } = state;
+  const fresh = !before || !hasSections(at(before, '/contact/type')) || isUntouched(state);
   const shipped = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (examples.find(({ name }) => name === example)?.case));
-  let document = fresh ? put(put(withContact(before, 'profiles'), '/labels', undefined), '/name', undefined) : withoutNameOf(before, shipped);
+  let document = fresh ? withEverything(put(put(put(withContact(isUntouched(state) ? null : before, 'profiles'), '/labels', undefined), '/name', undefined), '/contact', PROFILES)) : withoutNameOf(before, shipped);
   const missing = BODIES.filter((body) => !Object.keys(at(document, `/contact/${body}`) ?? {}).length);
   const bodies = bodiesOf(read, missing, onto);
   if (typeof bodies === 'string') return app.say(bodies);

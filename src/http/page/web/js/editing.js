@@ -4,25 +4,35 @@ import { cancel, checkCase, examples as examplesOf, Refused, remove, result as r
 import { at, pretty, put } from './document.js';
 import { hasFields, loadField } from './fields.js';
 import { formatRoute } from './routes.js';
-import { adoptJob } from './result.js';
-import { inOrder } from './starts.js';
+import { adoptJob, tellingPoint } from './result.js';
+import { freeRolling, hasSections, inOrder, lacksSection, standardSection, withEverything, withFields, withoutExtras } from './starts.js';
 import { removeTyped, TYPED } from './typed.js';
+import { oneWheel } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./document.js').JsonObject} JsonObject */
 /** @typedef {import('./document.js').JsonValue} JsonValue */
+/** @typedef {import('./api.js').Fault} Fault */
 
+const BODIES = /** @type {const} */ (['rail', 'wheel']);
 const KEPT = 'railhead.case';
 const PAUSE_MS = 120;
 const WAIT_S = 10;
-/** The example that a new tab begins with. */
-const FIRST = 'hertz-steel';
-/** Estimated seconds up to which a case is solved while it is written. */
-const LIVE_SECONDS_MAX = 0.05;
+/** The example that a new tab begins with: a new wheel on a new rail, rolling freely. */
+const FIRST = 'wheel-rail';
+/** Estimated seconds up to which a case is solved while it is written; the first one may take longer, since nobody waits for the next. */
+const LIVE_SECONDS_MAX = 1;
+const FIRST_SECONDS_MAX = 10;
 
 let timer = 0;
 let began = -Infinity;
 let asking = new AbortController();
+/** The text of the example as it was opened. */
+let opened = '';
+/** Is a case being solved while it is written? */
+let previewing = false;
+/** Was any case solved or written since the page was opened? */
+let first = true;
 
 /** The case as it was left in this tab, or the first example. @param {App} app */
 export async function openKept(app) {
@@ -31,7 +41,7 @@ export async function openKept(app) {
   try {
     app.compose({ examples: await examplesOf() });
     removeTyped().catch(() => {});
-    if (!kept) openExample(app, FIRST);
+    if (!kept) openFirst(app);
   } catch (error) {
     app.refused(error);
   }
@@ -62,13 +72,28 @@ export function change(app, pointer, value) {
   editDocument(app, put(app.store.get().compose.document ?? {}, pointer, value));
 }
 
-/** @param {App} app @param {string} name */
+/** An example with all fields. @param {App} app @param {string} name */
 export function openExample(app, name) {
-  const example = app.store.get().compose.examples.find((known) => known.name === name);
-  if (!example) return;
-  app.compose({ example: name, files: {}, typing: null });
-  editDocument(app, inOrder(/** @type {JsonObject} */ (/** @type {unknown} */ (example.case))));
+  const example = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (app.store.get().compose.examples.find((known) => known.name === name)?.case));
+  if (example) openCase(app, name, { ...example, outputs: withFields(example.outputs) });
 }
+
+/** The case that a new tab begins with: with damage, stresses and temperature. @param {App} app */
+function openFirst(app) {
+  const example = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (app.store.get().compose.examples.find((known) => known.name === FIRST)?.case));
+  if (example) openCase(app, FIRST, withEverything({ ...example, motion: freeRolling('profiles') }));
+}
+
+/** @param {App} app @param {string} name @param {JsonObject} document */
+function openCase(app, name, document) {
+  const ordered = inOrder(document);
+  opened = pretty(ordered);
+  app.compose({ example: name, files: {}, typing: null });
+  editDocument(app, ordered);
+}
+
+/** Is the case an example that nobody has changed? @param {import('./state.js').Compose} state */
+export const isUntouched = ({ example, text }) => example !== '' && text === opened;
 
 /**
  * @param {App} app
@@ -87,53 +112,106 @@ function take(app, document, text, unreadable) {
 /** @param {App} app */
 async function check(app) {
   timer = 0;
-  const { text, unreadable } = app.store.get().compose;
-  if (unreadable) return;
+  const { text, document, unreadable } = app.store.get().compose;
+  if (unreadable || !document) return;
   began = performance.now();
   const mine = (asking = new AbortController());
   try {
-    const checked = await checkCase(text, mine.signal);
-    if (mine.signal.aborted) return;
-    const type = at(app.store.get().compose.document ?? undefined, '/contact/type');
-    const understood = checked.understood ? { type, of: checked.understood } : null;
-    app.compose({ checked, understood, faults: [], refusal: '' });
-    await preview(app, checked.digest, mine.signal);
+    const lone = loneSection(document);
+    if (lone) await checkLone(app, document, lone, mine.signal);
+    else {
+      const checked = await checkCase(text, mine.signal);
+      if (mine.signal.aborted) return;
+      const type = at(document, '/contact/type');
+      const understood = checked.understood ? { type, of: checked.understood } : null;
+      app.compose({ checked, understood, lone: null, faults: [], refusal: '' });
+      preview(app).catch(app.refused);
+    }
   } catch (error) {
     if (!mine.signal.aborted) showRefusal(app, error);
   }
 }
 
+/** The only cross-section of a case that has one of the two. @param {JsonObject} document @returns {'rail' | 'wheel' | null} */
+function loneSection(document) {
+  const there = BODIES.filter((body) => hasSections(at(document, '/contact/type')) && !lacksSection(document, body));
+  return there.length === 1 ? there[0] : null;
+}
+
+/**
+ * Reads a cross-section without its counterpart: a new one of the standard stands in for that.
+ * @param {App} app
+ * @param {JsonObject} document
+ * @param {'rail' | 'wheel'} body
+ * @param {AbortSignal} signal
+ */
+async function checkLone(app, document, body, signal) {
+  const other = body === 'rail' ? 'wheel' : 'rail';
+  const standard = standardSection(app.store.get().compose.examples, other);
+  const whole = oneWheel(put(document, `/contact/${other}`, standard), 'right', 0);
+  /** @type {Fault[]} */
+  let faults = [];
+  let line = null;
+  try {
+    const { understood } = await checkCase(JSON.stringify(whole), signal);
+    line = understood?.placement?.[`${body}_mm`] ?? null;
+  } catch (error) {
+    if (!(error instanceof Refused) || !error.faults.length) throw error;
+    faults = error.faults.filter(({ pointer }) => pointer?.startsWith(`/contact/${body}`));
+  }
+  if (!signal.aborted) app.compose({ checked: null, understood: null, preview: null, refusal: '', faults, lone: { body, line } });
+}
+
 /** @param {App} app @param {unknown} error */
 function showRefusal(app, error) {
-  if (error instanceof Refused && error.faults.length) app.compose({ checked: null, faults: error.faults, preview: null });
+  if (error instanceof Refused && error.faults.length) app.compose({ checked: null, lone: null, faults: error.faults, preview: null });
   else {
-    app.compose({ checked: null, faults: [], refusal: error instanceof Error ? error.message : String(error), preview: null });
+    app.compose({ checked: null, lone: null, faults: [], refusal: error instanceof Error ? error.message : String(error), preview: null });
     if (error instanceof Refused && error.status === 401) app.refused(error);
   }
 }
 
+/** Solves the case while it is written, if that takes little time: one after the other, and always the newest. @param {App} app */
+async function preview(app) {
+  if (previewing) return;
+  previewing = true;
+  try {
+    for (let next = wanted(app); next; next = wanted(app)) await solveTyped(app, next);
+  } finally {
+    previewing = false;
+  }
+}
+
+/** The digest of a case that is to be solved while it is written; empty for none. @param {App} app */
+function wanted(app) {
+  const { document, checked, live, preview: known } = app.store.get().compose;
+  if (!checked || known?.digest === checked.digest) return '';
+  const cheap = live && document && checked.estimate.seconds < (first ? FIRST_SECONDS_MAX : LIVE_SECONDS_MAX);
+  if (!cheap && known) app.compose({ preview: null });
+  return cheap ? checked.digest : '';
+}
+
 /**
- * Solves a cheap case while it is written. The job is removed as soon as its answer is here.
+ * Solves the case without damage and what else is not shown, and removes the job as soon as its answer is here.
  * @param {App} app
  * @param {string} digest
- * @param {AbortSignal} signal
  */
-async function preview(app, digest, signal) {
-  const { document, checked, live, preview: known } = app.store.get().compose;
-  if (!live || !document || !checked || checked.estimate.seconds > LIVE_SECONDS_MAX) {
-    app.compose({ preview: null });
-    return;
-  }
-  if (known?.digest === digest) return;
-  const text = JSON.stringify({ ...document, ...TYPED });
-  // Not given up when the next character is written: its job would stay.
-  const job = await submit(text, { wait: 2 });
+async function solveTyped(app, digest) {
+  const { document } = app.store.get().compose;
+  const job = await submit(JSON.stringify({ ...withoutExtras(document ?? {}), ...TYPED }), { wait: first ? WAIT_S : 2 });
+  first = false;
+  /** @type {import('./state.js').Preview} */
+  let answer = { digest, result: null, patch: 0, point: 0, field: null };
   try {
-    if (job.state !== 'succeeded') return;
-    const result = job.result ?? (await resultOf(job.id));
-    const field = hasFields(result) ? await loadField(job.id, result, 0, 0) : null;
-    if (!signal.aborted) app.compose({ preview: { digest, result, field } });
+    const result = job.state === 'succeeded' ? (job.result ?? (await resultOf(job.id))) : null;
+    if (result) {
+      const loads = result.patches.map((patch) => patch.normal_force_n);
+      const patch = loads.indexOf(Math.max(...loads));
+      const point = tellingPoint(result.patches[patch].points);
+      answer = { digest, result, patch, point, field: hasFields(result) ? await loadField(job.id, result, patch, point) : null };
+    }
   } finally {
+    app.compose({ preview: answer });
     if (job.state === 'queued' || job.state === 'running') await cancel('jobs', job.id).catch(() => {});
     await remove('jobs', job.id).catch(() => {});
   }
@@ -142,8 +220,7 @@ async function preview(app, digest, signal) {
 /** @param {App} app @param {boolean} live */
 export function solveLive(app, live) {
   app.compose({ live, preview: null });
-  const { document, checked } = app.store.get().compose;
-  if (live && document && checked) preview(app, checked.digest, asking.signal).catch(app.refused);
+  preview(app).catch(app.refused);
 }
 
 /** Solves the case and shows its result. @param {App} app */
@@ -166,8 +243,8 @@ export async function solve(app) {
 /** Queues the case and shows the list. @param {App} app */
 export async function queue(app) {
   try {
-    const job = await submit(app.store.get().compose.text);
-    app.say(`Queued as ${job.id.slice(0, 8)}`);
+    await submit(app.store.get().compose.text);
+    app.say('Added to the queue');
     app.go(formatRoute('jobs'));
   } catch (error) {
     showFaults(app, error);

@@ -8,6 +8,7 @@ import { parse, parseList, textOf } from './written.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./api.js').Fault} Fault */
+/** @typedef {import('./document.js').JsonValue} JsonValue */
 
 /**
  * @typedef {object} FieldLook
@@ -16,6 +17,8 @@ import { parse, parseList, textOf } from './written.js';
  * @property {string} [empty] Shown where nothing is given.
  * @property {boolean} [text] Takes any text, not only numbers.
  * @property {boolean} [list] Takes one number or several.
+ * @property {(value: JsonValue | undefined) => string} [format] What is shown of the value, where a unit does not say it.
+ * @property {(written: string) => JsonValue | undefined} [read] The value of what was written.
  */
 
 /** The id of the field of a pointer. @param {string} pointer */
@@ -41,16 +44,18 @@ export function field(app, pointer, label, unit, look = {}) {
   const { document, typing } = app.store.get().compose;
   const fault = faultAt(app, pointer);
   const id = fieldId(pointer);
-  const shown = typing?.pointer === pointer ? typing.text : textOf(at(document ?? undefined, pointer), look.factor);
+  const value = at(document ?? undefined, pointer);
+  const shown = typing?.pointer === pointer ? typing.text : look.format ? look.format(value) : textOf(value, look.factor);
   const write = (/** @type {InputEvent} */ event) => {
     const { value } = /** @type {HTMLInputElement} */ (event.target);
     app.compose({ typing: { pointer, text: value } });
-    change(app, pointer, look.text ? value || undefined : look.list ? parseList(value, look.factor) : parse(value, look.factor));
+    const read = look.read ?? (look.text ? (text) => text || undefined : look.list ? (text) => parseList(text, look.factor) : (text) => parse(text, look.factor));
+    change(app, pointer, read(value));
   };
   return html`<div class=${fault ? 'field bad' : 'field'}>
     <label for=${id}>${label}</label>
     <span class="input">
-      <input id=${id} inputmode=${look.text || look.list ? 'text' : 'decimal'} autocomplete="off" .value=${shown} placeholder=${look.empty ?? ''}
+      <input id=${id} inputmode=${look.text || look.list || look.read ? 'text' : 'decimal'} autocomplete="off" .value=${shown} placeholder=${look.empty ?? ''}
         aria-invalid=${fault ? 'true' : 'false'} aria-describedby=${fault ? `${id}-fault` : nothing}
         @input=${write} @blur=${() => app.compose({ typing: null })}>
       ${unit ? html`<span class="unit">${unit}</span>` : nothing}
@@ -58,6 +63,24 @@ export function field(app, pointer, label, unit, look = {}) {
     ${fault ? html`<p class="fault" id=${`${id}-fault`}>${faultText(fault, look.factor, unit)}</p>`
       : look.hint ? html`<p class="hint">${look.hint}</p>` : nothing}
   </div>`;
+}
+
+/**
+ * A choice for one value of the case.
+ * @param {App} app
+ * @param {string} pointer
+ * @param {string} label
+ * @param {readonly (readonly [JsonValue | undefined, string])[]} options Values and their texts; the first is undefined, the default of the service.
+ */
+export function choice(app, pointer, label, options) {
+  const value = at(app.store.get().compose.document ?? undefined, pointer);
+  const known = options.some(([option]) => option === value);
+  const fault = faultAt(app, pointer);
+  const pick = (/** @type {Event} */ event) => change(app, pointer, options[/** @type {HTMLSelectElement} */ (event.target).selectedIndex]?.[0]);
+  return html`<div class=${fault ? 'field bad' : 'field'}><label for=${fieldId(pointer)}>${label}</label>
+    <select id=${fieldId(pointer)} @change=${pick}>${options.map(([option, text]) => html`<option ?selected=${option === value}>${text}</option>`)}
+      ${known ? nothing : html`<option selected>${JSON.stringify(value)}</option>`}</select>
+    ${fault ? html`<p class="fault">${fault.detail}</p>` : nothing}</div>`;
 }
 
 /**

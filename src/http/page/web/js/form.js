@@ -1,10 +1,11 @@
 // The form: fields for the common parts of a case, in engineers' units. Whatever it does not show stays in the JSON untouched.
 
 import { html, nothing } from '../vendor/lit-html.js';
-import { at, isObject, numberAt } from './document.js';
+import { at, isObject, numberAt, put } from './document.js';
 import { change, editDocument } from './editing.js';
+import { fixed, number } from './format.js';
 import { contactFields } from './contactform.js';
-import { ALL_OUTPUTS, hasSections, withContact, withoutNameOf } from './starts.js';
+import { freeRolling, hasSections, ONE_MOTION, outputsOf, withContact, withEverything, withOutput, withoutExtras, withoutNameOf } from './starts.js';
 import { faultAt, field } from './field.js';
 import { FIRST_HISTORY, historyFields } from './historyform.js';
 
@@ -13,12 +14,13 @@ import { FIRST_HISTORY, historyFields } from './historyform.js';
 /** @typedef {import('./document.js').JsonValue} JsonValue */
 
 const CONTACTS = [
-  ['radii', 'Radii'], ['ellipse', 'Ellipse'], ['profiles', 'Profiles'], ['wheelset', 'Wheelset'], ['gap_profile', 'Gap curve'],
+  ['profiles', 'Profiles'], ['wheelset', 'Wheelset'], ['radii', 'Radii'], ['ellipse', 'Ellipse'], ['gap_profile', 'Gap curve'],
   ['gap_grid', 'Gap grid'], ['pressure_grid', 'Pressure grid'],
 ];
+const KM_PER_H = 1e6 / 3600;
 const COMPONENTS = /** @type {const} */ ([
-  { key: 'creepage_x', label: 'Creepage along', unit: '%', factor: 0.01 },
-  { key: 'creepage_y', label: 'across', unit: '%', factor: 0.01 },
+  { key: 'creepage_x', label: 'Creepage x', unit: '%', factor: 0.01 },
+  { key: 'creepage_y', label: 'Creepage y', unit: '%', factor: 0.01 },
   { key: 'spin_per_mm', label: 'Spin', unit: '1/m', factor: 0.001 },
 ]);
 
@@ -27,7 +29,8 @@ function chooseContact(app, kind) {
   const { document, example, examples } = app.store.get().compose;
   const known = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (examples.find(({ name }) => name === example)?.case));
   app.compose({ example: '' });
-  editDocument(app, withContact(withoutNameOf(document ?? {}, known), kind));
+  const next = withContact(withoutNameOf(document ?? {}, known), kind);
+  editDocument(app, hasSections(kind) ? withEverything(next) : next);
 }
 
 /** @param {App} app */
@@ -36,7 +39,7 @@ export function caseForm(app) {
   const type = String(at(document, '/contact/type') ?? '');
   const fault = faultAt(app, '/contact/type');
   return html`
-    <fieldset><legend>Contact</legend>
+    <fieldset><legend>Kind of contact</legend>
       <div class="segs" role="group" aria-label="Kind of contact">${CONTACTS.map(([kind, label]) => html`<label class="seg">
         <input type="radio" name="contact" .checked=${kind === type} @change=${() => chooseContact(app, kind)}>
         <span>${label}</span></label>`)}</div>
@@ -50,57 +53,99 @@ export function caseForm(app) {
         ? field(app, '/material/shear_modulus_mpa', 'Shear modulus', 'GPa', { factor: 1000 })
         : field(app, '/material/young_modulus_mpa', "Young's modulus", 'GPa', { factor: 1000 })}
       ${field(app, '/material/poisson_ratio', "Poisson's ratio", 'ν')}</div></fieldset>
-    <fieldset><legend>Answer</legend>${answerFields(app, document)}</fieldset>`;
+    <fieldset><legend>Results</legend>${answerFields(app, document)}</fieldset>`;
 }
 
 /** @param {App} app @param {string} type */
 function loadField(app, type) {
   const document = app.store.get().compose.document ?? {};
   if (type === 'pressure_grid') return html`<p class="hint">The load is that of the given pressure.</p>`;
-  if (at(document, '/load/approach_mm') !== undefined) return field(app, '/load/approach_mm', 'Approach', 'μm', { factor: 0.001 });
+  if (at(document, '/load/approach_mm') !== undefined) return field(app, '/load/approach_mm', 'Penetration', 'μm', { factor: 0.001 });
   const vertical = at(document, '/load/vertical_force_n') !== undefined || (hasSections(type) && at(document, '/load/normal_force_n') === undefined);
   return vertical
-    ? field(app, '/load/vertical_force_n', 'Vertical force', 'kN', { factor: 1000 })
-    : field(app, '/load/normal_force_n', 'Normal force', 'kN', { factor: 1000 });
+    ? field(app, '/load/vertical_force_n', type === 'wheelset' ? 'Axle load' : 'Wheel load Q', 'kN', { factor: 1000 })
+    : field(app, '/load/normal_force_n', 'Normal force N', 'kN', { factor: 1000 });
 }
 
 /** @param {App} app @param {string} type */
 function motionFields(app, type) {
   const { motion } = app.store.get().compose.document ?? {};
   const kind = Array.isArray(motion) ? 'list' : isObject(motion) && 'sweep' in motion ? 'sweep' : isObject(motion) && 'wheelset' in motion ? 'wheelset' : isObject(motion) && 'history' in motion ? 'history' : 'one';
-  const kinds = [...(hasSections(type) ? [['wheelset', 'Wheelset']] : []), ['one', 'Creepages'], ['sweep', 'Creep curve'], ...(type === 'wheelset' ? [] : [['history', 'While it rolls']])];
+  const kinds = [...(hasSections(type) ? [['wheelset', 'Rolling wheel']] : []), ['one', 'Creepages'], ['sweep', 'Creep curve'], ...(type === 'wheelset' ? [] : [['history', 'Over a distance']])];
   return html`
     <div class="segs" role="group" aria-label="Kind of motion">${kinds.map(([key, label]) => html`<label class="seg">
-      <input type="radio" name="motion" .checked=${key === kind} @change=${() => change(app, '/motion', startMotion(key, motion))}><span>${label}</span></label>`)}</div>
+      <input type="radio" name="motion" .checked=${key === kind} @change=${() => chooseMotion(app, key, type)}><span>${label}</span></label>`)}</div>
     ${kind === 'list' ? html`<p class="hint">${/** @type {JsonValue[]} */ (motion).length} motions on the same patch; change them in the JSON.</p>` : nothing}
     ${kind === 'history' ? historyFields(app, type) : nothing}
-    ${kind === 'one' ? html`<div class="triple">${COMPONENTS.map(({ key, label, unit, factor }) => field(app, `/motion/${key}`, label, unit, { factor }))}</div>` : nothing}
-    ${kind === 'wheelset' ? html`<div class="pair">
-      ${field(app, '/motion/wheelset/speed_mm_per_s', 'Speed', 'km/h', { factor: 1e6 / 3600 })}
-      ${turningField(app)}
-      ${acrossField(app)}</div>` : nothing}
+    ${kind === 'one' ? html`<div class="triple">${COMPONENTS.map(({ key, label, unit, factor }) => field(app, `/motion/${key}`, label, unit, { factor }))}</div>
+      <div class="pair">${field(app, '/motion/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H })}</div>` : nothing}
+    ${kind === 'wheelset' ? wheelFields(app, type) : nothing}
     ${kind === 'sweep' && isObject(motion) && isObject(motion.sweep) ? sweepFields(app, motion.sweep) : nothing}`;
 }
 
-/** How the wheelset turns, in the form that the case has. @param {App} app */
-function turningField(app) {
-  const given = (/** @type {string} */ member) => at(app.store.get().compose.document ?? {}, `/motion/wheelset/${member}`) !== undefined;
-  if (given('drive_torque_n_mm')) return field(app, '/motion/wheelset/drive_torque_n_mm', 'Torque of the drive', 'N·m', { factor: 1000 });
-  if (given('angular_velocity_rad_per_s')) return field(app, '/motion/wheelset/angular_velocity_rad_per_s', 'Angular velocity', 'rad/s');
-  return field(app, '/motion/wheelset/free_rolling_radius_mm', 'Free rolling radius', 'mm');
+/**
+ * How a wheel turns: the member of the motion, its name, and the value that it begins with.
+ * @type {readonly { member: string, label: string, unit: string, factor: number, start: number, only?: string }[]}
+ */
+const TURNING = [
+  { member: 'force_x_n', label: 'Longitudinal force', unit: 'kN', factor: 1000, start: -3000, only: 'profiles' },
+  { member: 'drive_torque_n_mm', label: 'Torque of the drive', unit: 'N·m', factor: 1000, start: 1e6, only: 'wheelset' },
+  { member: 'free_rolling_radius_mm', label: 'Free rolling radius', unit: 'mm', factor: 1, start: 460 },
+  { member: 'angular_velocity_rad_per_s', label: 'Angular velocity', unit: 'rad/s', factor: 1, start: 43.5 },
+];
+const SIDEWAYS = [
+  { member: 'lateral_velocity_mm_per_s', label: 'Lateral velocity', unit: 'mm/s', factor: 1, start: 0 },
+  { member: 'force_y_n', label: 'Lateral force, to the left', unit: 'kN', factor: 1000, start: 4000 },
+];
+
+/** The motion of a wheel or a wheelset. @param {App} app @param {string} type */
+function wheelFields(app, type) {
+  const { document, typing } = app.store.get().compose;
+  const given = /** @type {JsonObject} */ (at(document ?? {}, '/motion/wheelset') ?? {});
+  const ways = TURNING.filter(({ only }) => !only || only === type);
+  const way = ways.find(({ member }) => member in given);
+  // A force of 0 is free rolling, but not while it is being written.
+  const free = way && given[way.member] === 0 && (way.only !== undefined) && typing?.pointer !== `/motion/wheelset/${way.member}`;
+  const across = SIDEWAYS.find(({ member }) => member in given) ?? SIDEWAYS[0];
+  const turn = (/** @type {Event} */ event) => {
+    const { value } = /** @type {HTMLSelectElement} */ (event.target);
+    const kept = Object.fromEntries(Object.entries(given).filter(([member]) => !TURNING.some((known) => known.member === member)));
+    const chosen = ways.find(({ member }) => member === value) ?? ways[0];
+    change(app, '/motion/wheelset', { ...kept, [chosen.member]: value ? chosen.start : 0 });
+  };
+  const move = (/** @type {Event} */ event) => {
+    const { value } = /** @type {HTMLSelectElement} */ (event.target);
+    const kept = Object.fromEntries(Object.entries(given).filter(([member]) => !SIDEWAYS.some((known) => known.member === member)));
+    change(app, '/motion/wheelset', { ...kept, [value]: SIDEWAYS.find(({ member }) => member === value)?.start ?? 0 });
+  };
+  return html`<div class="pair">${field(app, '/motion/wheelset/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H })}
+      <div class="field"><label for="turning">Rotation</label><select id="turning" @change=${turn}>
+        <option value="" ?selected=${free}>free, without torque</option>
+        ${ways.map(({ member, label }) => html`<option value=${member} ?selected=${!free && member === way?.member}>${label}</option>`)}</select></div></div>
+    <div class="pair">${free || !way ? nothing : field(app, `/motion/wheelset/${way.member}`, way.label, way.unit, { factor: way.factor })}
+      ${type === 'wheelset' ? nothing : html`<div class="field"><label for="sideways">Sideways</label><select id="sideways" @change=${move}>
+        ${SIDEWAYS.map(({ member, label }) => html`<option value=${member} ?selected=${member === across.member}>${label}</option>`)}</select></div>`}
+      ${field(app, `/motion/wheelset/${across.member}`, across.label, across.unit, { factor: across.factor, empty: '0' })}</div>
+    <p class="hint">${turningNote(app, way?.member, Boolean(free), numberAt(given, '/free_rolling_radius_mm'))}</p>`;
 }
 
-/** How it moves across the track, in the form that the case has. @param {App} app */
-function acrossField(app) {
-  const forced = at(app.store.get().compose.document ?? {}, '/motion/wheelset/force_y_n') !== undefined;
-  return forced
-    ? field(app, '/motion/wheelset/force_y_n', 'Force across', 'kN', { factor: 1000 })
-    : field(app, '/motion/wheelset/lateral_velocity_mm_per_s', 'Lateral velocity', 'mm/s');
+/** What the rotation of the wheel means for its longitudinal force. @param {App} app @param {string | undefined} member @param {boolean} free @param {number} radius */
+function turningNote(app, member, free, radius) {
+  if (free) return 'The wheel turns so that the rails take no longitudinal force from it.';
+  if (member === 'force_x_n') return 'Force on the rail along the track: negative under a driven wheel, positive under a braked one.';
+  if (member !== 'free_rolling_radius_mm') return '';
+  const { document, checked } = app.store.get().compose;
+  const nominal = numberAt(document ?? undefined, '/contact/rolling_radius_mm');
+  const touch = checked?.understood?.placement?.first_touch;
+  if (!touch) return 'A difference of 0.1 % between this radius and that of the contact is a creepage of 0.1 %.';
+  const own = nominal + touch.wheel_mm[1];
+  return `The wheel touches at a radius of ${fixed(own, 2)} mm: the difference is a creepage of ${number(100 * (1 - own / radius), 2)} %, and pulls.`;
 }
 
 /** @param {App} app @param {JsonObject} sweep */
 function sweepFields(app, sweep) {
   return Object.entries(sweep).map(([key, range]) => {
+    if (key === 'speed_mm_per_s') return field(app, '/motion/sweep/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H });
     const component = COMPONENTS.find((known) => known.key === key);
     if (!component || !isObject(range) || 'values' in range) return html`<p class="hint">${key} = ${JSON.stringify(range)}</p>`;
     const { label, unit, factor } = component;
@@ -111,32 +156,46 @@ function sweepFields(app, sweep) {
   });
 }
 
+/** Another kind of motion. Damage and temperature are those of steady rolling. @param {App} app @param {string} kind @param {string} type */
+function chooseMotion(app, kind, type) {
+  const document = app.store.get().compose.document ?? {};
+  const next = put(document, '/motion', startMotion(kind, type, document.motion));
+  editDocument(app, kind === 'history' ? withoutExtras(next) : next);
+}
+
 /**
  * @param {string} kind
+ * @param {string} type That of the contact.
  * @param {JsonValue | undefined} before
  * @returns {JsonObject}
  */
-function startMotion(kind, before) {
-  if (kind === 'wheelset') return { wheelset: { speed_mm_per_s: 20000, free_rolling_radius_mm: 460 } };
+function startMotion(kind, type, before) {
+  if (kind === 'wheelset') return freeRolling(type);
   if (kind === 'history') return FIRST_HISTORY;
-  if (kind === 'sweep') return { sweep: { creepage_x: { from: 0, to: 0.006, points: 13 } } };
+  if (kind === 'sweep') return { sweep: { creepage_x: { from: 0, to: 0.006, points: 13 }, speed_mm_per_s: 20000 } };
   const first = Array.isArray(before) ? before[0] : before;
   const alone = isObject(first) && !('sweep' in first) && !('wheelset' in first) && !('history' in first);
-  return alone ? first : { creepage_x: 0.001, creepage_y: 0, spin_per_mm: 0 };
+  return alone ? first : ONE_MOTION;
 }
+
+const RESULTS = /** @type {const} */ ([
+  ['zones', 'stick and slip'], ['tractions', 'traction'], ['pressure', 'pressure'], ['slip', 'slip'],
+  ['damage', 'wear and fatigue'], ['subsurface', 'stress below the surface'], ['temperature', 'flash temperature'],
+]);
 
 /** @param {App} app @param {JsonObject} document */
 function answerFields(app, document) {
-  const outputs = Array.isArray(document.outputs) ? document.outputs.map(String) : ['resultants', 'zones'];
+  const outputs = outputsOf(document);
   const mesh = isObject(at(document, '/solver/mesh'));
-  const toggle = (/** @type {string} */ output, /** @type {boolean} */ on) =>
-    change(app, '/outputs', on ? [...outputs, output] : outputs.filter((name) => name !== output));
+  const fault = faultAt(app, '/outputs');
   return html`
-    <div class="checks" role="group" aria-label="Fields of the answer">${ALL_OUTPUTS.slice(1).map((output) => html`<label>
+    <div class="checks" role="group" aria-label="Results to compute">${RESULTS.map(([output, label]) => html`<label>
       <input type="checkbox" .checked=${outputs.includes(output)}
-        @change=${(/** @type {Event} */ event) => toggle(output, /** @type {HTMLInputElement} */ (event.target).checked)}> ${output}</label>`)}</div>
+        @change=${(/** @type {Event} */ event) => editDocument(app, withOutput(document, output, /** @type {HTMLInputElement} */ (event.target).checked))}> ${label}</label>`)}</div>
+    ${fault ? html`<p class="fault">${fault.detail}</p>` : nothing}
+    ${outputs.includes('damage') ? field(app, '/damage/parameters/shear_yield_mpa', 'Yield stress in shear, of the steel', 'MPa', { empty: '300' }) : nothing}
     <div class="pair">
-      ${mesh ? field(app, '/solver/mesh/strips', 'Strips', '') : field(app, '/solver/target_error', 'Target error', '% of μN', { factor: 0.01, empty: '0.5' })}
+      ${mesh ? field(app, '/solver/mesh/strips', 'Strips', '') : field(app, '/solver/target_error', 'Largest error', '% of μN', { factor: 0.01, empty: '0.5' })}
       ${mesh ? field(app, '/solver/mesh/cells', 'Cells of a strip', '') : field(app, '/name', 'Name', '', { text: true })}
     </div>
     ${Number.isFinite(numberAt(document, '/solver/time_limit_s')) ? field(app, '/solver/time_limit_s', 'Time limit', 's') : nothing}`;

@@ -10,12 +10,12 @@ import { faultAt, field } from './field.js';
 
 const STARTS = [['rest', 'Rest'], ['steady', 'Steady rolling'], ['pressed', 'Pressed together']];
 const COURSES = /** @type {const} */ ([
-  { key: 'creepage_x', label: 'Creepage along', unit: '%', factor: 0.01 },
-  { key: 'creepage_y', label: 'across', unit: '%', factor: 0.01 },
-  { key: 'force_x_n', label: 'or force along', unit: 'kN', factor: 1000 },
-  { key: 'force_y_n', label: 'or across', unit: 'kN', factor: 1000 },
-  { key: 'shift_x_mm', label: 'Shift along', unit: 'μm', factor: 0.001 },
-  { key: 'shift_y_mm', label: 'across', unit: 'μm', factor: 0.001 },
+  { key: 'creepage_x', label: 'Creepage x', unit: '%', factor: 0.01 },
+  { key: 'creepage_y', label: 'Creepage y', unit: '%', factor: 0.01 },
+  { key: 'force_x_n', label: 'or force Fx', unit: 'kN', factor: 1000 },
+  { key: 'force_y_n', label: 'or force Fy', unit: 'kN', factor: 1000 },
+  { key: 'shift_x_mm', label: 'Shift x', unit: 'μm', factor: 0.001 },
+  { key: 'shift_y_mm', label: 'Shift y', unit: 'μm', factor: 0.001 },
 ]);
 
 /** A history to begin with: a creepage that begins at once. */

@@ -81,7 +81,7 @@ function list(app) {
   return html`<div class="list" tabindex="0" role="group" aria-label="Jobs, newest first" @scroll=${scrolled}>
     ${spacer(first)}${rows.map((job) => row(app, job))}${spacer(after)}
     ${queue.loaded && !queue.jobs.length ? html`<p class="quiet pad">No jobs${queue.states.length ? ` that are ${queue.states.join(' or ')}` : ''}${queue.name ? ` with “${queue.name}” in their names` : ''}${queue.label ? ` with the label ${queue.label}` : ''}.
-      <a href="#/compose">Compose one.</a></p>` : nothing}
+      <a href="#/compose">Start one.</a></p>` : nothing}
     ${queue.loaded ? nothing : html`<p class="quiet pad">Loading …</p>`}
   </div>`;
 }

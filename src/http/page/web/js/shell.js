@@ -21,7 +21,7 @@ const KEY_ICON = html`<svg viewBox="0 0 20 20" width="17" height="17" fill="none
 /** @type {Record<View, (app: App) => unknown>} */
 const VIEWS = { compose, jobs: jobsView, result, compare: compareView, line: lineView, licences: licencesView };
 /** @type {Record<View, string>} */
-const TITLES = { compose: 'Compose', jobs: 'Jobs', result: 'Result', compare: 'Compare', line: 'Line', licences: 'Licences' };
+const TITLES = { compose: 'Contact', jobs: 'Jobs', result: 'Result', compare: 'Compare', line: 'Track', licences: 'Licences' };
 
 /** @param {App} app @param {HTMLElement} root */
 export function renderShell(app, root) {

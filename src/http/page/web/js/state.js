@@ -12,8 +12,10 @@
  * @typedef {object} Preview
  * A result while typing.
  * @property {string} digest Of the case that it belongs to.
- * @property {JobResult} result
- * @property {Field | null} field Of the first patch and motion, where the case asks for one.
+ * @property {JobResult | null} result Null if it could not be solved in a short time.
+ * @property {number} patch The one that carries most.
+ * @property {number} point
+ * @property {Field | null} field Of this patch and motion, where the case asks for one.
  */
 
 /**
@@ -25,6 +27,7 @@
  * @property {CheckedCase | null} checked What the service says of a sound case.
  * @property {{ type: unknown, of: NonNullable<CheckedCase['understood']> } | null} understood What the last sound case was understood as, by its
  *   kind of contact: the drawing stays while faults are being corrected.
+ * @property {{ body: 'rail' | 'wheel', line: readonly (readonly number[])[] | null } | null} lone The only cross-section of a case that lacks the other.
  * @property {readonly Fault[]} faults
  * @property {string} refusal Why it could not be checked, where that is no fault of the case.
  * @property {readonly import('./api.js').Schemas['ExampleCase'][]} examples Those of the service.
@@ -33,6 +36,7 @@
  * @property {boolean} solving
  * @property {boolean} live Solve while typing, where it costs milliseconds.
  * @property {Preview | null} preview
+ * @property {boolean} code Is the JSON unfolded?
  */
 
 /**
@@ -64,7 +68,7 @@ export const initialState = () => ({
   toast: '',
   turn: 0,
   compose: {
-    document: null, text: '', unreadable: '', typing: null, checked: null, understood: null, faults: [], refusal: '', examples: [], example: '', files: {}, solving: false,
-    live: true, preview: null,
+    document: null, text: '', unreadable: '', typing: null, checked: null, understood: null, lone: null, faults: [], refusal: '', examples: [], example: '', files: {}, solving: false,
+    live: true, preview: null, code: false,
   },
 });

@@ -50,3 +50,17 @@ export function parseList(written, factor) {
   if (items.length < 2) return parse(text, factor);
   return items.map((item) => parse(item, factor) ?? null);
 }
+
+/** An inclination as people write it: 1:40 for 0.025 rad. @param {JsonValue | undefined} value */
+export function inclinationText(value) {
+  if (typeof value !== 'number' || value === 0) return textOf(value);
+  const ratio = Number((1 / value).toPrecision(6));
+  return Number.isInteger(ratio) ? `${ratio < 0 ? '-' : ''}1:${Math.abs(ratio)}` : `${value}`;
+}
+
+/** The inclination in rad that was written as 1:40, 1/40, or in rad. @param {string} written */
+export function parseInclination(written) {
+  const ratio = /^\s*([-\u2212]?)\s*1\s*[:/]\s*(\d+(?:[.,]\d+)?)\s*$/.exec(written);
+  const steps = ratio ? Number(ratio[2].replace(',', '.')) : 0;
+  return ratio && steps > 0 ? (ratio[1] ? -1 : 1) * Number((1 / steps).toPrecision(12)) : parse(written);
+}

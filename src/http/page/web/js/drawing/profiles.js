@@ -56,6 +56,27 @@ export function drawProfiles(placed, standing) {
   </svg>`;
 }
 
+/**
+ * One cross-section alone.
+ * @param {'rail' | 'wheel'} body
+ * @param {readonly (readonly number[])[] | null} line In track axes; null if it could not be read.
+ */
+export function drawSection(body, line) {
+  if (!line) return html`<p class="quiet pad">The drawing appears when the ${body} can be read.</p>`;
+  const points = line.map(([y, z]) => /** @type {Point} */ ([y, z]));
+  const [ys, zs] = [points.map(([y]) => y), points.map(([, z]) => z)];
+  const [y0, y1, z0, z1] = [Math.min(...ys) - 10, Math.max(...ys) + 10, Math.min(...zs) - 12, Math.max(...zs) + 12];
+  const scale = WIDTH / (y1 - y0);
+  const height = (z1 - z0) * scale;
+  /** @type {(point: Point) => Point} */
+  const T = ([y, z]) => [(y1 - y) * scale, (z1 - z) * scale];
+  return html`<svg class="drawing" viewBox=${`0 0 ${WIDTH} ${height.toFixed(0)}`} role="img" aria-label=${`The ${body} alone, seen along rolling`}>
+    ${lattice([y0, y1], [z0, z1], T, height)}
+    <path class=${body} d=${closed(points.map(T), body === 'rail' ? height + 20 : -20)}/>
+    ${latticeNumbers([y0, y1], [z0, z1], T, height)}
+  </svg>`;
+}
+
 /** @param {readonly Point[]} line */
 const mean = (line) => (Math.min(...line.map(([y]) => y)) + Math.max(...line.map(([y]) => y))) / 2;
 

@@ -1,0 +1,50 @@
+// Remarks of the service: warnings first, notes folded, and what is said several times said once.
+
+import { html, nothing } from '../vendor/lit-html.js';
+
+/** @typedef {import('./api.js').Remark} Remark */
+/** @typedef {{ remark: Remark, patches: number[], points: number[] }} Group */
+/** @typedef {{ patch?: number, point?: number }} Place */
+
+/**
+ * Remarks with the same text but for their places, together.
+ * @param {readonly Remark[]} remarks
+ * @returns {Group[]}
+ */
+export function grouped(remarks) {
+  /** @type {Map<string, Group>} */
+  const groups = new Map();
+  for (const remark of remarks) {
+    const name = `${remark.code}\n${remark.pointer ?? ''}\n${remark.detail}`;
+    const group = groups.get(name) ?? { remark, patches: [], points: [] };
+    groups.set(name, group);
+    if (typeof remark.patch === 'number' && !group.patches.includes(remark.patch)) group.patches.push(remark.patch);
+    if (typeof remark.point === 'number' && !group.points.includes(remark.point)) group.points.push(remark.point);
+  }
+  return [...groups.values()];
+}
+
+/**
+ * Warnings in sight, notes folded.
+ * @param {readonly Remark[]} remarks
+ * @param {(place: Place) => void} [go] To the patch or motion that a remark is about.
+ */
+export function remarkList(remarks, go) {
+  const groups = grouped(remarks);
+  const warnings = groups.filter(({ remark }) => remark.severity === 'warning');
+  const notes = groups.filter(({ remark }) => remark.severity !== 'warning');
+  if (!groups.length) return nothing;
+  return html`<div class="remarks">${warnings.map((group) => entry(group, go))}
+    ${notes.length ? html`<details class="notes"><summary>${notes.length === 1 ? '1 note' : `${notes.length} notes`}</summary>${notes.map((group) => entry(group, go))}</details>` : nothing}</div>`;
+}
+
+/** @param {Group} group @param {((place: Place) => void) | undefined} go */
+function entry({ remark, patches, points }, go) {
+  const places = [
+    ...patches.map((patch) => ({ label: `patch ${patch}`, place: { patch } })),
+    ...points.map((point) => ({ label: `motion ${point + 1}`, place: { point } })),
+  ];
+  return html`<p class=${`remark ${remark.severity}`} data-code=${remark.code}>
+    ${go ? places.map(({ label, place }) => html`<button class="small" @click=${() => go(place)}>${label}</button> `) : nothing}
+    ${remark.pointer ? html`<code>${remark.pointer}</code> ` : nothing}${remark.detail}</p>`;
+}

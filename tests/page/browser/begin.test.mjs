@@ -1,0 +1,109 @@
+// Where a rail engineer begins: the first screen, files in odd forms, and what is set for a wheel on a rail.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { dropFiles, OUTPUT, setUp } from './harness.mjs';
+
+const { service, onPage } = setUp();
+
+/** A file that no example of the service has. @param {string} name */
+const file = (name) => readFileSync(new URL(`../data/${name}`, import.meta.url), 'utf8');
+/** @param {import('playwright-core').Page} page */
+const json = async (page) => JSON.parse(await page.locator('.code textarea').inputValue());
+/** @param {import('playwright-core').Page} page */
+const ready = (page) => page.locator('.verdict .checked').waitFor();
+/** @param {import('playwright-core').Page} page @param {string} name */
+const titled = (page, name) => page.waitForFunction((title) => document.querySelector('#h-drawing')?.textContent === title, name);
+
+test('the first screen says what it is for, asks for two files, and shows a result of a service that has solved nothing', () => onPage('', async (page) => {
+  await page.getByRole('heading', { level: 1, name: 'Wheel–rail contact' }).waitFor();
+  await page.getByText('Find where a wheel and a rail touch').waitFor();
+  await page.getByText('Drop a rail and a wheel profile').waitFor();
+  await page.locator('.preview dd').first().waitFor();
+  const shown = await page.locator('.preview').innerText();
+  for (const name of ['Q', 'Y, outward', 'Y/Q, Nadal', 'pmax']) assert.ok(shown.replace(/\s+/g, ' ').includes(name), `${name} in ${shown}`);
+  assert.equal(await page.locator('.code textarea').isVisible(), false, 'JSON is folded');
+  assert.equal(await page.locator('.segs[aria-label="Kind of contact"] .seg').first().innerText(), 'Profiles');
+  assert.doesNotMatch(await page.locator('body').innerText(), /\bSound\b|\bMB\b|approach/);
+  await page.screenshot({ path: join(OUTPUT, 'first.png') });
+}));
+
+test('an inclination is written as 1:40, and free rolling is the motion of files', () => onPage('', async (page) => {
+  await ready(page);
+  await dropFiles(page, '.drop.big', { 'own.ban': file('words-behind.ban'), 'own.whl': file('worn-wheel.whl') });
+  await titled(page, 'own on own');
+  await ready(page);
+  const inclination = page.getByLabel('Rail inclination');
+  assert.equal(await inclination.inputValue(), '1:40');
+  await inclination.fill('1:20');
+  assert.equal((await json(page)).contact.cant_rad, 0.05);
+  await inclination.fill('0,025');
+  await inclination.blur();
+  assert.equal(await inclination.inputValue(), '1:40');
+  assert.deepEqual((await json(page)).motion, { wheelset: { speed_mm_per_s: 20000, force_x_n: 0 } });
+  await page.getByLabel('Rotation').selectOption('free_rolling_radius_mm');
+  await page.getByText(/The wheel touches at a radius of \d+\.\d+ mm: the difference is a creepage/).waitFor();
+  await page.getByLabel('Rotation').selectOption('force_x_n');
+  await page.locator('#field-motion-wheelset-force_x_n').fill('0.5');
+  assert.equal((await json(page)).motion.wheelset.force_x_n, 500);
+  await page.locator('#field-contact-yaw_rad').fill('5');
+  await page.locator('#field-contact-roll_rad').fill('1');
+  await page.getByLabel('Track gauge').fill('1437');
+  await page.getByLabel('measured below the top').fill('16');
+  await page.getByLabel('Flange back distance').fill('1359');
+  const { contact } = await json(page);
+  assert.deepEqual([contact.yaw_rad, contact.roll_rad, contact.gauge_mm, contact.gauge_height_mm, contact.flange_back_distance_mm], [0.005, 0.001, 1437, 16, 1359]);
+  await ready(page);
+}));
+
+test('what was found in a file is shown and can be set otherwise: flange back, senses, smoothing, unit', () => onPage('', async (page) => {
+  await ready(page);
+  await dropFiles(page, 'main', { 'rail.prr': file('percent.prr'), 'wheel.txt': file('flange-at-0.txt') });
+  await titled(page, 'wheel on rail');
+  await page.getByText('0.000100 mm was found in the wheel file').or(page.getByText(/^0(\.0+)? mm was found in the wheel file$/)).waitFor();
+  await page.locator('#field-contact-flange_back_position_mm').fill('-70');
+  await page.locator('.verdict .warn, .verdict .fault').first().waitFor();
+  await page.locator('#field-contact-flange_back_position_mm').fill('');
+  await ready(page);
+  await page.getByText('How the wheel is read').click();
+  const wheel = page.locator('details.reading').filter({ hasText: 'How the wheel' });
+  await wheel.getByLabel('y is positive').selectOption('to the track centre');
+  assert.equal((await json(page)).contact.wheel.mirror_y, true);
+  await page.locator('.verdict .warn, .verdict .fault').first().waitFor();
+  await wheel.getByLabel('y is positive').selectOption({ index: 0 });
+  await ready(page);
+  await wheel.getByLabel('Smoothing').fill('auto');
+  await wheel.getByLabel('Unit').selectOption('mm');
+  assert.deepEqual([(await json(page)).contact.wheel.smoothing_mm, (await json(page)).contact.wheel.unit], ['auto', 'mm']);
+  await ready(page);
+}));
+
+test('a file alone is drawn, and a new counterpart is one click away', () => onPage('', async (page) => {
+  await ready(page);
+  await dropFiles(page, 'main', { 'old-header.whl': file('old-header.whl') });
+  await page.locator('svg[aria-label="The wheel alone, seen along rolling"] .wheel').waitFor();
+  await page.getByText('Next: the file of the rail.').waitFor();
+  await page.screenshot({ path: join(OUTPUT, 'lone.png') });
+  await page.getByRole('button', { name: 'Use a new 60E1 rail' }).click();
+  await page.locator('svg[aria-label^="Wheel on rail"]').waitFor();
+  await ready(page);
+}));
+
+test('a file that is not understood is shown with the line at fault, with and without its counterpart', () => onPage('', async (page) => {
+  await ready(page);
+  const lines = file('flange-at-0.txt').split('\n');
+  lines[40] = lines[40].replace(/(\d)(\s)/, '$1x$2');
+  for (const files of [{ 'wheel.txt': lines.join('\n') }, { 'wheel.txt': lines.join('\n'), 'rail.prr': file('percent.prr') }]) {
+    await dropFiles(page, 'main', files);
+    const line = page.locator('.excerpt .at-fault');
+    await line.waitFor();
+    assert.equal((await line.innerText()).trim(), lines[40].trim());
+    assert.match(await page.locator('.excerpt figcaption').innerText(), /wheel\.txt/);
+    assert.equal(await page.locator('.excerpt ol').getAttribute('start'), '39');
+  }
+  await page.screenshot({ path: join(OUTPUT, 'fault-line.png') });
+  await dropFiles(page, 'main', { 'elsewhere.prr': file('elsewhere.prr'), 'wheel.txt': file('flange-at-0.txt') });
+  await page.locator('.faults').getByText('the points are in another file, rail.dat').waitFor();
+  assert.equal((await service.ask('/v1/jobs?limit=100')).jobs.filter((/** @type {{ labels: Record<string, string> }} */ job) => !job.labels['railhead-page']).length, 0);
+}));
