@@ -59,7 +59,7 @@ test('the colours of the map are those of the values', () => onPage('', async (p
   const { id, result } = await service.solved(withFields('spin'));
   await page.goto(`${service.base}/#/jobs/${id}`);
   await drawn(page);
-  for (const drawnOver of ['arrows', 'stick border']) await page.getByLabel(drawnOver).uncheck();
+  for (const drawnOver of ['arrows', 'stick–slip line']) await page.getByLabel(drawnOver).uncheck();
   await page.waitForTimeout(60);
   const { cells } = await service.ask(`/v1/jobs/${id}/tractions?patch=0&point=0`);
   const bound = example('spin').friction.coefficient * result.patches[0].pressure_max_mpa;
@@ -205,6 +205,8 @@ test('two patches have one scale of colours, and stand on the profiles', () => o
   await page.goto(`${service.base}/#/jobs/${id}`);
   await drawn(page);
   await drawn(page, '.thumbs label:last-child field-map');
+  await page.getByLabel('scale').selectOption('common');
+  await page.waitForTimeout(100);
   const ranges = await page.locator('field-map').evaluateAll((maps) => maps.map((map) => /** @type {HTMLElement & { shown: { range: number[] } }} */ (map).shown.range));
   assert.equal(ranges.length, 3);
   for (const range of ranges) assert.deepEqual(range, ranges[0]);
@@ -242,7 +244,7 @@ test('colours can be those of cividis, and stay so', () => onPage('#/compose', a
   await drawn(page);
   const picture = () => page.locator('field-map.main canvas').first().evaluate((canvas) => /** @type {HTMLCanvasElement} */ (canvas).toDataURL());
   const viridis = await picture();
-  await page.locator('select.slim').selectOption('cividis');
+  await page.getByLabel('colours').selectOption('cividis');
   const cividis = await picture();
   assert.notEqual(cividis, viridis);
   await page.reload();

@@ -120,6 +120,9 @@ export const result = (id) => json(`/v1/jobs/${id}/result`);
 /** @type {(id: string) => Promise<JsonObject>} */
 export const caseOf = (id) => json(`/v1/jobs/${id}/case`);
 
+/** @type {(id: string, patch: number, point: number) => Promise<Schemas['Stresses']>} */
+export const stresses = (id, patch, point) => json(`/v1/jobs/${id}/subsurface?patch=${patch}&point=${point}`);
+
 /** @typedef {{ state?: readonly string[], batch?: string, label?: string, name?: string, fields?: string, cursor?: string, limit?: number }} Filter */
 /** @typedef {Omit<Schemas['JobPage'], 'jobs'> & { jobs: Job[] }} JobPage With all members of the jobs that are asked for. */
 

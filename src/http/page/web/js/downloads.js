@@ -14,6 +14,7 @@ const PARTS = {
   traction_x: { part: 'tractions', plot: 'traction' },
   traction_y: { part: 'tractions', plot: 'traction' },
   slip: { part: 'slip', plot: 'slip' },
+  temperature: { part: 'temperature', plot: 'temperature' },
   zones: { part: 'zones', plot: 'zones' },
 };
 const TABLES = ['csv', 'npz', 'vtk'];

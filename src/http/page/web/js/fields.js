@@ -20,12 +20,13 @@ import { readNpz } from './npz.js';
  * @property {number[]} [traction_y_mpa]
  * @property {number[]} [slip_x]
  * @property {number[]} [slip_y]
+ * @property {number[]} [temperature_c]
  */
 
 /** @typedef {{ cells: Cells, border: Loop[] | null }} Field */
 
 /** Parts of a result that are fields, by the name of the output that a case asks for. */
-const PARTS = ['pressure', 'tractions', 'slip', 'zones'];
+const PARTS = ['pressure', 'tractions', 'slip', 'zones', 'temperature'];
 /** Cells beyond which arrays are loaded instead of text. */
 const TEXT_CELLS_MAX = 4000;
 

@@ -1,12 +1,14 @@
 // The result that is being looked at: what is loaded of it, and which part is chosen.
 
-import { caseOf, checkCase, job as jobOf, Refused, result as resultOf } from './api.js';
+import { caseOf, checkCase, job as jobOf, Refused, result as resultOf, stresses as stressesOf } from './api.js';
 import { follow } from './events.js';
 import { at, numberAt } from './document.js';
 import { hasFields, loadField } from './fields.js';
 import { offered, quantityOf, rangeOf } from './field/quantities.js';
 import { placed } from './placing.js';
 import { formatRoute } from './routes.js';
+import { hasSections } from './starts.js';
+import { flangeAngle, oneWheel, sideOf } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./api.js').Job} Job */
@@ -14,6 +16,7 @@ import { formatRoute } from './routes.js';
 /** @typedef {import('./api.js').Point} Point */
 /** @typedef {import('./document.js').JsonObject} JsonObject */
 /** @typedef {import('./fields.js').Field} Field */
+/** @typedef {import('./api.js').Schemas['Stresses']} Stresses */
 /** @typedef {import('./field/quantities.js').Quantity} Quantity */
 
 /**
@@ -25,6 +28,10 @@ import { formatRoute } from './routes.js';
  * @property {import('./placing.js').Placed | null} placed Its cross-sections.
  * @property {Map<string, Promise<Field>>} asked Fields by patch and motion.
  * @property {(Field | undefined)[]} fields Those of the chosen motion, by patch.
+ * @property {Map<string, Stresses | null>} stresses Below the surface, by patch and motion; null while they are being loaded.
+ * @property {Partial<Record<'left' | 'right', number>>} flange Angle of the flange of each wheel in rad, where it has one.
+ * @property {'rail' | 'wheel'} wornBody On which cross-section wear is shown.
+ * @property {boolean} ownScale Colours of one patch and motion alone, not one range for all.
  * @property {number} patch
  * @property {number} point
  * @property {string} quantity Its key; empty if there is no field.
@@ -51,7 +58,7 @@ export function tellingPoint(points) {
 
 /** @param {Job} job @returns {Looked} */
 const fresh = (job) => ({
-  job, result: null, document: null, placed: null, asked: new Map(), fields: [], patch: 0, point: -1, quantity: '',
+  job, result: null, document: null, placed: null, asked: new Map(), fields: [], stresses: new Map(), flange: {}, wornBody: 'rail', ownScale: true, patch: 0, point: -1, quantity: '',
   held: null, border: true, arrows: true, mesh: false, curve: 'forces', wheelset: 'radii',
 });
 
@@ -147,13 +154,38 @@ function show(app, result) {
   loadFields(app).catch(app.refused);
 }
 
-/** Asks where the cross-sections of the case lie. @param {App} app */
+/** Asks where the cross-sections of the case lie, and how steep the flanges are. @param {App} app */
 async function placeProfiles(app) {
   const mine = looked;
-  if (!mine?.document || at(mine.document, '/contact/type') !== 'profiles') return;
-  const checked = await checkCase(JSON.stringify(mine.document), new AbortController().signal);
-  mine.placed = placed(checked.understood?.placement);
+  if (!mine?.document) return;
+  const type = at(mine.document, '/contact/type');
+  if (!hasSections(type)) return;
+  const { document, result } = mine;
+  const shift = result?.wheelset?.positions[0]?.lateral_shift_mm ?? 0;
+  const sides = type === 'profiles' ? [sideOf(document)] : /** @type {const} */ (['left', 'right']);
+  await Promise.all(sides.map(async (side) => {
+    const checked = await checkCase(JSON.stringify(oneWheel(document, side, shift)), new AbortController().signal);
+    const here = placed(checked.understood?.placement);
+    if (!here) return;
+    const angle = flangeAngle(here.wheel, side);
+    if (Number.isFinite(angle)) mine.flange[side] = angle;
+    if (type === 'profiles') mine.placed = here;
+  }));
   if (looked === mine) app.redraw();
+}
+
+/** The stresses below a patch for the chosen motion; asked for when they are first needed. @param {App} app @param {Looked} of @param {number} patch */
+export function stressesBelow(app, of, patch) {
+  const { job, point, result } = of;
+  const name = `${patch}/${point}`;
+  if (!of.stresses.has(name) && result && 'subsurface' in result.links) {
+    of.stresses.set(name, null);
+    stressesOf(job.id, patch, point).then((stresses) => {
+      of.stresses.set(name, stresses);
+      app.redraw();
+    }, app.refused);
+  }
+  return of.stresses.get(name) ?? null;
 }
 
 /** Loads the fields of all patches of the chosen motion. @param {App} app */
@@ -201,8 +233,10 @@ export function rememberView(app) {
 /** What friction bounds: its coefficient, NaN where the case has another law. @param {Looked} of */
 export const frictionOf = ({ document }) => numberAt(document ?? undefined, '/friction/coefficient');
 
-/** One range of colours for all patches and motions. @param {Looked} of @param {Quantity} quantity */
-export function sharedRange(of, quantity) {
+/** The range of colours: of the chosen patch and motion alone, or one for all of them. @param {Looked} of @param {Quantity} quantity */
+export function rangeShown(of, quantity) {
+  const own = of.fields[of.patch];
+  if (of.ownScale && own) return rangeOf(quantity, [own.cells], NaN);
   const pressure = Math.max(...(of.result?.patches ?? []).map((patch) => patch.pressure_max_mpa));
   const bound = quantity.bounded ? frictionOf(of) * pressure : NaN;
   const cells = of.fields.flatMap((field) => (field ? [field.cells] : []));

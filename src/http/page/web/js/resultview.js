@@ -3,20 +3,23 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { cancel } from './api.js';
 import { curveOf, isHistory } from './curvedata.js';
-import { put } from './document.js';
+import { isObject } from './document.js';
+import { damagePanel } from './damageview.js';
 import { downloads } from './downloads.js';
 import { drawProfiles } from './drawing/profiles.js';
 import { editDocument, solve } from './editing.js';
-import { inOrder, withFields } from './starts.js';
+import { loadsPanel } from './loadsview.js';
+import { remarkList } from './remarks.js';
+import { inOrder, withEverything, withFields, withSpeed } from './starts.js';
 import { indexOf } from './field/cells.js';
 import { hasFields } from './fields.js';
 import { chooseAmounts, chosenAmounts } from './field/palette.js';
 import { offered, quantityOf } from './field/quantities.js';
 import { FieldMap } from './fieldmap.js';
 import { count, degrees, number, seconds, withError } from './format.js';
-import { choose, frictionOf, lookedAt, rememberView, sharedRange } from './result.js';
+import { choose, frictionOf, lookedAt, rememberView, rangeShown } from './result.js';
 import { formatRoute } from './routes.js';
-import { positionOf, wheelsetPanel } from './wheelsetview.js';
+import { wheelsetPanel } from './wheelsetview.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./result.js').Looked} Looked */
@@ -77,8 +80,8 @@ function loaded(app, looked, answer) {
   const point = patch.points[looked.point];
   const mapped = hasFields(answer);
   return html`
-    ${remarks(app, answer)}
     ${figures(looked, patch, point)}
+    ${remarkList(answer.remarks ?? [], (place) => choose(app, place))}
     <div class=${mapped ? 'cols' : 'cols nofield'}>
       ${mapped ? fieldPanel(app, looked, answer) : html`<section class="panel wait"><p>The case asked for no fields, so there is no map.</p>
         <button class="primary" @click=${() => again(app, looked)}>Solve again with fields</button></section>`}
@@ -86,30 +89,20 @@ function loaded(app, looked, answer) {
         ${looked.placed && patch.position ? profilePanel(app, looked, answer) : nothing}
         ${answer.wheelset ? wheelsetPanel(app, looked, answer.wheelset) : nothing}
         ${patch.points.length > 2 ? curvePanel(app, looked, patch) : nothing}
-        ${answer.patches.length > 1 ? totalPanel(answer, looked.point, looked.patch) : nothing}
+        ${loadsPanel(app, looked, answer)}
+        ${answer.patches.length > 1 && !patch.position ? totalPanel(answer, looked.point) : nothing}
         ${factsPanel(answer, patch, point)}
       </div>
-    </div>`;
+    </div>
+    ${damagePanel(app, looked, answer, () => again(app, looked))}`;
 }
 
 /** @param {App} app @param {Looked} looked */
 function again(app, looked) {
   if (!looked.document) return;
-  editDocument(app, put(looked.document, '/outputs', withFields(looked.document.outputs)));
+  editDocument(app, isObject(looked.document.motion) && 'history' in looked.document.motion
+    ? { ...looked.document, outputs: withFields(looked.document.outputs) } : withEverything(withSpeed(looked.document)));
   solve(app);
-}
-
-/** Remarks of the whole, of the chosen patch and of the chosen motion; others lead to where they belong.
- * @param {App} app @param {JobResult} answer */
-function remarks(app, answer) {
-  return (answer.remarks ?? []).map((remark) => {
-    const place = [];
-    if (typeof remark.patch === 'number') place.push({ patch: remark.patch, label: `patch ${remark.patch}` });
-    if (typeof remark.point === 'number') place.push({ point: remark.point, label: `motion ${remark.point + 1}` });
-    return html`<p class=${`remark ${remark.severity}`} data-code=${remark.code}>
-      ${place.map(({ label, ...choice }) => html`<button class="small" @click=${() => choose(app, choice)}>${label}</button>`)}
-      ${remark.pointer ? html`<code>${remark.pointer}</code>` : nothing} ${remark.detail}</p>`;
-  });
 }
 
 /** @param {Looked} looked @param {Patch} patch @param {Point} point */
@@ -124,16 +117,16 @@ function figures(looked, patch, point) {
   const share = typeof point.stick_area_mm2 === 'number' ? point.stick_area_mm2 / patch.area_mm2 : NaN;
   const used = (100 * Math.hypot(point.force_x_n, point.force_y_n)) / (friction * patch.normal_force_n);
   return html`<dl class="figures" tabindex="0" aria-label="Numbers of the chosen patch and motion; forces on the rail">
-    ${figure(html`F<sub>x</sub> along`, point.force_x_n / 1000, 'kN', errors && errors.force_x_n / 1000)}
-    ${figure(html`F<sub>y</sub> across`, point.force_y_n / 1000, 'kN', errors && errors.force_y_n / 1000)}
-    ${figure(html`M<sub>z</sub> moment`, point.moment_z_n_mm / 1000, 'N·m', errors && errors.moment_z_n_mm / 1000)}
-    ${figure(html`N normal`, patch.normal_force_n / 1000, 'kN', undefined)}
-    ${figure(html`p<sub>max</sub> pressure`, patch.pressure_max_mpa, 'MPa', point.profile_uncertainty?.pressure_max_mpa ?? undefined)}
+    ${figure(html`F<sub>x</sub>`, point.force_x_n / 1000, 'kN', errors && errors.force_x_n / 1000)}
+    ${figure(html`F<sub>y</sub>`, point.force_y_n / 1000, 'kN', errors && errors.force_y_n / 1000)}
+    ${figure(html`M<sub>z</sub>`, point.moment_z_n_mm / 1000, 'N·m', errors && errors.moment_z_n_mm / 1000)}
+    ${figure(html`N`, patch.normal_force_n / 1000, 'kN', undefined)}
+    ${figure(html`p<sub>max</sub>`, patch.pressure_max_mpa, 'MPa', point.profile_uncertainty?.pressure_max_mpa ?? undefined)}
     ${figure('area', patch.area_mm2, 'mm²', undefined)}
     ${Number.isFinite(used) ? html`<div class="figure-of"><dt>friction used</dt><dd><b>${number(used, 3)}</b><span class="unit"> % of μN</span></dd></div>` : nothing}
     ${Number.isFinite(share) ? html`<div class="figure-of"><dt>stick</dt><dd><b>${number(100 * share, 3)}</b><span class="unit"> % of the area</span></dd>
       <svg class="share" viewBox="0 0 100 5" preserveAspectRatio="none" aria-hidden="true"><rect class="slip" width="100" height="5"/><rect class="stick" width=${100 * share} height="5"/></svg></div>` : nothing}
-    ${figure('Tγ friction power', point.friction_power_n, 'J/m', undefined)}
+    ${figure('Tγ, friction power', point.friction_power_n, 'J/m', undefined)}
   </dl>`;
 }
 
@@ -142,9 +135,9 @@ function fieldPanel(app, looked, answer) {
   const field = looked.fields[looked.patch];
   const all = field ? offered(field.cells) : [];
   const quantity = quantityOf(looked.quantity);
-  const toggles = /** @type {const} */ ([['border', 'stick border'], ['arrows', 'arrows'], ['mesh', 'cells']]);
+  const toggles = /** @type {const} */ ([['border', 'stick–slip line'], ['arrows', 'arrows'], ['mesh', 'cells']]);
   const shown = field && quantity && all.includes(quantity) ? {
-    field, quantity, range: sharedRange(looked, quantity), friction: frictionOf(looked), border: looked.border, arrows: looked.arrows,
+    field, quantity, range: rangeShown(looked, quantity), friction: frictionOf(looked), border: looked.border, arrows: looked.arrows,
     mesh: looked.mesh, held: looked.held, name: `${quantity.heading} of patch ${looked.patch}`,
   } : null;
   const moved = (/** @type {CrosshairEvent} */ { detail: { x, y, held } }) => {
@@ -157,12 +150,20 @@ function fieldPanel(app, looked, answer) {
         <input type="radio" name="quantity" .checked=${looked.quantity === key} @change=${() => choose(app, { quantity: key })}><span>${label}</span></label>`)}</div>
       <div class="toggles">${toggles.map(([key, label]) => html`<label><input type="checkbox" .checked=${looked[key]}
         @change=${(/** @type {Event} */ event) => choose(app, { [key]: /** @type {HTMLInputElement} */ (event.target).checked })}> ${label}</label>`)}
-        ${colourChoice()}</div>
+        ${scaleChoice(app, looked, answer)}${colourChoice()}</div>
     </header>
     ${answer.patches.length > 1 ? thumbnails(app, looked, answer) : nothing}
     ${shown ? html`<field-map class="main" .shown=${shown} @crosshair=${moved}></field-map>` : html`<p class="pad quiet">Loading the field …</p>`}
     ${field ? cellTable(field) : nothing}
   </section>`;
+}
+
+/** Colours of the chosen patch and motion alone, or one range for all, which ends at the largest μp. @param {App} app @param {Looked} looked @param {JobResult} answer */
+function scaleChoice(app, looked, answer) {
+  const bounded = quantityOf(looked.quantity)?.bounded;
+  if (!bounded && answer.patches.length < 2 && answer.patches[0].points.length < 2) return nothing;
+  return html`<label>scale <select class="slim" @change=${(/** @type {Event} */ event) => choose(app, { ownScale: /** @type {HTMLSelectElement} */ (event.target).value === 'own' })}>
+    <option value="own" ?selected=${looked.ownScale}>own</option><option value="common" ?selected=${!looked.ownScale}>common${bounded ? ', to μp' : ''}</option></select></label>`;
 }
 
 /** Two maps of amounts, both for every kind of colour vision. */
@@ -181,7 +182,7 @@ function thumbnails(app, looked, answer) {
   const widest = Math.max(...indices.map((index) => (index ? Math.max(index.x1 - index.x0, 1.6 * (index.y1 - index.y0)) : 1)));
   return html`<div class="segs thumbs" role="group" aria-label="Patch">${answer.patches.map((patch, at) => {
     const field = looked.fields[at];
-    const shown = field && quantity ? { field, quantity, range: sharedRange(looked, quantity), friction: frictionOf(looked), border: true, scale: 124 / widest } : null;
+    const shown = field && quantity ? { field, quantity, range: rangeShown(looked, quantity), friction: frictionOf(looked), border: true, scale: 124 / widest } : null;
     const angle = patch.position ? ` · ${degrees(patch.position.contact_angle_rad)}` : '';
     const warned = (answer.remarks ?? []).some((remark) => remark.patch === at && remark.severity === 'warning');
     return html`<label class="seg thumb"><input type="radio" name="patch" .checked=${looked.patch === at} @change=${() => choose(app, { patch: at })}>
@@ -229,7 +230,7 @@ function profilePanel(app, looked, answer) {
     choose: (/** @type {number} */ patch) => choose(app, { patch }),
   };
   return html`<section class="panel" aria-labelledby="h-profiles"><header class="bar"><h2 id="h-profiles">On the profiles</h2>
-    <span class="hint">${standing.combs[0] ? 'pressure stands on the rail' : ''}</span></header>
+    <span class="hint">${standing.combs[0] ? 'with the pressure on the rail' : ''}</span></header>
     <div class="figure">${drawProfiles(looked.placed, standing)}</div></section>`;
 }
 
@@ -264,39 +265,37 @@ function curvePanel(app, looked, patch) {
 /** @param {unknown} label @param {unknown} value */
 const row = (label, value) => html`<div><dt>${label}</dt><dd>${value}</dd></div>`;
 
-/** The sum of all patches. @param {JobResult} answer @param {number} point @param {number} patch */
-function totalPanel(answer, point, patch) {
-  const total = answer.total[answer.wheelset ? positionOf(answer.wheelset, patch) : point];
+/** The sum of patches that have no place in a track. @param {JobResult} answer @param {number} point */
+function totalPanel(answer, point) {
+  const total = answer.total[point];
   if (!total) return nothing;
   const errors = total.error_estimate;
   const force = (/** @type {number} */ value, /** @type {number | undefined} */ error) => {
     const text = withError(value / 1000, error && error / 1000);
     return text.error ? `${text.value} ± ${text.error}` : text.value;
   };
-  return html`<section class="panel" aria-labelledby="h-total"><header class="bar"><h2 id="h-total">All patches together</h2>
-    <span class="hint">${answer.patches[0].position ? 'track axes, with the normal forces' : ''}</span></header><dl class="table">
-    ${row('along', `${force(total.force_x_n, errors?.force_x_n)} kN`)}${row('to the left', `${force(total.force_y_n, errors?.force_y_n)} kN`)}
-    ${typeof total.force_z_n === 'number' ? row('up', `${number(total.force_z_n / 1000)} kN`) : nothing}
-    ${row('moment', `${force(total.moment_z_n_mm, errors?.moment_z_n_mm)} N·m`)}</dl></section>`;
+  return html`<section class="panel" aria-labelledby="h-total"><header class="bar"><h2 id="h-total">All patches together</h2></header><dl class="table">
+    ${row(html`F<sub>x</sub>`, `${force(total.force_x_n, errors?.force_x_n)} kN`)}${row(html`F<sub>y</sub>`, `${force(total.force_y_n, errors?.force_y_n)} kN`)}
+    ${row(html`M<sub>z</sub>`, `${force(total.moment_z_n_mm, errors?.moment_z_n_mm)} N·m`)}</dl></section>`;
 }
 
 /** @param {JobResult} answer @param {Patch} patch @param {Point} point */
 function factsPanel(answer, patch, point) {
   const { motion, solver, history } = point;
   const { position } = patch;
-  return html`<section class="panel facts" aria-labelledby="h-facts"><header class="bar"><h2 id="h-facts">How it was computed</h2></header><dl class="table">
-    ${row('creepage along, across', `${number(100 * (motion.creepage_x ?? 0))} %, ${number(100 * (motion.creepage_y ?? 0))} %`)}
+  return html`<details class="panel facts"><summary class="bar"><h2>How it was computed</h2></summary><dl class="table">
+    ${row('creepage x, y', `${number(100 * (motion.creepage_x ?? 0))} %, ${number(100 * (motion.creepage_y ?? 0))} %`)}
     ${row('spin', `${number(1000 * (motion.spin_per_mm ?? 0))} 1/m`)}
     ${history ? row('rolled, dissipated since the start', `${number(history.distance_mm)} mm, ${number(history.dissipated_n_mm / 1000)} J`) : nothing}
-    ${typeof history?.shift_x_mm === 'number' ? row('shifted along, across', `${number(1000 * history.shift_x_mm)} μm, ${number(1000 * (history.shift_y_mm ?? 0))} μm`) : nothing}
+    ${typeof history?.shift_x_mm === 'number' ? row('shifted in x, y', `${number(1000 * history.shift_x_mm)} μm, ${number(1000 * (history.shift_y_mm ?? 0))} μm`) : nothing}
     ${patch.semi_axes_mm ? row('semi-axes', `${patch.semi_axes_mm.map((axis) => number(axis)).join(' × ')} mm`) : nothing}
-    ${typeof patch.approach_mm === 'number' ? row('approach', `${number(1000 * patch.approach_mm)} μm`) : nothing}
+    ${typeof patch.approach_mm === 'number' ? row('penetration', `${number(1000 * patch.approach_mm)} μm`) : nothing}
     ${position ? row('contact angle, rolling radius', `${degrees(position.contact_angle_rad)}, ${number(position.rolling_radius_mm)} mm`) : nothing}
     ${typeof point.traction_max_mpa === 'number' ? row('largest traction', `${number(point.traction_max_mpa)} MPa`) : nothing}
     ${row('method', `${solver.method.replaceAll('_', ' ')}${solver.mesh ? `, ${solver.mesh.strips} × ${solver.mesh.cells} cells` : ''}`)}
     ${typeof solver.iterations === 'number' ? row('iterations', `${solver.iterations}, residual ${number(solver.residual, 2)}`) : nothing}
     ${row('time', `${seconds(solver.seconds)}${answer.cached ? ' (solved before)' : ''}`)}
     ${row('target', point.target_met === true ? 'met' : point.target_met === false ? 'not met' : 'none')}
-    ${row('version', answer.solver_version)}</dl></section>`;
+    ${row('version', answer.solver_version)}</dl></details>`;
 }
 

@@ -132,6 +132,13 @@ const withExtras = (document, wanted) => Object.keys(EXTRAS).reduce((/** @type {
 /** A case that asks for all that is drawn: fields, damage, stresses below the surface, temperature. @param {JsonObject} document */
 export const withEverything = (document) => withExtras({ ...document, outputs: withFields(document.outputs) }, true);
 
+/** A case with a speed, which temperature and Archard's wear need; lists of motions have theirs. @param {JsonObject} document @returns {JsonObject} */
+export function withSpeed(document) {
+  const { motion } = document;
+  if (!isObject(motion) || 'wheelset' in motion || 'history' in motion) return document;
+  return { ...document, motion: isObject(motion.sweep) ? { ...motion, sweep: { ...SPEED, ...motion.sweep } } : { ...SPEED, ...motion } };
+}
+
 /** A case that asks for fields only. @param {JsonObject} document */
 export const withoutExtras = (document) => withExtras(document, false);
 

@@ -46,3 +46,60 @@ export function grid(axes, labels) {
       <text x="4" y=${top - 8} class="strong">${labels.y}</text>
     </g>`;
 }
+
+/**
+ * @typedef {object} ChartLine
+ * @property {string} label
+ * @property {string} look Its class: `one`, `two`, `three` or `limit`.
+ * @property {readonly Point[]} points
+ */
+
+/**
+ * @typedef {object} Chart
+ * @property {string} name What it shows, for those who do not see it.
+ * @property {string} x
+ * @property {string} y
+ * @property {readonly ChartLine[]} lines
+ * @property {readonly [number, number]} [xRange]
+ * @property {readonly [number, number]} [yRange] Bottom and top.
+ * @property {readonly { at: Point, label: string }[]} [marks]
+ */
+
+const CHART = { width: 460, height: 290 };
+
+/** Lines over two axes with their legend. @param {Chart} chart */
+export function drawChart({ name, x, y, lines, xRange, yRange, marks = [] }) {
+  const all = [...lines.flatMap(({ points }) => points), ...marks.map((mark) => mark.at)];
+  const axes = {
+    left: 56, right: CHART.width - 14, top: 26, bottom: CHART.height - 62,
+    x: xRange ?? rangeOf(all.map((point) => point[0])), y: yRange ?? rangeOf(all.map((point) => point[1])),
+  };
+  const T = scaleOf(axes);
+  const box = `${axes.left} ${axes.top} ${axes.right - axes.left} ${axes.bottom - axes.top}`;
+  return svg`<svg class="drawing chart" viewBox=${`0 0 ${CHART.width} ${CHART.height}`} role="img" aria-label=${name}>
+    ${grid(axes, { x, y, columns: 6, rows: 5 })}
+    <svg x=${axes.left} y=${axes.top} width=${axes.right - axes.left} height=${axes.bottom - axes.top} viewBox=${box}>
+      ${lines.map(({ look, points }) => svg`<path class=${`line ${look}`} d=${path(points.map(T))}/>`)}
+    </svg>
+    ${marks.map(({ at, label }, order) => {
+      const [px, py] = T(at);
+      // Labels of neighbours stand on either side.
+      const right = px > CHART.width * 0.8 || (px > CHART.width * 0.2 && order % 2 === 1);
+      return svg`<g class="mark"><circle cx=${px} cy=${py} r="5"/><text x=${px + (right ? -9 : 9)} y=${py < axes.top + 14 ? py + 18 : py - 6} text-anchor=${right ? 'end' : 'start'}>${label}</text></g>`;
+    })}
+    ${legend(lines.filter(({ label }) => label))}
+  </svg>`;
+}
+
+/** @param {readonly ChartLine[]} lines */
+function legend(lines) {
+  const width = (CHART.width - 56) / Math.max(1, lines.length);
+  return lines.map(({ label, look }, at) => svg`<g class="legend">
+    <path class=${`line ${look}`} d=${`M${56 + at * width} ${CHART.height - 12}h22`}/><text x=${84 + at * width} y=${CHART.height - 8}>${label}</text></g>`);
+}
+
+/** From the least to the largest value, with 0. @param {readonly number[]} values @returns {[number, number]} */
+function rangeOf(values) {
+  const [low, high] = [Math.min(0, ...values), Math.max(0, ...values)];
+  return high > low ? [low, high + 0.06 * (high - low)] : [0, 1];
+}

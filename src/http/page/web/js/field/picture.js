@@ -412,7 +412,7 @@ export function tell({ index, friction, quantity, values }, place, cell) {
   /** @type {[string, string][]} */
   const told = [['x', `${number(place.x)} mm`], ['y', `${number(place.y)} mm`]];
   if (cell < 0) return [...told, ['', 'outside the patch']];
-  const { pressure_mpa, traction_x_mpa, traction_y_mpa, slip_x, slip_y, zone } = index.cells;
+  const { pressure_mpa, traction_x_mpa, traction_y_mpa, slip_x, slip_y, temperature_c, zone } = index.cells;
   if (quantity.key === 'difference') return [...told, [quantity.heading, `${number(values[cell])} ${quantity.unit}`]];
   if (pressure_mpa) told.push(['p', `${number(pressure_mpa[cell])} MPa`]);
   if (traction_x_mpa && traction_y_mpa) {
@@ -421,6 +421,7 @@ export function tell({ index, friction, quantity, values }, place, cell) {
     if (pressure_mpa && friction > 0) told.push(['|t|/μp', number(size / (friction * pressure_mpa[cell]), 3)]);
   }
   if (slip_x && slip_y) told.push(['slip', number(Math.hypot(slip_x[cell], slip_y[cell]), 3)]);
+  if (temperature_c) told.push(['T', `${number(temperature_c[cell], 3)} °C`]);
   if (zone) told.push(['zone', zone[cell]]);
   return told;
 }

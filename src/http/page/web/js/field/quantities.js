@@ -50,6 +50,10 @@ export const QUANTITIES = [
     vector: (cells) => (cells.slip_x && cells.slip_y ? [cells.slip_x, cells.slip_y] : null),
   },
   {
+    key: 'temperature', label: 'Temperature', heading: 'temperature', unit: '°C', scale: 'amount', vanishes: false, bounded: false,
+    values: (cells) => cells.temperature_c ?? null, vector: none,
+  },
+  {
     key: 'zones', label: 'Zones', heading: 'stick and slip', unit: '', scale: 'zones', vanishes: false, bounded: false,
     values: (cells) => (cells.zone ? Float64Array.from(cells.zone, (zone) => (zone === 'slip' ? 1 : 0)) : null), vector: none,
   },

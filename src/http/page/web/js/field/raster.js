@@ -47,7 +47,7 @@ export function rasterCells(index, values, frame) {
  */
 export function rasterSmooth(index, values, frame, vanishes) {
   const raster = new Float32Array(frame.width * frame.height).fill(NaN);
-  const samples = sampleStrips(index, values, vanishes);
+  const samples = samplesOf(index, values, vanishes);
   const { strips, border } = index;
   const last = strips.length - 1;
   for (let row = 0, upper = last; row < frame.height; row += 1) {
@@ -84,6 +84,46 @@ export function rasterSmooth(index, values, frame, vanishes) {
 function edgeFade(index, strip, y) {
   const edge = y > strip.y ? index.y1 : index.y0;
   return Math.sqrt(Math.max(0, (edge - y) / (edge - strip.y || 1)));
+}
+
+/** By whether the value is 0 at the border. @type {[WeakMap<ArrayLike<number>, Float32Array>, WeakMap<ArrayLike<number>, Float32Array>]} */
+const sampled = [new WeakMap(), new WeakMap()];
+
+/** The samples of values, taken once. @param {CellIndex} index @param {ArrayLike<number>} values @param {boolean} vanishes */
+function samplesOf(index, values, vanishes) {
+  const of = sampled[vanishes ? 1 : 0];
+  const known = of.get(values) ?? sampleStrips(index, values, vanishes);
+  of.set(values, known);
+  return known;
+}
+
+/** Points of a section. */
+const SECTION_POINTS = 120;
+
+/**
+ * Interpolated values on a line through the patch, from border to border.
+ * @param {CellIndex} index One that is `whole`.
+ * @param {ArrayLike<number>} values
+ * @param {boolean} along The line is along rolling, else across.
+ * @param {{ x: number, y: number }} place Where the line passes.
+ * @param {boolean} vanishes The value is 0 at the border.
+ * @returns {[number, number][]} Places on the line in mm, with their values.
+ */
+export function sectionSmooth(index, values, along, place, vanishes) {
+  const [loop] = index.border;
+  const span = along ? spanAt(loop, place.y) : spanAt(loop.map(([x, y]) => /** @type {const} */ ([y, x])), place.x);
+  if (!span) return [];
+  const [low, high] = span;
+  const step = (high - low) / SECTION_POINTS;
+  const frame = along
+    ? { width: SECTION_POINTS, height: 1, x0: low, y1: place.y + step / 2, step }
+    : { width: 1, height: SECTION_POINTS, x0: place.x - step / 2, y1: high, step };
+  const raster = rasterSmooth(index, values, frame, vanishes);
+  const inner = Array.from(raster, (value, at) => /** @type {[number, number]} */ ([along ? low + (at + 0.5) * step : high - (at + 0.5) * step, value]))
+    .filter(([, value]) => Number.isFinite(value));
+  if (!inner.length) return [];
+  const end = (/** @type {number} */ at, /** @type {[number, number]} */ near) => /** @type {[number, number]} */ ([at, vanishes ? 0 : near[1]]);
+  return [end(along ? low : high, inner[0]), ...inner, end(along ? high : low, inner[inner.length - 1])];
 }
 
 /**

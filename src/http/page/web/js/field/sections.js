@@ -1,6 +1,7 @@
 // The two sections of a field at the crosshair: along rolling below the map, across on its right. They share its axes.
 
 import { number, tickLabel, ticks } from '../format.js';
+import { sectionSmooth } from './raster.js';
 
 /** @typedef {import('./layout.js').Layout} Layout */
 /** @typedef {import('./layout.js').Box} Box */
@@ -79,9 +80,10 @@ function drawSection(pen, scene, section, layout, place, here, ink) {
   if (section.bounded) {
     const pressure = index.cells.pressure_mpa ?? [];
     const signs = quantity.scale === 'signed' ? [1, -1] : [1];
-    for (const sign of signs) drawLine(pen, section, (cell) => sign * friction * pressure[cell], ink.quiet, 1.25, [4, 3]);
+    const bound = lineOf(scene, section, pressure, true, place);
+    for (const sign of signs) drawLine(pen, section, layout, bound.map(([at, value]) => [at, sign * friction * value]), ink.quiet, 1.25, [4, 3]);
   }
-  drawLine(pen, section, (cell) => values[cell], ink.accent, 2, []);
+  drawLine(pen, section, layout, lineOf(scene, section, values, quantity.vanishes, place), ink.accent, 2, []);
   drawCursor(pen, section, layout, place, here, values, ink);
   pen.fillStyle = ink.ink;
   pen.font = `12px ${ink.font}`;
@@ -89,8 +91,27 @@ function drawSection(pen, scene, section, layout, place, here, ink) {
   pen.textAlign = 'left';
   const { box } = section;
   const legend = section.bounded && !layout.narrow ? '   (dashed: μp, shaded: stick)' : '';
-  const title = section.along ? `along rolling at y = ${number(place.y, 3)} mm${legend}` : `across at x = ${number(place.x, 3)} mm`;
+  const what = quantity.unit ? `${quantity.label.toLowerCase()} / ${quantity.unit}` : quantity.label.toLowerCase();
+  const title = section.along ? `${what} along rolling, y = ${number(place.y, 3)} mm${legend}` : `across, x = ${number(place.x, 3)} mm`;
   pen.fillText(title, box.left, box.top - 7);
+  if (section.along || !quantity.unit) return;
+  pen.textAlign = 'right';
+  pen.fillText(`/ ${quantity.unit}`, box.left + box.width, box.top + box.height + 34);
+}
+
+/**
+ * A section from border to border, interpolated as the map is; of cells as they were computed where the map shows these.
+ * @param {Scene} scene
+ * @param {Section} section
+ * @param {ArrayLike<number>} values
+ * @param {boolean} vanishes
+ * @param {{ x: number, y: number }} place
+ * @returns {[number, number][]}
+ */
+function lineOf({ index, mesh }, { along, cells }, values, vanishes, place) {
+  if (index.whole && !mesh) return sectionSmooth(index, values, along, place, vanishes);
+  const { x_mm, y_mm } = index.cells;
+  return cells.map((cell) => [along ? x_mm[cell] : y_mm[cell], values[cell]]);
 }
 
 /**
@@ -138,17 +159,18 @@ function shadeStick(pen, { along, box, cells, from, to }, zone, ink) {
 /**
  * @param {Pen} pen
  * @param {Section} section
- * @param {(cell: number) => number} of
+ * @param {Layout} layout
+ * @param {readonly [number, number][]} line Places in mm, with their values.
  * @param {string} colour
  * @param {number} width
  * @param {number[]} dash
  */
-function drawLine(pen, { along, cells, middle, value }, of, colour, width, dash) {
+function drawLine(pen, { along, value }, layout, line, colour, width, dash) {
   pen.beginPath();
-  cells.forEach((cell, place) => {
-    const x = along ? middle(cell) : value(of(cell));
-    const y = along ? value(of(cell)) : middle(cell);
-    if (place) pen.lineTo(x, y);
+  line.forEach(([at, amount], order) => {
+    const x = along ? layout.X(at) : value(amount);
+    const y = along ? value(amount) : layout.Y(at);
+    if (order) pen.lineTo(x, y);
     else pen.moveTo(x, y);
   });
   pen.strokeStyle = colour;
