@@ -98,7 +98,7 @@ function samplesOf(index, values, vanishes) {
 }
 
 /** Points of a section. */
-const SECTION_POINTS = 120;
+const SECTION_POINTS = 80;
 
 /**
  * Interpolated values on a line through the patch, from border to border.
