@@ -13,11 +13,11 @@ use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement
 use utoipa::openapi::{HeaderBuilder, ObjectBuilder, Required, ResponseBuilder};
 use utoipa_axum::router::OpenApiRouter;
 
-use crate::http::contract_forms;
 use crate::http::examples::EXAMPLES;
 use crate::http::problem::body::ProblemBody;
 use crate::http::problem::catalogue::describe_also;
 use crate::http::problem::kinds::ProblemKind;
+use crate::http::{contract_forms, contract_shared};
 
 #[derive(OpenApi)]
 #[openapi(
@@ -85,9 +85,10 @@ pub(super) fn text(mut document: utoipa::openapi::OpenApi) -> String {
     add_batches(&mut document);
     require_keys(&mut document);
     contract_forms::complete(&mut document);
-    let text = document.to_pretty_json();
     // Only a map with keys that are not strings cannot be written; the document has none.
-    text.map(|text| text + "\n").unwrap_or_default()
+    let mut document = serde_json::to_value(&document).unwrap_or_default();
+    contract_shared::share(&mut document);
+    contract_shared::lines(&document)
 }
 
 /// Returns the text of the contract, which is built on the first request for it.

@@ -20,6 +20,7 @@
 
 mod contract;
 mod contract_forms;
+mod contract_shared;
 mod dto;
 mod examples;
 pub mod extract;
@@ -165,18 +166,23 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
 /// Every documented route, in the order of the contract.
 fn resources() -> OpenApiRouter<AppState> {
     let changing = OpenApiRouter::with_openapi(contract::head())
-        .routes(routes!(jobs::get, jobs::delete))
-        .routes(routes!(batches::get, batches::delete))
         .routes(routes!(methods::methods))
         .routes(routes!(remarks::remarks))
         .routes(routes!(service_examples::examples))
-        .route_layer(from_fn(query::refuse_parameters))
-        .route_layer(from_fn(etag::revalidate));
+        .route_layer(from_fn(query::refuse_parameters));
+    let work = OpenApiRouter::new()
+        .routes(routes!(jobs::get, jobs::delete))
+        .routes(routes!(batches::get, batches::delete))
+        .route_layer(from_fn(query::refuse_all_but_wait));
+    let changing = changing.merge(work).route_layer(from_fn(etag::revalidate));
     let changing = contract::conditional(changing);
-    let finished = OpenApiRouter::new()
+    let case = OpenApiRouter::new()
         .routes(routes!(jobs::case))
+        .route_layer(from_fn(query::refuse_parameters));
+    let finished = OpenApiRouter::new()
         .routes(routes!(results::result))
-        .route_layer(from_fn(query::refuse_parameters))
+        .route_layer(from_fn(query::refuse_all_but_wait))
+        .merge(case)
         .route_layer(from_fn(etag::immutable));
     let finished = contract::conditional(finished);
     // They check their parameters themselves.
@@ -236,7 +242,7 @@ fn resources() -> OpenApiRouter<AppState> {
 fn profiles_and_runs() -> OpenApiRouter<AppState> {
     let changing = OpenApiRouter::new()
         .routes(routes!(runs::get, runs::delete))
-        .route_layer(from_fn(query::refuse_parameters));
+        .route_layer(from_fn(query::refuse_all_but_wait));
     let lists = OpenApiRouter::new().routes(routes!(runs::submit, runs::list));
     let tagged = changing.merge(lists).route_layer(from_fn(etag::revalidate));
     let plain = OpenApiRouter::new()

@@ -65,6 +65,32 @@ impl Jobs {
         }
     }
 
+    /// Waits until all jobs of a batch or run have ended, but not longer than `at_most`, and returns it as it then is. Returns at once when the service is
+    /// about to stop.
+    ///
+    /// # Errors
+    /// [`JobsError::BatchNotFound`], or a failed database.
+    pub async fn wait_batch(
+        &self,
+        kind: Kind,
+        id: Uuid,
+        at_most: Duration,
+    ) -> Result<Batch, JobsError> {
+        let until = Instant::now() + at_most;
+        let mut seen = None;
+        while let Ok(changed) =
+            timeout_at(until, self.batch_changed_since(kind, id, seen.as_deref())).await
+        {
+            let Some(batch) = changed? else { break };
+            let (ended, all) = batch.ended();
+            if ended == all {
+                return Ok(batch);
+            }
+            seen = Some(batch.change_tag());
+        }
+        self.batch(kind, id).await
+    }
+
     /// Waits until the jobs of a batch or run are in other states than `seen` says and returns it; at once if they are, or if
     /// nothing was seen yet. `None` when nothing more will come: all jobs had ended, or the service is about to stop.
     ///

@@ -5,12 +5,10 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::schema::contract as document;
+
 /// The committed contract; `railhead openapi` prints the one to commit.
 const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/api/openapi.json");
-
-fn document() -> Value {
-    serde_json::from_str(&railhead::http::openapi_json()).expect("the contract is JSON")
-}
 
 /// Every operation: `METHOD path` and its description.
 fn operations(document: &Value) -> Vec<(String, &Value)> {

@@ -93,5 +93,6 @@ mod tables_in_turn;
 mod traces;
 mod turns;
 mod under_load;
+mod uploads;
 mod vtk;
 mod worker;

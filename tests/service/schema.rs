@@ -5,9 +5,38 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
-static CONTRACT: LazyLock<Value> = LazyLock::new(|| {
-    serde_json::from_str(&railhead::http::openapi_json()).expect("the contract is JSON")
-});
+static CONTRACT: LazyLock<Value> = LazyLock::new(contract);
+
+/// The contract, with shared responses, parameters and examples in the places that refer to them.
+pub fn contract() -> Value {
+    let text = railhead::http::openapi_json();
+    let mut document: Value = serde_json::from_str(&text).expect("the contract is JSON");
+    let components = document["components"].clone();
+    let mut paths = document["paths"].take();
+    inline(&mut paths, &components);
+    document["paths"] = paths;
+    document
+}
+
+fn inline(value: &mut Value, components: &Value) {
+    let reference = value
+        .get("$ref")
+        .and_then(Value::as_str)
+        .and_then(|target| target.strip_prefix("#/components/"));
+    if let Some(target) = reference.filter(|target| !target.starts_with("schemas/")) {
+        let found = components.pointer(&format!("/{target}"));
+        *value = found
+            .unwrap_or_else(|| panic!("{target} is not in the contract"))
+            .clone();
+    }
+    match value {
+        Value::Object(members) => members
+            .values_mut()
+            .for_each(|member| inline(member, components)),
+        Value::Array(items) => items.iter_mut().for_each(|item| inline(item, components)),
+        _ => {}
+    }
+}
 
 /// Checks that the contract knows this answer: the status, the content type, and every member of the body.
 /// Addresses that the contract does not have, and methods that they do not have, are not checked.

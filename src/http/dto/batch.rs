@@ -52,20 +52,13 @@ pub(crate) struct CaseWithOptions {
     deadline_s: Option<u32>,
 }
 
-/// A batch that was accepted.
+/// A batch that was accepted, with the faults of cases that were left out.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct BatchReceipt {
-    /// Identifier of the batch.
-    #[schema(value_type = String, format = "uuid")]
-    pub id: String,
-    /// Number of jobs made.
-    pub count: u32,
-    /// Number of faulty cases that were left out; 0 unless the request said `on_invalid=skip`.
-    pub rejected: u32,
-    /// The faults of the cases that were left out, those of the first 1000.
+    #[serde(flatten)]
+    pub batch: BatchAnswer,
+    /// The faults of the cases that were left out, those of the first 1000; none unless the request said `on_invalid=skip`.
     pub errors: Vec<Fault>,
-    /// Where to go from here.
-    pub links: BTreeMap<String, String>,
 }
 
 /// A batch: how far it is.
@@ -162,7 +155,7 @@ impl From<Batch> for BatchAnswer {
     }
 }
 
-pub(crate) fn links(batch: &Batch) -> BTreeMap<String, String> {
+fn links(batch: &Batch) -> BTreeMap<String, String> {
     let own = format!("/v1/batches/{}", batch.id);
     BTreeMap::from([
         ("results".to_owned(), format!("{own}/results")),

@@ -8,6 +8,7 @@ pub mod ids;
 pub mod json;
 pub mod json_weight;
 pub mod labels;
+pub mod multipart;
 pub mod npz;
 pub mod query;
 pub mod rows;

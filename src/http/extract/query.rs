@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 
 use axum::extract::{Query as Pairs, Request};
-use axum::http::Uri;
+use axum::http::{Method, Uri};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
@@ -51,6 +51,18 @@ impl<A: Parameters<Limits = ()>, B: Parameters<Limits = ()>> Parameters for (A, 
 /// Layer around resources that have no parameters but their form, which was looked at before.
 pub async fn refuse_parameters(request: Request, next: Next) -> Response {
     match Query::read(request.uri(), &["format"]).finish() {
+        Ok(()) => next.run(request).await,
+        Err(fault) => fault.into_response(),
+    }
+}
+
+/// As [`refuse_parameters`], around resources whose `GET` can wait.
+pub async fn refuse_all_but_wait(request: Request, next: Next) -> Response {
+    let known: &[&str] = match *request.method() {
+        Method::GET => &["format", "wait"],
+        _ => &["format"],
+    };
+    match Query::read(request.uri(), known).finish() {
         Ok(()) => next.run(request).await,
         Err(fault) => fault.into_response(),
     }
@@ -239,6 +251,14 @@ impl Query {
                 });
             }
         }
+        query
+    }
+
+    /// As [`Query::read`], without the parameters that `known` does not list.
+    #[must_use]
+    pub fn part_of(uri: &Uri, known: &[&str]) -> Self {
+        let mut query = Query::read(uri, known);
+        query.faults.clear();
         query
     }
 

@@ -1,5 +1,7 @@
 //! The formats of answers: what each is called in `?format=`, and its content type.
 
+use axum::http::{HeaderName, HeaderValue, header};
+
 /// A form in which something can be answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
@@ -58,5 +60,19 @@ impl Format {
             Format::Parquet => "application/vnd.apache.parquet",
             Format::Events => "text/event-stream",
         }
+    }
+
+    /// The header `Content-Disposition` of an answer in this form, under which a browser saves it as `name` with the usual extension. Pictures are shown
+    /// where they stand, tables and archives are saved; JSON has none.
+    #[must_use]
+    pub fn disposition(self, name: &str) -> Option<(HeaderName, HeaderValue)> {
+        let kind = match self {
+            Format::Json | Format::Events => return None,
+            Format::Svg | Format::Png => "inline",
+            _ => "attachment",
+        };
+        let value = format!("{kind}; filename=\"{name}.{}\"", self.name());
+        let value = HeaderValue::from_str(&value).ok()?;
+        Some((header::CONTENT_DISPOSITION, value))
     }
 }

@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::Duration;
 
 use axum::Extension;
 use axum::body::{Body, Bytes};
@@ -19,21 +18,20 @@ use crate::http::dto::result::JobResult;
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::{Caller, Credential, revoked, until_revoked};
 use crate::http::extract::ids::BatchId;
-use crate::http::extract::query::{Parameters, Repeated, id, query, reader, seconds};
+use crate::http::extract::query::{Parameters, Repeated, id, query, reader};
 use crate::http::layers::compression::StreamedUnbuffered;
-use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
+use crate::http::limits::holding_body::hold_while_sent;
+use crate::http::limits::memory::Memory;
 use crate::http::problem::body::ProblemBody;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::render::batch_csv::Columns;
 use crate::http::render::format::Format;
 use crate::http::routes::batch_lines::{FIRST_PAGE_JOBS, Lines, STREAM_BYTES, Source};
-use crate::http::state::AppState;
+use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::jobs::model::job::State as JobState;
 use crate::jobs::model::kind::Kind;
 
-/// Longest time results are waited for, in s.
-const WAIT_MAX_SECONDS: u32 = 3600;
 /// Most columns of labels of a table for which no columns are named: three times as many as one case has labels.
 const LABEL_COLUMNS_MAX: u32 = 100;
 
@@ -65,9 +63,6 @@ const FORMATS: &[Format] = &[Format::Ndjson, Format::Csv];
 query! {
     /// Parameters of the results of a batch.
     BatchResultsQuery(() => ()) {
-        /// Wait for jobs that have not ended, at most this many seconds in all; lines are sent as soon as everything before them is there
-        #[param(minimum = 0, maximum = 3600)]
-        wait: u32 as u32 = seconds(0, WAIT_MAX_SECONDS);
         /// Only lines after that of this job, as to go on after the last line that was read
         #[param(format = "uuid")]
         after: Uuid as String = id("job");
@@ -91,7 +86,8 @@ problems! {
 /// The results of a batch in the order its cases were sent.
 ///
 /// NDJSON: exactly one line per job, nothing else. CSV: a header, then one line per job and motion with the sums over
-/// all patches, or with the column `patch` one line per job, motion and patch; a job without a result has one line without numbers. Without `wait` unfinished jobs appear with their state.
+/// all patches, or with the column `patch` one line per job, motion and patch; a job without a result has one line without numbers. With a wait, lines are
+/// sent as soon as everything before them is there. Without one, unfinished jobs appear with their state.
 #[utoipa::path(
     get,
     path = "/v1/batches/{id}/results",
@@ -99,7 +95,9 @@ problems! {
     operation_id = "get_batch_results",
     params(
         ("id" = String, Path, description = "Id of the batch", format = "uuid"),
-        BatchResultsQuery
+        BatchResultsQuery,
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
     ),
     responses((status = 200, description = "One line per job", content((BatchLine = "application/x-ndjson"), (String = "text/csv"))), BatchResultProblems)
 )]
@@ -107,13 +105,12 @@ pub(crate) async fn results(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
     uri: Uri,
-    State(AppState { crowds, memory, .. }): State<AppState>,
-    Extension(held): Extension<HeldShares>,
+    wait: Wait,
+    State(memory): State<Memory>,
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let query = BatchResultsQuery::read(&uri, &())?;
-    let wait = query.wait;
+    let (query, _) = <(BatchResultsQuery, WaitQuery)>::read(&uri, &())?;
     let format = choose(&headers, query.format, FORMATS)?;
     if query.columns.is_some() && format != Format::Csv {
         let detail = "only CSV has columns; ask for it with `format=csv`";
@@ -121,14 +118,8 @@ pub(crate) async fn results(
     }
     // Unknown batches are answered before the stream begins.
     jobs.batch(Kind::Cases, id).await?;
-    let place = match wait {
-        Some(_) => Some(crowds.require_wait(jobs.tenant())?),
-        None => None,
-    };
-    if place.is_some() {
-        held.release();
-    }
-    let until = wait.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
+    let until = wait.at_most().map(|at_most| Instant::now() + at_most);
+    let waits = until.is_some();
     // What a reader holds of small results; large ones are counted one by one.
     let share = memory.ready_answer(jobs.tenant(), STREAM_BYTES)?;
     let columns = match (format, query.columns) {
@@ -168,8 +159,12 @@ pub(crate) async fn results(
         (header::VARY, "Accept"),
     ];
     let mut response = (headers, body).into_response();
-    if wait.is_some() {
+    response
+        .headers_mut()
+        .extend(format.disposition(&format!("batch-{id}")));
+    if waits {
         response.extensions_mut().insert(StreamedUnbuffered);
     }
-    Ok(hold_while_sent(response, (place, share)))
+    response = wait.tell_applied(response);
+    Ok(hold_while_sent(response, (wait.into_place(), share)))
 }

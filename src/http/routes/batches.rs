@@ -8,11 +8,12 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
 
-use crate::http::dto::batch::{BatchAnswer, BatchReceipt, Cases, links};
+use crate::http::dto::batch::{BatchAnswer, BatchReceipt, Cases};
 use crate::http::extract::batch::body::{form, read_draft};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::BatchId;
 use crate::http::extract::labels::{LABELS_MAX, name, new_label};
+use crate::http::extract::multipart::{TableUpload, separate_template};
 use crate::http::extract::query::{Parameters, Repeated, id, query, reader};
 use crate::http::extract::submit_options::SubmitQuery;
 use crate::http::limits::memory::Memory;
@@ -22,6 +23,7 @@ use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::routes::jobs::{idempotency_key, mark_replay};
+use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::model::kind::Kind;
 
@@ -47,7 +49,7 @@ query! {
         /// A label of the batch, written `key:value`; may be repeated, for at most 32 labels with different keys
         #[param(max_items = 32, example = json!(["line:A12"]))]
         label: Vec<(String, String)> as Vec<String> = Repeated(new_label());
-        /// With `text/csv`, and needed there: the job whose case is the template
+        /// The job whose case is the template of a table; not with `multipart/form-data`, which holds the template itself
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
     }
@@ -55,8 +57,8 @@ query! {
 
 /// Submits many cases as one batch of jobs.
 ///
-/// The body is a JSON array of cases, one case per line (`application/x-ndjson`), or a table (`text/csv`) whose lines fill the cells of
-/// a template case; it is read as it arrives. All jobs of
+/// The body is a JSON array of cases, one case per line (`application/x-ndjson`), or a table whose lines fill the cells of
+/// a template case: as `multipart/form-data` with the parts `template` and `table`, or as `text/csv` with `?template=` naming a job. It is read as it arrives. All jobs of
 /// a batch answered with `202` are stored durably. Without `on_invalid=skip` one faulty case refuses the whole batch (`422`), and
 /// nothing is stored; every fault names its case, and its line in NDJSON and CSV. A JSON array that is not JSON is `400`; a line that is not JSON is a faulty case.
 #[utoipa::path(
@@ -67,6 +69,8 @@ query! {
     params(
         BatchQuery,
         SubmitQuery,
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10"),
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same cases and the same options answers the first batch instead of making another"),
         ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve all cases, also those that are identical to cases solved before", example = "no-cache"),
         ("traceparent" = Option<String>, Header, description = "W3C trace context: if the service exports traces, the traces of the jobs continue the client's trace. An unreadable value is ignored", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
@@ -74,9 +78,15 @@ query! {
     request_body(content(
         (Cases = "application/json"),
         (String = "application/x-ndjson"),
-        (String = "text/csv")
+        (String = "text/csv"),
+        (TableUpload = "multipart/form-data")
     ), description = "Cases, at most 200 000, each of at most 8 MiB and together at most 1 GiB"),
     responses(
+        (status = 200, description = "All jobs ended within the wait", body = BatchReceipt, headers(
+            ("Location" = String, description = "Path of the batch"),
+            ("Preference-Applied" = String, description = "The wait that was applied, if one was preferred"),
+            ("Idempotency-Replayed" = String, description = "`true` if this is the batch of an earlier request with the same `Idempotency-Key`; absent otherwise")
+        )),
         (status = 202, description = "The jobs are stored and will be solved", body = BatchReceipt, headers(
             ("Location" = String, description = "Path of the batch"),
             ("Idempotency-Replayed" = String, description = "`true` if this is the batch of an earlier request with the same `Idempotency-Key`; absent otherwise")
@@ -86,18 +96,22 @@ query! {
 )]
 pub(crate) async fn submit(
     Caller(jobs): Caller,
+    wait: Wait,
     State(options): State<HttpOptions>,
     State(memory): State<Memory>,
     request: Request,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(request.headers())?;
-    let (batch, submit) = <(BatchQuery, SubmitQuery)>::read(request.uri(), &())?;
+    let ((batch, submit), _) = <((BatchQuery, SubmitQuery), WaitQuery)>::read(request.uri(), &())?;
     let submit_options = submit.options(request.headers());
     let mut labels = labels_of(batch.label.unwrap_or_default())?;
     jobs.bind(&mut labels)
         .map_err(|faults| ApiError::bad_parameter("label", faults[0].detail.clone()))?;
-    let form = form(&jobs, request.headers(), batch.template).await?;
+    let (request, template) =
+        separate_template(&jobs, &memory, &options, batch.template, request).await?;
+    let (form, template_share) = form(&jobs, request.headers(), template).await?;
     let mut draft = read_draft(&jobs, &memory, &options, form, request).await?;
+    drop(template_share);
     draft.options = submit_options;
     draft.name = batch.name;
     draft.labels = labels;
@@ -105,18 +119,25 @@ pub(crate) async fn submit(
         return Err(refusal(&draft));
     }
     let errors = faults(&draft);
-    let (batch, replayed) = jobs.submit_batch(draft, key).await?;
+    let (mut batch, replayed) = jobs.submit_batch(draft, key).await?;
     let location = [(header::LOCATION, format!("/v1/batches/{}", batch.id))];
-    let receipt = BatchReceipt {
-        id: batch.id.to_string(),
-        count: batch.count,
-        rejected: batch.rejected,
-        errors,
-        links: links(&batch),
+    let id = batch.id;
+    // The batch is stored: whatever ends the wait early, the client must learn its id.
+    let waited = wait.hold(&jobs, async |at_most| {
+        jobs.wait_batch(Kind::Cases, id, at_most).await
+    });
+    if let Ok(Some(Ok(later))) = waited.await {
+        batch = later;
+    }
+    let batch = BatchAnswer::from(batch);
+    let status = match batch.ended {
+        true if wait.at_most().is_some() => StatusCode::OK,
+        _ => StatusCode::ACCEPTED,
     };
-    let mut response = (StatusCode::ACCEPTED, location, Json(receipt)).into_response();
+    let receipt = BatchReceipt { batch, errors };
+    let mut response = (status, location, Json(receipt)).into_response();
     mark_replay(&mut response, replayed);
-    Ok(response)
+    Ok(wait.tell_applied(response))
 }
 
 /// The labels of a submission.
@@ -179,14 +200,29 @@ problems! {
     path = "/v1/batches/{id}",
     tag = "batches",
     operation_id = "get_batch",
-    params(("id" = String, Path, description = "Id of the batch", format = "uuid")),
-    responses((status = 200, description = "The batch", body = BatchAnswer), GetBatchProblems)
+    params(
+        ("id" = String, Path, description = "Id of the batch", format = "uuid"),
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
+    ),
+    responses((status = 200, description = "The batch", body = BatchAnswer, headers(
+        ("Preference-Applied" = String, description = "The wait that was applied, if one was preferred")
+    )), GetBatchProblems)
 )]
 pub(crate) async fn get(
     Caller(jobs): Caller,
     BatchId(id): BatchId,
-) -> Result<Json<BatchAnswer>, ApiError> {
-    Ok(Json(jobs.batch(Kind::Cases, id).await?.into()))
+    wait: Wait,
+) -> Result<Response, ApiError> {
+    let kind = Kind::Cases;
+    let waited = wait.hold(&jobs, async |at_most| {
+        jobs.wait_batch(kind, id, at_most).await
+    });
+    let batch = match waited.await? {
+        Some(batch) => batch?,
+        None => jobs.batch(kind, id).await?,
+    };
+    Ok(wait.tell_applied(Json(BatchAnswer::from(batch)).into_response()))
 }
 
 /// Stops all jobs of a batch that have not ended. Those that have ended stay as they are.

@@ -265,7 +265,11 @@ pub(crate) async fn evaluate(
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
     ];
-    Ok(hold_while_sent((headers, body).into_response(), share))
+    let mut response = (headers, body).into_response();
+    response
+        .headers_mut()
+        .extend(format.disposition("evaluate"));
+    Ok(hold_while_sent(response, share))
 }
 
 /// Columns of JSON, named by pointers, short names or quantities with units, as those of a run are.

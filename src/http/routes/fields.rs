@@ -408,17 +408,7 @@ pub(crate) async fn write(
         (header::VARY, HeaderValue::from_static("Accept")),
     ];
     let mut response = (headers, body).into_response();
-    if matches!(format, Format::Npz | Format::Vtk) {
-        // Programs that open these files go by the ending of the name.
-        let file = format!(
-            "attachment; filename=\"{name}-{patch}-{point}.{}\"",
-            format.name()
-        );
-        if let Ok(file) = HeaderValue::from_str(&file) {
-            response
-                .headers_mut()
-                .insert(header::CONTENT_DISPOSITION, file);
-        }
-    }
+    let disposition = format.disposition(&format!("{name}-{patch}-{point}"));
+    response.headers_mut().extend(disposition);
     Ok(hold_while_sent(response, share))
 }

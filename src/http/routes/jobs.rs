@@ -1,29 +1,26 @@
 //! `/v1/jobs`: submit, get, cancel, delete, and the case as it was submitted.
 
-use std::time::Duration;
-
+use axum::Json;
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
-use axum::{Extension, Json};
 
 use crate::contact::case::words::question::Case;
 use crate::http::dto::job::JobAnswer;
-use crate::http::extract::caller::{Caller, Credential, revoked};
+use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::json::JsonBody;
 use crate::http::extract::query::Parameters;
 use crate::http::extract::submit_options::SubmitQuery;
-use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
+use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
 use crate::http::limits::shares::Share;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
-use crate::http::routes::prefer_wait::{Awaited, preferred_wait, say_applied};
 use crate::http::routes::results::result_text;
-use crate::http::state::AppState;
+use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::jobs::Jobs;
 use crate::jobs::model::job::{Job, State as JobState};
 
@@ -41,7 +38,7 @@ problems! {
 
 /// Submits one case as a job.
 ///
-/// A job answered with `202` or `200` is stored durably. With `Prefer: wait=N` the answer is the ended job (`200`) if it
+/// A job answered with `202` or `200` is stored durably. With `?wait=N` or `Prefer: wait=N` the answer is the ended job (`200`) if it
 /// ends within N seconds, including its result if it succeeded and its `error` if it failed. A case that is identical to one
 /// solved before (`name` and `labels` aside) succeeds at once with that result, marked `cached`.
 #[utoipa::path(
@@ -51,7 +48,8 @@ problems! {
     operation_id = "submit_job",
     params(
         SubmitQuery,
-        ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10"),
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10"),
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same case and the same options answers the first job instead of making another"),
         ("Cache-Control" = Option<String>, Header, description = "`no-cache`: solve the case even if an identical one was solved before", example = "no-cache"),
         ("traceparent" = Option<String>, Header, description = "W3C trace context: if the service exports traces, the trace of the job continues the client's trace. An unreadable value is ignored", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
@@ -64,7 +62,7 @@ problems! {
             ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for"),
             ("Idempotency-Replayed" = String, description = "`true` if this is the job of an earlier request with the same `Idempotency-Key`; absent otherwise")
         )),
-        (status = 200, description = "The job ended within the time given by `Prefer: wait`", body = JobAnswer, headers(
+        (status = 200, description = "The job ended within the wait", body = JobAnswer, headers(
             ("Location" = String, description = "Path of the job"),
             ("Preference-Applied" = String, description = "The wait that was applied"),
             ("Idempotency-Replayed" = String, description = "`true` if this is the job of an earlier request with the same `Idempotency-Key`; absent otherwise")
@@ -75,40 +73,38 @@ problems! {
 pub(crate) async fn submit(
     Caller(jobs): Caller,
     uri: Uri,
-    State(AppState { crowds, memory, .. }): State<AppState>,
-    Extension(held): Extension<HeldShares>,
-    credential: Option<Extension<Credential>>,
+    wait: Wait,
+    State(memory): State<Memory>,
     headers: HeaderMap,
     JsonBody { value, room }: JsonBody,
 ) -> Result<Response, ApiError> {
     let key = idempotency_key(&headers)?;
-    let place =
-        preferred_wait(&headers).and_then(|seconds| Some((seconds, crowds.wait(jobs.tenant())?)));
-    let wait = place.as_ref().map(|(seconds, _)| *seconds);
-    let options = SubmitQuery::read(&uri, &())?.options(&headers);
+    let (submit, _) = <(SubmitQuery, WaitQuery)>::read(&uri, &())?;
+    let options = submit.options(&headers);
     let announcements = jobs.announcements();
     let (mut job, replayed) = jobs.submit_with(value, key, options).await?;
     drop(room);
     let location = format!("/v1/jobs/{}", job.id);
-    if let Some(seconds) = wait {
-        // From here on the request only waits, which is counted apart.
-        held.release();
-        // The job is stored: whatever ends the wait early, the client must learn its id.
-        tokio::select! {
-            later = jobs.wait_from(announcements, job.clone(), Duration::from_secs(seconds.into())) => match later {
-                Ok(later) => job = later,
-                Err(reason) => tracing::debug!(%reason, job = %job.id, "the wait ended early"),
-            },
-            () = revoked(jobs.clone(), credential.map(|Extension(key)| key)) => {}
+    // The job is stored: whatever ends the wait early, the client must learn its id.
+    let stored = job.clone();
+    let waited = wait.hold(&jobs, async |at_most| {
+        jobs.wait_from(announcements, stored, at_most).await
+    });
+    match waited.await {
+        Ok(Some(Ok(later))) => job = later,
+        Ok(Some(Err(reason))) => {
+            tracing::debug!(%reason, job = %job.id, "the wait ended early");
         }
+        Ok(None) | Err(_) => {}
     }
-    let in_time = wait.is_some() && job.state.ended();
+    let waits = wait.at_most().is_some();
+    let in_time = waits && job.state.ended();
     let status = if in_time {
         StatusCode::OK
     } else {
         StatusCode::ACCEPTED
     };
-    let with_result = wait.is_some() && job.state == JobState::Succeeded;
+    let with_result = waits && job.state == JobState::Succeeded;
     let (body, share) = job_text(&jobs, &memory, job, with_result).await?;
     let head = [
         (header::LOCATION, location.as_str()),
@@ -121,7 +117,7 @@ pub(crate) async fn submit(
             .headers_mut()
             .insert(header::RETRY_AFTER, HeaderValue::from(1));
     }
-    let mut response = say_applied(response, wait);
+    let mut response = wait.tell_applied(response);
     mark_replay(&mut response, replayed);
     Ok(response)
 }
@@ -193,16 +189,26 @@ problems! {
     operation_id = "get_job",
     params(
         ("id" = String, Path, description = "Id of the job", format = "uuid"),
-        ("Prefer" = Option<String>, Header, description = "`wait=N`: answer when the job has ended, at most N seconds (60 at most) later (RFC 7240)", example = "wait=10")
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
     ),
     responses((status = 200, description = "The job", body = JobAnswer, headers(
         ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
     )), GetProblems)
 )]
-pub(crate) async fn get(awaited: Awaited) -> Result<Response, ApiError> {
-    let job = awaited.jobs.get_with_queue_place(awaited.id).await?;
-    let job = Json(JobAnswer::new(job));
-    Ok(say_applied(job.into_response(), awaited.applied))
+pub(crate) async fn get(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    wait: Wait,
+) -> Result<Response, ApiError> {
+    if let Some(ended) = wait
+        .hold(&jobs, async |at_most| jobs.wait(id, at_most).await)
+        .await?
+    {
+        ended?;
+    }
+    let job = Json(JobAnswer::new(jobs.get_with_queue_place(id).await?));
+    Ok(wait.tell_applied(job.into_response()))
 }
 
 /// The case of a job, as it was submitted.

@@ -172,6 +172,9 @@ pub(crate) async fn picture(
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'; sandbox"),
     );
+    response
+        .headers_mut()
+        .extend(format.disposition(&format!("plot-{id}")));
     Ok(hold_while_sent(response, share))
 }
 

@@ -90,5 +90,9 @@ async fn write(
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
     ];
-    Ok(hold_while_sent((headers, body).into_response(), share))
+    let mut response = (headers, body).into_response();
+    response
+        .headers_mut()
+        .extend(format.disposition("resultants"));
+    Ok(hold_while_sent(response, share))
 }

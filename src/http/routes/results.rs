@@ -8,6 +8,8 @@ use futures_util::{StreamExt, TryStreamExt, stream};
 use uuid::Uuid;
 
 use crate::http::dto::result::JobResult;
+use crate::http::extract::caller::Caller;
+use crate::http::extract::ids::JobId;
 use crate::http::layers::etag::{Known, tagged};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
@@ -15,7 +17,7 @@ use crate::http::limits::shares::Share;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
-use crate::http::routes::prefer_wait::{Awaited, say_applied};
+use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::jobs::Jobs;
 
 problems! {
@@ -31,25 +33,34 @@ problems! {
     operation_id = "get_result",
     params(
         ("id" = String, Path, description = "Id of the job", format = "uuid"),
-        ("Prefer" = Option<String>, Header, description = "`wait=N`: wait for the end of the job, at most N seconds (60 at most) (RFC 7240)", example = "wait=10")
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
     ),
     responses((status = 200, description = "The result", body = JobResult, headers(
         ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
     )), ResultProblems)
 )]
 pub(crate) async fn result(
-    Awaited { jobs, id, applied }: Awaited,
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    wait: Wait,
     State(memory): State<Memory>,
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
+    if let Some(ended) = wait
+        .hold(&jobs, async |at_most| jobs.wait(id, at_most).await)
+        .await?
+    {
+        ended?;
+    }
     let tag = match Known::of(&jobs, id, &uri, &headers, Format::Json).await? {
         Known::Unchanged(answer) => return Ok(answer),
         Known::Tag(tag) => tag,
     };
     let (body, share) = result_text(&jobs, &memory, id, ["", ""]).await?;
     let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
-    let response = say_applied((head, body).into_response(), applied);
+    let response = wait.tell_applied((head, body).into_response());
     Ok(tagged(&tag, hold_while_sent(response, share)))
 }
 

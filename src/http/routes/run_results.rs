@@ -25,6 +25,8 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::format::Format;
 use crate::http::render::row_tables::{RowWriter, WriteError};
+use crate::http::routes::runs::ended_run;
+use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::jobs::codec::table::{RowTable, TableKind};
 use crate::jobs::run::model::Run;
 use crate::jobs::run::results::ChunkRef;
@@ -95,7 +97,9 @@ pub(crate) struct RunRow {
     operation_id = "get_run_results",
     params(
         ("id" = String, Path, description = "Id of the run", format = "uuid"),
-        RunResultsQuery
+        RunResultsQuery,
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
     ),
     responses((status = 200, description = "One line or row for each row", content(
         (RunRow = "application/x-ndjson"),
@@ -107,14 +111,15 @@ pub(crate) struct RunRow {
 pub(crate) async fn results(
     Caller(jobs): Caller,
     RunId(id): RunId,
+    wait: Wait,
     uri: Uri,
     State(memory): State<Memory>,
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let query = RunResultsQuery::read(&uri, &())?;
+    let (query, _) = <(RunResultsQuery, WaitQuery)>::read(&uri, &())?;
     let format = choose(&headers, query.format, FORMATS)?;
-    let run = jobs.run(id).await?;
+    let run = ended_run(&jobs, id, &wait).await?;
     require_ended(&run)?;
     let columns = selected(&run, query.columns)?;
     let share = memory.ready_answer(jobs.tenant(), STREAM_BYTES)?;
@@ -146,7 +151,11 @@ pub(crate) async fn results(
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
     ];
-    Ok(hold_while_sent((headers, body).into_response(), share))
+    let mut response = (headers, body).into_response();
+    response
+        .headers_mut()
+        .extend(format.disposition(&format!("run-{id}")));
+    Ok(hold_while_sent(wait.tell_applied(response), share))
 }
 
 /// Why answers cannot be read.

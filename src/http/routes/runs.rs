@@ -12,6 +12,7 @@ use crate::http::dto::run::{RunAnswer, RunRequest};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::RunId;
 use crate::http::extract::labels::{name, new_label};
+use crate::http::extract::multipart::{TableUpload, separate_template};
 use crate::http::extract::query::{Parameters, Repeated, count, id, query, reader};
 use crate::http::extract::run_rows::body::{form, read_run};
 use crate::http::extract::submit_options::SubmitQuery;
@@ -24,10 +25,12 @@ use crate::http::routes::batches::labels_of;
 use crate::http::routes::job_list::{ListProblems, ListTotal};
 use crate::http::routes::jobs::{idempotency_key, mark_replay};
 use crate::http::routes::next_page::{answer, list_query};
+use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::jobs::error::JobsError;
 use crate::jobs::model::kind::Kind;
 use crate::jobs::run::draft::RunOptions;
-use crate::jobs::{BATCH_PAGE_MAX, BatchFilter};
+use crate::jobs::run::model::Run;
+use crate::jobs::{BATCH_PAGE_MAX, BatchFilter, Jobs};
 
 /// Runs in one page of a list when nothing is said.
 const LIST_LIMIT_DEFAULT: u32 = 20;
@@ -47,7 +50,7 @@ query! {
         /// A label of the run, written `key:value`; may be repeated, for at most 32 labels with different keys
         #[param(max_items = 32, example = json!(["line:A12"]))]
         label: Vec<(String, String)> as Vec<String> = Repeated(new_label());
-        /// With a table, and needed there: the job whose case is the template
+        /// The job whose case is the template of a table; not with `multipart/form-data`, which holds the template itself
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
         /// What a column is whose title does not say it, as `TITLE:NAME`; may be repeated. The name is a JSON pointer, a short name or a name with a
@@ -67,7 +70,7 @@ query! {
 /// Submits many rows as one run.
 ///
 /// A row is the template with the row's values in place of its own; it is solved as a case of its own, to the last bit, whatever other rows there are. With `auto`, a row takes the table of creep forces where its bound meets the target, and `boundary_element` elsewhere. The body is
-/// JSON with `template` and `columns`, at most as large as one of `/v1/evaluate`, or a table with `?template=`, which is read as it arrives. A
+/// JSON with `template` and `columns`, at most as large as one of `/v1/evaluate`, or a table, which is read as it arrives: as `multipart/form-data` with the parts `template` and `table`, or alone with `?template=` naming a job. A
 /// row that cannot be solved has a `status` in the results that says why, and does not affect other rows.
 #[utoipa::path(
     post,
@@ -77,6 +80,8 @@ query! {
     params(
         RunQuery,
         SubmitQuery,
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10"),
         ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same rows and the same options answers the first run instead of making another"),
         ("traceparent" = Option<String>, Header, description = "W3C trace context: if the service exports traces, the trace of the run continues the client's trace. An unreadable value is ignored", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
     ),
@@ -86,9 +91,15 @@ query! {
         (String = "application/x-ndjson"),
         (Vec<u8> = "application/vnd.apache.arrow.stream"),
         (Vec<u8> = "application/vnd.apache.parquet"),
-        (Vec<u8> = "application/x-npz")
+        (Vec<u8> = "application/x-npz"),
+        (TableUpload = "multipart/form-data")
     ), description = "At most 10 000 000 rows and 1 GiB"),
     responses(
+        (status = 200, description = "The run ended within the wait", body = RunAnswer, headers(
+            ("Location" = String, description = "Path of the run"),
+            ("Preference-Applied" = String, description = "The wait that was applied, if one was preferred"),
+            ("Idempotency-Replayed" = String, description = "`true` if this is the run of an earlier request with the same `Idempotency-Key`; absent otherwise")
+        )),
         (status = 202, description = "The rows are stored and will be solved", body = RunAnswer, headers(
             ("Location" = String, description = "Path of the run"),
             ("Idempotency-Replayed" = String, description = "`true` if this is the run of an earlier request with the same `Idempotency-Key`; absent otherwise")
@@ -98,12 +109,13 @@ query! {
 )]
 pub(crate) async fn submit(
     Caller(jobs): Caller,
+    wait: Wait,
     State(options): State<HttpOptions>,
     State(memory): State<Memory>,
     request: Request,
 ) -> Result<Response, ApiError> {
     let idempotency_key = idempotency_key(request.headers())?;
-    let (run, submit) = <(RunQuery, SubmitQuery)>::read(request.uri(), &())?;
+    let ((run, submit), _) = <((RunQuery, SubmitQuery), WaitQuery)>::read(request.uri(), &())?;
     let mut labels = labels_of(run.label.unwrap_or_default())?;
     jobs.bind(&mut labels)
         .map_err(|faults| ApiError::bad_parameter("label", faults[0].detail.clone()))?;
@@ -113,18 +125,30 @@ pub(crate) async fn submit(
         submit: submit.options(request.headers()),
         idempotency_key,
     };
-    let form = form(&jobs, request.headers(), run.template).await?;
+    let (request, template) =
+        separate_template(&jobs, &memory, &options, run.template, request).await?;
+    let form = (form(request.headers(), template.as_ref())?, template);
     let carried = run.carry.unwrap_or_default().into_iter();
     let named = run.column.unwrap_or_default().into_iter();
     let named = named.chain(carried.map(|title| (title, String::new())));
     let read = (form, NamedColumns(named.collect()));
     let draft = read_run(&jobs, &memory, &options, read, request).await?;
-    let (run, replayed) = jobs.submit_run(draft, options_of_run).await?;
-    let location = [(header::LOCATION, format!("/v1/runs/{}", run.chunks.id))];
+    let (mut run, replayed) = jobs.submit_run(draft, options_of_run).await?;
+    let id = run.chunks.id;
+    let location = [(header::LOCATION, format!("/v1/runs/{id}"))];
+    // The run is stored: whatever ends the wait early, the client must learn its id.
+    let waited = wait.hold(&jobs, async |at_most| jobs.wait_run(id, at_most).await);
+    if let Ok(Some(Ok(later))) = waited.await {
+        run = later;
+    }
+    let status = match run.state().ended() {
+        true if wait.at_most().is_some() => StatusCode::OK,
+        _ => StatusCode::ACCEPTED,
+    };
     let run = Json(RunAnswer::from(run));
-    let mut response = (StatusCode::ACCEPTED, location, run).into_response();
+    let mut response = (status, location, run).into_response();
     mark_replay(&mut response, replayed);
-    Ok(response)
+    Ok(wait.tell_applied(response))
 }
 
 /// A page of runs, newest first.
@@ -200,14 +224,31 @@ problems! {
     path = "/v1/runs/{id}",
     tag = "runs",
     operation_id = "get_run",
-    params(("id" = String, Path, description = "Id of the run", format = "uuid")),
-    responses((status = 200, description = "The run", body = RunAnswer), GetRunProblems)
+    params(
+        ("id" = String, Path, description = "Id of the run", format = "uuid"),
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
+    ),
+    responses((status = 200, description = "The run", body = RunAnswer, headers(
+        ("Preference-Applied" = String, description = "The wait that was applied, if one was preferred")
+    )), GetRunProblems)
 )]
 pub(crate) async fn get(
     Caller(jobs): Caller,
     RunId(id): RunId,
-) -> Result<Json<RunAnswer>, ApiError> {
-    Ok(Json(jobs.run(id).await?.into()))
+    wait: Wait,
+) -> Result<Response, ApiError> {
+    let run = ended_run(&jobs, id, &wait).await?;
+    Ok(wait.tell_applied(Json(RunAnswer::from(run)).into_response()))
+}
+
+/// A run, after the wait that the request asks for.
+pub(crate) async fn ended_run(jobs: &Jobs, id: Uuid, wait: &Wait) -> Result<Run, ApiError> {
+    let waited = wait.hold(jobs, async |at_most| jobs.wait_run(id, at_most).await);
+    match waited.await? {
+        Some(run) => Ok(run?),
+        None => Ok(jobs.run(id).await?),
+    }
 }
 
 /// Stops a run. Finished rows keep their answers.

@@ -121,5 +121,9 @@ async fn write(
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),
     ];
-    Ok(hold_while_sent((head, text).into_response(), share))
+    let mut response = (head, text).into_response();
+    response
+        .headers_mut()
+        .extend(format.disposition("subsurface"));
+    Ok(hold_while_sent(response, share))
 }

@@ -4,15 +4,16 @@ use axum::body::Body;
 use axum::extract::Request;
 use axum::http::HeaderMap;
 use serde_json::Value;
-use uuid::Uuid;
 
 use crate::contact::error::Fault;
 use crate::http::extract::arriving::Arriving;
 use crate::http::extract::batch::own_options;
 use crate::http::extract::batch::splitter::{Element, Layout, Splitter};
 use crate::http::extract::batch::table::TableBody;
-use crate::http::extract::json::{essence, read_json, read_strict, weigh_case};
+use crate::http::extract::json::{essence, read_strict, weigh_case};
+use crate::http::extract::multipart::{Template, template_missing};
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
+use crate::http::limits::shares::Share;
 use crate::http::limits::turns::Computation;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
@@ -52,8 +53,8 @@ impl Form {
 pub async fn form(
     jobs: &Jobs,
     headers: &HeaderMap,
-    template: Option<Uuid>,
-) -> Result<Form, ApiError> {
+    template: Option<Template>,
+) -> Result<(Form, Option<Share>), ApiError> {
     let essence = essence(headers);
     if template.is_some() && essence != "text/csv" {
         return Err(ApiError::bad_parameter(
@@ -62,22 +63,20 @@ pub async fn form(
         ));
     }
     match (essence.as_str(), template) {
-        ("application/json", _) => Ok(Form::Array),
-        ("application/x-ndjson" | "application/ndjson" | "application/jsonl", _) => Ok(Form::Lines),
-        ("text/csv", Some(job)) => {
-            let case = jobs.case(job).await;
-            let case = case.map_err(|error| ApiError::from(error).about("template"))?;
-            let case = jobs.with_profiles(read_json(&case)?).await?;
-            Ok(Form::Table(Box::default(), case))
+        ("application/json", _) => Ok((Form::Array, None)),
+        ("application/x-ndjson" | "application/ndjson" | "application/jsonl", _) => {
+            Ok((Form::Lines, None))
         }
-        ("text/csv", None) => Err(ApiError::bad_parameter(
-            "template",
-            "a table needs `?template=` with the id of a job; its case is what the columns are filled into",
-        )),
+        ("text/csv", Some(template)) => {
+            let (case, share) = template.case(jobs).await?;
+            let case = jobs.with_profiles(case).await?;
+            Ok((Form::Table(Box::default(), case), share))
+        }
+        ("text/csv", None) => Err(template_missing()),
         (other, _) => Err(ApiError::new(
             ProblemKind::UnsupportedMediaType,
             format!(
-                "the content type is `{other}`; send an array with `application/json`, one case per line with `application/x-ndjson`, or a table with `text/csv`"
+                "the content type is `{other}`; send an array with `application/json`, one case per line with `application/x-ndjson`, a table with `text/csv`, or a template and a table with `multipart/form-data`"
             ),
         )),
     }

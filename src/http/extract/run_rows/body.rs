@@ -6,12 +6,11 @@ use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::HeaderMap;
-use serde_json::Value;
-use uuid::Uuid;
 
 use crate::contact::evaluate::varied::Values;
 use crate::http::extract::arriving::Arriving;
-use crate::http::extract::json::{essence, read_json};
+use crate::http::extract::json::essence;
+use crate::http::extract::multipart::{Template, template_missing};
 use crate::http::extract::npz::{read_arrays, too_large};
 use crate::http::extract::rows::{declared_bytes, read_body, read_json_columns};
 use crate::http::extract::run_rows::text::{CsvRows, JsonRows};
@@ -50,15 +49,11 @@ pub enum RowsForm {
     Npz,
 }
 
-/// The form that the rows are declared to have, and the template if a job holds it.
+/// The form that the rows are declared to have. A table needs a template, JSON has its own.
 ///
 /// # Errors
-/// The content type is none of these, or the template is missing, unknown or not wanted.
-pub async fn form(
-    jobs: &Jobs,
-    headers: &HeaderMap,
-    template: Option<Uuid>,
-) -> Result<(RowsForm, Option<Value>), ApiError> {
+/// The content type is none of these, or the template is missing or not wanted.
+pub fn form(headers: &HeaderMap, template: Option<&Template>) -> Result<RowsForm, ApiError> {
     let form = match essence(headers).as_str() {
         "application/json" => RowsForm::Json,
         "text/csv" => RowsForm::Csv,
@@ -72,26 +67,18 @@ pub async fn form(
             return Err(ApiError::new(
                 ProblemKind::UnsupportedMediaType,
                 format!(
-                    "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv`, `application/x-ndjson`, `application/vnd.apache.arrow.stream`, `application/vnd.apache.parquet` or `application/x-npz`"
+                    "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv`, `application/x-ndjson`, `application/vnd.apache.arrow.stream`, `application/vnd.apache.parquet` or `application/x-npz`, or a template and a table with `multipart/form-data`"
                 ),
             ));
         }
     };
     match (form, template) {
-        (RowsForm::Json, None) => Ok((form, None)),
         (RowsForm::Json, Some(_)) => Err(ApiError::bad_parameter(
             "template",
             "`template` belongs to a table; JSON has a `template` of its own",
         )),
-        (_, Some(job)) => {
-            let case = jobs.case(job).await;
-            let case = case.map_err(|error| ApiError::from(error).about("template"))?;
-            Ok((form, Some(read_json(&case)?)))
-        }
-        (_, None) => Err(ApiError::bad_parameter(
-            "template",
-            "a table needs `?template=` with the id of a job; its case is what the columns are filled into",
-        )),
+        (RowsForm::Json, None) | (_, Some(_)) => Ok(form),
+        (_, None) => Err(template_missing()),
     }
 }
 
@@ -103,7 +90,7 @@ pub async fn read_run(
     jobs: &Jobs,
     memory: &Memory,
     options: &HttpOptions,
-    ((form, template), named): ((RowsForm, Option<Value>), NamedColumns),
+    ((form, template), named): ((RowsForm, Option<Template>), NamedColumns),
     request: Request<Body>,
 ) -> Result<RunDraft, ApiError> {
     let rows_max = options.run_max_rows;
@@ -111,6 +98,7 @@ pub async fn read_run(
     let Some(template) = template else {
         return from_json(jobs, memory, options, named, request).await;
     };
+    let (template, template_share) = template.case(&jobs).await?;
     let file = spool(&jobs, options, request).await?;
     let bytes_max = options.evaluate_max_bytes;
     // An archive is read as a whole, once packed and once as numbers.
@@ -121,7 +109,7 @@ pub async fn read_run(
     let share = memory.rows(jobs.tenant(), bytes).await?;
     let mut computation = memory.computation(jobs.tenant());
     let read = computation.run(move |pace| {
-        let _held = share;
+        let _held = (share, template_share);
         let draft = |columns| jobs.draft_run(template.clone(), columns, rows_max);
         let mut draft = match form {
             RowsForm::Ndjson => {

@@ -10,7 +10,7 @@ use crate::http::dto::tenant_limits::TenantLimits;
 use crate::http::extract::caller::AnyTenant;
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::PlainProblems;
-use crate::http::routes::prefer_wait::WAIT_MAX_SECONDS;
+use crate::http::routes::wait::WAIT_MAX_SECONDS;
 use crate::jobs::PAGE_MAX;
 
 /// What the service can do.

@@ -1,0 +1,222 @@
+//! A table and its template in one request, as `multipart/form-data`.
+
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::batches::{results, small};
+use crate::errors::assert_problem;
+use crate::runs::{ended, template};
+use crate::server::{Answer, Server};
+
+const BOUNDARY: &str = "a-boundary";
+
+/// Parts with their heads, as a body.
+fn body(parts: &[(&str, &str)]) -> String {
+    let parts = parts.iter();
+    let parts = parts.map(|(head, text)| {
+        format!("--{BOUNDARY}\r\nContent-Disposition: form-data; {head}\r\n\r\n{text}\r\n")
+    });
+    parts.collect::<String>() + &format!("--{BOUNDARY}--\r\n")
+}
+
+async fn upload(server: &Server, path: &str, parts: &[(&str, &str)]) -> Answer {
+    let body = body(parts);
+    let kind = format!("multipart/form-data; boundary={BOUNDARY}");
+    let send = |request: reqwest::RequestBuilder| request.header("content-type", kind).body(body);
+    server.send(Method::POST, path, send).await
+}
+
+async fn with_type(server: &Server, path: &str, kind: &'static str, text: &str) -> Answer {
+    let text = text.to_owned();
+    let send = |request: reqwest::RequestBuilder| request.header("content-type", kind).body(text);
+    server.send(Method::POST, path, send).await
+}
+
+#[tokio::test]
+async fn a_table_with_its_template_is_answered_like_one_over_a_job() {
+    let server = Server::start().await;
+    let case = small("template");
+    let job = server.submit(&case).await;
+    let id = job.rsplit('/').next().expect("an id");
+    let table = "label:km,normal_force_n,/motion/creepage_x\n37.2,80000,0.002\n37.4,90000,0\n";
+    let over_job = with_type(
+        &server,
+        &format!("/v1/batches?template={id}"),
+        "text/csv",
+        table,
+    )
+    .await;
+    assert_eq!(over_job.status, 202, "{}", over_job.text);
+    let case = case.to_string();
+    let parts = [
+        ("name=\"template\"; filename=\"case.json\"", case.as_str()),
+        ("name=\"table\"; filename=\"rows.csv\"", table),
+    ];
+    let alone = upload(&server, "/v1/batches", &parts).await;
+    assert_eq!(alone.status, 202, "{}", alone.text);
+    let [expected, found] = [
+        results(&server, &over_job.json, "?wait=60").await,
+        results(&server, &alone.json, "?wait=60").await,
+    ];
+    assert_eq!(found.len(), 2);
+    for (expected, found) in expected.iter().zip(&found) {
+        assert_eq!(found["labels"], expected["labels"]);
+        assert!(found["result"].is_object(), "{found}");
+        assert_eq!(found["result"]["patches"], expected["result"]["patches"]);
+    }
+}
+
+#[tokio::test]
+async fn a_run_takes_every_form_of_table_with_its_template() {
+    let server = Server::start().await;
+    let case = template("auto").to_string();
+    let csv = "normal_force_n,/motion/creepage_x,section\n5e4,1e-3,a\n6e4,0,b\n";
+    let ndjson = "{\"normal_force_n\":5e4,\"/motion/creepage_x\":1e-3,\"section\":\"a\"}\n\
+                  {\"normal_force_n\":6e4,\"/motion/creepage_x\":0,\"section\":\"b\"}\n";
+    let rows = json!({ "template": template("auto"), "columns": {
+        "normal_force_n": [5e4, 6e4], "/motion/creepage_x": [1e-3, 0.0], "section": ["a", "b"]
+    } });
+    let expected = server.post("/v1/runs?wait=60", &rows).await;
+    assert_eq!(expected.status, 200, "{}", expected.text);
+    let template = ("name=\"template\"", case.as_str());
+    let mut answers = vec![answers_of(&server, &expected).await];
+    for table in [
+        (
+            "name=\"table\"; filename=\"rows.csv\"\r\nContent-Type: text/csv",
+            csv,
+        ),
+        // As programs send files whose form they do not know.
+        (
+            "name=\"table\"; filename=\"rows.CSV\"\r\nContent-Type: application/octet-stream",
+            csv,
+        ),
+        ("name=\"table\"", csv),
+        ("name=\"table\"; filename=\"rows.ndjson\"", ndjson),
+    ] {
+        let run = upload(&server, "/v1/runs?wait=60", &[template, table]).await;
+        assert_eq!(run.status, 200, "{}: {}", table.0, run.text);
+        answers.push(answers_of(&server, &run).await);
+    }
+    assert!(answers[0].contains(",ok,"), "{}", answers[0]);
+    assert!(
+        answers.iter().all(|answer| *answer == answers[0]),
+        "{answers:#?}"
+    );
+}
+
+async fn answers_of(server: &Server, run: &Answer) -> String {
+    let path = run.header("location").expect("a location").to_owned();
+    ended(server, &path).await;
+    server.get(&format!("{path}/results?format=csv")).await.text
+}
+
+#[tokio::test]
+async fn parts_that_are_missing_or_wrong_are_named() {
+    let server = Server::idle().await;
+    let case = template("auto").to_string();
+    let template = ("name=\"template\"", case.as_str());
+    let table = ("name=\"table\"", "normal_force_n\n5e4\n");
+    for (parts, said) in [
+        (vec![], "nothing where the part `template` is expected"),
+        (
+            vec![table, template],
+            "`table` where the part `template` is expected",
+        ),
+        (vec![template], "nothing where the part `table` is expected"),
+        (
+            vec![template, ("name=\"rows\"", "1")],
+            "`rows` where the part `table` is expected",
+        ),
+    ] {
+        for path in ["/v1/runs", "/v1/batches"] {
+            let answer = upload(&server, path, &parts).await;
+            assert_problem(&answer, 422, "faulty-table", said);
+        }
+    }
+    let broken = upload(&server, "/v1/runs", &[("name=\"template\"", "{"), table]).await;
+    assert_problem(&broken, 400, "malformed-json", "");
+    let job = uuid::Uuid::nil();
+    let twice = upload(
+        &server,
+        &format!("/v1/runs?template={job}"),
+        &[template, table],
+    )
+    .await;
+    assert_problem(&twice, 400, "bad-query", "leave `?template=` out");
+    let kind = "multipart/form-data";
+    let bare = with_type(&server, "/v1/runs", kind, &body(&[template, table])).await;
+    assert_problem(&bare, 415, "unsupported-media-type", "boundary");
+    let faulty: Value = json!({ "load": {} });
+    let faulty = faulty.to_string();
+    let faulty = upload(
+        &server,
+        "/v1/runs",
+        &[("name=\"template\"", &faulty), table],
+    )
+    .await;
+    assert_problem(&faulty, 422, "faulty-case", "");
+}
+
+#[tokio::test]
+async fn a_batch_and_a_run_can_be_waited_for_as_a_job_can() {
+    let server = Server::start().await;
+    let prefer = |body: Value| {
+        move |request: reqwest::RequestBuilder| request.header("prefer", "wait=60").json(&body)
+    };
+    let rows = json!({ "template": template("auto"), "columns": { "normal_force_n": [5e4, 6e4] } });
+    for (path, body) in [
+        ("/v1/jobs", small("waits")),
+        ("/v1/batches", json!([small("one"), small("two")])),
+        ("/v1/runs", rows),
+    ] {
+        let asked = server.post(&format!("{path}?wait=60"), &body).await;
+        assert_eq!(asked.status, 200, "{path}: {}", asked.text);
+        assert_eq!(asked.header("preference-applied"), None);
+        let preferred = server.send(Method::POST, path, prefer(body.clone())).await;
+        assert_eq!(preferred.status, 200, "{path}: {}", preferred.text);
+        assert_eq!(preferred.header("preference-applied"), Some("wait=60"));
+        for answer in [&asked, &preferred] {
+            let ended = ["succeeded", "ended"].map(|state| json!(state));
+            assert!(
+                ended.contains(&answer.json["state"]),
+                "{path}: {}",
+                answer.text
+            );
+        }
+        // What has not been waited for can be waited for later.
+        let later = server.post(path, &body).await;
+        let location = later.header("location").expect("a location").to_owned();
+        let got = server.get(&format!("{location}?wait=60")).await;
+        assert_eq!(got.status, 200, "{}", got.text);
+        assert!(got.json["ended_at"].is_string(), "{path}: {}", got.text);
+        let wrong = server.get(&format!("{location}?wait=soon")).await;
+        assert_problem(&wrong, 400, "bad-query", "from 0 to 3600");
+        let unknown = server.get(&format!("{location}?wait=1&pause=1")).await;
+        assert_problem(&unknown, 400, "bad-query", "`pause`");
+    }
+}
+
+#[tokio::test]
+async fn answers_in_tables_are_saved_under_names_of_their_own() {
+    let server = Server::start().await;
+    let batch = server
+        .post("/v1/batches?wait=60", &json!([small("one")]))
+        .await;
+    let rows = json!({ "template": template("auto"), "columns": { "normal_force_n": [5e4] } });
+    let run = server.post("/v1/runs?wait=60", &rows).await;
+    for (answer, kind, format) in [
+        (&batch, "batch", "csv"),
+        (&batch, "batch", "ndjson"),
+        (&run, "run", "parquet"),
+        (&run, "run", "arrow"),
+    ] {
+        let path = answer.header("location").expect("a location");
+        let id = path.rsplit('/').next().expect("an id");
+        let results = server.get(&format!("{path}/results?format={format}")).await;
+        let expected = format!("attachment; filename=\"{kind}-{id}.{format}\"");
+        assert_eq!(
+            results.header("content-disposition"),
+            Some(expected.as_str())
+        );
+    }
+}
