@@ -26,8 +26,8 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::http::dto::run::CellValue;
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::Caller;
-use crate::http::extract::json;
 use crate::http::extract::json::essence;
+use crate::http::extract::multipart::{TableUpload, Template, separate_template, template_missing};
 use crate::http::extract::npz::read_npz;
 use crate::http::extract::query::{Parameters, id, query};
 use crate::http::extract::rows::{
@@ -176,7 +176,7 @@ problems! {
 query! {
     /// Parameters of an evaluation.
     EvaluateQuery(() => ()) {
-        /// With a table, and needed there: the job whose case is the template
+        /// The job whose case is the template of a table; not with `multipart/form-data`, which holds the template itself
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
         /// `json`, `csv`, `arrow` or `npz`; overrides `Accept`
@@ -197,7 +197,7 @@ query! {
     tag = "cases",
     operation_id = "evaluate_rows",
     params(EvaluateQuery),
-    request_body(content((EvaluateRequest = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/x-npz")), description = "At most 1 000 000 rows and 64 MiB"),
+    request_body(content((EvaluateRequest = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/x-npz"), (TableUpload = "multipart/form-data")), description = "At most 1 000 000 rows and 64 MiB"),
     responses((status = 200, description = "The rows' resultants", content((EvaluateAnswer = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/x-npz"))), EvaluateProblems)
 )]
 pub(crate) async fn evaluate(
@@ -208,8 +208,16 @@ pub(crate) async fn evaluate(
 ) -> Result<Response, ApiError> {
     let EvaluateQuery { template, format } = EvaluateQuery::read(request.uri(), &())?;
     let format = choose(request.headers(), format, FORMATS)?;
+    let (request, template) =
+        separate_template(&jobs, &memory, &options, template, request).await?;
     let essence = essence(request.headers());
-    let template = stored_template(&jobs, &essence, template).await?;
+    let (template, template_share) = match table_template(&essence, template)? {
+        Some(template) => {
+            let (case, share) = template.case(&jobs).await?;
+            (Some(case), share)
+        }
+        None => (None, None),
+    };
     // First the text and its numbers, then these and the answer: about twice the text at any time.
     let bytes = match &*essence {
         // May be packed.
@@ -232,6 +240,7 @@ pub(crate) async fn evaluate(
         time: options.evaluate_time,
     };
     let work = computation.run(move |pace| {
+        let _held = template_share;
         let (template, columns) = match template {
             Some(template) if essence == NPZ => {
                 (template, varied(read_npz(text.clone(), bytes_max)?))
@@ -312,30 +321,19 @@ fn varied(columns: Vec<Column>) -> Vec<VariedColumn> {
 }
 
 /// The template of a table; nothing for JSON, which has its own.
-async fn stored_template(
-    jobs: &Jobs,
-    essence: &str,
-    template: Option<Uuid>,
-) -> Result<Option<Value>, ApiError> {
+fn table_template(essence: &str, template: Option<Template>) -> Result<Option<Template>, ApiError> {
     match (essence, template) {
         ("application/json", None) => Ok(None),
         ("application/json", Some(_)) => Err(ApiError::bad_parameter(
             "template",
             "`template` belongs to a table; JSON has a `template` of its own",
         )),
-        ("text/csv" | ARROW_STREAM | ARROW_FILE | NPZ, Some(job)) => {
-            let case = jobs.case(job).await;
-            let case = case.map_err(|error| ApiError::from(error).about("template"))?;
-            json::read_json(&case).map(Some)
-        }
-        ("text/csv" | ARROW_STREAM | ARROW_FILE | NPZ, None) => Err(ApiError::bad_parameter(
-            "template",
-            "a table needs `?template=` with the id of a job; its case is what the columns are filled into",
-        )),
+        ("text/csv" | ARROW_STREAM | ARROW_FILE | NPZ, Some(template)) => Ok(Some(template)),
+        ("text/csv" | ARROW_STREAM | ARROW_FILE | NPZ, None) => Err(template_missing()),
         (other, _) => Err(ApiError::new(
             ProblemKind::UnsupportedMediaType,
             format!(
-                "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv`, `application/vnd.apache.arrow.stream` or `application/x-npz`"
+                "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv`, `application/vnd.apache.arrow.stream` or `application/x-npz`, or a template and a table with `multipart/form-data`"
             ),
         )),
     }
