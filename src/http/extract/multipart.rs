@@ -103,6 +103,8 @@ pub async fn separate_template(
     while let Some(piece) = arriving.next().await? {
         text.extend_from_slice(&piece);
     }
+    // The next part can be read once this one is gone.
+    drop(arriving);
     let weight = weigh_case(&text, options.parsed_max_bytes)?;
     let share = memory.parsed(jobs.tenant(), weight).await?;
     let template = Template::Case(read_json(&text)?, share);
