@@ -34,7 +34,7 @@ query! {
 pub(crate) struct Wait {
     seconds: Option<u32>,
     preferred: bool,
-    _place: Option<Share>,
+    place: Option<Share>,
     held: Option<HeldShares>,
     key: Option<Credential>,
 }
@@ -51,7 +51,7 @@ impl Wait {
         if let (Some(_), Some(held)) = (self.seconds, &self.held) {
             held.release();
         }
-        self._place
+        self.place
     }
 
     /// Runs what waits at most the time it is given. Returns `None` if the request does not ask to wait.
@@ -110,7 +110,7 @@ where
         Ok(Wait {
             seconds,
             preferred,
-            _place: place,
+            place,
             held: parts.extensions.get().cloned(),
             key: parts.extensions.get().cloned(),
         })
