@@ -111,6 +111,7 @@ const ORDER: &[&str] = &[
     "http::layers",
     "http::extract",
     "http::contract_forms",
+    "http::contract_shared",
     "http::contract",
     "http::page",
     "http::state",
