@@ -1,7 +1,8 @@
 // Compare and Line: several jobs side by side, and the cases of a batch along a label.
 import assert from 'node:assert/strict';
+import { join } from 'node:path';
 import { test } from 'node:test';
-import { drawn, example, parsed, readout, setUp, withFields } from './harness.mjs';
+import { drawn, example, OUTPUT, parsed, readout, setUp, withFields } from './harness.mjs';
 
 const { service, onPage } = setUp();
 
@@ -11,7 +12,7 @@ test('compared jobs share range and crosshair, and say how many errors they are 
   const fine = await service.solved({ ...base, name: 'two', solver: { mesh: { strips: 14, cells: 14 } } });
   const other = await service.solved({ ...base, name: 'three', friction: { coefficient: 0.15 } });
   await page.goto(`${service.base}/#/jobs`);
-  for (const name of ['one', 'two', 'three']) await page.getByLabel(`Compare ${name}`, { exact: true }).check();
+  for (const name of ['one', 'two', 'three']) await page.getByLabel(`Choose ${name}`, { exact: true }).check();
   await page.getByRole('link', { name: 'Compare 3' }).first().click();
   await drawn(page, '[aria-label="Job C"] field-map');
   const ranges = await page.locator('[aria-label^="Job "] field-map').evaluateAll((maps) => maps.map((map) => /** @type {HTMLElement & { shown: { range: number[] } }} */ (map).shown.range));
@@ -21,7 +22,7 @@ test('compared jobs share range and crosshair, and say how many errors they are 
   await page.waitForTimeout(120);
   const [a, c] = [await readout(page, '[aria-label="Job A"] field-map'), await readout(page, '[aria-label="Job C"] field-map')];
   assert.deepEqual([c.x, c.y], [a.x, a.y]);
-  const force = page.locator('tr', { hasText: 'F x along' });
+  const force = page.locator('tr', { hasText: 'Fx / N' });
   const numbers = async () => (await force.locator('td').allInnerTexts());
   assert.equal((await numbers())[4], 'within the errors');
   assert.ok(Math.abs(parsed((await numbers())[0]) - coarse.result.patches[0].points[0].force_x_n) < 1);
@@ -83,4 +84,41 @@ test('a batch stands along its label, with limits, the worst places and the way 
   await page.locator('section[aria-labelledby="h-worst"] a').first().click();
   await page.locator('.figures').waitFor();
   await drawn(page);
+}));
+
+test('a worn rail lies over a new one: difference, worn area, numbers of all patches, the same place on the rail', () => onPage('#/compose', async (page) => {
+  const base = example('wheel-rail');
+  const points = /** @type {[number, number][]} */ (base.contact.rail.points_mm);
+  // A hollow of half a cosine wave, 20 mm long and 0.5 mm deep, about y −8: 5 mm² are missing.
+  const groove = (/** @type {number} */ y) => (Math.abs(y + 8) < 10 ? 0.25 * (1 + Math.cos((Math.PI * (y + 8)) / 10)) : 0);
+  const finer = points.flatMap(([y, z], at) => {
+    const next = points[at + 1];
+    const parts = next && Math.abs(next[0] - y) > 0.4 ? 4 : 1;
+    return Array.from({ length: parts }, (_, part) => [y + (part / parts) * ((next ?? [y])[0] - y), z + (part / parts) * ((next ?? [y, z])[1] - z)]);
+  });
+  const worn = finer.map(([y, z]) => [Number(y.toFixed(4)), Number((z + groove(y)).toFixed(5))]);
+  const solve = (/** @type {string} */ name, /** @type {object} */ rail) =>
+    service.solved({ ...base, name, contact: { ...base.contact, rail, lateral_shift_mm: 0, accept_rough_profiles: true }, outputs: ['resultants', 'zones', 'tractions', 'pressure', 'damage'] });
+  const [one, two] = [await solve('new rail', base.contact.rail), await solve('worn rail', { points_mm: worn })];
+  assert.deepEqual([one.state, two.state], ['succeeded', 'succeeded'], JSON.stringify(two.error));
+  await page.goto(`${service.base}/#/compare/${one.id}/${two.id}`);
+  await page.getByRole('img', { name: 'Cross-section of the rail of B over that of A' }).waitFor();
+  await page.getByRole('img', { name: 'What the rail of B lacks against that of A' }).waitFor();
+  const told = await page.locator('section[aria-labelledby="h-overlay"]').innerText();
+  const area = Number(/Worn area ([\d.]+) mm²/.exec(told)?.[1]);
+  const depth = Number(/at most ([\d.]+) mm/.exec(told)?.[1]);
+  assert.ok(Math.abs(area - 5) < 0.6, told);
+  assert.ok(Math.abs(depth - 0.5) < 0.06, told);
+  await page.screenshot({ path: join(OUTPUT, 'compare-worn.png'), fullPage: true });
+  const row = (/** @type {string} */ name) => page.locator('section[aria-labelledby="h-numbers"] tr').filter({ has: page.locator('th[scope="row"]', { hasText: new RegExp(`^${name}`) }) }).first().locator('td').allInnerTexts();
+  const result = await service.ask(`/v1/jobs/${two.id}/result`);
+  assert.equal(parsed((await row('patches'))[1]), result.patches.length);
+  assert.ok(Math.abs(parsed((await row('Q / kN'))[1]) + result.total[0].force_z_n / 1000) < 0.01);
+  for (const name of ['Y, outward', 'Y/Q', 'largest pressure', 'area', 'Tγ', 'wear depth', 'N / kN']) assert.ok((await row(name)).length >= 3, name);
+  await page.getByLabel('aligned').selectOption('fit');
+  await page.locator('section[aria-labelledby="h-overlay"]').getByText('Worn area').waitFor();
+  await page.getByRole('radio', { name: 'wheel' }).check();
+  await page.getByText('Both cases have the same wheel.').waitFor();
+  await page.getByLabel('at the same place').selectOption('patch');
+  await drawn(page, '[aria-label="Difference"] field-map');
 }));

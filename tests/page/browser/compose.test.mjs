@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
-import { ALL, drawn, dropFiles, example, OUTPUT, setUp } from './harness.mjs';
+import { ALL, drawn, dropFiles, example, OUTPUT, setUp, until } from './harness.mjs';
 
 const { service, onPage } = setUp();
 const EXAMPLES = readdirSync(new URL('../../../api/examples/', import.meta.url)).filter((name) => name.endsWith('.case.json'));
@@ -307,8 +307,5 @@ test('a cheap case is solved while it is written, and leaves no job behind', () 
   await drawn(page, '.preview field-map');
   await page.getByRole('checkbox', { name: 'result while typing' }).uncheck();
   await page.locator('.preview').waitFor({ state: 'detached' });
-  await page.waitForFunction(async (expected) => {
-    const { jobs } = await (await fetch('/v1/jobs?limit=1000')).json();
-    return jobs.length === expected;
-  }, before, { polling: 100 });
+  await until(async () => (await service.ask('/v1/jobs?limit=1000')).jobs.length === before);
 }));

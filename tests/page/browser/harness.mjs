@@ -164,3 +164,12 @@ export async function dropFiles(page, place, files) {
   }, files);
   await page.dispatchEvent(place, 'drop', { dataTransfer });
 }
+
+/** Waits up to 15 s until something holds. @param {() => Promise<boolean>} holds */
+export async function until(holds) {
+  for (let round = 0; round < 75; round += 1) {
+    if (await holds()) return;
+    await new Promise((resolve) => setTimeout(resolve, 200));
+  }
+  assert.fail(`${holds}`);
+}

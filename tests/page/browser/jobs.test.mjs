@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { test } from 'node:test';
-import { drawn, example, launch, Service, setUp, SLACK } from './harness.mjs';
+import { drawn, example, launch, Service, setUp, SLACK, until } from './harness.mjs';
 
 const { service, onPage } = setUp();
 
@@ -26,8 +26,16 @@ test('a job is followed from the queue to its end, and another is cancelled', ()
   // The list is empty until the answer with the new filter is there.
   await row(page, 'slow two').waitFor();
   assert.equal(await page.locator('.rows.job').count(), 1);
+  // Deleting can be undone for some seconds.
   await page.getByRole('button', { name: 'Delete slow two' }).click();
   await page.getByText('No jobs that are cancelled').waitFor();
+  await page.getByRole('button', { name: 'Undo' }).click();
+  await row(page, 'slow two').waitFor();
+  await page.waitForTimeout(6500);
+  assert.equal((await fetch(`${service.base}/v1/jobs/${second.id}`)).status, 200);
+  await page.getByRole('button', { name: 'Delete slow two' }).click();
+  await page.getByText('No jobs that are cancelled').waitFor();
+  await until(async () => (await fetch(`${service.base}/v1/jobs/${second.id}`)).status === 404);
   assert.equal((await fetch(`${service.base}/v1/jobs/${second.id}`)).status, 404);
   await page.goto(`${service.base}/#/jobs/${first.id}`);
   await page.getByText('Solving …').waitFor();
@@ -58,12 +66,40 @@ test('a batch shows its progress and is cancelled as a whole', () => onPage('#/c
   await batch.waitFor({ state: 'detached' });
 }));
 
+test('jobs of batches do not hide those submitted alone, and several are deleted at once', () => onPage('#/compose', async (page) => {
+  const short = { ...example('hertz-steel'), outputs: ['resultants'] };
+  for (const name of ['alone one', 'alone two', 'alone three']) await service.solved({ ...short, name });
+  const cases = Array.from({ length: 400 }, (_, i) => ({ ...short, name: `part ${i}` }));
+  const { id } = await service.ask('/v1/batches?name=many', { json: cases });
+  await fetch(`${service.base}/v1/batches/${id}/results?wait=30`).then((answer) => answer.text());
+  await page.goto(`${service.base}/#/jobs`);
+  await row(page, 'alone one').waitFor();
+  assert.equal(await row(page, 'part ').count(), 0);
+  // Its jobs have no time of their own.
+  await page.locator(`.batch[data-batch="${id}"]`).getByRole('button', { name: 'Its jobs' }).click();
+  await row(page, 'part 399').waitFor();
+  assert.equal(await row(page, 'alone').count(), 0);
+  assert.match(await row(page, 'part 399').locator('.n').innerText(), /^(solved before)?$/);
+  await page.getByLabel('Show').selectOption('alone');
+  await row(page, 'alone one').waitFor();
+  // The list is searched while it is written.
+  await page.getByLabel('Name').pressSequentially('alone t');
+  await row(page, 'alone one').waitFor({ state: 'detached' });
+  await row(page, 'alone two').waitFor();
+  await page.getByLabel('Choose all jobs of the list').check();
+  await page.getByText('2 chosen').waitFor();
+  await page.getByRole('button', { name: 'Delete 2' }).click();
+  await page.getByText('No jobs with “alone t”').waitFor();
+  await until(async () => (await service.ask('/v1/jobs?name=alone')).jobs.length === 1);
+}));
+
 test('10 000 jobs scroll without a stutter, in few rows', () => onPage('#/compose', async (page) => {
   const line = JSON.stringify({ ...example('hertz-steel'), outputs: ['resultants'] });
   const body = Array.from({ length: 10_000 }, (_, i) => line.replace('UIC60 crown, 100 kN', `case ${i}`)).join('\n');
   const { id } = await service.ask('/v1/batches', { body, headers: { 'Content-Type': 'application/x-ndjson' } });
   await service.ask(`/v1/batches/${id}/cancel`, { method: 'POST' });
   await page.goto(`${service.base}/#/jobs`);
+  await page.locator(`.batch[data-batch="${id}"]`).getByRole('button', { name: 'Its jobs' }).click();
   await row(page, 'case 9999').waitFor();
   // To the end, page after page.
   await page.waitForFunction(() => {
@@ -99,11 +135,10 @@ test('10 000 jobs scroll without a stutter, in few rows', () => onPage('#/compos
   await page.goBack();
   await row(page, name ?? '').waitFor();
   assert.ok(Math.abs((await page.locator('.list').evaluate((list) => list.scrollTop)) - place) < 200);
-  assert.match((await page.locator('#h-jobs').innerText()).replace(/\u2009/g, ''), /Jobs 1000\d/);
+  assert.match((await page.locator('#h-jobs').innerText()).replace(/\u2009/g, ''), /Jobs 10000/);
   await page.getByLabel('Name').fill('case 99');
-  await page.getByLabel('Name').blur();
   await page.waitForFunction(() => document.querySelectorAll('.rows.job').length > 0 && [...document.querySelectorAll('.rows.job .name')].every((link) => link.textContent?.includes('case 99')));
-  await page.getByRole('checkbox', { name: 'failed' }).check();
+  await page.getByRole('checkbox', { name: 'failed', exact: true }).check();
   await page.getByRole('checkbox', { name: 'running' }).check();
   await page.getByText('No jobs that are failed or running').waitFor();
 }));

@@ -14,7 +14,7 @@
 /** @typedef {Patch['points'][number]} Point */
 /** @typedef {import('./document.js').JsonObject} JsonObject */
 
-/** @typedef {{ method?: string, body?: string, headers?: Record<string, string>, signal?: AbortSignal }} Asked */
+/** @typedef {{ method?: string, body?: string, headers?: Record<string, string>, signal?: AbortSignal, keepalive?: boolean }} Asked */
 
 const KEY = 'railhead.key';
 let key = sessionStorage.getItem(KEY) ?? '';
@@ -151,7 +151,7 @@ export const batch = (id) => json(`/v1/batches/${id}`);
 export const cancel = (kind, id) => request(`/v1/${kind}/${id}/cancel`, { method: 'POST' });
 
 /** @param {'jobs' | 'batches'} kind @param {string} id */
-export const remove = (kind, id) => request(`/v1/${kind}/${id}`, { method: 'DELETE' });
+export const remove = (kind, id) => request(`/v1/${kind}/${id}`, { method: 'DELETE', keepalive: true });
 
 /**
  * Saves what a path answers as a file.

@@ -1,13 +1,17 @@
 // Up to four jobs side by side: what is loaded of them, and what is chosen.
 
-import { caseOf, job as jobOf, result as resultOf } from './api.js';
-import { numberAt } from './document.js';
+import { caseOf, checkCase, job as jobOf, result as resultOf } from './api.js';
+import { at, numberAt } from './document.js';
 import { hasFields, loadField } from './fields.js';
 import { indexOf } from './field/cells.js';
 import { offered, quantityOf, rangeOf, valuesOf } from './field/quantities.js';
-import { MARKED_MAX } from './marks.js';
+import { COMPARED_MAX } from './marks.js';
 import { tellingPoint } from './result.js';
+import { placed } from './placing.js';
 import { formatRoute } from './routes.js';
+import { hasSections } from './starts.js';
+import { bestFit, wearBetween } from './wear.js';
+import { oneWheel, outward, sideOf } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./api.js').Job} Job */
@@ -16,7 +20,10 @@ import { formatRoute } from './routes.js';
 /** @typedef {import('./fields.js').Field} Field */
 /** @typedef {import('./field/quantities.js').Quantity} Quantity */
 
-/** @typedef {{ id: string, job: Job, result: JobResult, document: JsonObject, patch: number, point: number, field: Field | null }} Side */
+/** @typedef {import('./wear.js').Body} Body */
+/** @typedef {import('./placing.js').Place} Place */
+/** @typedef {Record<Body, readonly Place[]>} Sections In track axes. */
+/** @typedef {{ id: string, job: Job, result: JobResult, document: JsonObject, patch: number, point: number, field: Field | null, sections: Sections | null }} Side */
 
 /**
  * @typedef {object} Comparison
@@ -24,6 +31,9 @@ import { formatRoute } from './routes.js';
  * @property {Side[]} sides
  * @property {string} quantity
  * @property {number} other Which side the first is compared with.
+ * @property {Body} body Which cross-sections are laid over each other.
+ * @property {boolean} fitted They are aligned by best fit, not as they lie in the track and on the axle.
+ * @property {boolean} sameRail Fields are subtracted at the same place on the rail, not of the patch.
  */
 
 /** @type {Comparison | null} */
@@ -37,15 +47,17 @@ export const compared = () => comparison;
  * @param {Record<string, string>} query
  */
 export async function openComparison(app, ids, query) {
-  const wanted = ids.slice(0, MARKED_MAX);
+  const wanted = ids.slice(0, COMPARED_MAX);
   const key = wanted.join('/');
   if (comparison?.key === key) return;
   /** @type {Comparison} */
-  const mine = { key, sides: [], quantity: query.field ?? '', other: Math.max(1, Math.min(wanted.length - 1, Number(query.with) || 1)) };
+  const mine = { key, sides: [], quantity: query.field ?? '', other: Math.max(1, Math.min(wanted.length - 1, Number(query.with) || 1)), body: 'rail', fitted: false, sameRail: true };
   comparison = mine;
   try {
     mine.sides = await Promise.all(wanted.map((id, at) => loadSide(id, query[`patch${at}`] ?? query.patch, query[`point${at}`] ?? query.point)));
     settle(mine);
+    const [one, two] = [mine.sides[0], mine.sides[mine.other]];
+    if (one && two && equal(one, two, 'rail') && !equal(one, two, 'wheel')) mine.body = 'wheel';
     app.redraw();
   } catch (error) {
     app.refused(error);
@@ -60,11 +72,65 @@ export async function openComparison(app, ids, query) {
  */
 async function loadSide(id, patch, point) {
   const [job, result, document] = await Promise.all([jobOf(id), resultOf(id), caseOf(id)]);
-  const at = Math.min(result.patches.length - 1, Math.max(0, Number(patch) || 0));
-  const { points } = result.patches[at];
+  const which = Math.min(result.patches.length - 1, Math.max(0, Number(patch) || 0));
+  const { points } = result.patches[which];
   const chosen = point === undefined ? tellingPoint(points) : Math.min(points.length - 1, Math.max(0, Number(point) || 0));
-  const side = { id, job, result, document, patch: at, point: chosen, field: null };
-  return { ...side, field: await fieldOf(side) };
+  const [field, sections] = await Promise.all([fieldOf({ id, result, patch: which, point: chosen }), sectionsOf(document)]);
+  return { id, job, result, document, patch: which, point: chosen, field, sections };
+}
+
+/** The cross-sections of a case, as the service reads and places them. @param {JsonObject} document @returns {Promise<Sections | null>} */
+async function sectionsOf(document) {
+  if (!hasSections(at(document, '/contact/type'))) return null;
+  const { understood } = await checkCase(JSON.stringify(oneWheel(document, 'right', 0)), new AbortController().signal);
+  return placed(understood?.placement);
+}
+
+/** Is a cross-section of two cases the same? @param {Side} one @param {Side} two @param {Body} body */
+export const equal = (one, two, body) =>
+  JSON.stringify(at(one.document, `/contact/${body}`)) === JSON.stringify(at(two.document, `/contact/${body}`));
+
+/** @type {{ key: string, wear: ReturnType<typeof wearBetween> } | null} */
+let wearBefore = null;
+
+/** What the cross-section of the second lacks against that of the first; null where one of them has none. @param {Comparison} of */
+export function wearOf({ sides, other, body, fitted }) {
+  const [one, two] = [sides[0], sides[other]];
+  if (!one?.sections || !two?.sections) return null;
+  const key = [one.id, two.id, body, fitted].join();
+  if (wearBefore?.key !== key) {
+    const moved = shapeOf(two, two.sections, body);
+    const first = shapeOf(one, one.sections, body);
+    wearBefore = { key, wear: wearBetween(first, moved, body, fitted ? bestFit(first, moved) : [0, 0]) };
+  }
+  return wearBefore.wear;
+}
+
+/**
+ * A cross-section with y to the field side from the track centre: a rail as it lies by its gauge, a wheel on its centred axle, with its running circle at z 0.
+ * @param {Side} side
+ * @param {Sections} sections
+ * @param {Body} body
+ * @returns {readonly Place[]}
+ */
+export function shapeOf({ document }, sections, body) {
+  const hand = at(document, '/contact/type') === 'profiles' ? sideOf(document) : 'right';
+  const shift = body === 'wheel' && at(document, '/contact/type') === 'profiles' ? numberAt(document, '/contact/lateral_shift_mm') || 0 : 0;
+  const line = sections[body].map(([y, z]) => /** @type {Place} */ ([outward(hand, y - shift), z]));
+  const level = body === 'wheel' ? heightAt(line, RUNNING_CIRCLE_MM) : 0;
+  return line.map(([y, z]) => [y, z - level]);
+}
+
+/** From the track centre to the circle at which wheels are measured, with the usual flange-back distance of 1360 mm. */
+const RUNNING_CIRCLE_MM = 750;
+
+/** The height of a line at a place; that of its nearest point beyond its ends. @param {readonly Place[]} line @param {number} y */
+function heightAt(line, y) {
+  for (let i = 1; i < line.length; i += 1) {
+    const [[ya, za], [yb, zb]] = [line[i - 1], line[i]];
+    if ((ya - y) * (yb - y) <= 0 && ya !== yb) return za + ((y - ya) / (yb - ya)) * (zb - za);
+  }
+  return line.reduce((best, point) => (Math.abs(point[0] - y) < Math.abs(best[0] - y) ? point : best), line[0])[1];
 }
 
 /** @param {Pick<Side, 'id' | 'result' | 'patch' | 'point'>} side */
@@ -117,9 +183,22 @@ function rememberComparison(app, { sides, quantity, other }) {
 export const frictionOf = ({ document }) => numberAt(document, '/friction/coefficient');
 
 /** One range of colours for all sides. @param {Comparison} of @param {Quantity} quantity */
-export function rangeOfAll({ sides }, quantity) {
-  const bounds = sides.map((side) => frictionOf(side) * side.result.patches[side.patch].pressure_max_mpa);
-  return rangeOf(quantity, sides.flatMap(({ field }) => (field ? [field.cells] : [])), Math.max(...bounds));
+export const rangeOfAll = ({ sides }, quantity) => rangeOf(quantity, sides.flatMap(({ field }) => (field ? [field.cells] : [])), NaN);
+
+/**
+ * Where a place of one patch is in the other, if both lie on the same place of the rail.
+ * @param {Side} one
+ * @param {Side} two
+ * @returns {((place: { x: number, y: number }) => { x: number, y: number }) | null} Null where the patches have no place.
+ */
+export function onSameRail(one, two) {
+  const [first, second] = [one, two].map(({ result, patch }) => result.patches[patch].position);
+  if (!first || !second) return null;
+  const [handOne, handTwo] = [sideOf(one.document), sideOf(two.document)];
+  return ({ x, y }) => ({
+    x: x + first.track_mm[0] - second.track_mm[0],
+    y: outward(handTwo, first.rail_mm[0] + outward(handOne, y * Math.cos(first.contact_angle_rad)) - second.rail_mm[0]) / Math.cos(second.contact_angle_rad),
+  });
 }
 
 /**
@@ -127,15 +206,17 @@ export function rangeOfAll({ sides }, quantity) {
  * @param {Field} one
  * @param {Field} two
  * @param {Quantity} quantity
+ * @param {((place: { x: number, y: number }) => { x: number, y: number }) | null} move From places of the first to those of the second; null for the same.
  * @returns {Quantity} One that is shown on the first field.
  */
-export function differenceOf(one, two, quantity) {
+export function differenceOf(one, two, quantity, move) {
   const values = valuesOf(quantity, one.cells) ?? [];
   const others = valuesOf(quantity, two.cells) ?? [];
   const index = indexOf(two);
   const { x_mm, y_mm } = one.cells;
   const differences = Float64Array.from(x_mm, (x, cell) => {
-    const other = index.nearest(x, y_mm[cell]);
+    const place = move ? move({ x, y: y_mm[cell] }) : { x, y: y_mm[cell] };
+    const other = index.nearest(place.x, place.y);
     return other < 0 ? NaN : others[other] - values[cell];
   });
   return {
@@ -147,14 +228,17 @@ export function differenceOf(one, two, quantity) {
 /** @type {{ one: Field, two: Field, key: string, quantity: Quantity, field: Field } | null} */
 let differenceBefore = null;
 
-/** The same, made once for each pair. @param {Field} one @param {Field} two @param {string} key */
-export function knownDifference(one, two, key) {
-  const quantity = quantityOf(key);
-  if (!quantity || quantity.scale === 'zones') return null;
+/** The difference of two sides, made once for each pair. @param {Side} first @param {Side} second @param {string} name @param {boolean} sameRail */
+export function knownDifference(first, second, name, sameRail) {
+  const [one, two] = [first.field, second.field];
+  const quantity = quantityOf(name);
+  if (!one || !two || !quantity || quantity.scale === 'zones') return null;
+  const move = sameRail ? onSameRail(first, second) : null;
+  const key = `${name} ${move !== null}`;
   if (differenceBefore?.one !== one || differenceBefore.two !== two || differenceBefore.key !== key) {
     // A field of its own: values are kept by the cells that they belong to.
     const field = { cells: { ...one.cells }, border: one.border };
-    differenceBefore = { one, two, key, quantity: differenceOf(one, two, quantity), field };
+    differenceBefore = { one, two, key, quantity: differenceOf(one, two, quantity, move), field };
   }
   return differenceBefore;
 }

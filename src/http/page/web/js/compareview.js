@@ -1,12 +1,14 @@
 // Compare: maps at one scale with one crosshair, the difference of two, their numbers against the errors, and what differs in the cases.
 
 import { html, nothing } from '../vendor/lit-html.js';
-import { chooseCompared, chooseSide, common, compared, frictionOf, knownDifference, rangeOfAll } from './compare.js';
+import { chooseCompared, chooseSide, common, compared, equal, frictionOf, knownDifference, onSameRail, rangeOfAll, shapeOf, wearOf } from './compare.js';
+import { drawChart, drawShapes } from './drawing/axes.js';
 import { at, differences } from './document.js';
 import { quantityOf } from './field/quantities.js';
 import { FieldMap } from './fieldmap.js';
-import { number } from './format.js';
+import { fixed, number } from './format.js';
 import { formatRoute } from './routes.js';
+import { wheelLoads } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./compare.js').Side} Side */
@@ -16,10 +18,44 @@ import { formatRoute } from './routes.js';
 
 const LETTERS = 'ABCD';
 const DIFFERENCES_MAX = 30;
-const NUMBERS = /** @type {const} */ ([
-  ['F x along', 'force_x_n', 'N'], ['F y across', 'force_y_n', 'N'], ['M z', 'moment_z_n_mm', 'N·mm'],
-  ['stick area', 'stick_area_mm2', 'mm²'], ['largest traction', 'traction_max_mpa', 'MPa'], ['friction power', 'friction_power_n', 'J/m'],
-]);
+/** @type {readonly [unknown, keyof Point, string, number][]} Numbers of the chosen patch and motion, with their units. */
+const NUMBERS = [
+  [html`F<sub>x</sub>`, 'force_x_n', 'N', 1], [html`F<sub>y</sub>`, 'force_y_n', 'N', 1], [html`M<sub>z</sub>`, 'moment_z_n_mm', 'N·m', 1000],
+  ['stick area', 'stick_area_mm2', 'mm²', 1], ['largest traction', 'traction_max_mpa', 'MPa', 1], ['friction power', 'friction_power_n', 'J/m', 1],
+];
+
+/** Numbers of the wheel, over all its patches. @type {readonly [string, string, (side: Side) => number | undefined][]} */
+const OF_WHEEL = [
+  ['patches', '', ({ result }) => result.patches.length],
+  ['Q', 'kN', (side) => loadOf(side, ({ q_n }) => q_n / 1000)],
+  ['Y, outward', 'kN', (side) => loadOf(side, ({ y_n }) => y_n / 1000)],
+  ['Y/Q', '', (side) => loadOf(side, ({ y_n, q_n }) => y_n / q_n)],
+  ['largest pressure', 'MPa', ({ result }) => Math.max(...result.patches.map((patch) => patch.pressure_max_mpa))],
+  ['area', 'mm²', ({ result }) => total(result.patches.map((patch) => patch.area_mm2))],
+  ['Tγ', 'J/m', ({ result, point }) => total(result.patches.map(({ points }) => points[Math.min(point, points.length - 1)].friction_power_n))],
+  ['wear depth, Tγ/A law, largest mean', 'nm', (side) => damageOf(side, ({ usfd_wear }) => usfd_wear?.depth_nm.value)],
+  ['RCF damage, WLRM', '10⁻⁶', (side) => damageOf(side, ({ wlrm }) => wlrm && wlrm.damage_per_pass.value * 1e6)],
+  ['load over shakedown limit', '', (side) => damageOf(side, ({ shakedown }) => shakedown?.over_limit.value)],
+];
+
+/** @param {readonly number[]} values */
+const total = (values) => values.reduce((sum, value) => sum + value, 0);
+
+/** A number of the load of the only wheel. @param {Side} side @param {(of: import('./wheelloads.js').WheelLoad) => number} pick */
+function loadOf({ result, document, point }, pick) {
+  const [load] = result.wheelset ? [] : wheelLoads(result, document, point);
+  return load && pick(load);
+}
+
+/** The largest of a number of damage over the patches. @param {Side} side @param {(of: import('./api.js').Schemas['DamageAnswer']) => number | undefined} pick */
+function damageOf({ result, point }, pick) {
+  const values = result.patches.flatMap(({ points }) => {
+    const { damage } = points[Math.min(point, points.length - 1)];
+    const value = damage ? pick(damage) : undefined;
+    return value === undefined ? [] : [value];
+  });
+  return values.length ? Math.max(...values) : undefined;
+}
 
 /** @param {App} app */
 export function compareView(app) {
@@ -35,6 +71,7 @@ export function compareView(app) {
       <div class="segs" role="group" aria-label="Quantity">${all.map(({ key, label }) => html`<label class="seg">
         <input type="radio" name="quantity" .checked=${of.quantity === key} @change=${() => chooseCompared(app, { quantity: key })}><span>${label}</span></label>`)}</div>
     </header>
+    ${profilesPanel(app, of)}
     <div class="two" @crosshair=${together}>${of.sides.map((side, place) => sidePanel(app, of, side, place))}${differencePanel(app, of)}</div>
     <div class="two">${numbersPanel(of)}${casesPanel(of)}</div>
   </div>`;
@@ -73,14 +110,17 @@ function sidePanel(app, of, side, place) {
 function differencePanel(app, of) {
   const [one] = of.sides;
   const two = of.sides[of.other];
-  const known = one.field && two?.field ? knownDifference(one.field, two.field, of.quantity) : null;
+  const known = two && knownDifference(one, two, of.quantity, of.sameRail);
   if (!known) return nothing;
+  const placed = onSameRail(one, two) !== null;
+  const same = (/** @type {Event} */ event) => chooseCompared(app, { sameRail: /** @type {HTMLSelectElement} */ (event.target).value === 'rail' });
   const letter = LETTERS[of.other];
   const shown = { field: known.field, quantity: known.quantity, tallest: 320, name: `${letter} − A` };
   return html`<section class="panel" aria-label="Difference"><header class="bar"><h2>${letter} − A</h2>
       ${of.sides.length > 2 ? html`<div class="segs" role="group" aria-label="Compared with A">${of.sides.slice(1).map((_, place) => html`<label class="seg">
         <input type="radio" name="other" .checked=${of.other === place + 1} @change=${() => chooseCompared(app, { other: place + 1 })}><span>${LETTERS[place + 1]}</span></label>`)}</div>` : nothing}
-      <span class="hint">${letter} at the cells of A</span></header>
+      ${placed ? html`<label class="inline">at the same place <select class="slim" @change=${same}>
+        <option value="rail" ?selected=${of.sameRail}>on the rail</option><option value="patch" ?selected=${!of.sameRail}>in the patch</option></select></label>` : nothing}</header>
     <field-map .shown=${shown}></field-map></section>`;
 }
 
@@ -104,16 +144,49 @@ export function apart(difference, error) {
 function numbersPanel({ sides, other }) {
   const points = sides.map(pointOf);
   const letter = LETTERS[other];
+  const line = (/** @type {unknown} */ label, /** @type {string} */ unit, /** @type {readonly (number | undefined)[]} */ values, error = 0) => {
+    const [one, two] = [values[0], values[other]];
+    if (one === undefined || two === undefined || !Number.isFinite(one) || !Number.isFinite(two)) return nothing;
+    return html`<tr><th scope="row">${label}${unit ? ` / ${unit}` : ''}</th>${values.map((value) => html`<td>${Number.isInteger(value) ? value : number(value, 5)}</td>`)}
+      <td>${number(two - one, 3)}</td><td class="quiet">${apart(two - one, error)}</td></tr>`;
+  };
   return html`<section class="panel" aria-labelledby="h-numbers"><header class="bar"><h2 id="h-numbers">Numbers</h2></header><div class="scroll" tabindex="0" role="region" aria-labelledby="h-numbers">
     <table><thead><tr><th></th>${points.map((_, place) => html`<th scope="col">${LETTERS[place]}</th>`)}<th scope="col">${letter} − A</th><th></th></tr></thead>
-    <tbody>${NUMBERS.map(([label, name, unit]) => {
-      const values = points.map((point) => point[name]);
-      const [one, two] = [values[0], values[other]];
-      if (typeof one !== 'number' || typeof two !== 'number') return nothing;
-      const error = Math.hypot(errorOf(points[0], name), errorOf(points[other], name));
-      return html`<tr><th scope="row">${label} / ${unit}</th>${values.map((value) => html`<td>${number(value, 5)}</td>`)}
-        <td>${number(two - one, 3)}</td><td class="quiet">${apart(two - one, error)}</td></tr>`;
-    })}</tbody></table></div></section>`;
+    <tbody><tr><th scope="rowgroup" colspan=${sides.length + 3}>All patches</th></tr>
+      ${OF_WHEEL.map(([label, unit, value]) => line(label, unit, sides.map(value)))}
+      <tr><th scope="rowgroup" colspan=${sides.length + 3}>The patch and motion above</th></tr>
+      ${line('N', 'kN', sides.map(({ result, patch }) => result.patches[patch].normal_force_n / 1000))}
+      ${line('largest pressure', 'MPa', sides.map(({ result, patch }) => result.patches[patch].pressure_max_mpa),
+        Math.hypot(...[points[0], points[other]].map(({ profile_uncertainty: open }) => open?.pressure_max_mpa ?? 0)))}
+      ${NUMBERS.map(([label, name, unit, factor]) => line(label, unit, points.map((point) => (typeof point[name] === 'number' ? point[name] / factor : undefined)),
+        Math.hypot(errorOf(points[0], name), errorOf(points[other], name)) / factor))}</tbody></table></div></section>`;
+}
+
+/** The cross-sections over each other, and what one lacks against the other. @param {App} app @param {Comparison} of */
+function profilesPanel(app, of) {
+  const wear = wearOf(of);
+  const [one, two] = [of.sides[0], of.sides[of.other]];
+  if (!wear || !one.sections) return nothing;
+  const letter = LETTERS[of.other];
+  const align = (/** @type {Event} */ event) => chooseCompared(app, { fitted: /** @type {HTMLSelectElement} */ (event.target).value === 'fit' });
+  const shapes = [
+    { label: `A: ${one.job.name || one.id}`, look: 'one', points: shapeOf(one, one.sections, of.body) },
+    { label: `${letter}: ${two.job.name || two.id}`, look: 'two', points: wear.moved },
+  ];
+  const most = wear.most && wear.most.depth > 1e-3 ? wear.most : null;
+  const lengths = wear.curve.map(([length]) => length);
+  return html`<section class="panel" aria-labelledby="h-overlay"><header class="bar"><h2 id="h-overlay">Profiles</h2>
+      <div class="segs" role="group" aria-label="Cross-section">${/** @type {const} */ (['rail', 'wheel']).map((body) => html`<label class="seg">
+        <input type="radio" name="body" .checked=${of.body === body} @change=${() => chooseCompared(app, { body })}><span>${body}</span></label>`)}</div>
+      <label class="inline">aligned <select class="slim" @change=${align}><option value="place" ?selected=${!of.fitted}>${of.body === 'rail' ? 'at gauge and top' : 'at flange back and running circle'}</option>
+        <option value="fit" ?selected=${of.fitted}>by best fit</option></select></label></header>
+    <div class="cards"><div class="card">${drawShapes({
+      name: `Cross-section of the ${of.body} of ${letter} over that of A`, shapes, mark: most && { at: most.at, label: `${fixed(most.depth, 2)} mm` },
+    })}</div>
+    <div class="card">${equal(one, two, of.body) ? html`<p class="quiet">Both cases have the same ${of.body}.</p>` : html`${drawChart({
+      name: `What the ${of.body} of ${letter} lacks against that of A`, lines: [{ label: `A − ${letter}`, look: 'one', points: wear.curve }],
+      x: `along the ${of.body} of A / mm`, y: 'wear, along the normal / mm', xRange: [Math.min(...lengths), Math.max(...lengths)],
+    })}<p>Worn area <b>${fixed(wear.area, 1)} mm²</b>${most ? html`, at most <b>${fixed(most.depth, 2)} mm</b> deep` : nothing}${wear.added > 0.05 ? `; ${letter} has ${fixed(wear.added, 1)} mm² more elsewhere` : ''}.</p>`}</div></div></section>`;
 }
 
 /** @param {Comparison} of */

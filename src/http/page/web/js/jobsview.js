@@ -1,10 +1,11 @@
 // Jobs: batches with their progress, and a list of which only the rows in view exist.
 
 import { html, nothing, svg } from '../vendor/lit-html.js';
-import { cancel, download, remove } from './api.js';
+import { cancel, download } from './api.js';
+import { isThere, removeLater } from './deleting.js';
 import { ago, count, seconds } from './format.js';
-import { marked, toggleMark } from './marks.js';
-import { filterQueue, forgetBatch, loadMore, queueSeen, refreshSoon } from './queue.js';
+import { COMPARED_MAX, mark, marked, toggleMark } from './marks.js';
+import { filterQueue, isLoadingMore, isNearEnd, jobsShown, loadMore, queueSeen, refreshSoon } from './queue.js';
 import { formatRoute } from './routes.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -23,16 +24,19 @@ const GLYPHS = { queued: '○', running: '◔', succeeded: '●', failed: '✕',
 /** @param {App} app */
 export function jobsView(app) {
   const queue = queueSeen();
-  const newest = [...queue.batches.values()].sort((one, two) => (one.id < two.id ? 1 : -1));
+  const newest = [...queue.batches.values()].filter(isThere).sort((one, two) => (one.id < two.id ? 1 : -1));
   // Those that go on are always in sight; of the others the newest few.
   const shown = newest.filter((batch, at) => !batch.ended || at < ENDED_SHOWN);
-  const number = queue.loaded ? html` <span class="quiet n">${count(queue.total)}${queue.more ? ' or more' : ''}</span>` : nothing;
+  const counted = queue.shown === 'all' || queue.batch !== '';
+  const more = queue.cursor !== '' && (!counted || queue.more);
+  const number = queue.loaded ? html` <span class="quiet n">${count(Math.max(counted ? queue.total : 0, jobsShown().length))}${more ? ' or more' : ''}</span>` : nothing;
   return html`<h1 class="visually-hidden">Jobs</h1>
     ${shown.map((batch) => batchPanel(app, batch))}
     <section class="panel jobs" aria-labelledby="h-jobs">
-      <header class="bar"><h2 id="h-jobs">Jobs${number}</h2>${filters(app)}${compareLink()}</header>
+      <header class="bar"><h2 id="h-jobs">Jobs${number}</h2>${filters(app)}</header>
+      ${chosenBar(app)}
       ${usage(queue.me)}
-      <div class="rows head" aria-hidden="true"><span></span><span>State</span><span>Name</span><span>Labels</span><span>Submitted</span><span>Took</span><span></span></div>
+      <div class="rows head"><span>${allMark(app)}</span><span>State</span><span>Name</span><span>Labels</span><span>Submitted</span><span>Took</span><span></span></div>
       ${list(app)}
     </section>`;
 }
@@ -45,44 +49,84 @@ function usage(me) {
     ${count(me.quota.queued)} places of the queue in use</p>`;
 }
 
+/** Pause after a letter before the list is asked for. */
+const TYPING_MS = 250;
+let typing = 0;
+
 /** @param {App} app */
 function filters(app) {
   const queue = queueSeen();
-  const text = (/** @type {'label' | 'name'} */ what) => (/** @type {Event} */ event) =>
-    filterQueue(app, { [what]: /** @type {HTMLInputElement} */ (event.target).value.trim() });
+  const text = (/** @type {'label' | 'name'} */ what) => (/** @type {Event} */ event) => {
+    const { value } = /** @type {HTMLInputElement} */ (event.target);
+    clearTimeout(typing);
+    // A label is complete with its value.
+    if (what === 'label' && value && !/^[^:]+:.+/.test(value)) return;
+    typing = window.setTimeout(() => value !== queue[what] && filterQueue(app, { [what]: value }), TYPING_MS);
+  };
   const toggle = (/** @type {string} */ state) => () =>
     filterQueue(app, { states: queue.states.includes(state) ? queue.states.filter((other) => other !== state) : [...queue.states, state] });
-  return html`<div class="segs" role="group" aria-label="States">${STATES.map((state) => html`<label class="seg">
+  const show = (/** @type {Event} */ event) => filterQueue(app, { shown: /** @type {HTMLSelectElement} */ (event.target).value === 'all' ? 'all' : 'alone', batch: '' });
+  const batch = queue.batches.get(queue.batch);
+  return html`<label class="inline">Show <select class="slim" @change=${show}>
+      ${queue.batch ? html`<option value="" selected>jobs of ${batch?.name || 'one batch'}</option>` : nothing}
+      <option value="alone" ?selected=${!queue.batch && queue.shown === 'alone'}>single jobs</option>
+      <option value="all" ?selected=${!queue.batch && queue.shown === 'all'}>all, with those of batches</option></select></label>
+    <div class="segs" role="group" aria-label="States">${STATES.map((state) => html`<label class="seg">
       <input type="checkbox" .checked=${queue.states.includes(state)} @change=${toggle(state)}><span>${state}</span></label>`)}</div>
-    <label class="inline">Name <input class="search" placeholder="part of it" .value=${queue.name} @change=${text('name')}></label>
-    <label class="inline">Label <input class="search" placeholder="line:A12" .value=${queue.label} @change=${text('label')}></label>`;
+    <label class="inline">Name <input class="search" placeholder="part of it" .value=${queue.name} @input=${text('name')}></label>
+    <label class="inline">Label <input class="search" placeholder="line:A12" .value=${queue.label} @input=${text('label')}></label>`;
 }
 
-function compareLink() {
-  const ids = marked();
-  if (ids.length < 2) return html`<span class="hint">tick two to four to compare</span>`;
-  return html`<a class="button primary small" href=${formatRoute('compare', ids)}>Compare ${ids.length}</a>`;
+/** Ticks all jobs that are loaded, or none. @param {App} app */
+function allMark(app) {
+  const ids = jobsShown().map(({ id }) => id);
+  const all = ids.length > 0 && ids.every((id) => marked().includes(id));
+  return html`<input type="checkbox" aria-label="Choose all jobs of the list" .checked=${all} @change=${() => mark(app, all ? [] : ids)}>`;
 }
+
+/** What can be done with the ticked jobs. @param {App} app */
+function chosenBar(app) {
+  const jobs = jobsShown().filter(({ id }) => marked().includes(id));
+  if (!jobs.length) return nothing;
+  const ended = jobs.filter(({ state }) => !isOpen(state)).map(({ id }) => id);
+  const solved = jobs.filter(({ state }) => state === 'succeeded').map(({ id }) => id);
+  const drop = () => {
+    mark(app, []);
+    removeLater(app, 'jobs', ended, ended.length === 1 ? 'One job' : `${count(ended.length)} jobs`);
+  };
+  const compare = solved.length >= 2 && solved.length <= COMPARED_MAX;
+  return html`<div class="bar chosen"><span>${count(jobs.length)} chosen</span>
+    ${compare ? html`<a class="button primary small" href=${formatRoute('compare', solved)}>Compare ${solved.length}</a>` : html`<span class="hint">two to four can be compared</span>`}
+    ${ended.length ? html`<button class="small" @click=${drop}>Delete ${count(ended.length)}</button>` : nothing}
+    <button class="small ghost" @click=${() => mark(app, [])}>None</button></div>`;
+}
+
+/** @param {State} state */
+const isOpen = (state) => state === 'queued' || state === 'running';
 
 /** @param {App} app */
 function list(app) {
   const queue = queueSeen();
   const height = Math.max(320, innerHeight - 190);
-  const first = Math.max(0, Math.min(queue.jobs.length, Math.floor(queue.top / ROW)) - SPARE_ROWS);
-  const rows = queue.jobs.slice(first, first + Math.ceil(height / ROW) + 2 * SPARE_ROWS);
+  const jobs = jobsShown();
+  const first = Math.max(0, Math.min(jobs.length, Math.floor(queue.top / ROW)) - SPARE_ROWS);
+  const rows = jobs.slice(first, first + Math.ceil(height / ROW) + 2 * SPARE_ROWS);
   const scrolled = (/** @type {Event} */ event) => {
-    const { scrollTop, clientHeight, scrollHeight } = /** @type {HTMLElement} */ (event.target);
-    if (scrollTop + clientHeight > scrollHeight - 40 * ROW) loadMore(app);
+    const list = /** @type {HTMLElement} */ (event.target);
+    const { scrollTop } = list;
+    if (isNearEnd(list)) loadMore(app);
     if (Math.abs(scrollTop - queue.top) < 3 * ROW && scrollTop > 0) return;
     queue.top = scrollTop;
     app.redraw();
   };
-  const after = queue.jobs.length - first - rows.length;
+  const after = jobs.length - first - rows.length;
   return html`<div class="list" tabindex="0" role="group" aria-label="Jobs, newest first" @scroll=${scrolled}>
     ${spacer(first)}${rows.map((job) => row(app, job))}${spacer(after)}
-    ${queue.loaded && !queue.jobs.length ? html`<p class="quiet pad">No jobs${queue.states.length ? ` that are ${queue.states.join(' or ')}` : ''}${queue.name ? ` with “${queue.name}” in their names` : ''}${queue.label ? ` with the label ${queue.label}` : ''}.
+    ${queue.loaded && !jobs.length && !queue.cursor ? html`<p class="quiet pad">No jobs${queue.states.length ? ` that are ${queue.states.join(' or ')}` : ''}${queue.name ? ` with “${queue.name}” in their names` : ''}${queue.label ? ` with the label ${queue.label}` : ''}.
       <a href="#/compose">Start one.</a></p>` : nothing}
     ${queue.loaded ? nothing : html`<p class="quiet pad">Loading …</p>`}
+    ${queue.loaded && queue.cursor && jobs.length * ROW < height ? html`<p class="pad quiet">${isLoadingMore() ? 'Looking for jobs older than those of batches …'
+      : html`<button class="small" @click=${() => loadMore(app)}>Look further back</button>`}</p>` : nothing}
   </div>`;
 }
 
@@ -92,10 +136,13 @@ const spacer = (rows) => svg`<svg class="spacer" width="1" height=${rows * ROW} 
 /** @param {App} app @param {Job} job */
 function row(app, job) {
   const name = job.name || job.id;
-  const open = job.state === 'queued' || job.state === 'running';
-  const act = () => (open ? cancel('jobs', job.id) : remove('jobs', job.id)).then(() => refreshSoon(app), app.refused);
+  const open = isOpen(job.state);
+  const act = () => {
+    if (open) cancel('jobs', job.id).then(() => refreshSoon(app), app.refused);
+    else removeLater(app, 'jobs', [job.id], name);
+  };
   return html`<div class="rows job">
-    <span><input type="checkbox" aria-label=${`Compare ${name}`} .checked=${marked().includes(job.id)} ?disabled=${job.state !== 'succeeded'}
+    <span><input type="checkbox" aria-label=${`Choose ${name}`} .checked=${marked().includes(job.id)}
       @change=${() => toggleMark(app, job.id)}></span>
     <span class=${`state ${job.state}`}><i aria-hidden="true">${GLYPHS[job.state]}</i> ${job.state}${job.state === 'running'
       ? html` <progress max="1" .value=${job.progress} aria-label="Progress"></progress>` : nothing}</span>
@@ -110,6 +157,8 @@ function row(app, job) {
 /** @param {Job} job */
 function took(job) {
   if (job.cached) return 'solved before';
+  // Jobs of a batch are solved in groups, whose time is that of none of them.
+  if (job.batch_id) return '';
   if (!job.started_at || !job.ended_at) return '';
   const time = (Date.parse(job.ended_at) - Date.parse(job.started_at)) / 1000;
   return time > 0 ? seconds(time) : '< 1 ms';
@@ -119,17 +168,15 @@ function took(job) {
 function batchPanel(app, batch) {
   const states = STATES.filter((state) => batch.states[state]).map((state) => `${count(batch.states[state])} ${state}`);
   const table = () => download(`/v1/batches/${batch.id}/results?format=csv`, `batch-${batch.id.slice(0, 8)}.csv`).catch(app.refused);
-  const drop = () => remove('batches', batch.id).then(() => {
-    forgetBatch(batch.id);
-    refreshSoon(app);
-  }, app.refused);
+  const drop = () => removeLater(app, 'batches', [batch.id], batch.name || `The batch of ${count(batch.count)}`);
   return html`<section class="panel batch" aria-label=${`Batch of ${batch.count}`} data-batch=${batch.id}>
     <strong>${batch.name || `Batch of ${count(batch.count)}`}</strong>${batch.name ? html`<span class="quiet">${count(batch.count)} cases</span>` : nothing}
     ${Object.entries(batch.labels).map(([key, value]) => html`<span class="chip">${key}: ${value}</span>`)}
     <svg class="shares" viewBox="0 0 1000 10" preserveAspectRatio="none" role="img" aria-label=${`${Math.round(100 * batch.progress)} percent ended`}>${shares(batch)}</svg>
     <span class="n">${Math.floor(100 * batch.progress)} %</span><span class="quiet">${states.join(' · ')}</span>
     <span class="do">${batch.ended ? html`
-      <a class="button small" href=${formatRoute('line', [batch.id])}>Along the line</a><button class="small" @click=${table}>CSV</button>
+      <button class="small" @click=${() => filterQueue(app, { batch: batch.id })}>Its jobs</button>
+      <a class="button small" href=${formatRoute('line', [batch.id])}>Along the track</a><button class="small" @click=${table}>CSV</button>
       <button class="small ghost" aria-label=${`Delete the batch of ${batch.count}`} @click=${drop}>Delete</button>`
       : html`<button class="small" @click=${() => cancel('batches', batch.id).catch(app.refused)}>Cancel all</button>`}</span>
   </section>`;

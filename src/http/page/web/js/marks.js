@@ -1,17 +1,20 @@
-// The jobs that are ticked for comparing.
+// The jobs that are ticked, for comparing or deleting them.
 
 /** @typedef {import('./state.js').App} App */
 
 // As many as stand side by side in a window; chosen by judgement.
-export const MARKED_MAX = 4;
+export const COMPARED_MAX = 4;
 
-/** @type {string[]} */
+/** @type {readonly string[]} */
 let ids = [];
 
 export const marked = () => ids;
 
-/** Ticks a job, or takes the tick away; a fifth tick takes away the first. @param {App} app @param {string} id */
-export function toggleMark(app, id) {
-  ids = ids.includes(id) ? ids.filter((other) => other !== id) : [...ids, id].slice(-MARKED_MAX);
+/** @param {App} app @param {readonly string[]} wanted */
+export function mark(app, wanted) {
+  ids = wanted;
   app.redraw();
 }
+
+/** Ticks a job, or takes the tick away. @param {App} app @param {string} id */
+export const toggleMark = (app, id) => mark(app, ids.includes(id) ? ids.filter((other) => other !== id) : [...ids, id]);

@@ -28,10 +28,10 @@ const app = {
   store,
   compose: (change) => store.set({ compose: { ...store.get().compose, ...change } }),
   redraw: () => store.set({ turn: store.get().turn + 1 }),
-  say(text) {
+  say(text, action, duration = TOAST_MS) {
     clearTimeout(toastTimer);
-    store.set({ toast: text });
-    toastTimer = window.setTimeout(() => store.set({ toast: '' }), TOAST_MS);
+    store.set({ toast: text, action: action ?? null });
+    toastTimer = window.setTimeout(() => store.set({ toast: '', action: null }), duration);
   },
   refused(error) {
     if (error instanceof DOMException && error.name === 'AbortError') return;

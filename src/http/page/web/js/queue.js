@@ -1,6 +1,7 @@
 // The jobs and batches of the tenant: what is loaded of them, and how events keep them up to date.
 
 import { batches as batchesOf, jobs as jobsOf, me as askMe } from './api.js';
+import { isThere } from './deleting.js';
 import { follow } from './events.js';
 import { isTyped } from './typed.js';
 
@@ -18,6 +19,8 @@ import { isTyped } from './typed.js';
  * @property {string[]} states Only jobs in one of these; none for all.
  * @property {string} label Only jobs with this label, `key:value`; empty for all.
  * @property {string} name Only jobs whose name contains this.
+ * @property {'alone' | 'all'} shown Only jobs that were submitted alone, or those of batches too.
+ * @property {string} batch Only jobs of this batch; empty for all.
  * @property {Map<string, Batch>} batches
  * @property {import('./api.js').Schemas['Me'] | null} me Who asks, and what is used.
  * @property {number} top Pixels that the list is scrolled by.
@@ -26,6 +29,9 @@ import { isTyped } from './typed.js';
 const PAGE = 200;
 const MORE = 1000;
 const BATCHES = 20;
+/** Jobs that fill the list, and jobs among which they are searched by themselves. */
+const FILLED = 60;
+const SEARCHED_MAX = 20_000;
 /** Events of batches say nothing of their jobs: these are looked at again, but not more often than this. */
 const REFRESH_MS = 1000;
 /** What was deleted elsewhere is told by no event. */
@@ -33,7 +39,7 @@ const SELDOM_MS = 20_000;
 
 /** @type {Queue} */
 const queue = {
-  jobs: [], cursor: '', loaded: false, total: 0, more: false, states: [], label: '', name: '', batches: new Map(), me: null, top: 0,
+  jobs: [], cursor: '', loaded: false, total: 0, more: false, states: [], label: '', name: '', shown: 'alone', batch: '', batches: new Map(), me: null, top: 0,
 };
 let stopping = new AbortController();
 let seldom = 0;
@@ -41,7 +47,12 @@ let soon = 0;
 let turn = 0;
 let loadingMore = false;
 
+export const isLoadingMore = () => loadingMore;
+
 export const queueSeen = () => queue;
+
+/** The jobs of the list: without those that are being deleted, and without rows of batches where these are not wanted. */
+export const jobsShown = () => queue.jobs.filter((job) => isThere(job) && (queue.shown === 'all' || queue.batch !== '' || !job.batch_id));
 
 /** Shows the lists, and follows everything of the tenant in one stream. @param {App} app */
 export function startQueue(app) {
@@ -73,7 +84,8 @@ const filter = () => ({
   state: queue.states,
   label: queue.label,
   name: queue.name,
-  fields: 'id,state,name,labels,created_at,started_at,ended_at,cached,progress',
+  batch: queue.batch,
+  fields: 'batch_id,id,state,name,labels,created_at,started_at,ended_at,cached,progress',
 });
 
 /** Loads batches and the newest page again, and puts it before what is loaded. @param {App} app */
@@ -95,10 +107,25 @@ async function refresh(app) {
     queue.me = me;
     queue.loaded = true;
     app.redraw();
+    fill(app);
   } catch (error) {
     if (!signal.aborted) app.refused(error);
   }
 }
+
+/** Loads more where rows of batches leave too few others, or the list is scrolled to its end. @param {App} app */
+function fill(app) {
+  if (!queue.cursor) return;
+  if (jobsShown().length < FILLED && queue.jobs.length < SEARCHED_MAX) loadMore(app);
+  // The list is as high as its rows after the next frame.
+  else requestAnimationFrame(() => isNearEnd(document.querySelector('.list')) && loadMore(app));
+}
+
+/** Pixels before the end of the list at which the next page is loaded. */
+const AHEAD = 40 * 44;
+
+/** @param {Element | null} list */
+export const isNearEnd = (list) => list !== null && list.scrollTop > 0 && list.scrollTop + list.clientHeight > list.scrollHeight - AHEAD;
 
 /** Looks again before long, after something was changed. @param {App} app */
 export function refreshSoon(app, pause = 0) {
@@ -112,7 +139,7 @@ export function refreshSoon(app, pause = 0) {
 function takeJob(app, job) {
   if (isTyped(job)) return;
   const known = queue.jobs.some(({ id }) => id === job.id);
-  const filtered = queue.states.length || queue.label || queue.name;
+  const filtered = queue.states.length || queue.label || queue.name || queue.batch;
   if (known && !filtered) {
     queue.jobs = queue.jobs.map((other) => (other.id === job.id ? job : other));
     app.redraw();
@@ -126,7 +153,7 @@ function takeBatch(app, batch) {
   refreshSoon(app, REFRESH_MS);
 }
 
-/** @param {App} app @param {Partial<Pick<Queue, 'states' | 'label' | 'name'>>} wanted */
+/** @param {App} app @param {Partial<Pick<Queue, 'states' | 'label' | 'name' | 'shown' | 'batch'>>} wanted */
 export function filterQueue(app, wanted) {
   turn += 1;
   Object.assign(queue, wanted, { jobs: [], cursor: '', loaded: false, top: 0 });
@@ -141,19 +168,17 @@ export async function loadMore(app) {
   const mine = turn;
   try {
     const page = await jobsOf({ ...filter(), limit: MORE, cursor: queue.cursor });
-    if (mine !== turn) return;
-    const known = new Set(queue.jobs.map((job) => job.id));
-    queue.jobs = [...queue.jobs, ...page.jobs.filter((job) => !known.has(job.id))];
-    queue.cursor = page.next_cursor ?? '';
-    app.redraw();
+    if (mine === turn) {
+      const known = new Set(queue.jobs.map((job) => job.id));
+      queue.jobs = [...queue.jobs, ...page.jobs.filter((job) => !known.has(job.id))];
+      queue.cursor = page.next_cursor ?? '';
+      app.redraw();
+    }
   } catch (error) {
     app.refused(error);
+    return;
   } finally {
     loadingMore = false;
   }
-}
-
-/** @param {string} id */
-export function forgetBatch(id) {
-  queue.batches.delete(id);
+  fill(app);
 }

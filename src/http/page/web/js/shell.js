@@ -8,7 +8,7 @@ import { isDark } from './field/palette.js';
 import { jobsView } from './jobsview.js';
 import { licencesView } from './licences.js';
 import { lineView } from './lineview.js';
-import { marked } from './marks.js';
+import { COMPARED_MAX, marked } from './marks.js';
 import { lookedAt } from './result.js';
 import { result } from './resultview.js';
 import { formatRoute } from './routes.js';
@@ -25,19 +25,23 @@ const TITLES = { compose: 'Contact', jobs: 'Jobs', result: 'Result', compare: 'C
 
 /** @param {App} app @param {HTMLElement} root */
 export function renderShell(app, root) {
-  const { route, toast, keyLine } = app.store.get();
+  const { route, toast, action, keyLine } = app.store.get();
+  const act = () => {
+    app.say('');
+    action?.act();
+  };
   document.title = `${TITLES[route.view]} – railhead`;
   render(html`${topBar(app)}${keyLine ? keyForm(app) : nothing}
     <main id="main" tabindex="-1">${VIEWS[route.view](app)}</main>
     <footer class="foot quiet"><a href="/docs/">API</a> · <a href="/openapi.json">contract</a> · <a href="#/licences">licences</a></footer>
-    <div class=${toast ? 'toast on' : 'toast'} role="status" aria-live="polite">${toast}</div>`, root);
+    <div class=${toast ? 'toast on' : 'toast'} role="status" aria-live="polite">${toast}${action ? html` <button class="small" @click=${act}>${action.label}</button>` : nothing}</div>`, root);
 }
 
 /** @param {App} app */
 function topBar(app) {
   const { route, health } = app.store.get();
   const looked = lookedAt();
-  const ids = marked();
+  const ids = marked().slice(0, COMPARED_MAX);
   /** @type {[View, string][]} */
   const tabs = [
     ['compose', formatRoute('compose')], ['jobs', formatRoute('jobs')],

@@ -39,12 +39,15 @@
  * @property {boolean} code Is the JSON unfolded?
  */
 
+/** @typedef {{ label: string, act: () => void }} Action */
+
 /**
  * @typedef {object} PageState
  * @property {Route} route
  * @property {{ ready: boolean, version: string } | null} health
  * @property {boolean} keyLine Is the line for the API key open?
  * @property {string} toast
+ * @property {Action | null} action What the toast offers.
  * @property {Compose} compose
  * @property {number} turn Counts changes of what the views keep themselves.
  */
@@ -54,7 +57,7 @@
  * @property {import('./store.js').Store<PageState>} store
  * @property {(change: Partial<Compose>) => void} compose Changes the state of Compose.
  * @property {() => void} redraw
- * @property {(text: string) => void} say Shows a short message.
+ * @property {(text: string, action?: Action, duration?: number) => void} say Shows a short message, for some milliseconds.
  * @property {(error: unknown) => void} refused Shows why something failed; a missing key opens its line.
  * @property {(address: string) => void} go To an address of the page.
  * @property {(address: string) => void} remember Writes what is shown into the address, without a step in the history.
@@ -66,6 +69,7 @@ export const initialState = () => ({
   health: null,
   keyLine: false,
   toast: '',
+  action: null,
   turn: 0,
   compose: {
     document: null, text: '', unreadable: '', typing: null, checked: null, understood: null, lone: null, faults: [], refusal: '', examples: [], example: '', files: {}, solving: false,

@@ -1,0 +1,56 @@
+// Deleting with a way back: jobs and batches vanish from the lists at once, and are removed a few seconds later unless that is undone.
+
+import { Refused, remove } from './api.js';
+
+/** @typedef {import('./state.js').App} App */
+/** @typedef {'jobs' | 'batches'} Kind */
+
+const UNDO_MS = 6000;
+
+/** @type {{ kind: Kind, ids: readonly string[], timer: number } | null} */
+let pending = null;
+/** What has been deleted, so that an older answer does not bring it back. @type {Set<string>} */
+const gone = new Set();
+
+/** Is a job or a batch still there for the reader? @param {{ id: string }} of */
+export const isThere = ({ id }) => !gone.has(id);
+
+/**
+ * @param {App} app
+ * @param {Kind} kind
+ * @param {readonly string[]} ids
+ * @param {string} what What the message calls them.
+ */
+export function removeLater(app, kind, ids, what) {
+  flush(app);
+  for (const id of ids) gone.add(id);
+  pending = { kind, ids, timer: window.setTimeout(() => flush(app), UNDO_MS) };
+  app.say(`${what} deleted`, {
+    label: 'Undo',
+    act: () => {
+      if (!pending) return;
+      clearTimeout(pending.timer);
+      for (const id of pending.ids) gone.delete(id);
+      pending = null;
+      app.redraw();
+    },
+  }, UNDO_MS);
+  app.redraw();
+}
+
+/** Removes what waits to be removed. @param {App} [app] */
+function flush(app) {
+  if (!pending) return;
+  const { kind, ids, timer } = pending;
+  clearTimeout(timer);
+  pending = null;
+  for (const id of ids) {
+    remove(kind, id).catch((error) => {
+      if (error instanceof Refused && error.status === 404) return;
+      gone.delete(id);
+      app?.refused(error);
+    });
+  }
+}
+
+addEventListener('pagehide', () => flush());

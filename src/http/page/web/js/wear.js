@@ -1,0 +1,162 @@
+// One cross-section over another: how they are aligned, and how far the second lies inside the first, which is the wear.
+
+/** @typedef {import('./placing.js').Place} Place */
+/** @typedef {'rail' | 'wheel'} Body */
+
+/**
+ * @typedef {object} Wear
+ * @property {readonly Place[]} moved The second cross-section, aligned with the first.
+ * @property {readonly [number, number][]} curve Length along the first cross-section in mm, and what the second lacks there in mm.
+ * @property {number} area What it lacks altogether, in mm².
+ * @property {number} added What it has more, in mm².
+ * @property {{ depth: number, at: Place } | null} most Where it lacks most.
+ */
+
+const ROUNDS = 30;
+/** Rounds of a fit in which all points count; then the share of them that lies nearest, since the others are worn. Chosen by judgement. */
+const WHOLE_ROUNDS = 6;
+const FITTED = 0.75;
+/** Farther away a line is another part of the cross-section. */
+const REACH_MM = 20;
+/** A shift of less than this ends the fit, in mm. */
+const SETTLED_MM = 1e-4;
+
+/** The nearest place on a line; `end` if that is one of its ends. @param {readonly Place[]} line @param {Place} from */
+function nearestOn(line, [y, z]) {
+  let best = { distance: Infinity, place: line[0], end: true };
+  for (let at = 1; at < line.length; at += 1) {
+    const [ya, za] = line[at - 1];
+    const [dy, dz] = [line[at][0] - ya, line[at][1] - za];
+    const length = dy * dy + dz * dz;
+    const share = length ? ((y - ya) * dy + (z - za) * dz) / length : 0;
+    const inside = Math.max(0, Math.min(1, share));
+    const place = /** @type {Place} */ ([ya + inside * dy, za + inside * dz]);
+    const distance = Math.hypot(place[0] - y, place[1] - z);
+    if (distance < best.distance) best = { distance, place, end: (at === 1 && share < 0) || (at === line.length - 1 && share > 1) };
+  }
+  return best;
+}
+
+/** A line with one point for about every length. @param {readonly Place[]} line @param {number} step In mm. */
+export function resampled(line, step) {
+  /** @type {Place[]} */
+  const points = [line[0]];
+  for (let at = 1; at < line.length; at += 1) {
+    const [ya, za] = line[at - 1];
+    const [yb, zb] = line[at];
+    const parts = Math.max(1, Math.round(Math.hypot(yb - ya, zb - za) / step));
+    for (let part = 1; part <= parts; part += 1) points.push([ya + (part / parts) * (yb - ya), za + (part / parts) * (zb - za)]);
+  }
+  const kept = points.slice(0, 1);
+  for (const point of points) {
+    const last = kept[kept.length - 1];
+    if (Math.hypot(point[0] - last[0], point[1] - last[1]) >= 0.9 * step) kept.push(point);
+  }
+  return kept;
+}
+
+/** The normal of a line at a point, to the left of its sense. @param {readonly Place[]} line @param {number} at @returns {Place} */
+function normalAt(line, at) {
+  const [before, after] = [line[Math.max(0, at - 1)], line[Math.min(line.length - 1, at + 1)]];
+  const [dy, dz] = [after[0] - before[0], after[1] - before[1]];
+  const length = Math.hypot(dy, dz) || 1;
+  return [-dz / length, dy / length];
+}
+
+/**
+ * The shift of the second line that brings most of it onto the first: least squares of the distances along its normals, first of all points, then of
+ * those that lie nearest.
+ * @param {readonly Place[]} one
+ * @param {readonly Place[]} two
+ * @returns {Place} In mm.
+ */
+export function bestFit(one, two) {
+  const [fixed, free] = [resampled(one, 0.5), resampled(two, 1)];
+  let [sy, sz] = [0, 0];
+  for (let round = 0; round < ROUNDS; round += 1) {
+    const pairs = free.flatMap(([y, z], at) => {
+      const found = nearestOn(fixed, [y + sy, z + sz]);
+      const [ny, nz] = normalAt(free, at);
+      return found.end ? [] : [{ ny, nz, rest: ny * (found.place[0] - y - sy) + nz * (found.place[1] - z - sz) }];
+    }).sort((a, b) => Math.abs(a.rest) - Math.abs(b.rest));
+    const near = round < WHOLE_ROUNDS ? pairs : pairs.slice(0, Math.ceil(FITTED * pairs.length));
+    const sum = (/** @type {(of: typeof near[number]) => number} */ of) => near.reduce((total, pair) => total + of(pair), 0);
+    const [yy, yz, zz] = [sum(({ ny }) => ny * ny), sum(({ ny, nz }) => ny * nz), sum(({ nz }) => nz * nz)];
+    const [ry, rz] = [sum(({ ny, rest }) => ny * rest), sum(({ nz, rest }) => nz * rest)];
+    const determinant = yy * zz - yz * yz;
+    if (!(determinant > 1e-9)) break;
+    const [dy, dz] = [(zz * ry - yz * rz) / determinant, (yy * rz - yz * ry) / determinant];
+    sy += dy;
+    sz += dz;
+    if (round > WHOLE_ROUNDS && Math.hypot(dy, dz) < SETTLED_MM) break;
+  }
+  return [sy, sz];
+}
+
+/** How far from a point, along a direction, a line is met; the nearest place, to either side. @param {readonly Place[]} line @param {Place} from @param {Place} direction */
+function metAlong(line, [y, z], [ny, nz]) {
+  let best = NaN;
+  for (let at = 1; at < line.length; at += 1) {
+    const [ya, za] = line[at - 1];
+    const [dy, dz] = [line[at][0] - ya, line[at][1] - za];
+    const cross = ny * dz - nz * dy;
+    if (Math.abs(cross) < 1e-12) continue;
+    const share = ((ya - y) * nz - (za - z) * ny) / cross;
+    if (share < -1e-9 || share > 1 + 1e-9) continue;
+    const far = ((ya - y) * dz - (za - z) * dy) / cross;
+    if (!(Math.abs(far) >= Math.abs(best))) best = far;
+  }
+  return Math.abs(best) <= REACH_MM ? best : NaN;
+}
+
+/**
+ * What the second cross-section lacks against the first.
+ * @param {readonly Place[]} one
+ * @param {readonly Place[]} two
+ * @param {Body} body The material of a rail is below its line, that of a wheel above.
+ * @param {Place} shift Of the second, in mm.
+ * @returns {Wear}
+ */
+export function wearBetween(one, two, body, [sy, sz]) {
+  const first = resampled(one, 0.25);
+  const moved = two.map(([y, z]) => /** @type {Place} */ ([y + sy, z + sz]));
+  const outward = body === 'rail' ? 1 : -1;
+  const top = first.reduce((best, [, z], at) => (outward * z > outward * first[best][1] ? at : best), 0);
+  // The sense in which the line runs decides which side is out.
+  const sense = Math.sign(normalAt(first, top)[1]) === outward ? 1 : -1;
+  /** @type {[number, number][]} */
+  const curve = [];
+  let [length, area, added] = [0, 0, 0];
+  /** @type {Wear['most']} */
+  let most = null;
+  /** @type {{ from: Place, to: Place, depth: number } | null} */
+  let before = null;
+  first.forEach((point, at) => {
+    if (at) length += Math.hypot(point[0] - first[at - 1][0], point[1] - first[at - 1][1]);
+    const [ny, nz] = normalAt(first, at);
+    const depth = -sense * metAlong(moved, point, [ny, nz]);
+    if (!Number.isFinite(depth)) {
+      before = null;
+      return;
+    }
+    const here = { from: point, to: /** @type {Place} */ ([point[0] - sense * depth * ny, point[1] - sense * depth * nz]), depth };
+    curve.push([length, depth]);
+    if (before) {
+      const between = quadrangle(before.from, here.from, here.to, before.to);
+      if (before.depth + depth > 0) area += between;
+      else added += between;
+    }
+    if (!most || depth > most.depth) most = { depth, at: point };
+    before = here;
+  });
+  return { moved, curve, area, added, most };
+}
+
+/** The area between four corners. @param {Place[]} corners */
+function quadrangle(...corners) {
+  const twice = corners.reduce((sum, [y, z], at) => {
+    const [yb, zb] = corners[(at + 1) % corners.length];
+    return sum + y * zb - yb * z;
+  }, 0);
+  return Math.abs(twice) / 2;
+}

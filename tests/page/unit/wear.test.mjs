@@ -1,0 +1,43 @@
+// Cross-sections over each other: the worn area of known shapes, and a fit that finds a known shift.
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { bestFit, wearBetween } from '../../../src/http/page/web/js/wear.js';
+import { flangeAngle, nadal } from '../../../src/http/page/web/js/wheelloads.js';
+
+/** The head of a rail: an arc of 300 mm radius, 60 mm wide, with faces of 20 mm. */
+const arc = Array.from({ length: 121 }, (_, i) => -30 + i / 2).map((y) => /** @type {[number, number]} */ ([y, Math.sqrt(300 ** 2 - y * y) - 300]));
+const head = /** @type {[number, number][]} */ ([[-30, -21.5], ...arc, [30, -21.5]]);
+
+test('a groove in the head is worn by its area and its depth, in whichever sense the line runs', () => {
+  // Half a cosine wave of 20 mm length and 1 mm depth has 10 mm².
+  const worn = head.map(([y, z]) => /** @type {[number, number]} */ ([y, Math.abs(y) < 10 ? z - 0.5 * (1 + Math.cos((Math.PI * y) / 10)) : z]));
+  for (const [one, two] of [[head, worn], [[...head].reverse(), worn], [head, [...worn].reverse()]]) {
+    const wear = wearBetween(one, two, 'rail', [0, 0]);
+    assert.ok(Math.abs(wear.area - 10) < 0.1, `${wear.area}`);
+    assert.ok(wear.added < 0.05, `${wear.added}`);
+    assert.ok(wear.most && Math.abs(wear.most.depth - 1) < 0.01 && Math.abs(wear.most.at[0]) < 0.3);
+  }
+  // The other way round the groove is what the second has more.
+  const grown = wearBetween(worn, head, 'rail', [0, 0]);
+  assert.ok(grown.area < 0.05 && Math.abs(grown.added - 10) < 0.1);
+  // The material of a wheel is above its line.
+  const wheel = (/** @type {[number, number][]} */ line) => line.map(([y, z]) => /** @type {[number, number]} */ ([y, -z]));
+  assert.ok(Math.abs(wearBetween(wheel(head), wheel(worn), 'wheel', [0, 0]).area - 10) < 0.1);
+});
+
+test('the best fit finds a shift of a shape that is worn in part', () => {
+  const moved = head.map(([y, z]) => /** @type {[number, number]} */ ([y + 1.3, (y > 12 && y < 25 ? z - 0.8 : z) - 0.7]));
+  const [y, z] = bestFit(head, moved);
+  assert.ok(Math.abs(y + 1.3) < 0.1 && Math.abs(z - 0.7) < 0.03, `${y}, ${z}`);
+});
+
+test('the angle of a flange is that of its flank, and Nadal\'s limit follows from it', () => {
+  const radians = (70 * Math.PI) / 180;
+  // Tread, flank of 70° and 20 mm height, back: on the right wheel the field side is at negative y.
+  const flank = Array.from({ length: 21 }, (_, i) => /** @type {[number, number]} */ ([-720 - (i - 20) / Math.tan(radians), -20 + i]));
+  const wheel = /** @type {[number, number][]} */ ([[-700, 10], [-700, -20], ...flank, ...Array.from({ length: 60 }, (_, i) => /** @type {[number, number]} */ ([-721 - i, i / 40]))]);
+  wheel.sort(() => 0);
+  assert.ok(Math.abs(flangeAngle(wheel, 'right') - radians) < 0.02, `${(flangeAngle(wheel, 'right') * 180) / Math.PI}`);
+  assert.ok(Number.isNaN(flangeAngle(wheel.filter(([, z]) => z >= 0), 'right')));
+  assert.ok(Math.abs(nadal(radians, 0.3) - 1.342) < 2e-3);
+});
