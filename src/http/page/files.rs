@@ -73,6 +73,8 @@ pub(crate) const FILES: &[PageFile] = files!(
     "js/result.js",
     "js/resultview.js",
     "js/routes.js",
+    "js/run.js",
+    "js/runview.js",
     "js/shell.js",
     "js/starts.js",
     "js/state.js",

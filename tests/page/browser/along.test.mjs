@@ -1,5 +1,6 @@
 // Compare and Line: several jobs side by side, and the cases of a batch along a label.
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { drawn, example, OUTPUT, parsed, readout, setUp, withFields } from './harness.mjs';
@@ -121,4 +122,45 @@ test('a worn rail lies over a new one: difference, worn area, numbers of all pat
   await page.getByText('Both cases have the same wheel.').waitFor();
   await page.getByLabel('at the same place').selectOption('patch');
   await drawn(page, '[aria-label="Difference"] field-map');
+}));
+
+test('a run stands along its kilometres: totals by section, exceedances, the worst rows, and a row as a job', () => onPage('#/compose', async (page) => {
+  const rows = 3000;
+  const template = JSON.parse(readFileSync(new URL('../../../api/examples/run.json', import.meta.url), 'utf8')).template;
+  const columns = {
+    km: Array.from({ length: rows }, (_, i) => Number((10 + i / 100).toFixed(2))),
+    section: Array.from({ length: rows }, (_, i) => (i < 1000 ? 'straight' : i < 2000 ? 'curve' : 'switch')),
+    '/load/normal_force_n': Array.from({ length: rows }, (_, i) => 60_000 + 30_000 * Math.abs(Math.sin(i / 90))),
+    '/motion/creepage_x': Array.from({ length: rows }, (_, i) => 0.0004 + (i >= 1000 && i < 2000 ? 0.0015 : 0)),
+  };
+  const { id } = await service.ask('/v1/runs?name=night', { json: { template, columns } });
+  await page.goto(`${service.base}/#/line`);
+  await page.getByRole('link', { name: /^night: 3000 rows/ }).click();
+  await page.locator('line-strips canvas').nth(3).waitFor({ timeout: 60_000 });
+  // Strips have titles with units.
+  assert.deepEqual(await page.locator('.strip-title').evaluateAll((titles) => titles.map((title) => title.firstChild?.textContent)), ['wear number Tγ / J/m', 'largest pressure / MPa', 'longitudinal force Fx / kN', 'lateral force Fy / kN']);
+  const totals = await service.ask(`/v1/runs/${id}/totals?by=section&columns=friction_power_n&percentiles=50,99,100&above=20`);
+  const section = (/** @type {string} */ name) => page.locator('table.sections tbody tr').filter({ has: page.locator('th', { hasText: new RegExp(`^${name}$`) }) }).locator('td').allInnerTexts();
+  for (const of of totals.sections) {
+    await page.locator('table.sections tbody tr').filter({ hasText: of.value }).waitFor();
+    const cells = await section(of.value);
+    assert.equal(parsed(cells[0]), of.rows);
+    assert.ok(Math.abs(parsed(cells[4]) - of.columns.friction_power_n.percentiles['100']) < 0.01 * of.columns.friction_power_n.percentiles['100'], cells.join());
+  }
+  // A limit is drawn in, and what reaches it is counted by the service.
+  await page.getByLabel('Limit of wear number').fill('20');
+  await page.getByLabel('Limit of wear number').blur();
+  const over = totals.all.columns.friction_power_n.above['20'];
+  await page.getByText(new RegExp(`^${String(over)} of 3000 rows reach the limit of 20`)).waitFor();
+  assert.ok(page.url().includes('friction_power_n=20'));
+  const curve = totals.sections.find((/** @type {{ value: string }} */ of) => of.value === 'curve');
+  await page.waitForFunction((count) => [...document.querySelectorAll('table.sections tbody tr')].some((row) => row.querySelector('th')?.textContent === 'curve' && Number(row.lastElementChild?.textContent) === count), curve.columns.friction_power_n.above['20']);
+  // The worst row is the one of the largest value, and opens as a job with its fields.
+  const worst = page.locator('section[aria-labelledby="h-worst"] tbody tr').first();
+  const value = parsed(await worst.locator('td').first().innerText());
+  assert.ok(Math.abs(value - totals.all.columns.friction_power_n.max) < 0.01 * value, `${value}`);
+  await page.screenshot({ path: join(OUTPUT, 'run.png'), fullPage: true });
+  await worst.getByRole('button').click();
+  await drawn(page);
+  assert.match(await page.locator('h1').innerText(), /^row \d+ of night$/);
 }));

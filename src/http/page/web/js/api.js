@@ -147,6 +147,22 @@ export const examples = () => json('/v1/examples');
 /** @type {(id: string) => Promise<Batch>} */
 export const batch = (id) => json(`/v1/batches/${id}`);
 
+/** @param {{ limit?: number }} filter @returns {Promise<Schemas['RunPage']>} */
+export const runs = (filter) => json(`/v1/runs?${search(filter)}`);
+
+/** @type {(id: string) => Promise<Schemas['Run']>} */
+export const run = (id) => json(`/v1/runs/${id}`);
+
+/**
+ * @param {string} id
+ * @param {{ columns?: string, percentiles?: string, above?: string, by?: string, width?: number }} wanted
+ * @returns {Promise<Schemas['RunTotals']>}
+ */
+export const runTotals = (id, wanted) => json(`/v1/runs/${id}/totals?${search(wanted)}`);
+
+/** @type {(id: string, row: number) => Promise<Schemas['RunRowAlone']>} */
+export const runRow = (id, row) => json(`/v1/runs/${id}/rows/${row}`);
+
 /** @param {'jobs' | 'batches'} kind @param {string} id */
 export const cancel = (kind, id) => request(`/v1/${kind}/${id}/cancel`, { method: 'POST' });
 

@@ -1,6 +1,6 @@
 // The jobs of a batch along a label that is a number, such as the chainage: what the strips show of each.
 
-import { batch as batchOf, batches as batchesOf, jobs as jobsOf, request } from './api.js';
+import { batch as batchOf, batches as batchesOf, jobs as jobsOf, request, runs as runsOf } from './api.js';
 import { formatRoute } from './routes.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -37,18 +37,21 @@ let line = null;
 
 export const lineSeen = () => line;
 
-/** @type {import('./api.js').Batch[] | null} */
-let ended = null;
+/** @typedef {{ batches: readonly import('./api.js').Batch[], runs: readonly import('./api.js').Schemas['Run'][] }} Offered */
 
-/** Batches to choose from; null as long as they are being loaded. */
-export const endedBatches = () => ended;
+/** @type {Offered | null} */
+let offeredHere = null;
+
+/** Batches and runs to choose from; null as long as they are being loaded. */
+export const offeredLines = () => offeredHere;
 
 /** @param {App} app @param {string | undefined} id @param {Record<string, string>} query */
 export async function openLine(app, id, query) {
   if (!id) {
     line = null;
     try {
-      ended = (await batchesOf({ limit: 50 })).batches.filter((batch) => batch.ended);
+      const [{ batches }, { runs }] = await Promise.all([batchesOf({ limit: 50 }), runsOf({ limit: 50 })]);
+      offeredHere = { batches: batches.filter((batch) => batch.ended), runs };
       app.redraw();
     } catch (error) {
       app.refused(error);

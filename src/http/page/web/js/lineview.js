@@ -1,9 +1,11 @@
-// Line: strips along a label that is a number, limits, the worst places, and the way from there to the contact.
+// Track: strips along a label that is a number, limits, the worst places, and the way from there to the contact.
 
 import { html, nothing } from '../vendor/lit-html.js';
-import { chooseLine, endedBatches, lineSeen, placeOf, STRIPS, worstRows } from './line.js';
+import { chooseLine, lineSeen, offeredLines, placeOf, STRIPS, worstRows } from './line.js';
 import { count, number } from './format.js';
 import { formatRoute } from './routes.js';
+import { runSeen } from './run.js';
+import { runView } from './runview.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./line.js').Line} Line */
@@ -11,18 +13,33 @@ import { formatRoute } from './routes.js';
 
 const WORST = 8;
 
+/** @type {{ rows: readonly import('./line.js').Row[], by: string, x: number[], strips: import('./strips.js').Strip[] } | null} */
+let made = null;
+
+/** What the strips show, made once for the rows in their order. @param {Line} of */
+function stripsOf({ rows, by }) {
+  if (made?.rows !== rows || made.by !== by) {
+    const strips = STRIPS.map(({ key, label, unit, colour }) => ({ key, label, unit, colour, lines: [{ label, values: rows.map((row) => row[key]) }] }));
+    made = { rows, by, x: rows.map((row) => placeOf(row, by)), strips };
+  }
+  return made;
+}
+
 /** @param {App} app */
 export function lineView(app) {
+  const run = runSeen();
+  if (run) return runView(app, run);
   const line = lineSeen();
-  if (!line) return choice(endedBatches());
-  if (!line.rows.length && line.done) return html`<section class="panel wait"><h1>Along the line</h1><p>This batch has no results.</p></section>`;
+  if (!line) return choice(offeredLines());
+  if (!line.rows.length && line.done) return html`<section class="panel wait"><h1>Along the track</h1><p>This batch has no results.</p></section>`;
+  const { x, strips } = stripsOf(line);
   const shown = {
-    rows: line.rows, by: line.by, limits: line.limits, zoom: line.zoom,
-    open: (/** @type {import('./line.js').Row} */ row) => app.go(formatRoute('result', [row.id])),
+    x, strips, xLabel: line.by || 'case', limits: line.limits, zoom: line.zoom,
+    open: (/** @type {number} */ at) => app.go(formatRoute('result', [line.rows[at].id])),
     zoomed: (/** @type {Line['zoom']} */ zoom) => chooseLine(app, { zoom }),
   };
   const by = (/** @type {Event} */ event) => chooseLine(app, { by: /** @type {HTMLSelectElement} */ (event.target).value, zoom: null });
-  return html`<div class="result"><header class="jobhead"><div><h1>Along the line</h1>
+  return html`<div class="result"><header class="jobhead"><div><h1>Along the track</h1>
       <p class="quiet">${count(line.rows.length)} of ${count(line.count)} cases · drag to zoom, double click or Enter opens the contact, Escape shows all</p></div>
       <label class="inline">Along <select @change=${by}>${['', ...line.labels].map((label) => html`<option value=${label} ?selected=${label === line.by}>${label || 'order of the batch'}</option>`)}</select></label></header>
     ${line.done ? html`<div class="cols">
@@ -31,13 +48,17 @@ export function lineView(app) {
     : html`<progress max=${line.count || 1} .value=${line.rows.length} aria-label="Loading"></progress>`}</div>`;
 }
 
-/** No batch is chosen yet. @param {readonly import('./api.js').Batch[] | null} batches */
-function choice(batches) {
-  if (!batches) return html`<p class="pad quiet">Loading …</p>`;
-  return html`<section class="panel wait"><h1>Along the line</h1>
-    ${batches.length ? html`<p>Choose a batch:</p>${batches.map((batch) => html`<a class="button" href=${formatRoute('line', [batch.id])}>
-      ${batch.name ? `${batch.name}: ` : ''}${count(batch.count)} cases of ${batch.created_at.slice(0, 16).replace('T', ' ')}</a>`)}`
-    : html`<p>There is no batch that has ended. Send many cases with a label that is a number, such as <code>"km": "37.2"</code>, to <code>/v1/batches</code>.</p>`}
+/** Nothing is chosen yet. @param {import('./line.js').Offered | null} offered */
+function choice(offered) {
+  if (!offered) return html`<p class="pad quiet">Loading …</p>`;
+  const { batches, runs } = offered;
+  const when = (/** @type {string} */ time) => time.slice(0, 16).replace('T', ' ');
+  return html`<section class="panel wait"><h1>Along the track</h1>
+    ${batches.length || runs.length ? html`<p>Choose a run or a batch of cases:</p>
+      ${runs.map((run) => html`<a class="button" href=${formatRoute('line', [run.id], { kind: 'run' })}>${run.name || 'Run'}: ${count(run.rows)} rows of ${when(run.created_at)}</a>`)}
+      ${batches.map((batch) => html`<a class="button" href=${formatRoute('line', [batch.id])}>${batch.name || 'Batch'}: ${count(batch.count)} cases of ${when(batch.created_at)}</a>`)}`
+    : html`<p>There is no run and no batch that has ended. Send a table of loads and creepages with a column such as <code>km</code> to <code>/v1/runs</code>,
+      or cases with a label that is a number, such as <code>"km": "37.2"</code>, to <code>/v1/batches</code>.</p>`}
     <a class="button" href="#/jobs">To the jobs</a></section>`;
 }
 

@@ -9,6 +9,7 @@ import { loadCurves } from './late.js';
 import { openLine } from './line.js';
 import { isGone, openJob } from './result.js';
 import { startQueue, stopQueue } from './queue.js';
+import { leaveRun, openRun } from './run.js';
 import { formatRoute, parseRoute } from './routes.js';
 import { renderShell } from './shell.js';
 import { initialState } from './state.js';
@@ -60,7 +61,9 @@ function follow() {
   if (route.view === 'result' || route.view === 'line') loadCurves();
   if (route.view === 'result') openJob(app, route.ids[0], route.query);
   if (route.view === 'compare') openComparison(app, route.ids, route.query);
-  if (route.view === 'line') openLine(app, route.ids[0], route.query);
+  if (route.view === 'line' && route.query.kind === 'run' && route.ids[0]) openRun(app, route.ids[0], route.query).catch(app.refused);
+  else leaveRun();
+  if (route.view === 'line' && route.query.kind !== 'run') openLine(app, route.ids[0], route.query);
   if (before.view !== route.view) document.getElementById('main')?.focus({ preventScroll: true });
 }
 

@@ -1,25 +1,31 @@
-// <line-strips>: one strip for each quantity along the line, with one cursor; dragging zooms all, a double click opens the contact.
+// <line-strips>: one strip for each quantity along the track, with one cursor; dragging zooms all, a double click opens the contact.
 
 import uPlot from '../vendor/uPlot.esm.js';
 import { number, tickLabel } from './format.js';
 import { adoptShown } from './adopt.js';
-import { placeOf, STRIPS } from './line.js';
 
-/** @typedef {import('./line.js').Row} Row */
-/** @typedef {import('./line.js').StripKey} StripKey */
+/**
+ * @typedef {object} Strip
+ * @property {string} key
+ * @property {string} label
+ * @property {string} unit
+ * @property {string} colour
+ * @property {readonly { label: string, values: (number | null)[] }[]} lines The first is filled.
+ */
 
 /**
  * @typedef {object} Shown
- * @property {readonly Row[]} rows Sorted along the line.
- * @property {string} by
- * @property {Partial<Record<StripKey, number>>} limits
+ * @property {number[]} x Increasing.
+ * @property {string} xLabel
+ * @property {readonly Strip[]} strips
+ * @property {Partial<Record<string, number>>} limits
  * @property {{ from: number, to: number } | null} zoom
- * @property {(row: Row) => void} open
+ * @property {(at: number) => void} open
  * @property {(zoom: { from: number, to: number } | null) => void} zoomed
  */
 
-const HEIGHT = 132;
-const LAST_HEIGHT = 168;
+const HEIGHT = 112;
+const LAST_HEIGHT = 156;
 
 export class LineStrips extends HTMLElement {
   /** @type {Shown | null} */ #shown = null;
@@ -46,7 +52,7 @@ export class LineStrips extends HTMLElement {
   set shown(shown) {
     const before = this.#shown;
     this.#shown = shown;
-    if (before?.rows === shown.rows && before.by === shown.by) this.#plots.forEach((plot) => plot.redraw());
+    if (before?.x === shown.x && before.strips === shown.strips) this.#plots.forEach((plot) => plot.redraw());
     else this.#build();
   }
 
@@ -57,6 +63,7 @@ export class LineStrips extends HTMLElement {
   #clear() {
     this.#plots.forEach((plot) => plot.destroy());
     this.#plots = [];
+    this.replaceChildren();
   }
 
   #resize() {
@@ -71,9 +78,14 @@ export class LineStrips extends HTMLElement {
     const shown = this.#shown;
     if (!shown || !this.isConnected || !this.clientWidth) return;
     const sync = uPlot.sync('line');
-    const xs = shown.rows.map((row) => placeOf(row, shown.by));
-    this.#plots = STRIPS.map((strip, at) => {
-      const plot = new uPlot(this.#options(strip, at === STRIPS.length - 1, sync.key), [xs, shown.rows.map((row) => row[strip.key])], this);
+    this.#plots = shown.strips.map((strip, at) => {
+      const title = document.createElement('p');
+      const value = document.createElement('span');
+      title.className = 'strip-title';
+      title.append(`${strip.label}${strip.unit ? ` / ${strip.unit}` : ''}`, value);
+      this.append(title);
+      const last = at === shown.strips.length - 1;
+      const plot = new uPlot(this.#options(strip, last, sync.key, value), [shown.x, ...strip.lines.map(({ values }) => values)], this);
       plot.over.addEventListener('dblclick', () => this.#open(plot.cursor.idx));
       sync.sub(plot);
       return plot;
@@ -83,21 +95,20 @@ export class LineStrips extends HTMLElement {
 
   /** @param {number | null | undefined} at */
   #open(at) {
-    const row = typeof at === 'number' ? this.#shown?.rows[at] : undefined;
-    if (row) this.#shown?.open(row);
+    if (typeof at === 'number') this.#shown?.open(at);
   }
 
   /** Arrow keys move the cursor of all strips, Enter opens the contact, Escape shows the whole line. @param {KeyboardEvent} event */
   #key(event) {
     const [first] = this.#plots;
-    const rows = this.#shown?.rows ?? [];
-    if (!first || !rows.length) return;
+    const length = this.#shown?.x.length ?? 0;
+    if (!first || !length) return;
     const at = first.cursor.idx ?? 0;
     const by = event.shiftKey ? 10 : 1;
     if (event.key === 'Enter') this.#open(at);
-    else if (event.key === 'Escape') this.#zoomAll(first.data[0][0], first.data[0][rows.length - 1]);
+    else if (event.key === 'Escape') this.#zoomAll(first.data[0][0], first.data[0][length - 1]);
     else if (event.key === 'ArrowLeft' || event.key === 'ArrowRight') {
-      const next = Math.max(0, Math.min(rows.length - 1, at + (event.key === 'ArrowRight' ? by : -by)));
+      const next = Math.max(0, Math.min(length - 1, at + (event.key === 'ArrowRight' ? by : -by)));
       first.setCursor({ left: first.valToPos(first.data[0][next], 'x'), top: 10 });
     } else return;
     event.preventDefault();
@@ -111,29 +122,36 @@ export class LineStrips extends HTMLElement {
   }
 
   /**
-   * @param {typeof STRIPS[number]} strip
+   * @param {Strip} strip
    * @param {boolean} last
    * @param {string} key
+   * @param {HTMLElement} value Where the value at the cursor is told.
    * @returns {uPlot.Options}
    */
-  #options({ key: strip, label, unit, colour }, last, key) {
+  #options({ key: strip, unit, colour, lines }, last, key, value) {
     const style = getComputedStyle(this);
     const token = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
     const labels = (/** @type {uPlot} */ _, /** @type {number[]} */ marks) => marks.map((mark) => tickLabel(mark, marks));
-    const axis = { stroke: token('--ink-2'), grid: { stroke: token('--line'), width: 1 }, ticks: { show: false }, font: `12px ${style.fontFamily}` };
+    const font = `12px ${style.fontFamily}`;
+    const axis = { stroke: token('--ink-2'), grid: { stroke: token('--line'), width: 1 }, ticks: { show: false }, font, labelFont: font, labelSize: 20, labelGap: 0 };
+    const xLabel = this.#shown?.xLabel || 'case';
     return {
       width: this.clientWidth,
       height: last ? LAST_HEIGHT : HEIGHT,
       scales: { x: { time: false } },
       cursor: { sync: { key, setSeries: false }, drag: { x: true, y: false } },
-      legend: { live: true },
-      axes: [{ ...axis, size: last ? 34 : 4, values: last ? labels : () => [] }, { ...axis, size: 58, values: labels }],
-      series: [
-        { label: this.#shown?.by || 'case', value: (_, value) => number(value, 6) },
-        { label: `${label} / ${unit}`, stroke: token(colour), width: 1.25, fill: `${token(colour)}22`, points: { show: false }, value: (_, value) => number(value) },
-      ],
+      legend: { show: false },
+      axes: [{ ...axis, size: last ? 30 : 4, values: last ? labels : () => [], ...(last ? { label: xLabel } : {}) }, { ...axis, size: 58, values: labels }],
+      series: [{}, ...lines.map((line, at) => (at
+        ? { label: line.label, stroke: token('--ink'), width: 1, points: { show: false } }
+        : { label: line.label, stroke: token(colour), width: 1.25, fill: `${token(colour)}22`, points: { show: false } }))],
       hooks: {
         draw: [(plot) => this.#drawLimit(plot, strip, token('--bad'))],
+        setCursor: [(plot) => {
+          const { idx } = plot.cursor;
+          value.textContent = typeof idx !== 'number' ? ''
+            : `${xLabel} ${number(plot.data[0][idx], 6)}: ${lines.map((line, at) => `${lines.length > 1 ? `${line.label} ` : ''}${number(plot.data[at + 1][idx])}`).join(', ')} ${unit}`;
+        }],
         setScale: [(plot, scale) => {
           const { min, max } = plot.scales.x;
           if (scale !== 'x' || this.#zooming || typeof min !== 'number' || typeof max !== 'number' || !this.#plots.includes(plot)) return;
@@ -145,7 +163,7 @@ export class LineStrips extends HTMLElement {
     };
   }
 
-  /** @param {uPlot} plot @param {StripKey} strip @param {string} colour */
+  /** @param {uPlot} plot @param {string} strip @param {string} colour */
   #drawLimit(plot, strip, colour) {
     const limit = this.#shown?.limits[strip];
     if (limit === undefined) return;
