@@ -1,7 +1,8 @@
 // Numbers, ticks and times as text.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { ago, bytes, degrees, fixed, number, seconds, tickLabel, ticks, withError } from '../../../src/http/page/web/js/format.js';
+import { ago, degrees, fixed, number, seconds, tickLabel, ticks, withError } from '../../../src/http/page/web/js/format.js';
+import { inclinationText, parseInclination } from '../../../src/http/page/web/js/written.js';
 
 test('a value has the digits that its error leaves', () => {
   assert.deepEqual(withError(10.0335081, 0.127522), { value: '10.03', error: '0.13' });
@@ -48,13 +49,18 @@ test('a step of two and a half shows its half', () => {
   assert.deepEqual(whole.map((mark) => tickLabel(mark, whole)), ['0', '20', '40']);
 });
 
-test('times, sizes and angles are told in units that are read', () => {
+test('times and angles are told in units that are read', () => {
   assert.equal(seconds(0.00543), '5.43 ms');
   assert.equal(seconds(300), '5.00 min');
-  assert.equal(bytes(66_836_481), '66.8 MB');
   assert.equal(degrees(-0.481848971752288), '−27.6°');
   const now = Date.parse('2026-02-03T12:00:00Z');
   assert.equal(ago('2026-02-03T11:59:58Z', now), 'just now');
   assert.equal(ago('2026-02-03T11:45:00Z', now), '15 min ago');
   assert.equal(ago('2026-01-01T11:45:00Z', now), '2026-01-01');
+});
+
+test('inclinations are written as ratios and read in every form', () => {
+  assert.deepEqual([0.025, 0.05, -0.05, 0.03, 0, undefined].map(inclinationText), ['1:40', '1:20', '-1:20', '0.03', '0', '']);
+  assert.deepEqual(['1:40', '1 / 40', '−1:20', '1:33,3', '0,025', ''].map(parseInclination), [0.025, 0.025, -0.05, 0.03003003003, 0.025, undefined]);
+  assert.equal(parseInclination('much'), 'much');
 });

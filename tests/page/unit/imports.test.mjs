@@ -44,3 +44,16 @@ test('no file of the page imports itself in a circle', () => {
   assert.ok(own.length > files.length, `${own.length} imports were found in ${files.length} files`);
   assert.deepEqual(circle(files, (file) => graph.get(file) ?? []), null);
 });
+
+test('the document names every file that the first view needs, so that the browser asks for all of them at once', () => {
+  const needed = new Set();
+  const visit = (/** @type {string} */ file) => {
+    if (needed.has(file)) return;
+    needed.add(file);
+    const text = readFileSync(new URL(file), 'utf8');
+    for (const [, path] of text.matchAll(/^import (?:[^'"]*? from )?'(\.[^']+)';/gm)) visit(new URL(path, file).href);
+  };
+  visit(new URL('page.js', PAGE).href);
+  const named = [...readFileSync(new URL('../index.html', PAGE), 'utf8').matchAll(/(?:modulepreload"|module") (?:href|src)="\/page\/-\/([^"]+)"/g)].map(([, path]) => new URL(`../${path}`, PAGE).href);
+  assert.deepEqual(named.sort(), [...needed].sort());
+});

@@ -112,7 +112,8 @@ export class CreepCurve extends HTMLElement {
       pen.lineTo(left + width, y);
       pen.stroke();
       pen.font = font.replace('12px', `${12 * density}px`);
-      pen.fillText(bound > 0 ? 'μN' : '−μN', left + 6 * density, y - 5 * density);
+      pen.textAlign = 'right';
+      pen.fillText(bound > 0 ? 'μN' : '−μN', left + width - 6 * density, y - 5 * density);
     }
     pen.setLineDash([]);
     if (curve.x.length <= MARKED_MAX) for (const line of curve.lines) drawErrors(plot, curve, line, token(line.colour), density);

@@ -62,12 +62,6 @@ export function seconds(value) {
 }
 
 /** @param {number} value */
-export function bytes(value) {
-  if (value < 1e6) return `${number(value / 1e3, 3)} kB`;
-  return value < 1e9 ? `${number(value / 1e6, 3)} MB` : `${number(value / 1e9, 3)} GB`;
-}
-
-/** @param {number} value */
 export const count = (value) => fixed(value, 0);
 
 /** @param {number} radians */

@@ -95,7 +95,7 @@ function drawGround(pen, layout, ink) {
 function drawValues(pen, scene, layout, density, ink) {
   const { index, quantity, values, mesh } = scene;
   const { map } = layout;
-  const smooth = !mesh && quantity.scale !== 'zones' && index.whole;
+  const smooth = !mesh && index.whole;
   const frame = {
     width: Math.ceil(map.width * density),
     height: Math.ceil(map.height * density),
@@ -111,14 +111,16 @@ function drawValues(pen, scene, layout, density, ink) {
     trace(pen, index.border, layout);
     pen.clip();
   }
-  if (quantity.scale === 'zones') drawZones(pen, scene, layout, ink);
+  if (quantity.scale === 'zones' && !smooth) drawZones(pen, scene, layout, ink);
   else {
     const sheet = document.createElement('canvas');
     sheet.width = frame.width;
     sheet.height = frame.height;
     const sheetPen = /** @type {Pen} */ (sheet.getContext('2d'));
     const image = sheetPen.createImageData(frame.width, frame.height);
-    colourise(raster, new Uint32Array(image.data.buffer), mapOf(quantity.scale), scene.range);
+    const pixels = new Uint32Array(image.data.buffer);
+    if (quantity.scale === 'zones') paintZones(raster, pixels, frame.width, density, ink);
+    else colourise(raster, pixels, mapOf(quantity.scale), scene.range);
     sheetPen.putImageData(image, 0, 0);
     pen.drawImage(sheet, map.left, map.top, frame.width / density, frame.height / density);
   }
@@ -127,7 +129,33 @@ function drawValues(pen, scene, layout, density, ink) {
 }
 
 /**
- * Zones are never interpolated; slip is hatched too, since colour must not be the only sign.
+ * Stick and slip inside the border: the zone that is nearer. Slip is hatched too, since colour must not be the only sign.
+ * @param {Float32Array} shares 0 for stick to 1 for slip, by pixels.
+ * @param {Uint32Array} pixels
+ * @param {number} width
+ * @param {number} density
+ * @param {Ink} ink
+ */
+function paintZones(shares, pixels, width, density, ink) {
+  const [stick, slip, hatched] = [wordOf(ink.stick, 1), wordOf(ink.slip, 1), wordOf(ink.slip, 0.6)];
+  const step = Math.round(HATCH_STEP * density);
+  for (let pixel = 0; pixel < shares.length; pixel += 1) {
+    const share = shares[pixel];
+    if (share !== share) continue;
+    const line = ((pixel % width) + Math.floor(pixel / width)) % step < density;
+    pixels[pixel] = share < 0.5 ? stick : line ? hatched : slip;
+  }
+}
+
+/** A colour as the word of an `ImageData` on a little-endian machine. @param {string} colour As `#rrggbb`. @param {number} light */
+function wordOf(colour, light) {
+  const rgb = parseInt(colour.slice(1), 16);
+  const part = (/** @type {number} */ shift) => Math.round(((rgb >> shift) & 255) * light);
+  return (0xff000000 | (part(0) << 16) | (part(8) << 8) | part(16)) >>> 0;
+}
+
+/**
+ * Zones of cells as they were computed; slip is hatched too, since colour must not be the only sign.
  * @param {Pen} pen
  * @param {Scene} scene
  * @param {Layout} layout
