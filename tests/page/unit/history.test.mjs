@@ -30,7 +30,7 @@ test('other motions stand over what varies most, whatever kind was looked at bef
   const steady = [3, 1, 2].map((creepage) => ({ ...point(0, 0.001 * creepage, 1000 * creepage), history: undefined }));
   for (const kind of /** @type {const} */ (['forces', 'creepages'])) {
     const curve = curveOf(patch(steady), kind, 0.3);
-    assert.equal(curve?.xLabel, 'creepage along / %');
+    assert.equal(curve?.xLabel, 'creepage x / %');
     assert.deepEqual(curve?.order, [1, 2, 0]);
   }
 });

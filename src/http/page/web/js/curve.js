@@ -72,7 +72,7 @@ export class CreepCurve extends HTMLElement {
       scales: { x: { time: false }, y: { range: withZero } },
       axes: [{ ...axis, size: 30, gap: 4, label: curve.xLabel }, { ...axis, size: 58, label: curve.yLabel }],
       series: [
-        { label: curve.xLabel, value: (_, value) => number(value) },
+        { label: curve.xLabel, value: (_, value) => (value === null ? '' : number(value)) },
         ...curve.lines.map((line) => seriesOf(line, token, curve.x.length <= MARKED_MAX)),
       ],
       legend: { live: true },
@@ -142,6 +142,7 @@ const seriesOf = (line, token, marked) => ({
   dash: line.dash,
   points: { show: marked, size: 6, fill: token('--surface'), width: 1.5 },
   value: (_plot, value, _series, at) => {
+    if (value === null) return '';
     const error = at === null ? null : line.error[at];
     return `${number(value)}${error ? ` ± ${number(error, 2)}` : ''} ${line.unit}`;
   },

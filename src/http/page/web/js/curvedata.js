@@ -16,8 +16,8 @@
  */
 
 const MOTIONS = /** @type {const} */ ([
-  { key: 'creepage_x', label: 'creepage along / %', factor: 0.01 },
-  { key: 'creepage_y', label: 'creepage across / %', factor: 0.01 },
+  { key: 'creepage_x', label: 'creepage x / %', factor: 0.01 },
+  { key: 'creepage_y', label: 'creepage y / %', factor: 0.01 },
   { key: 'spin_per_mm', label: 'spin / (1/m)', factor: 0.001 },
 ]);
 
@@ -53,8 +53,8 @@ function creepageCurve(patch) {
     ...places(patch),
     yLabel: 'creepage / %',
     lines: [
-      { label: 'along', unit: '%', colour: '--c1', y: points.map(({ motion }) => 100 * (motion.creepage_x ?? 0)), error: points.map(({ history }) => known(history?.creepage_x_error)) },
-      { label: 'across', unit: '%', colour: '--c2', dash: [7, 4], y: points.map(({ motion }) => 100 * (motion.creepage_y ?? 0)), error: points.map(({ history }) => known(history?.creepage_y_error)) },
+      { label: 'creepage x', unit: '%', colour: '--c1', y: points.map(({ motion }) => 100 * (motion.creepage_x ?? 0)), error: points.map(({ history }) => known(history?.creepage_x_error)) },
+      { label: 'creepage y', unit: '%', colour: '--c2', dash: [7, 4], y: points.map(({ motion }) => 100 * (motion.creepage_y ?? 0)), error: points.map(({ history }) => known(history?.creepage_y_error)) },
     ],
     bound: NaN,
   };

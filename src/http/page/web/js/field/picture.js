@@ -342,7 +342,8 @@ function drawAxes(pen, layout, ink) {
  * @param {Layout} layout
  */
 export function barBox({ map, narrow }) {
-  const width = Math.min(260, map.width * (narrow ? 0.46 : 0.55));
+  // The heading needs its room.
+  const width = Math.max(60, Math.min(260, map.width * (narrow ? 0.46 : 0.55), map.width - 130));
   return { left: map.left + map.width - width, top: 12, width, height: 10 };
 }
 

@@ -165,7 +165,12 @@ function shadeStick(pen, { along, box, cells, from, to }, zone, ink) {
  * @param {number} width
  * @param {number[]} dash
  */
-function drawLine(pen, { along, value }, layout, line, colour, width, dash) {
+function drawLine(pen, { along, box, value }, layout, line, colour, width, dash) {
+  pen.save();
+  pen.beginPath();
+  // Friction's bound may lie far above a scale of its own.
+  pen.rect(box.left - 2, box.top - 2, box.width + 4, box.height + 4);
+  pen.clip();
   pen.beginPath();
   line.forEach(([at, amount], order) => {
     const x = along ? layout.X(at) : value(amount);
@@ -177,7 +182,7 @@ function drawLine(pen, { along, value }, layout, line, colour, width, dash) {
   pen.lineWidth = width;
   pen.setLineDash(dash);
   pen.stroke();
-  pen.setLineDash([]);
+  pen.restore();
 }
 
 /**
