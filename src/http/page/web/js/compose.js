@@ -88,7 +88,8 @@ function drawing({ understood, lone }, document) {
     case 'radii':
     case 'ellipse':
       return drawEllipse(document, known?.patches[0]);
-    case 'profiles': {
+    case 'profiles':
+    case 'wheelset': {
       const before = placedBefore?.of === known ? placedBefore : { of: known, drawn: placed(known?.placement) };
       placedBefore = before;
       return html`<div class="stack">${drawProfiles(before.drawn)}${drawGap(before.drawn)}</div>`;
@@ -98,8 +99,6 @@ function drawing({ understood, lone }, document) {
     case 'gap_grid':
     case 'pressure_grid':
       return drawGrid(document);
-    case 'wheelset':
-      return html`<p class="pad hint">The patches of both wheels are drawn with the result.</p>`;
     default:
       return nothing;
   }
@@ -146,6 +145,7 @@ function excerpt({ document, files }, { pointer, detail }) {
 
 /** The result while typing: the numbers of the wheel, and the field of the patch that carries most. @param {Compose} state */
 function previewOf({ preview, document, understood }) {
+  if (preview?.failure) return html`<section class="preview" aria-label="Result while typing"><p class="fault">Solving it fails: ${preview.failure}</p></section>`;
   if (!preview?.result) return nothing;
   const { result, patch, point, field } = preview;
   const { patches } = result;

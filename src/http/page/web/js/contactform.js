@@ -5,7 +5,7 @@ import { at, isObject, numberAt, put } from './document.js';
 import { change, editDocument, isUntouched } from './editing.js';
 import { hasSections, lacksSection, PROFILES, standardSection, withContact, withEverything, withoutNameOf } from './starts.js';
 import { choice, faultAt, field, fieldId } from './field.js';
-import { count, number } from './format.js';
+import { count, fixed, number } from './format.js';
 import { bodiesOf, decoded, profileKind } from './files.js';
 import { parseGapCurve, parseGrid } from './tables.js';
 import { inclinationText, parse, parseInclination } from './written.js';
@@ -52,11 +52,11 @@ function profileFields(app) {
     ${sectionZones(app)}
     <div class="segs" role="group" aria-label="Side of the track">${['left', 'right'].map((name) => html`<label class="seg">
       <input type="radio" name="side" .checked=${side === name} @change=${() => change(app, '/contact/side', name)}><span>${name} rail</span></label>`)}</div>
-    <label class="slide"><span>Lateral shift of the wheelset, to the left <output>${number(shift, 3)} mm</output></span>
-      <input type="range" min="-8" max="8" step="0.05" .value=${String(shift)} @input=${slide}></label>
-    <div class="triple">${field(app, '/contact/lateral_shift_mm', 'Lateral shift', 'mm', { empty: '0' })}
+    <div class="triple">${field(app, '/contact/lateral_shift_mm', 'Shift to the left', 'mm', { empty: '0' })}
       ${field(app, '/contact/yaw_rad', 'Angle of attack', 'mrad', { factor: 0.001, empty: '0' })}
       ${field(app, '/contact/roll_rad', 'Roll', 'mrad', { factor: 0.001, empty: '0' })}</div>
+    <label class="slide"><span class="visually-hidden">Move the wheelset to the left</span>
+      <input type="range" min="-8" max="8" step="0.05" .value=${String(shift)} @input=${slide}></label>
     ${trackFields(app)}`;
 }
 
@@ -69,12 +69,21 @@ function trackFields(app) {
   const byOrigin = at(document ?? undefined, '/contact/rail_origin_mm') !== undefined;
   return html`<div class="pair">${field(app, '/contact/rolling_radius_mm', 'Wheel radius', 'mm')}
       ${field(app, '/contact/cant_rad', 'Rail inclination', '', { format: inclinationText, read: parseInclination, empty: '0', hint: 'such as 1:40, or in rad' })}</div>
-    <div class="pair">${byOrigin ? field(app, '/contact/rail_origin_mm', 'Rail origin from track centre', 'mm')
+    <div class="pair">${byOrigin ? field(app, '/contact/rail_origin_mm', 'Rail origin from track centre', 'mm', { hint: 'in place of the gauge' })
       : html`${field(app, '/contact/gauge_mm', 'Track gauge', 'mm', { empty: '1435' })}${field(app, '/contact/gauge_height_mm', 'measured below the top', 'mm', { empty: '14' })}`}</div>
+    <button class="link" @click=${() => placeRail(app, !byOrigin)}>${byOrigin ? 'Place the rail by the gauge' : 'Place the rail by its origin instead of the gauge'}</button>
     <div class="pair">${field(app, '/contact/flange_back_distance_mm', 'Flange back distance', 'mm', { empty: '1360' })}
       ${field(app, '/contact/flange_back_position_mm', 'Flange back at y', 'mm', {
-        empty: number(position, 3), hint: stated ? '' : found ? `${number(position, 3)} mm was found in the wheel file` : 'usual: −70 mm',
+        empty: fixed(position, 2), hint: stated ? '' : found ? `${fixed(position, 2)} mm was found in the wheel file` : 'usual: −70 mm',
       })}</div>`;
+}
+
+/** Places the rail by the origin of its cross-section, as a rail without a gauge face needs it, or by the gauge. @param {App} app @param {boolean} byOrigin */
+function placeRail(app, byOrigin) {
+  const { document } = app.store.get().compose;
+  const contact = /** @type {JsonObject} */ (at(document ?? undefined, '/contact') ?? {});
+  const { rail_origin_mm, gauge_mm, gauge_height_mm, ...kept } = contact;
+  editDocument(app, put(document ?? {}, '/contact', byOrigin ? { ...kept, rail_origin_mm: 750 } : kept));
 }
 
 /** @param {App} app */

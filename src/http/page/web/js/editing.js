@@ -1,7 +1,7 @@
 // What happens to the case that is being written: changes, checks while writing, the result while typing, solving.
 
 import { cancel, checkCase, examples as examplesOf, Refused, remove, result as resultOf, submit } from './api.js';
-import { at, pretty, put } from './document.js';
+import { at, numberAt, pretty, put } from './document.js';
 import { hasFields, loadField } from './fields.js';
 import { formatRoute } from './routes.js';
 import { adoptJob, tellingPoint } from './result.js';
@@ -120,9 +120,12 @@ async function check(app) {
     const lone = loneSection(document);
     if (lone) await checkLone(app, document, lone, mine.signal);
     else {
-      const checked = await checkCase(text, mine.signal);
-      if (mine.signal.aborted) return;
       const type = at(document, '/contact/type');
+      const wheel = type === 'wheelset' ? checkCase(JSON.stringify(oneWheel(document, 'left', firstShift(document))), mine.signal).catch(() => null) : null;
+      const [whole, one] = await Promise.all([checkCase(text, mine.signal), wheel]);
+      if (mine.signal.aborted) return;
+      // Of a wheelset the left wheel is drawn.
+      const checked = one ? { ...whole, quality: one.quality, understood: one.understood } : whole;
       const understood = checked.understood ? { type, of: checked.understood } : null;
       app.compose({ checked, understood, lone: null, faults: [], refusal: '' });
       preview(app).catch(app.refused);
@@ -130,6 +133,12 @@ async function check(app) {
   } catch (error) {
     if (!mine.signal.aborted) showRefusal(app, error);
   }
+}
+
+/** The first lateral shift of a wheelset, in mm. @param {JsonObject} document */
+function firstShift(document) {
+  const [number, from, first] = ['', '/from', '/values/0'].map((end) => numberAt(document, `/contact/lateral_shift_mm${end}`));
+  return [number, from, first].find(Number.isFinite) ?? 0;
 }
 
 /** The only cross-section of a case that has one of the two. @param {JsonObject} document @returns {'rail' | 'wheel' | null} */
@@ -201,14 +210,14 @@ async function solveTyped(app, digest) {
   const job = await submit(JSON.stringify({ ...withoutExtras(document ?? {}), ...TYPED }), { wait: first ? WAIT_S : 2 });
   first = false;
   /** @type {import('./state.js').Preview} */
-  let answer = { digest, result: null, patch: 0, point: 0, field: null };
+  let answer = { digest, result: null, failure: job.state === 'failed' ? (job.error?.detail ?? 'The case cannot be solved.') : '', patch: 0, point: 0, field: null };
   try {
     const result = job.state === 'succeeded' ? (job.result ?? (await resultOf(job.id))) : null;
     if (result) {
       const loads = result.patches.map((patch) => patch.normal_force_n);
       const patch = loads.indexOf(Math.max(...loads));
       const point = tellingPoint(result.patches[patch].points);
-      answer = { digest, result, patch, point, field: hasFields(result) ? await loadField(job.id, result, patch, point) : null };
+      answer = { ...answer, result, patch, point, field: hasFields(result) ? await loadField(job.id, result, patch, point) : null };
     }
   } finally {
     app.compose({ preview: answer });

@@ -131,14 +131,17 @@ function wheelFields(app, type) {
 
 /** What the rotation of the wheel means for its longitudinal force. @param {App} app @param {string | undefined} member @param {boolean} free @param {number} radius */
 function turningNote(app, member, free, radius) {
-  if (free) return 'The wheel turns so that the rails take no longitudinal force from it.';
+  const { document, checked, understood } = app.store.get().compose;
+  const nominal = numberAt(document ?? undefined, '/contact/rolling_radius_mm');
+  const touch = (checked?.understood?.placement ?? understood?.of.placement)?.first_touch;
+  const own = touch ? nominal + touch.wheel_mm[1] : NaN;
+  if (free) {
+    const differs = Number.isFinite(own) ? ` It touches at a radius of ${fixed(own, 2)} mm; at the fixed radius of ${number(nominal)} mm it would have a creepage of ${number(100 * (1 - own / nominal), 2)} %.` : '';
+    return `The wheel turns so that the rail takes no longitudinal force from it.${differs}`;
+  }
   if (member === 'force_x_n') return 'Force on the rail along the track: negative under a driven wheel, positive under a braked one.';
   if (member !== 'free_rolling_radius_mm') return '';
-  const { document, checked } = app.store.get().compose;
-  const nominal = numberAt(document ?? undefined, '/contact/rolling_radius_mm');
-  const touch = checked?.understood?.placement?.first_touch;
   if (!touch) return 'A difference of 0.1 % between this radius and that of the contact is a creepage of 0.1 %.';
-  const own = nominal + touch.wheel_mm[1];
   return `The wheel touches at a radius of ${fixed(own, 2)} mm: the difference is a creepage of ${number(100 * (1 - own / radius), 2)} %, and pulls.`;
 }
 

@@ -13,6 +13,7 @@
  * A result while typing.
  * @property {string} digest Of the case that it belongs to.
  * @property {JobResult | null} result Null if it could not be solved in a short time.
+ * @property {string} failure Why it has no result; empty if that is for lack of time.
  * @property {number} patch The one that carries most.
  * @property {number} point
  * @property {Field | null} field Of this patch and motion, where the case asks for one.
