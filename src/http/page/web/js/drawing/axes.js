@@ -120,7 +120,8 @@ export function drawShapes({ name, shapes, mark }) {
   return svg`<svg class="drawing chart" viewBox=${`0 0 ${width} ${(bottom + 40 + 18 * shapes.length).toFixed(0)}`} role="img" aria-label=${name}>
     ${grid(axes, { x: 'y from the track centre, to the field side / mm', y: 'z up / mm', columns: 8, rows: 4 })}
     ${shapes.map(({ look, points }) => svg`<path class=${`line ${look}`} d=${path(points.map(T))}/>`)}
-    ${mark ? svg`<g class="mark"><circle cx=${T(mark.at)[0]} cy=${T(mark.at)[1]} r="5"/><text x=${T(mark.at)[0] + 9} y=${T(mark.at)[1] + 18}>${mark.label}</text></g>` : ''}
+    ${mark ? svg`<g class="mark"><circle cx=${T(mark.at)[0]} cy=${T(mark.at)[1]} r="5"/><text
+      x=${T(mark.at)[0] + (T(mark.at)[0] > 0.8 * width ? -9 : 9)} y=${T(mark.at)[1] + 18} text-anchor=${T(mark.at)[0] > 0.8 * width ? 'end' : 'start'}>${mark.label}</text></g>` : ''}
     ${shapes.map(({ label, look }, order) => svg`<g class="legend"><path class=${`line ${look}`} d=${`M50 ${bottom + 46 + 18 * order}h22`}/><text x="80" y=${bottom + 50 + 18 * order}>${label}</text></g>`)}
   </svg>`;
 }
