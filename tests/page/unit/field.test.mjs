@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { CellIndex, smoothLoop } from '../../../src/http/page/web/js/field/cells.js';
 import { quantityOf, rangeOf, valuesOf } from '../../../src/http/page/web/js/field/quantities.js';
-import { rasterCells, rasterSmooth, spanAt } from '../../../src/http/page/web/js/field/raster.js';
+import { rasterCells, rasterSmooth, rasterZones, sectionSmooth, spanAt } from '../../../src/http/page/web/js/field/raster.js';
 import { stickBorder } from '../../../src/http/page/web/js/field/stick.js';
 
 /** @typedef {import('../../../src/http/page/web/js/fields.js').Cells} Cells */
@@ -112,4 +112,31 @@ test('a smooth border goes through the corners it is given', () => {
   assert.deepEqual(smoothLoop([[0, 0], [2, 0], [2, 2], [0, 2]]).filter(([x, y]) => x < 0 || x > 2 || y < 0 || y > 2), [], 'sharp corners stay');
   assert.ok(smooth.every(([x, y]) => Math.abs(Math.hypot(x, y) - 1) < 0.02), 'near the circle');
   assert.ok(Math.abs((spanAt(smooth, 0.1)?.[1] ?? 0) - Math.sqrt(0.99)) < 0.02);
+});
+
+test('zones are smooth from strip to strip: half-way between two strips the border lies half-way', () => {
+  const index = square({ zone: ['slip', 'stick', 'stick', 'slip', 'slip', 'stick', 'slip', 'stick', 'stick'] });
+  const raster = rasterZones(index, NaN, FRAME);
+  // The first pixel that sticks in a row, in mm.
+  const border = (/** @type {number} */ y) => {
+    const row = Math.floor((1.5 - y) * 30);
+    const column = Array.from({ length: 90 }, (_, at) => raster[row * 90 + at]).findIndex((distance) => distance < 0);
+    return -1.5 + column / 30;
+  };
+  for (const [y, x] of [[-1.2, -0.5], [0.5, 0], [0.01, 0.5], [1.2, -0.5]]) assert.ok(Math.abs(border(y) - x) < 0.08, `${y}: ${border(y)}`);
+});
+
+test('a section reaches from border to border, with 0 at both ends where the quantity vanishes there', () => {
+  const index = square();
+  const values = [1, 2, 3, 4, 9, 6, 7, 8, 5];
+  for (const along of [true, false]) {
+    const line = sectionSmooth(index, values, along, { x: 0, y: 0 }, true);
+    const places = line.map(([place]) => place).sort((one, two) => one - two);
+    assert.ok(line.length > 20);
+    assert.deepEqual([line[0][1], line[line.length - 1][1]], [0, 0]);
+    assert.ok(Math.abs(places[0] + 1.5) < 0.05 && Math.abs(places[places.length - 1] - 1.5) < 0.05, `${places[0]}`);
+    assert.ok(Math.abs(Math.max(...line.map(([, value]) => value)) - 9) < 0.3);
+    assert.ok(sectionSmooth(index, values, along, { x: 0, y: 0 }, false)[0][1] > 0);
+  }
+  assert.deepEqual(sectionSmooth(index, values, true, { x: 0, y: 2 }, true), []);
 });

@@ -187,6 +187,20 @@ export function smoothLoop(loop) {
 }
 
 /**
+ * The same for a line with two ends.
+ * @param {[number, number][]} line
+ * @returns {[number, number][]}
+ */
+export function smoothLine(line) {
+  const last = line.length - 1;
+  if (last < 2 || last > 400) return line;
+  const beyond = (/** @type {[number, number]} */ end, /** @type {[number, number]} */ next) => /** @type {[number, number]} */ ([2 * end[0] - next[0], 2 * end[1] - next[1]]);
+  const all = [beyond(line[0], line[1]), ...line, beyond(line[last], line[last - 1])];
+  const inner = line.slice(0, last).flatMap((one, at) => Array.from({ length: FINER }, (_, part) => between(all[at], one, line[at + 1], all[at + 3], part / FINER)));
+  return [...inner, line[last]];
+}
+
+/**
  * @param {[number, number]} before
  * @param {[number, number]} one
  * @param {[number, number]} two

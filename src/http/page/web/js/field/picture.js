@@ -2,7 +2,8 @@
 
 import { number, tickLabel, ticks } from '../format.js';
 import { colourise, hex, mapOf } from './palette.js';
-import { rasterCells, rasterSmooth } from './raster.js';
+import { rasterCells, rasterSmooth, rasterZones } from './raster.js';
+import { smoothLine } from './cells.js';
 import { stickBorder } from './stick.js';
 
 /** @typedef {import('./cells.js').CellIndex} CellIndex */
@@ -104,7 +105,8 @@ function drawValues(pen, scene, layout, density, ink) {
     step: 1 / (layout.scale * density),
   };
   if (!frame.width || !frame.height) return;
-  const raster = smooth ? rasterSmooth(index, values, frame, quantity.vanishes) : rasterCells(index, values, frame);
+  const raster = !smooth ? rasterCells(index, values, frame)
+    : quantity.scale === 'zones' ? rasterZones(index, scene.friction, frame) : rasterSmooth(index, values, frame, quantity.vanishes);
   pen.save();
   if (smooth) {
     pen.beginPath();
@@ -129,21 +131,21 @@ function drawValues(pen, scene, layout, density, ink) {
 }
 
 /**
- * Stick and slip inside the border: the zone that is nearer. Slip is hatched too, since colour must not be the only sign.
- * @param {Float32Array} shares 0 for stick to 1 for slip, by pixels.
+ * Stick and slip inside the border. Slip is hatched too, since colour must not be the only sign.
+ * @param {Float32Array} distances From the border of the stick zone, negative where it sticks, by pixels.
  * @param {Uint32Array} pixels
  * @param {number} width
  * @param {number} density
  * @param {Ink} ink
  */
-function paintZones(shares, pixels, width, density, ink) {
+function paintZones(distances, pixels, width, density, ink) {
   const [stick, slip, hatched] = [wordOf(ink.stick, 1), wordOf(ink.slip, 1), wordOf(ink.slip, 0.6)];
   const step = Math.round(HATCH_STEP * density);
-  for (let pixel = 0; pixel < shares.length; pixel += 1) {
-    const share = shares[pixel];
-    if (share !== share) continue;
+  for (let pixel = 0; pixel < distances.length; pixel += 1) {
+    const distance = distances[pixel];
+    if (distance !== distance) continue;
     const line = ((pixel % width) + Math.floor(pixel / width)) % step < density;
-    pixels[pixel] = share < 0.5 ? stick : line ? hatched : slip;
+    pixels[pixel] = distance < 0 ? stick : line ? hatched : slip;
   }
 }
 
@@ -238,7 +240,7 @@ function drawBorders(pen, scene, layout, ink) {
   pen.stroke();
   if (!scene.border || quantity.scale === 'zones') return;
   const border = new Path2D();
-  trace(border, stickBorder(index, scene.friction), layout, false);
+  trace(border, stickBorder(index, scene.friction).map(smoothLine), layout, false);
   pen.save();
   pen.beginPath();
   trace(pen, index.border, layout);

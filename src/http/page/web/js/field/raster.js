@@ -1,5 +1,7 @@
 // Values of cells at the pixels of a picture: as they were computed, or interpolated inside the border of the patch.
 
+import { slipDistances } from './stick.js';
+
 /** @typedef {import('./cells.js').CellIndex} CellIndex */
 
 /**
@@ -46,8 +48,25 @@ export function rasterCells(index, values, frame) {
  * @returns {Float32Array} Row by row from the top; NaN outside.
  */
 export function rasterSmooth(index, values, frame, vanishes) {
+  return rasterSamples(index, samplesOf(index, values, vanishes), frame, vanishes);
+}
+
+/**
+ * How far from the border of the stick zone, as a share of the strip: negative where it sticks.
+ * @param {CellIndex} index One that is `whole`, with zones.
+ * @param {number} friction
+ * @param {Frame} frame
+ */
+export const rasterZones = (index, friction, frame) => rasterSamples(index, slipDistances(index, friction, SAMPLES), frame, false);
+
+/**
+ * @param {CellIndex} index
+ * @param {Float32Array} samples
+ * @param {Frame} frame
+ * @param {boolean} vanishes
+ */
+function rasterSamples(index, samples, frame, vanishes) {
   const raster = new Float32Array(frame.width * frame.height).fill(NaN);
-  const samples = samplesOf(index, values, vanishes);
   const { strips, border } = index;
   const last = strips.length - 1;
   for (let row = 0, upper = last; row < frame.height; row += 1) {

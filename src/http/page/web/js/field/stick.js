@@ -3,16 +3,10 @@
 /** @typedef {import('./cells.js').CellIndex} CellIndex */
 /** @typedef {[number, number][]} Line */
 
-/**
- * Lines between stick and slip.
- * @param {CellIndex} index
- * @param {number} friction Its coefficient; NaN if it is not known, then the border lies between the cells.
- * @returns {Line[]}
- */
-export function stickBorder(index, friction) {
-  const { zone } = index.cells;
-  if (!zone) return [];
-  const crossings = index.strips.map((strip) => {
+/** Where stick and slip meet in every strip. @param {CellIndex} index One with zones. @param {number} friction */
+function crossingsOf(index, friction) {
+  const { zone = [] } = index.cells;
+  return index.strips.map((strip) => {
     /** @type {number[]} */
     const places = [];
     for (let cell = strip.first + 1; cell < strip.end; cell += 1) {
@@ -21,6 +15,48 @@ export function stickBorder(index, friction) {
     }
     return places;
   });
+}
+
+/** How far from stick, in lengths of the strip, a strip counts that slips all along. Chosen by judgement: zones that end between two strips are rounded. */
+const WHOLE = 0.25;
+
+/**
+ * How far every sample of a strip is from the nearest place where stick and slip meet, as a share of the strip; positive where it slips. Between
+ * strips 0 is the border of the stick zone.
+ * @param {CellIndex} index One with zones.
+ * @param {number} friction
+ * @param {number} count Samples of a strip.
+ */
+export function slipDistances(index, friction, count) {
+  const { zone = [] } = index.cells;
+  const crossings = crossingsOf(index, friction);
+  const samples = new Float32Array(index.strips.length * count);
+  index.strips.forEach(({ first, left, right }, at) => {
+    const places = crossings[at];
+    let slips = zone[first] === 'slip';
+    let passed = 0;
+    for (let sample = 0; sample < count; sample += 1) {
+      const x = left + ((sample + 0.5) / count) * (right - left);
+      while (passed < places.length && places[passed] < x) {
+        slips = !slips;
+        passed += 1;
+      }
+      const near = places.reduce((least, place) => Math.min(least, Math.abs(place - x)), Infinity) / (right - left);
+      samples[at * count + sample] = (slips ? 1 : -1) * Math.min(WHOLE, near);
+    }
+  });
+  return samples;
+}
+
+/**
+ * Lines between stick and slip.
+ * @param {CellIndex} index
+ * @param {number} friction Its coefficient; NaN if it is not known, then the border lies between the cells.
+ * @returns {Line[]}
+ */
+export function stickBorder(index, friction) {
+  if (!index.cells.zone) return [];
+  const crossings = crossingsOf(index, friction);
   /** @type {Line[]} */
   const lines = [];
   /** @type {Line[]} */
