@@ -10,11 +10,13 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::force_control;
 use crate::contact::rolling::history;
 use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::gradients::add_gradients;
 use crate::contact::rolling::refinement::state::RefinementState;
 use crate::contact::rolling::resolution::{RelativeTo, Resolution, TARGET_LEAST};
+use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::task::RollingTask;
 use crate::contact::solution::assemble::Assembly;
 use crate::contact::solution::finish::share_seconds;
@@ -56,13 +58,18 @@ fn solve_motions(
         return Ok(assembly.finish());
     }
     for index in 0..case.problem.motions.len() {
-        let point = force_control::solve(&task, &mut state, index, watch)?;
+        let by_table = by_table(case, &task, &state, index, watch)?;
+        let point = match by_table.clone().filter(|_| !case.run.needs_cells()) {
+            Some(found) => found,
+            None => force_control::solve(&task, &mut state, index, watch)?,
+        };
         let motion = StagedMotion {
             operators,
             case,
             solved,
             index,
             watch,
+            by_table,
         };
         match case.run.relative_to {
             RelativeTo::FrictionLimit => {
@@ -73,6 +80,28 @@ fn solve_motions(
         state.trim();
     }
     Ok(assembly.finish())
+}
+
+/// The answer of the creep table to a motion, where `auto` takes its resultants: its bound meets the target. They do not depend on whether a mesh is
+/// solved for values per cell.
+fn by_table(
+    case: &CheckedCase,
+    task: &RollingTask,
+    state: &RefinementState,
+    index: usize,
+    watch: &TimeLimit,
+) -> Result<Option<MotionAnswer>, SolveError> {
+    if !case.may_take_table(index) {
+        return Ok(None);
+    }
+    let mut found = table::solve(task, state.ellipses(), &task.motions[index], watch)?;
+    found.skips.push(Skip::Mesh);
+    let limit = task.friction.limit_of_all(task.footprint);
+    let allowed = case.run.allowed_error(&found, limit);
+    let is_met = allowed
+        .zip(found.error())
+        .is_some_and(|(allowed, error)| error <= allowed);
+    Ok(is_met.then_some(found))
 }
 
 /// Solves the steps of a history.
@@ -113,6 +142,8 @@ struct StagedMotion<'a> {
     solved: &'a SolvedFootprint,
     index: usize,
     watch: &'a TimeLimit<'a>,
+    /// The answer that gives the resultants, where it is not that on the mesh.
+    by_table: Option<MotionAnswer>,
 }
 
 impl StagedMotion<'_> {
@@ -124,6 +155,9 @@ impl StagedMotion<'_> {
         state: &mut RefinementState,
         mut point: MotionAnswer,
     ) -> Result<(), SolveError> {
+        if let Some(found) = &self.by_table {
+            point.take_resultants(found);
+        }
         if self.case.run.wants(Output::Gradients) && point.gradients.is_none() {
             add_gradients(task, state, self.index, &mut point, self.watch)?;
         }

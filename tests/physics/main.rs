@@ -5,6 +5,7 @@ extern crate railhead_contact as railhead;
 #[path = "../../benches/report/allocations.rs"]
 mod allocations;
 mod answers;
+mod auto;
 mod carter;
 mod case_faults;
 mod case_mutations;

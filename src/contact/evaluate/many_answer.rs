@@ -366,6 +366,7 @@ fn numbers_of(solution: &Solution, columns: &NumberColumns) -> Option<Vec<f64>> 
     let stick: Option<f64> = points().map(|point| point.stick_area_mm2).sum();
     let error = total.error_estimate;
     let pressures = solution.patches.iter().map(|patch| patch.pressure_max_mpa);
+    let has_mesh = points().any(|point| point.solver.mesh.is_some());
     let iterations: u32 = points().map(|point| point.solver.iterations).sum();
     let numbers: RowNumbers = [
         sum(|patch| patch.normal_force_n),
@@ -379,7 +380,11 @@ fn numbers_of(solution: &Solution, columns: &NumberColumns) -> Option<Vec<f64>> 
         area,
         pressures.fold(0.0, f64::max),
         solution.patches.len() as f64,
-        f64::from(iterations),
+        if has_mesh {
+            f64::from(iterations)
+        } else {
+            f64::NAN
+        },
     ];
     let found = columns.found.iter();
     let found = found.map(|found| found.number(solution).unwrap_or(f64::NAN));

@@ -18,13 +18,9 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::methods::fastsim::{self, EllipseMesh};
 use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
 use crate::contact::rolling::methods::table::file::table;
-use crate::contact::rolling::methods::table::material::MaterialTable;
 use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
 use crate::contact::rolling::refinement::gradients::{STEP, slope};
 use crate::contact::rolling::resolution::{RelativeTo, Resolution};
-
-/// From so many rows on it is worth making the table of their material, which takes about as long as it saves here.
-const MATERIAL_ROWS: usize = 4096;
 
 /// Rows that can be evaluated.
 #[derive(Debug)]
@@ -148,12 +144,7 @@ impl Rows {
         mut note: impl FnMut([f64; 2]) -> Result<(), E>,
     ) -> Result<RowsAnswer, E> {
         let mut answer = RowsAnswer::with_capacity(self.rows, self.gradients);
-        let material = self.material_table();
-        let mut state = Shapes {
-            material: material.as_ref(),
-            hertz: None,
-            table: None,
-        };
+        let mut state = Shapes::default();
         for number in 0..self.rows {
             let mut row = self.fixed;
             for (variable, values) in &self.varied {
@@ -166,16 +157,8 @@ impl Rows {
         Ok(answer)
     }
 
-    /// The table at the rows' Poisson's ratio, if it is one and they are many.
-    fn material_table(&self) -> Option<MaterialTable> {
-        let by_table = matches!(self.method, RowMethod::Table { .. });
-        let varied = |(variable, _): &(Variable, _)| *variable == Variable::PoissonRatio;
-        let wanted = by_table && self.rows >= MATERIAL_ROWS && !self.varied.iter().any(varied);
-        wanted.then(|| table().of_material(self.material(&self.fixed)[1]))
-    }
-
     /// The answer to a row, and its normal force in N and √(ab) in mm.
-    fn answer_row(&self, row: &Row, shapes: &mut Shapes<'_>) -> (RowAnswer, [f64; 2]) {
+    fn answer_row(&self, row: &Row, shapes: &mut Shapes) -> (RowAnswer, [f64; 2]) {
         let at = |variable: Variable| row[variable as usize];
         let [modulus, poisson] = self.material(row);
         let force = at(Variable::NormalForce);
@@ -205,6 +188,7 @@ impl Rows {
             pressure_max: 1.5 * (force / a) / (PI * b),
             approach: 0.0,
             normal_force: force,
+            shape: None,
         };
         let friction = at(Variable::Friction);
         let lost = friction > 0.0 && friction < COEFFICIENT_LEAST;
@@ -219,7 +203,11 @@ impl Rows {
         let mut found = self.creep(&patch, motion, shapes);
         let of = match self.relative_to {
             RelativeTo::FrictionLimit => 1.0,
-            RelativeTo::Force => found.creep.force[0].hypot(found.creep.force[1]),
+            RelativeTo::Force if patch.limit > 0.0 => {
+                let [x, y, _] = found.creep.force;
+                (patch.limit * x).hypot(patch.limit * y) / patch.limit
+            }
+            RelativeTo::Force => 0.0,
         };
         let missed = self
             .target
@@ -248,7 +236,7 @@ impl Rows {
     }
 
     /// What the method says of a patch.
-    fn creep(&self, patch: &RowPatch, motion: [f64; 3], shapes: &mut Shapes<'_>) -> RowCreep {
+    fn creep(&self, patch: &RowPatch, motion: [f64; 3], shapes: &mut Shapes) -> RowCreep {
         if patch.limit == 0.0 {
             let still = motion == [0.0; 3];
             return RowCreep::ok(Creep {
@@ -394,15 +382,13 @@ impl RowCreep {
 }
 
 /// What neighbouring rows often share.
-#[derive(Debug)]
-struct Shapes<'a> {
-    /// The table at the Poisson's ratio of all rows.
-    material: Option<&'a MaterialTable>,
+#[derive(Debug, Default)]
+struct Shapes {
     hertz: Option<([f64; 2], HertzShape)>,
-    table: Option<([f64; 2], EllipseTable<'a>)>,
+    table: Option<([f64; 2], EllipseTable<'static>)>,
 }
 
-impl<'a> Shapes<'a> {
+impl Shapes {
     fn hertz(&mut self, radii: [f64; 2]) -> HertzShape {
         match self.hertz {
             Some((known, shape)) if known == radii => shape,
@@ -414,14 +400,11 @@ impl<'a> Shapes<'a> {
         }
     }
 
-    fn table(&mut self, ratio: f64, poisson: f64) -> EllipseTable<'a> {
+    fn table(&mut self, ratio: f64, poisson: f64) -> EllipseTable<'static> {
         match self.table {
             Some((known, ellipse)) if known == [ratio, poisson] => ellipse,
             _ => {
-                let ellipse = match self.material {
-                    Some(material) => table().ellipse_of(material, ratio),
-                    None => table().ellipse(ratio, poisson),
-                };
+                let ellipse = table().ellipse(ratio, poisson);
                 self.table = Some(([ratio, poisson], ellipse));
                 ellipse
             }

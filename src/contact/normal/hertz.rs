@@ -19,6 +19,8 @@ pub struct Ellipse {
     pub approach: f64,
     /// Normal force in N: as given where it was, so that no digit of it is lost.
     pub normal_force: f64,
+    /// The shape of the radii that it follows from, where radii were given.
+    pub shape: Option<HertzShape>,
 }
 
 /// How two bodies are pressed together.
@@ -64,7 +66,23 @@ impl Ellipse {
         } else {
             (small, large)
         };
-        Ellipse::of_semi_axes(a, b, loading, contact_modulus)
+        Ellipse {
+            shape: Some(HertzShape::of_radii(rolling, lateral)),
+            ..Ellipse::of_semi_axes(a, b, loading, contact_modulus)
+        }
+    }
+
+    /// Semi-axes in mm and their ratio a/b as rows of many contacts have them: of radii to 1e-11, by the shape. The table of creep forces takes
+    /// these, so that a case and a row have the same answer to the last bit.
+    #[must_use]
+    pub fn axes_of_rows(&self, contact_modulus: f64) -> ([f64; 2], f64) {
+        match self.shape {
+            Some(shape) => (
+                shape.semi_axes(self.normal_force, contact_modulus),
+                shape.ratio(),
+            ),
+            None => ([self.a, self.b], self.a / self.b),
+        }
     }
 
     /// The contact with semi-axes `a` along and `b` across rolling in mm, and contact modulus `E*` in MPa:
@@ -90,6 +108,7 @@ impl Ellipse {
                 NormalLoad::Force(force) => force,
                 NormalLoad::Approach(_) => PI * a * b * pressure_max * 2.0 / 3.0,
             },
+            shape: None,
         }
     }
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use crate::contact::case::words::solver::MethodName;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::problem::physics::{MotionPart, Problem};
 use crate::contact::problem::run::Run;
@@ -53,6 +54,17 @@ impl CheckedCase {
             problem,
             ..self.clone()
         }
+    }
+
+    /// May `auto` take the resultants of a motion from the creep table? Creepages and a target must be given, and the table must cover the contact.
+    #[must_use]
+    pub(crate) fn may_take_table(&self, index: usize) -> bool {
+        let CheckedCase { problem, run, .. } = self;
+        run.method_asked == MethodName::Auto
+            && run.resolution.target().is_some()
+            && problem.history.is_none()
+            && problem.forces[index] == [None; 2]
+            && problem.is_in_table()
     }
 
     /// What is asked of the tangential problem on a footprint.

@@ -146,7 +146,12 @@ impl Problem {
 
     /// Does the table of creep forces cover the patch?
     pub(crate) fn is_in_table(&self) -> bool {
-        let inside = |plain: PlainContact| outside(plain.ellipse.a / plain.ellipse.b).is_none();
+        let inside = |plain: PlainContact| {
+            let (_, ratio) = plain
+                .ellipse
+                .axes_of_rows(self.elasticity.contact_modulus());
+            outside(ratio).is_none()
+        };
         self.plain().is_some_and(inside) && unlike(&self.elasticity).is_none()
     }
 

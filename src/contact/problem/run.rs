@@ -83,6 +83,13 @@ impl Run {
         }
     }
 
+    /// Is anything asked for that follows from the cells of a mesh?
+    #[must_use]
+    pub fn needs_cells(&self) -> bool {
+        self.outputs.iter().any(|output| output.needs_fields())
+            || self.after.needs_power(&self.outputs)
+    }
+
     /// Is this output asked for?
     #[must_use]
     pub fn wants(&self, output: Output) -> bool {

@@ -35,7 +35,7 @@ pub struct MotionAnswer {
     pub remarks: Vec<Remark>,
     /// Work over all levels.
     pub work: Work,
-    /// The method that was used.
+    /// The method that gave the resultants.
     pub method: Method,
     /// Wall time in s.
     pub seconds: f64,
@@ -77,6 +77,15 @@ pub struct SolvedFields {
 }
 
 impl MotionAnswer {
+    /// Replaces the resultants, and what belongs to them, by those of another method; the values per cell stay.
+    pub(crate) fn take_resultants(&mut self, of: &MotionAnswer) {
+        self.resultants.clone_from(&of.resultants);
+        self.errors.clone_from(&of.errors);
+        self.stick.clone_from(&of.stick);
+        self.gradients.clone_from(&of.gradients);
+        self.method = of.method;
+    }
+
     /// Tangential force of all patches over their friction limit in N; 0 without friction.
     #[must_use]
     pub fn force_share(&self, limit: f64) -> f64 {

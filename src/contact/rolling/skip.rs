@@ -3,6 +3,8 @@
 /// A part of the usual work that was recognised as unnecessary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Skip {
+    /// The bound of the creep table meets the target, so that resultants need no mesh.
+    Mesh,
     /// The tractions of a motion without creepage and spin are 0.
     NoMotion,
     /// Without friction there are no tractions.
@@ -22,6 +24,7 @@ impl Skip {
     #[must_use]
     pub fn text(self) -> &'static str {
         match self {
+            Skip::Mesh => "the bound of the creep table meets the target: no mesh",
             Skip::NoMotion => "no creepage and no spin: nothing to solve",
             Skip::NoFriction => "no friction: no tractions",
             Skip::RigidSlip => {

@@ -40,7 +40,7 @@ pub struct Solver {
 #[serde(rename_all = "snake_case")]
 #[schema(as = Method)]
 pub enum MethodName {
-    /// The best method for the case (today always `boundary_element`).
+    /// Resultants by `table` where its error bound meets the target, and else by `boundary_element`, which also gives the values per cell.
     #[default]
     Auto,
     /// Semismooth Newton on the projected equations, strip-preconditioned GMRES.

@@ -212,7 +212,7 @@ pub struct PointSolution {
     /// Number of cells that slip; absent unless zones were asked for.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub slip_cells: Option<u32>,
-    /// Largest tangential traction in MPa; absent from methods that know resultants only.
+    /// Largest tangential traction in MPa; absent without a mesh.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub traction_max_mpa: Option<f64>,
@@ -382,9 +382,9 @@ pub struct GradientErrors {
 /// How a point was computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SolverReport {
-    /// The method that gave the numbers.
+    /// The method that gave the resultants. With `auto` it may be `table`; values per cell are then those of `boundary_element` on `mesh`.
     pub method: MethodName,
-    /// The finest mesh: strips of this patch, cells along x in each; absent from methods that need none.
+    /// The finest mesh: strips of this patch, cells along x in each; absent where none was needed.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub mesh: Option<MeshReport>,

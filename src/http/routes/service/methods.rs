@@ -164,8 +164,8 @@ pub(crate) async fn methods(
 fn describe_method(method: MethodName) -> MethodCapability {
     let summary = match method {
         MethodName::Auto => {
-            "The best method for the case: `boundary_element` for jobs. Rows of runs and of `/v1/evaluate` take `table` where it represents the case and \
-             the bound of its error meets `target_error`; runs solve the other rows by `boundary_element`."
+            "Resultants by `table` for elliptic contacts of like bodies with one coefficient of friction and given creepages, where the bound of its \
+             error meets `target_error`, and else by `boundary_element`. Values per cell are by `boundary_element`."
         }
         MethodName::BoundaryElement => {
             "Boundary elements with a semismooth Newton iteration: fast, for every motion and any shape of patch."

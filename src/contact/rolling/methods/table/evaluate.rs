@@ -6,7 +6,6 @@ use crate::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
 use crate::contact::rolling::methods::table::grid::{
     DIRECTIONS, POLES, RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, cell, ln_ratio_max, sigma,
 };
-use crate::contact::rolling::methods::table::material::{MaterialTable, parabola};
 use crate::contact::rolling::methods::table::near_nodes::{
     NEAR, NearNodes, SIZE_ROW, Value, ValueAndSlopes,
 };
@@ -52,8 +51,6 @@ pub struct Creep {
 #[derive(Debug, Clone, Copy)]
 pub struct EllipseTable<'a> {
     table: &'a CreepTable,
-    /// The same numbers at this Poisson's ratio, if they are at hand.
-    material: Option<&'a MaterialTable>,
     shape: Shape,
     /// C11, C22, C23, C33.
     kalker: [f64; 4],
@@ -129,41 +126,10 @@ impl CreepTable {
     #[inline(always)]
     pub fn ellipse(&self, ratio: f64, poisson_ratio: f64) -> EllipseTable<'_> {
         let ln_ratio = ratio.ln();
-        let coefficients = self.shapes.at(ln_ratio, &poisson_weights(poisson_ratio));
-        self.ellipse_with(ratio, ln_ratio, coefficients, parabola(poisson_ratio))
-    }
-
-    /// The table at one Poisson's ratio, 0 to 0.5, for [`CreepTable::ellipse_of`].
-    #[must_use]
-    pub fn of_material(&self, poisson_ratio: f64) -> MaterialTable {
-        MaterialTable::new(&self.spline, self.unit, &self.shapes, poisson_ratio)
-    }
-
-    /// As [`CreepTable::ellipse`], of a material whose table this table made.
-    #[must_use]
-    #[inline(always)]
-    pub fn ellipse_of<'a>(&'a self, material: &'a MaterialTable, ratio: f64) -> EllipseTable<'a> {
-        let ln_ratio = ratio.ln();
-        let coefficients = material.shapes.at(ln_ratio);
-        EllipseTable {
-            material: Some(material),
-            ..self.ellipse_with(ratio, ln_ratio, coefficients, material.poisson)
-        }
-    }
-
-    /// The table for an ellipse with `[C11, C22, C23, C33]` of its material and `[C11, C22]` of ν = 1/4.
-    #[inline(always)]
-    fn ellipse_with(
-        &self,
-        ratio: f64,
-        ln_ratio: f64,
-        (kalker, quarter): ([f64; 4], [f64; 2]),
-        poisson: [f64; 3],
-    ) -> EllipseTable<'_> {
+        let (kalker, quarter) = self.shapes.at(ln_ratio, &poisson_weights(poisson_ratio));
         let root = ratio.sqrt();
         EllipseTable {
             table: self,
-            material: None,
             shape: Shape::new(root, quarter),
             scale: [
                 kalker[0],
@@ -173,9 +139,20 @@ impl CreepTable {
             kalker,
             ln_ratio,
             ratio: self.ratio.at(ln_ratio),
-            poisson,
+            poisson: parabola(poisson_ratio),
         }
     }
+}
+
+/// Weights of the values at `POISSON_RATIOS` in those of a Poisson's ratio: a parabola.
+#[inline(always)]
+fn parabola(poisson_ratio: f64) -> [f64; 3] {
+    let nu = 4.0 * poisson_ratio;
+    [
+        0.5 * (1.0 - nu) * (2.0 - nu),
+        nu * (2.0 - nu),
+        0.5 * nu * (nu - 1.0),
+    ]
 }
 
 impl EllipseTable<'_> {
@@ -185,10 +162,24 @@ impl EllipseTable<'_> {
         self.kalker
     }
 
-    /// Creep forces of the dimensionless creepages `G c²/(μN) (ν_x, ν_y, c φ)` with c = √(ab).
+    /// Creep forces of the dimensionless creepages `G c²/(μN) (ν_x, ν_y, c φ)` with c = √(ab), at most μN.
     #[must_use]
     #[inline(always)]
     pub fn creep(&self, creepage: [f64; 3]) -> Creep {
+        let mut creep = self.interpolated(creepage);
+        let [x, y, _] = creep.force;
+        let square = x * x + y * y;
+        if square > 1.0 {
+            let force = square.sqrt();
+            (creep.force[0], creep.force[1]) = (x / force, y / force);
+        }
+        creep
+    }
+
+    /// The same as interpolated: F may be larger than μN by its error.
+    #[must_use]
+    #[inline(always)]
+    pub(crate) fn interpolated(&self, creepage: [f64; 3]) -> Creep {
         let Quarter { inside, signs } = Quarter::of(creepage);
         let size = self.size(inside);
         if size == 0.0 {
@@ -260,7 +251,7 @@ impl EllipseTable<'_> {
             let moved = |by: f64| {
                 let mut moved = creepage;
                 moved[j] += by;
-                self.creep(moved).force
+                self.interpolated(moved).force
             };
             let (back, ahead) = (moved(-step), moved(step));
             for k in 0..3 {
@@ -301,11 +292,6 @@ impl EllipseTable<'_> {
                 by_size: combined(&value, &size.slope),
                 by_pole: combined(&by_pole, &size.value),
                 by_direction: combined(&by_direction, &size.value),
-            }
-        } else if let Some(material) = self.material {
-            Sums {
-                value: material.value(&near, &size.value),
-                ..Sums::default()
             }
         } else {
             let value = simd::dispatch(Value(&table.spline, near));

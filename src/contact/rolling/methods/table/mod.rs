@@ -5,7 +5,6 @@ pub mod coordinates;
 pub mod evaluate;
 pub mod file;
 pub mod grid;
-pub mod material;
 pub mod near_nodes;
 pub mod shape_coefficients;
 pub mod solve;

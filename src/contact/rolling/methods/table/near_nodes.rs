@@ -27,30 +27,29 @@ pub struct NearNodes {
 }
 
 impl NearNodes {
-    /// The `N` numbers of four sizes at one a/b, pole and direction, of a spline `[a/b][pole][direction][size][number]` with `N/4`
-    /// numbers of each size.
+    /// The numbers of four sizes at one a/b, pole and direction, of a spline `[a/b][pole][direction][size][number]`.
     #[inline(always)]
-    fn row<'a, T, const N: usize>(&self, spline: &'a [T], [i, j, k]: [usize; 3]) -> &'a [T; N] {
+    fn row<'a>(&self, spline: &'a [i16], [i, j, k]: [usize; 3]) -> &'a [i16; NEAR] {
         let pole = (self.ratio.first + i) * POLE_COEFFICIENTS + self.pole.first + j;
         let place = pole * DIRECTION_COEFFICIENTS + self.direction.first + k;
-        let start = (place * SIZES.len() + self.size) * (N / 4);
-        match spline[start..start + N].try_into() {
+        let start = (place * SIZES.len() + self.size) * SIZE_ROW;
+        match spline[start..start + NEAR].try_into() {
             Ok(row) => row,
             Err(_) => unreachable!("a slice of that length"),
         }
     }
 
     #[inline(always)]
-    fn value<T: Copy + Into<f32>, const N: usize>(&self, spline: &[T]) -> [f32; N] {
-        let mut sum = [0.0_f32; N];
+    fn value(&self, spline: &[i16]) -> [f32; NEAR] {
+        let mut sum = [0.0_f32; NEAR];
         for i in 0..4 {
             for j in 0..4 {
                 let outer = self.ratio.value[i] * self.pole.value[j];
                 for k in 0..4 {
                     let weight = (outer * self.direction.value[k]) as f32;
-                    let row: &[T; N] = self.row(spline, [i, j, k]);
-                    for n in 0..N {
-                        sum[n] += weight * row[n].into();
+                    let row = self.row(spline, [i, j, k]);
+                    for n in 0..NEAR {
+                        sum[n] += weight * f32::from(row[n]);
                     }
                 }
             }
@@ -72,7 +71,7 @@ impl NearNodes {
                         (sloped * self.direction.value[k]) as f32,
                         (outer * self.direction.slope[k]) as f32,
                     ];
-                    let row: &[i16; NEAR] = self.row(spline, [i, j, k]);
+                    let row = self.row(spline, [i, j, k]);
                     for (sum, weight) in sums.iter_mut().zip(weights) {
                         for n in 0..NEAR {
                             sum[n] += weight * f32::from(row[n]);
@@ -106,17 +105,5 @@ impl WithSimd for ValueAndSlopes<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> [[f32; NEAR]; 3] {
         self.1.with_slopes(self.0)
-    }
-}
-
-/// The sums at one Poisson's ratio: the four functions at four sizes.
-pub struct ValueOfMaterial<'a>(pub &'a [f32], pub NearNodes);
-
-impl WithSimd for ValueOfMaterial<'_> {
-    type Output = [f32; 4 * OUTPUTS];
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> [f32; 4 * OUTPUTS] {
-        self.1.value(self.0)
     }
 }

@@ -72,47 +72,6 @@ impl ShapeCoefficients {
     }
 }
 
-impl ShapeCoefficients {
-    /// Those of one material, with the weights of its Poisson's ratio.
-    #[must_use]
-    pub fn of_material(&self, poisson: &[f64; 5]) -> MaterialCoefficients {
-        let of_node = |node: &[[f64; 4]; 5]| {
-            let own = |k: usize| (0..5).map(|n| poisson[n] * node[n][k]).sum();
-            let quarter = node[2];
-            [own(0), own(1), own(2), own(3), quarter[0], quarter[1]]
-        };
-        MaterialCoefficients {
-            axis: self.axis.clone(),
-            spline: self.spline.iter().map(of_node).collect(),
-        }
-    }
-}
-
-/// The same at one Poisson's ratio.
-#[derive(Debug, Clone)]
-pub struct MaterialCoefficients {
-    axis: Axis,
-    /// Logarithms of C11, C22, C23 and C33 of the material and of C11 and C22 of ν = 1/4, at each node.
-    spline: Vec<[f64; 6]>,
-}
-
-impl MaterialCoefficients {
-    /// `[C11, C22, C23, C33]` of the material, and `[C11, C22]` of ν = 1/4.
-    #[must_use]
-    #[inline(always)]
-    pub fn at(&self, ln_ratio: f64) -> ([f64; 4], [f64; 2]) {
-        let weights = self.axis.at(ln_ratio);
-        let mut sums = [0.0; 6];
-        for (weight, node) in weights.value.iter().zip(&self.spline[weights.first..]) {
-            for (sum, value) in sums.iter_mut().zip(node) {
-                *sum += weight * value;
-            }
-        }
-        let [c11, c22, c23, c33, quarter11, quarter22] = sums.map(f64::exp);
-        ([c11, c22, c23, c33], [quarter11, quarter22])
-    }
-}
-
 impl Default for ShapeCoefficients {
     fn default() -> Self {
         ShapeCoefficients::new()

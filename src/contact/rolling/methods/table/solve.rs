@@ -8,6 +8,7 @@ use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
+use crate::contact::normal::hertz::Ellipse;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::table::evaluate::Creep;
@@ -49,9 +50,13 @@ pub fn solve(
     let (mut of_all, mut limits) = (0.0, 0.0);
     let mut errors = Vec::with_capacity(patches.len() + 1);
     for (number, ellipse) in ellipses.iter().enumerate() {
-        covers(number, ellipse)?;
+        let place = match task.footprint.ellipse() {
+            Some(hertz) => TableEllipse::of_hertz(hertz, task.elasticity),
+            None => TableEllipse::of_load(ellipse),
+        };
+        covers(number, ellipse.misplaced, place.ratio)?;
         let limit = task.friction.limit(task.footprint, number);
-        let answer = on_ellipse(task.elasticity, ellipse, limit, motion);
+        let answer = on_ellipse(task, &place, limit, motion);
         let mut error = answer.error;
         if ellipse.misplaced > 0.0 {
             error += PER_MISPLACED * ellipse.misplaced + ANY_SHAPE;
@@ -64,7 +69,11 @@ pub fn solve(
         limits += limit;
         found.push(answer);
     }
-    errors.push(Some(if limits > 0.0 { of_all / limits } else { 0.0 }));
+    errors.push(match errors[..] {
+        [only] => only,
+        _ if limits > 0.0 => Some(of_all / limits),
+        _ => Some(0.0),
+    });
     Ok(MotionAnswer {
         motion: *motion,
         saturated: false,
@@ -103,8 +112,7 @@ pub fn outside(ratio: f64) -> Option<String> {
     })
 }
 
-fn covers(number: usize, ellipse: &LoadEllipse) -> Result<(), SolveError> {
-    let misplaced = ellipse.misplaced;
+fn covers(number: usize, misplaced: f64, ratio: f64) -> Result<(), SolveError> {
     let reason = if misplaced > MISPLACED_MAX {
         Some(format!(
             "{:.0} % of the load of patch {number} is elsewhere than on the best ellipse; at most {:.0} % may be, use boundary_element",
@@ -112,7 +120,7 @@ fn covers(number: usize, ellipse: &LoadEllipse) -> Result<(), SolveError> {
             100.0 * MISPLACED_MAX
         ))
     } else {
-        outside(ellipse.ratio()).map(|reason| format!("patch {number} is {reason}"))
+        outside(ratio).map(|reason| format!("patch {number} is {reason}"))
     };
     reason.map_or(Ok(()), |reason| Err(SolveError::NotCovered { reason }))
 }
@@ -141,31 +149,63 @@ pub(crate) fn forces(
     if limit <= 0.0 {
         return [0.0; 2];
     }
-    let creepage = dimensionless(shear_modulus, ellipse, limit, motion);
-    let ratio = ellipse.ratio().clamp(RATIO_MIN, RATIO_MAX);
-    let Creep { force, .. } = table().ellipse(ratio, poisson_ratio).creep(creepage);
+    let ellipse = TableEllipse::of_load(ellipse);
+    let creepage = dimensionless(shear_modulus, &ellipse, limit, motion);
+    let ratio = ellipse.ratio.clamp(RATIO_MIN, RATIO_MAX);
+    let at_ratio = table().ellipse(ratio, poisson_ratio);
+    let Creep { force, .. } = at_ratio.interpolated(creepage);
     [limit * force[0], limit * force[1]]
 }
 
+/// An ellipse as the table takes it.
+#[derive(Debug, Clone, Copy)]
+struct TableEllipse {
+    /// Its centre in mm.
+    centre: [f64; 2],
+    /// c = √(ab) in mm.
+    length: f64,
+    /// a/b.
+    ratio: f64,
+}
+
+impl TableEllipse {
+    fn of_load(ellipse: &LoadEllipse) -> TableEllipse {
+        TableEllipse {
+            centre: ellipse.centre,
+            length: ellipse.length(),
+            ratio: ellipse.ratio(),
+        }
+    }
+
+    fn of_hertz(ellipse: &Ellipse, elasticity: &Elasticity) -> TableEllipse {
+        let ([a, b], ratio) = ellipse.axes_of_rows(elasticity.contact_modulus());
+        TableEllipse {
+            centre: [0.0; 2],
+            length: (a * b).sqrt(),
+            ratio,
+        }
+    }
+}
+
 /// `[F_x/(μN), F_y/(μN), M_z/(μN√(ab))]` about the centre of an ellipse as resultants about the origin of the case.
-fn about_origin(ellipse: &LoadEllipse, limit: f64, force: [f64; 3]) -> Resultants {
+fn about_origin(ellipse: &TableEllipse, limit: f64, force: [f64; 3]) -> Resultants {
     let [x, y] = ellipse.centre;
     let [force_x, force_y] = [force[0], force[1]].map(|part| limit * part);
     Resultants {
         force_x,
         force_y,
-        moment_z: limit * ellipse.length() * force[2] + x * force_y - y * force_x,
+        moment_z: limit * ellipse.length * force[2] + x * force_y - y * force_x,
     }
 }
 
 /// Creepages about the centre of an ellipse and spin, as the table has them.
 fn dimensionless(
     shear_modulus: f64,
-    ellipse: &LoadEllipse,
+    ellipse: &TableEllipse,
     limit: f64,
     motion: &Motion,
 ) -> [f64; 3] {
-    let c = ellipse.length();
+    let c = ellipse.length;
     let [x, y] = ellipse.centre;
     let unit = shear_modulus * c * c / limit;
     let spin = motion.spin_per_mm;
@@ -186,8 +226,8 @@ struct PatchAnswer {
 
 /// Forces in N on a patch that an ellipse stands for, about the origin of the case; `limit` is μN in N.
 fn on_ellipse(
-    elasticity: &Elasticity,
-    ellipse: &LoadEllipse,
+    task: &RollingTask,
+    ellipse: &TableEllipse,
     limit: f64,
     motion: &Motion,
 ) -> PatchAnswer {
@@ -199,11 +239,12 @@ fn on_ellipse(
             gradients: PatchGradients::default(),
         };
     }
-    let c = ellipse.length();
+    let c = ellipse.length;
     let [x, y] = ellipse.centre;
-    let unit = elasticity.shear_modulus * c * c / limit;
-    let creepage = dimensionless(elasticity.shear_modulus, ellipse, limit, motion);
-    let here = table().ellipse(ellipse.ratio(), elasticity.poisson_ratio);
+    let modulus = task.interface.reduction * task.elasticity.shear_modulus;
+    let unit = modulus * c * c / limit;
+    let creepage = dimensionless(modulus, ellipse, limit, motion);
+    let here = table().ellipse(ellipse.ratio, task.elasticity.poisson_ratio);
     let (
         Creep {
             force,
@@ -212,13 +253,13 @@ fn on_ellipse(
         },
         slopes,
     ) = here.with_slopes(creepage);
-    // By ν_x, ν_y and φ about the origin; then the moment about the origin.
-    let by_origin = slopes.map(|[x_slope, y_slope, z_slope]| {
-        [x_slope, y_slope, c * z_slope - y * x_slope + x * y_slope]
-            .map(|slope| limit * unit * slope)
-    });
+    // In N and mm about the centre; then by ν_x, ν_y and φ about the origin; then the moment about the origin.
+    let arms = [1.0, 1.0, c];
+    let own =
+        [0, 1, 2].map(|k| [0, 1, 2].map(|j| slopes[k][j] * (limit * unit) * arms[k] * arms[j]));
+    let by_origin = own.map(|[by_x, by_y, by_spin]| [by_x, by_y, by_spin - y * by_x + x * by_y]);
     let [fx, fy, m] = by_origin;
-    let moment = [0, 1, 2].map(|j| c * m[j] + x * fy[j] - y * fx[j]);
+    let moment = [0, 1, 2].map(|j| m[j] + x * fy[j] - y * fx[j]);
     PatchAnswer {
         resultants: about_origin(ellipse, limit, force),
         error: bound,
