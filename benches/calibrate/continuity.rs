@@ -15,7 +15,7 @@ fn case(motion: &Value, target: f64) -> Value {
         "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
         "load": { "normal_force_n": 100_000 },
         "motion": motion,
-        "solver": { "target_error": target },
+        "solver": { "method": "boundary_element", "target_error": target },
         "outputs": ["resultants"],
     })
 }

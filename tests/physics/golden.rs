@@ -116,12 +116,13 @@ fn made() -> Vec<(&'static str, Value)> {
     let along = || json!({ "creepage_x": 0.001 });
     let all = || json!({ "creepage_x": 0.001, "creepage_y": -0.0005, "spin_per_mm": 0.0006 });
     let spin = || json!({ "creepage_x": 0.004, "spin_per_mm": 0.004 });
-    let target = |t: f64| json!({ "target_error": t });
+    let target = |t: f64| json!({ "method": "boundary_element", "target_error": t });
     let mesh = || json!({ "mesh": { "strips": 12, "cells": 16 } });
     let sweep = || json!([{ "creepage_x": 0.0005, "spin_per_mm": 0.003 }, { "creepage_x": 0.001, "spin_per_mm": 0.003 }, { "creepage_x": 0.002, "spin_per_mm": 0.003 }]);
     vec![
         ("radii, creepage", case(radii(), along(), target(0.005))),
         ("radii, all", case(radii(), all(), target(0.005))),
+        ("radii, all, auto", case(radii(), all(), json!({}))),
         ("radii, all, 0.001", case(radii(), all(), target(0.001))),
         ("radii, all, 0.0003", case(radii(), all(), target(0.0003))),
         ("radii, spin", case(radii(), spin(), target(0.002))),

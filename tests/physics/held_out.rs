@@ -48,7 +48,7 @@ impl Tally {
     }
 }
 
-fn tally(class: Class, target: f64) -> Tally {
+fn tally(method: &str, class: Class, target: f64) -> Tally {
     let truths = truth::read();
     let known = &truths[class.name()];
     let mut tally = Tally::default();
@@ -63,7 +63,7 @@ fn tally(class: Class, target: f64) -> Tally {
             truth::print(&question),
             "another population than the file's"
         );
-        question["solver"] = json!({ "target_error": target });
+        question["solver"] = json!({ "method": method, "target_error": target });
         let problem = contact::check(&question, &Limits::default()).expect("a sound case");
         let (solution, _) = contact::solve(&problem, &Unmonitored).expect("an answer");
         let marked = solution
@@ -79,8 +79,13 @@ fn tally(class: Class, target: f64) -> Tally {
 
 /// Covered in so many of a hundred, more than 2 times too small in at most `far`, and in the median at most `sharp` times the error.
 fn assert_covers(class: Class, covered: usize, far: usize, sharp: f64) {
+    assert_covers_by("boundary_element", class, covered, far, sharp);
+}
+
+/// The same of a method.
+fn assert_covers_by(method: &str, class: Class, covered: usize, far: usize, sharp: f64) {
     for target in [0.02, 0.005, 0.001] {
-        let found = tally(class, target);
+        let found = tally(method, class, target);
         let clear = found.ratios.len() >= CLEAR_MIN;
         let ratio = if clear { median(&found.ratios) } else { 1.0 };
         println!(
@@ -113,6 +118,12 @@ fn assert_covers(class: Class, covered: usize, far: usize, sharp: f64) {
 #[test]
 fn estimates_cover_the_error_of_random_ellipses() {
     assert_covers(Class::Ellipse, 95, 1, 4.2);
+}
+
+#[test]
+fn estimates_of_auto_cover_the_error_of_random_ellipses() {
+    // Those of the table are wider.
+    assert_covers_by("auto", Class::Ellipse, 95, 1, 12.0);
 }
 
 #[test]

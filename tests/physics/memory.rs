@@ -32,7 +32,7 @@ pub fn creep_map(side: u32, target: f64) -> Value {
         contact,
         100_000,
         &json!(motions),
-        &json!({ "target_error": target }),
+        &json!({ "method": "boundary_element", "target_error": target }),
     )
 }
 
@@ -114,7 +114,7 @@ fn the_cost_counts_the_operators_that_a_case_leaves_in_the_store() {
         let contact = json!({ "type": "ellipse", "a_mm": 6, "b_mm": 4 });
         resultants(contact, 80_000, motions, solver)
     };
-    let target = json!({ "target_error": 0.005 });
+    let target = json!({ "method": "boundary_element", "target_error": 0.005 });
     let mesh = json!({ "mesh": { "strips": 20, "cells": 30 } });
     let creep = json!([{ "creepage_x": 0.001 }, { "creepage_x": 0.002 }]);
     let all = json!([{ "creepage_x": 0.001, "creepage_y": 0.0005, "spin_per_mm": 0.0004 }]);

@@ -63,7 +63,7 @@ fn rows_are_answered_as_jobs_of_the_same_method_are() {
             let limit = patch.friction_limit_n.expect("a limit").max(1e-9);
             let c = (patch.area_mm2 / std::f64::consts::PI).sqrt();
             // Chords of a job's mesh are fitted to the a/b of its patch, those of rows are all of the circle.
-            let within = if method == "table" { 1e-6 } else { 2e-3 };
+            let within = if method == "table" { 0.0 } else { 2e-3 };
             let near = |found: f64, known: f64, unit: f64| (found - known).abs() <= within * unit;
             assert!(
                 near(answer.force_x_n[row], point.force_x_n, limit),
@@ -119,8 +119,7 @@ fn rows_outside_the_table_or_above_the_target_say_so_and_faults_name_row_and_col
 }
 
 #[test]
-fn many_rows_of_one_material_are_answered_as_a_few_are() {
-    // From 4096 rows on the table of their Poisson's ratio is made first; a column of that ratio leaves no such table.
+fn many_rows_are_answered_as_a_few_are() {
     let count = 4200;
     let spread = |low: f64, high: f64, step: f64| -> Vec<f64> {
         let part = |row: usize| (step * row as f64).fract();
@@ -136,8 +135,8 @@ fn many_rows_of_one_material_are_answered_as_a_few_are() {
         ("/friction/coefficient", spread(0.05, 0.5, 0.317)),
     ];
     let contact = json!({ "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 });
-    for within in [1e-6, 0.0] {
-        if within == 0.0 {
+    for varies_material in [false, true] {
+        if varies_material {
             columns.push(("/material/poisson_ratio", spread(0.0, 0.5, 0.557)));
         }
         let answer = |from: usize, to: usize| {
@@ -149,26 +148,19 @@ fn many_rows_of_one_material_are_answered_as_a_few_are() {
         };
         let whole = answer(0, count);
         let halves = [answer(0, count / 2), answer(count / 2, count)];
-        let (mut worst, mut equal) = (0.0_f64, 0);
         for row in 0..count {
             let half = &halves[row / (count / 2)];
             let at = row % (count / 2);
-            let limit = columns[0].1[row] * columns[4].1[row];
-            let off = [
-                (whole.force_x_n[row] - half.force_x_n[at]) / limit,
-                (whole.force_y_n[row] - half.force_y_n[at]) / limit,
-                whole.stick_share[row] - half.stick_share[at],
-            ];
-            worst = off.iter().fold(worst, |worst, off| worst.max(off.abs()));
-            equal += usize::from(off == [0.0; 3]);
-            assert_eq!(whole.error_estimate[row], half.error_estimate[at], "{row}");
+            let of = |answer: &RowsAnswer, row: usize| {
+                [
+                    answer.force_x_n[row],
+                    answer.force_y_n[row],
+                    answer.stick_share[row],
+                    answer.error_estimate[row],
+                ]
+            };
+            assert_eq!(of(&whole, row), of(half, at), "{row}");
             assert_eq!(whole.status[row], half.status[at], "{row}");
         }
-        assert!(worst <= within, "{worst}");
-        assert_eq!(
-            equal == count,
-            within == 0.0,
-            "{equal} of {count} are equal"
-        );
     }
 }

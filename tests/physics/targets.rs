@@ -17,7 +17,7 @@ struct Outcome {
 fn outcome(case: &ReferenceCase, target: f64) -> Outcome {
     let ellipse = case.ellipse();
     let mut question = ellipse.case(1, 1);
-    question["solver"] = json!({ "target_error": target });
+    question["solver"] = json!({ "method": "boundary_element", "target_error": target });
     question["outputs"] = json!(["resultants"]);
     let (solution, _) = solve(&question);
     let point = &solution.patches[0].points[0];
@@ -94,7 +94,7 @@ fn a_target_out_of_reach_is_said_and_not_hidden() {
         .find(|c| c.id.contains("ab5"))
         .expect("a slender patch with spin");
     let mut question = case.ellipse().case(1, 1);
-    question["solver"] = json!({ "target_error": 1e-4 });
+    question["solver"] = json!({ "method": "boundary_element", "target_error": 1e-4 });
     let (solution, _) = solve(&question);
     assert_eq!(solution.patches[0].points[0].target_met, Some(false));
     assert!(
@@ -113,7 +113,7 @@ fn a_looser_target_costs_fewer_cells() {
     let case = &cases("hertz_longspin")[0];
     let cells = |target: f64| {
         let mut question = case.ellipse().case(1, 1);
-        question["solver"] = json!({ "target_error": target });
+        question["solver"] = json!({ "method": "boundary_element", "target_error": target });
         let mesh = solve(&question).0.patches[0].points[0]
             .solver
             .mesh
@@ -138,7 +138,7 @@ fn a_pole_on_the_edge_of_two_strips_counts() {
             "contact": { "type": "ellipse", "a_mm": ratio * 0.0654, "b_mm": 0.0654 },
             "load": { "normal_force_n": 633_000.0 },
             "motion": { "spin_per_mm": 5.7386 },
-            "solver": { "target_error": target },
+            "solver": { "method": "boundary_element", "target_error": target },
             "outputs": ["resultants"],
         }));
         let point = &solution.patches[0].points[0];
@@ -163,7 +163,7 @@ fn tractions_add_up_to_the_resultants_where_nothing_tells_the_error() {
         "friction": { "coefficient": 0.3 },
         "material": { "shear_modulus_mpa": 82000.0, "poisson_ratio": 0.5 },
         "motion": { "creepage_x": 0.0, "creepage_y": 0.0, "spin_per_mm": -8.778406145583708e-4 },
-        "solver": { "target_error": 0.01 },
+        "solver": { "method": "boundary_element", "target_error": 0.01 },
         "outputs": ["resultants", "tractions"],
     });
     let (solution, fields) = solve(&case);

@@ -53,7 +53,7 @@ fn case(solver: &Value, motion: &Value) -> CheckedCase {
 /// and areas.
 fn with_equations(precision_target: f64, work: impl Fn(&SlipEquations, [&[f64]; 2])) {
     let checked = case(
-        &json!({ "target_error": precision_target }),
+        &json!({ "method": "boundary_element", "target_error": precision_target }),
         &json!({ "creepage_x": 0.001 }),
     );
     let footprint = normal_stage::solve(&checked, &Unmonitored)
@@ -193,12 +193,12 @@ fn a_small_solve_allocates_a_bounded_number_of_times() {
     // What the process makes once is made by another thread, whose allocations are not counted.
     std::thread::scope(|scope| {
         scope
-            .spawn(|| count(&json!({ "target_error": 0.02 })))
+            .spawn(|| count(&json!({ "method": "boundary_element", "target_error": 0.02 })))
             .join()
     })
     .expect("an answer");
     let on_mesh = count(&json!({ "mesh": { "strips": 8, "cells": 8 } }));
-    let to_target = count(&json!({ "target_error": 0.005 }));
+    let to_target = count(&json!({ "method": "boundary_element", "target_error": 0.005 }));
     println!("{on_mesh} allocations on a mesh of the client, {to_target} to the target");
     // Most are made with meshes, operators and factors, each once.
     assert!(on_mesh < 500, "{on_mesh} allocations on one mesh");
@@ -213,7 +213,10 @@ fn a_small_solve_takes_some_hundred_allocations() {
         json!({ "creepage_x": 0.001, "creepage_y": 0.0005 }),
         json!({ "creepage_x": 0.0005, "creepage_y": 0.0005, "spin_per_mm": 0.0004 }),
     ] {
-        let checked = case(&json!({ "target_error": 0.02 }), &motion);
+        let checked = case(
+            &json!({ "method": "boundary_element", "target_error": 0.02 }),
+            &motion,
+        );
         let again = || solve_with(&store, &checked, &Unmonitored).expect("an answer");
         let first = again();
         let count = during(again);
