@@ -74,7 +74,7 @@ fn references() -> Vec<(String, Value)> {
         .flat_map(|class| reference::cases(class))
         .map(|case| {
             let mut question = case.ellipse().case(1, 1);
-            question["solver"] = json!({ "target_error": 0.005 });
+            question["solver"] = json!({ "method": "boundary_element", "target_error": 0.005 });
             (format!("reference {}", case.id), question)
         });
     let gaps = GapReference::profiles()
@@ -97,7 +97,9 @@ fn by_chance() -> Vec<(String, Value)> {
         .flat_map(|(class, count)| (0..count).map(move |number| (class, number)))
         .map(|(class, number)| {
             let name = format!("{} {number}", class.name());
-            (name, population::case(class, number))
+            let mut case = population::case(class, number);
+            case["solver"] = json!({ "method": "boundary_element" });
+            (name, case)
         })
         .collect()
 }
@@ -137,7 +139,7 @@ fn sweeps() -> Vec<(String, Value)> {
         ];
         for (name, sweep) in sweeps {
             let mut case = ellipse.case(1, 1);
-            case["solver"] = json!({ "target_error": 0.005 });
+            case["solver"] = json!({ "method": "boundary_element", "target_error": 0.005 });
             case["motion"] = json!({ "sweep": sweep });
             cases.push((format!("sweep {name} {shape}"), case));
         }
@@ -158,7 +160,11 @@ fn methods() -> Vec<(String, Value)> {
             json!({ "method": "fastsim", "traction_bound": "parabolic" }),
         ),
         ("mesh", json!({ "mesh": { "strips": 12, "cells": 16 } })),
-        ("finer", json!({ "target_error": 0.001 })),
+        (
+            "finer",
+            json!({ "method": "boundary_element", "target_error": 0.001 }),
+        ),
+        ("auto", json!({})),
     ];
     let random = &mut Random(17);
     let mut cases = Vec::new();
@@ -206,7 +212,7 @@ fn variants() -> Vec<(String, Value)> {
     let mut ellipse = Ellipse::steel(1.5, 0.28)
         .normalised(0.8, -0.4, 1.2)
         .case(1, 1);
-    ellipse["solver"] = json!({ "target_error": 0.005 });
+    ellipse["solver"] = json!({ "method": "boundary_element", "target_error": 0.005 });
     let radii = json!({ "type": "radii", "rolling_mm": 460, "lateral_mm": 300 });
     let steel = json!({ "shear_modulus_mpa": 82_000, "poisson_ratio": 0.28 });
     let soft = json!({ "young_modulus_mpa": 150_000, "poisson_ratio": 0.31 });
