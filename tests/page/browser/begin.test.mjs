@@ -122,3 +122,17 @@ test('a wheelset of own files is drawn by its left wheel, and its files stay', (
   await page.locator('svg[aria-label^="Wheel on rail"] .wheel').waitFor();
   assert.equal((await json(page)).contact.wheel.text, file('worn-wheel.whl'));
 }));
+
+test('a rail whose points jump says so while typing, and is solved all the same on request', () => onPage('', async (page) => {
+  await ready(page);
+  await dropFiles(page, 'main', { 'rail.txt': file('jumping-points.txt'), 'wheel.txt': file('flange-at-0.txt') });
+  await titled(page, 'wheel on rail');
+  await page.getByLabel('Shift to the left').fill('-1');
+  await page.locator('.preview .fault').waitFor();
+  assert.match(await page.locator('.preview .fault').innerText(), /^Solving it fails: .*rail/);
+  await page.getByRole('button', { name: 'Solve it all the same' }).click();
+  assert.equal((await json(page)).contact.accept_rough_profiles, true);
+  await page.locator('.preview .fault').waitFor({ state: 'detached' });
+  await page.getByLabel('solve although the profiles are rough').uncheck();
+  assert.equal((await json(page)).contact.accept_rough_profiles, undefined);
+}));

@@ -7,7 +7,7 @@ import { at, numberAt, placeInText } from './document.js';
 import { drawEllipse } from './drawing/patch.js';
 import { drawGapCurve, drawGrid } from './drawing/gaps.js';
 import { drawGap, drawProfiles, drawSection } from './drawing/profiles.js';
-import { editText, isUntouched, openExample, queue, solve, solveLive } from './editing.js';
+import { change, editText, isUntouched, openExample, queue, solve, solveLive } from './editing.js';
 import { offered, rangeOf } from './field/quantities.js';
 import { fieldId } from './field.js';
 import { caseForm } from './form.js';
@@ -43,7 +43,7 @@ export function compose(app) {
             </div></header>
           <div class="figure">${state.document ? drawing(state, state.document) : nothing}</div>
           <div class="verdict" role="status">${verdict(app, state)}</div>
-          ${previewOf(state)}
+          ${previewOf(app, state)}
         </section>
         ${codePanel(app, state)}
       </div>
@@ -143,9 +143,12 @@ function excerpt({ document, files }, { pointer, detail }) {
     <ol start=${from + 1}>${lines.slice(from, number + AROUND).map((line, place) => html`<li class=${from + place === number - 1 ? 'at-fault' : ''}><code>${line || ' '}</code></li>`)}</ol></figure>`;
 }
 
-/** The result while typing: the numbers of the wheel, and the field of the patch that carries most. @param {Compose} state */
-function previewOf({ preview, document, understood }) {
-  if (preview?.failure) return html`<section class="preview" aria-label="Result while typing"><p class="fault">Solving it fails: ${preview.failure}</p></section>`;
+/** The result while typing: the numbers of the wheel, and the field of the patch that carries most. @param {App} app @param {Compose} state */
+function previewOf(app, { preview, document, checked, understood }) {
+  // With faults the result is that of another case.
+  if (!checked) return nothing;
+  if (preview?.failure) return html`<section class="preview" aria-label="Result while typing"><p class="fault">Solving it fails: ${preview.failure}</p>
+    ${preview.failure.includes('accept_rough_profiles') ? html`<button class="small" @click=${() => change(app, '/contact/accept_rough_profiles', true)}>Solve it all the same</button>` : nothing}</section>`;
   if (!preview?.result) return nothing;
   const { result, patch, point, field } = preview;
   const { patches } = result;

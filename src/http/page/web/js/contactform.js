@@ -113,7 +113,9 @@ function sectionZones(app) {
   const there = BODIES.filter((body) => document && isObject(at(document, `/contact/${body}`)) && !lacksSection(document, body));
   return html`<div class="pair">${sectionZone(app, 'rail')}${sectionZone(app, 'wheel')}</div>
     ${there.length === 2 ? html`<button class="link" @click=${() => exchange(app)}>Exchange rail and wheel</button>` : nothing}
-    ${there.map((body) => readingFields(app, body))}`;
+    ${there.map((body) => readingFields(app, body))}
+    ${at(document ?? undefined, '/contact/accept_rough_profiles') === true ? html`<div class="checks"><label><input type="checkbox" checked
+      @change=${() => change(app, '/contact/accept_rough_profiles', undefined)}> solve although the profiles are rough</label></div>` : nothing}`;
 }
 
 const UNITS = /** @type {const} */ ([[undefined, 'as in the file, else mm'], ['mm', 'mm'], ['cm', 'cm'], ['m', 'm'], ['inch', 'inch']]);

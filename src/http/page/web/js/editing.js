@@ -18,6 +18,7 @@ const BODIES = /** @type {const} */ (['rail', 'wheel']);
 const KEPT = 'railhead.case';
 const PAUSE_MS = 120;
 const WAIT_S = 10;
+const TYPED_WAIT_S = 5;
 /** The example that a new tab begins with: a new wheel on a new rail, rolling freely. */
 const FIRST = 'wheel-rail';
 /** Estimated seconds up to which a case is solved while it is written; the first one may take longer, since nobody waits for the next. */
@@ -207,7 +208,7 @@ function wanted(app) {
  */
 async function solveTyped(app, digest) {
   const { document } = app.store.get().compose;
-  const job = await submit(JSON.stringify({ ...withoutExtras(document ?? {}), ...TYPED }), { wait: first ? WAIT_S : 2 });
+  const job = await submit(JSON.stringify({ ...withoutExtras(document ?? {}), ...TYPED }), { wait: first ? WAIT_S : TYPED_WAIT_S });
   first = false;
   /** @type {import('./state.js').Preview} */
   let answer = { digest, result: null, failure: job.state === 'failed' ? (job.error?.detail ?? 'The case cannot be solved.') : '', patch: 0, point: 0, field: null };
