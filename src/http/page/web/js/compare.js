@@ -209,7 +209,7 @@ export function onSameRail(one, two) {
  * @param {((place: { x: number, y: number }) => { x: number, y: number }) | null} move From places of the first to those of the second; null for the same.
  * @returns {Quantity} One that is shown on the first field.
  */
-export function differenceOf(one, two, quantity, move) {
+function differenceOf(one, two, quantity, move) {
   const values = valuesOf(quantity, one.cells) ?? [];
   const others = valuesOf(quantity, two.cells) ?? [];
   const index = indexOf(two);

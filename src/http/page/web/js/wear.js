@@ -38,7 +38,7 @@ function nearestOn(line, [y, z]) {
 }
 
 /** A line with one point for about every length. @param {readonly Place[]} line @param {number} step In mm. */
-export function resampled(line, step) {
+function resampled(line, step) {
   /** @type {Place[]} */
   const points = [line[0]];
   for (let at = 1; at < line.length; at += 1) {
