@@ -166,8 +166,12 @@ export const runRow = (id, row) => json(`/v1/runs/${id}/rows/${row}`);
 /** @param {'jobs' | 'batches'} kind @param {string} id */
 export const cancel = (kind, id) => request(`/v1/${kind}/${id}/cancel`, { method: 'POST' });
 
-/** @param {'jobs' | 'batches'} kind @param {string} id */
-export const remove = (kind, id) => request(`/v1/${kind}/${id}`, { method: 'DELETE', keepalive: true });
+/**
+ * @param {'jobs' | 'batches'} kind
+ * @param {string} id
+ * @param {boolean} [keepalive] The request goes on when the page is left; a browser allows few of them at once.
+ */
+export const remove = (kind, id, keepalive = false) => request(`/v1/${kind}/${id}`, { method: 'DELETE', keepalive });
 
 /**
  * Saves what a path answers as a file.

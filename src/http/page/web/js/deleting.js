@@ -6,6 +6,10 @@ import { Refused, remove } from './api.js';
 /** @typedef {'jobs' | 'batches'} Kind */
 
 const UNDO_MS = 6000;
+/** Requests under way. */
+const AT_ONCE = 4;
+/** Requests that outlive the page: Chromium allows 20. */
+const KEPT_ALIVE_MAX = 16;
 
 /** @type {{ kind: Kind, ids: readonly string[], timer: number } | null} */
 let pending = null;
@@ -38,19 +42,28 @@ export function removeLater(app, kind, ids, what) {
   app.redraw();
 }
 
-/** Removes what waits to be removed. @param {App} [app] */
+/** Removes what waits to be removed, a few at a time. @param {App} app */
 function flush(app) {
   if (!pending) return;
   const { kind, ids, timer } = pending;
   clearTimeout(timer);
   pending = null;
-  for (const id of ids) {
-    remove(kind, id).catch((error) => {
-      if (error instanceof Refused && error.status === 404) return;
-      gone.delete(id);
-      app?.refused(error);
-    });
-  }
+  const waiting = [...ids];
+  const next = async () => {
+    for (let id = waiting.shift(); id !== undefined; id = waiting.shift()) {
+      try {
+        await remove(kind, id);
+      } catch (error) {
+        if (error instanceof Refused && error.status === 404) continue;
+        gone.delete(id);
+        app.refused(error);
+      }
+    }
+  };
+  for (let lane = 0; lane < AT_ONCE; lane += 1) next();
 }
 
-addEventListener('pagehide', () => flush());
+// Nothing more can be undone when the page is left.
+addEventListener('pagehide', () => {
+  for (const id of pending?.ids.slice(0, KEPT_ALIVE_MAX) ?? []) remove(pending?.kind ?? 'jobs', id, true).catch(() => {});
+});
