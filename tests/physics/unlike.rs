@@ -323,7 +323,7 @@ fn motions_of_bodies_that_hardly_differ_are_those_of_like_bodies() {
     let motions = json!([reference.one(), spin]);
     let limit = reference.friction * reference.normal_force_n;
     let forces = |reference: &Reference| {
-        let (solution, _) = solve(&reference.case(motions.clone()));
+        let (solution, _) = solve_on_meshes(&reference.case(motions.clone()));
         let points = &solution.patches[0].points;
         [0, 1].map(|k| [points[k].force_x_n, points[k].force_y_n])
     };
