@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::contact::case::limits::Limits;
 use crate::contact::case::words::contact::{
-    Contact, CrossSection, FormatName, Load, SideName, Smoothing,
+    Contact, CrossSection, FormatName, Load, SideName, Smoothing, SurfaceName,
 };
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::{Elastic, Material};
@@ -292,6 +292,8 @@ impl Contact {
             yaw_rad: 0.0,
             roll_rad: 0.0,
             accept_rough_profiles: false,
+            reference_surface: SurfaceName::Plane,
+            influence: None,
         }
     }
 }

@@ -59,6 +59,7 @@ pub mod time_limit;
 pub mod unlike_bodies;
 pub(crate) mod unlike_motions;
 pub(crate) mod wheel_balance;
+pub(crate) mod wheel_on_curve;
 pub mod wheel_on_rail;
 pub mod wheelset;
 

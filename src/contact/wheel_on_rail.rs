@@ -14,7 +14,9 @@ use crate::contact::monitor::Monitor;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::wheel_height::search::HeightStart;
-use crate::contact::normal::wheel_height::task::{Accuracy, NormalPass, WheelLoad, WheelTask};
+use crate::contact::normal::wheel_height::task::{
+    Accuracy, NormalPass, ReferenceSurface, WheelLoad, WheelTask,
+};
 use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
@@ -31,6 +33,7 @@ use crate::contact::time_limit::TimeLimit;
 use crate::contact::unlike_bodies::{KeptLoad, UnlikeGap};
 use crate::contact::unlike_motions;
 use crate::contact::wheel_balance::{BALANCE, BalanceExit, ROUNDS_MAX, next_share, tolerance};
+use crate::contact::wheel_on_curve;
 
 /// Least fraction of the vertical part of its normal forces that a wheel carries; on a steep flange friction may take away all of it. Chosen by
 /// judgement; how much it matters was not measured.
@@ -60,6 +63,16 @@ pub(crate) fn solve(
     judge: &mut dyn Judge,
     monitor: &dyn Monitor,
 ) -> Result<SolvedWheel, SolveError> {
+    if let ReferenceSurface::Curve(influence) = contact.surface {
+        let before = &mut |wheel: &WheelContact| judge.before(wheel);
+        let found = wheel_on_curve::solve(operators, case, contact, influence, before, monitor);
+        let (wheel, solution, fields) = found?;
+        return Ok(SolvedWheel {
+            wheel,
+            solution,
+            fields,
+        });
+    }
     let search = contact
         .search()
         .map_err(|reason| SolveError::NormalProblem { reason })?;

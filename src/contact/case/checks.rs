@@ -6,7 +6,7 @@ use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
-use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::contact::{Contact, Load, SurfaceName};
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
@@ -85,6 +85,7 @@ impl CheckedParts {
         let motions = given.motion.map(|motion| motions::expand(motion, limits));
         let motions = motions.and_then(|motions| collect_fault(motions, &mut faults));
         let region = task.as_ref().map(|(task, _)| task);
+        faults.extend(curve_faults(&given, elasticity, motions.as_ref()));
         let force = normal_force(region, given.load);
         faults.extend(motion_faults(&given, motions.as_ref(), force, limits));
         if let Some(history) = motions.as_ref().and_then(|all| all.history.as_ref()) {
@@ -134,6 +135,50 @@ impl CheckedParts {
         };
         (parts, faults)
     }
+}
+
+/// Faults of what does not go with a contact on the curve of the rail.
+fn curve_faults(
+    given: &PartialCase,
+    elasticity: Option<Elasticity>,
+    motions: Option<&ExpandedMotions>,
+) -> Vec<Fault> {
+    let Some(Contact::Profiles {
+        reference_surface: SurfaceName::Curve,
+        ..
+    }) = given.contact
+    else {
+        return Vec::new();
+    };
+    let mut faults = Vec::new();
+    let mut fault = |pointer: &str, what: &str| {
+        let detail = format!(
+            "{what} with contact.reference_surface \"curve\"; give reference_surface \"plane\" for it"
+        );
+        faults.push(Fault::new(pointer, detail));
+    };
+    if elasticity.is_some_and(|pair| pair.difference != 0.0) {
+        fault("/material", "bodies that differ are not solved");
+    }
+    if motions.is_some_and(|motions| motions.history.is_some()) {
+        fault("/motion/history", "a history is not solved");
+    } else if motions.is_some_and(|motions| motions.motions.len() > 1) {
+        fault("/motion", "only one motion is solved in a case");
+    }
+    let method = given.solver.map(|solver| solver.method);
+    if !matches!(
+        method,
+        None | Some(MethodName::Auto | MethodName::BoundaryElement)
+    ) {
+        fault("/solver/method", "only boundary_element is solved");
+    }
+    let planar = [Output::Subsurface, Output::Damage, Output::Gradients];
+    for (k, output) in given.outputs.iter().enumerate() {
+        if planar.contains(output) {
+            fault(&format!("/outputs/{k}"), "this output is not computed");
+        }
+    }
+    faults
 }
 
 /// Faults of a history beside what it has to go with.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::contact::case::flange_back;
 use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::words::contact::{
-    Contact, CrossSection, FormatName, Load, Smoothing, SmoothingWord,
+    Contact, CrossSection, FormatName, InfluenceName, Load, Smoothing, SmoothingWord, SurfaceName,
 };
 use crate::contact::case::words::motion::{Motions, Wheelset};
 use crate::contact::error::Fault;
@@ -17,8 +17,11 @@ use crate::contact::geometry::orientation::{FormatSenses, Senses, StatedSenses};
 use crate::contact::geometry::profile::{Body, Profile, Reading};
 use crate::contact::geometry::wheel_rail::{NotPlaced, Placement, RailPlace, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
+use crate::contact::half_space::bent_surface::Influence;
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
+use crate::contact::normal::wheel_height::task::{
+    ProfileTrust, ReferenceSurface, WheelLoad, WheelTask,
+};
 use crate::contact::normal::wheel_height::wheelset_task::WheelsetMove;
 use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::RemarkEntry;
@@ -55,6 +58,7 @@ pub(crate) fn task(
         loading,
         contact_modulus,
         trust: trust(contact),
+        surface: surface(contact),
     };
     Ok(Some((NormalTask::Wheel(Arc::new(contact)), remarks)))
 }
@@ -168,6 +172,8 @@ fn wheel_rail(
         yaw_rad,
         roll_rad,
         accept_rough_profiles,
+        reference_surface: _,
+        influence: _,
     } = contact
     else {
         return Err(vec![fault(
@@ -291,6 +297,21 @@ fn trust(contact: &Contact) -> ProfileTrust {
     ProfileTrust {
         auto: [auto(rail), auto(wheel)],
         accept_rough: *accept_rough_profiles,
+    }
+}
+
+/// The surface on which the contact is solved.
+fn surface(contact: &Contact) -> ReferenceSurface {
+    match contact {
+        Contact::Profiles {
+            reference_surface: SurfaceName::Curve,
+            influence,
+            ..
+        } => ReferenceSurface::Curve(match influence.unwrap_or_default() {
+            InfluenceName::AngleCorrected => Influence::AngleCorrected,
+            InfluenceName::HalfSpace => Influence::HalfSpace,
+        }),
+        _ => ReferenceSurface::Planes,
     }
 }
 

@@ -15,7 +15,9 @@ use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel_height::task::{ProfileTrust, WheelLoad, WheelTask};
+use crate::contact::normal::wheel_height::task::{
+    ProfileTrust, ReferenceSurface, WheelLoad, WheelTask,
+};
 use crate::contact::normal::wheel_height::wheelset_task::{
     KinematicsTask, WheelsetMove, WheelsetTask,
 };
@@ -78,6 +80,7 @@ pub(crate) fn task(
             loading: WheelLoad::Vertical(share * force),
             contact_modulus,
             trust: trust(contact, sections[k].map(|(_, section)| section)),
+            surface: ReferenceSurface::Planes,
         })
     };
     let (Some(left), Some(right_side)) = (side(0, left), side(1, 1.0 - left)) else {

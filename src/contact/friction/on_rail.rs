@@ -20,6 +20,34 @@ pub(crate) fn in_frame(
     if let Some(law) = friction.along() {
         return FrictionLaw::Along(law.about(frame.origin[0]));
     }
+    // Where the rail turns away from the plane nothing touches.
+    across_rail(friction, geometry, extents, |y| {
+        geometry.rail_over(frame, y).ok()
+    })
+}
+
+/// Friction in the axes of the surface of a rail whose patches have these extents `[x_min, x_max, s_min, s_max]` in mm along its cross-section: a
+/// coefficient by the y of the rail's profile, or by the inclination of its surface, becomes one by the arc length from an origin. `rail` gives
+/// the parameter of the rail's curve by the arc length.
+pub(crate) fn on_curve(
+    friction: &FrictionLaw,
+    geometry: &WheelRail,
+    extents: impl Iterator<Item = [f64; 4]>,
+    origin: f64,
+    rail: impl Fn(f64) -> f64,
+) -> FrictionLaw {
+    let extents =
+        extents.map(|[x_min, x_max, low, high]| [x_min, x_max, low - origin, high - origin]);
+    across_rail(friction, geometry, extents, |y| Some(rail(origin + y)))
+}
+
+/// Friction across patches whose places y lie over parameters of the rail's curve.
+fn across_rail(
+    friction: &FrictionLaw,
+    geometry: &WheelRail,
+    extents: impl Iterator<Item = [f64; 4]>,
+    rail: impl Fn(f64) -> Option<f64>,
+) -> FrictionLaw {
     let Some(law) = friction.across() else {
         return friction.clone();
     };
@@ -28,8 +56,7 @@ pub(crate) fn in_frame(
     let step = (high - low) / (SAMPLES - 1) as f64;
     let found = (0..SAMPLES).filter_map(|k| {
         let y = low + k as f64 * step;
-        // Where the rail turns away from the plane nothing touches.
-        let rail = geometry.rail_over(frame, y).ok()?;
+        let rail = rail(y)?;
         let at = match law.place {
             AcrossPlace::Y => geometry.on_rail(rail)[0],
             AcrossPlace::Angle => {

@@ -19,6 +19,7 @@ pub mod plane_curve;
 pub mod profile;
 pub mod profile_quality;
 pub mod rail_in_frame;
+pub mod reference_curve;
 pub mod rigid_touch;
 pub mod surface_exit;
 pub mod wheel_in_frame;

@@ -1,5 +1,6 @@
 //! The elastic half-space: surface displacements caused by pressures and tractions.
 
+pub mod bent_surface;
 pub mod elasticity;
 pub mod grid_coefficients;
 pub mod grid_operator;

@@ -1,12 +1,14 @@
 //! The solved normal problem of one frame: its patches and their pressures.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::load_across::LoadAcross;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
+use crate::contact::normal::surface_slip::SurfaceSlip;
 use crate::contact::once::Once;
 
 /// The patches of one frame with their pressures; never empty. It answers where the patches are, how long their chords are,
@@ -16,6 +18,7 @@ pub struct Footprint {
     shape: FootprintShape,
     patches: Vec<Patch>,
     uncertainty: Option<NormalUncertainty>,
+    slip: Option<Arc<SurfaceSlip>>,
     loads: Once<Vec<LoadAcross>>,
 }
 
@@ -70,6 +73,7 @@ impl Footprint {
             patches: vec![ellipse.patch()],
             shape: FootprintShape::Hertz(ellipse),
             uncertainty: None,
+            slip: None,
             loads: Once::default(),
         }
     }
@@ -81,6 +85,7 @@ impl Footprint {
             patches: field.patches(),
             shape: FootprintShape::Sampled(field),
             uncertainty: None,
+            slip: None,
             loads: Once::default(),
         }
     }
@@ -96,6 +101,21 @@ impl Footprint {
             uncertainty: Some(uncertainty),
             ..Footprint::given(field)
         }
+    }
+
+    /// The same on a surface that slips beyond the motion of a plane.
+    #[must_use]
+    pub(crate) fn with_slip(self, slip: SurfaceSlip) -> Footprint {
+        Footprint {
+            slip: Some(Arc::new(slip)),
+            ..self
+        }
+    }
+
+    /// The slip of the surface beyond the motion of a plane, where it has one.
+    #[must_use]
+    pub fn slip(&self) -> Option<&SurfaceSlip> {
+        self.slip.as_deref()
     }
 
     /// The patches, in order of their smallest y.

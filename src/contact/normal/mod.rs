@@ -7,6 +7,8 @@ pub mod hertz;
 pub mod load_across;
 pub mod neighbours;
 pub mod normal_task;
+pub(crate) mod on_curve;
 pub mod patch;
 pub mod pressure_field;
+pub mod surface_slip;
 pub mod wheel_height;

@@ -123,7 +123,7 @@ fn cell_mean_powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>,
     let (level, traction) = (task.level, &task.answer.traction);
     let (mesh, nu) = (&level.normalised, level.poisson_ratio());
     let mut power = rigid_powers(mesh, &level.scale.motion(task.motion), traction);
-    if let Some([x, y]) = &level.pressure_slip {
+    if let Some([x, y]) = &level.surface_slip {
         let areas = mesh.areas();
         for (i, power) in power.iter_mut().enumerate() {
             *power += areas[i] * (traction[0][i] * x[i] + traction[1][i] * y[i]);

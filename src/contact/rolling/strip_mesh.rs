@@ -13,6 +13,7 @@ use crate::contact::mesh::strips::{Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::hertz::Ellipse;
+use crate::contact::normal::surface_slip::SurfaceSlip;
 use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::{
@@ -114,8 +115,9 @@ pub struct StripMesh {
     pub bound: Vec<f64>,
     /// Flexibility of an elastic layer between the bodies, dimensionless.
     pub layer: f64,
-    /// Mean slip of every cell from the pressure of unlike bodies, dimensionless, along x and across; none for like bodies.
-    pub pressure_slip: Option<[Vec<f64>; 2]>,
+    /// Mean slip of every cell beyond that of the motion, dimensionless, along x and across: from the pressure of unlike bodies, or on a
+    /// surface that bends.
+    pub surface_slip: Option<[Vec<f64>; 2]>,
     poisson_ratio: f64,
     precision: Precision,
     mirrored: bool,
@@ -177,7 +179,9 @@ impl StripMesh {
         let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
         let bound = bounds(task, fitted, &mesh, &pressure, largest);
         // Pressures enter the equations through their bounds only, so that bounds decide the symmetry.
-        let mirror = mesh.mirror_line().filter(|_| bounds_mirror(&mesh, &bound));
+        let mirror = mesh
+            .mirror_line()
+            .filter(|_| footprint.slip().is_none() && bounds_mirror(&mesh, &bound));
         let [x, y] = middle(&patches.iter().map(|p| p.extent).collect::<Vec<_>>());
         let scale = Scale {
             length: (patches.iter().map(|p| p.area).sum::<f64>() / PI).sqrt(),
@@ -190,7 +194,11 @@ impl StripMesh {
         if precision == Precision::Single {
             normalised.round(COORDINATE_STEP);
         }
-        let pressure_slip = (task.is_coupled() && scale.traction > 0.0).then(|| {
+        let of_surface = footprint
+            .slip()
+            .filter(|_| scale.traction > 0.0)
+            .map(|slip| surface_slips(&mesh, slip, scale.slip()));
+        let of_pressure = (task.is_coupled() && scale.traction > 0.0).then(|| {
             // A reduced shear modulus is one for tractions alone.
             let unit = task.interface.reduction / scale.traction;
             let relative: Vec<f64> = pressure.iter().map(|p| p * unit).collect();
@@ -205,7 +213,7 @@ impl StripMesh {
             normalised: Arc::new(normalised),
             bound,
             layer: task.interface.layer * scale.shear_modulus / scale.length,
-            pressure_slip,
+            surface_slip: of_pressure.or(of_surface),
             poisson_ratio,
             precision,
             mirrored: mirror.is_some(),
@@ -234,7 +242,7 @@ impl StripMesh {
             return None;
         }
         // The slips from the pressure of unlike bodies are symmetric as those of a longitudinal creepage are.
-        let along = motion.creepage_x != 0.0 || self.pressure_slip.is_some();
+        let along = motion.creepage_x != 0.0 || self.surface_slip.is_some();
         let lateral = motion.creepage_y != 0.0 || motion.spin_per_mm != 0.0;
         match (along, lateral) {
             (_, false) => Some(Parity::Longitudinal),
@@ -290,6 +298,14 @@ impl StripMesh {
         }
         values
     }
+}
+
+/// Mean slips of the cells in a unit, along x and across.
+fn surface_slips(mesh: &Mesh, slip: &SurfaceSlip, unit: f64) -> [Vec<f64>; 2] {
+    let y = mesh.cell_load_y();
+    let of = |i: usize| slip.mean([mesh.left[i], mesh.right[i]], y[i]);
+    let slips: Vec<[f64; 2]> = (0..mesh.cells()).map(of).collect();
+    [0, 1].map(|k| slips.iter().map(|slip| slip[k] / unit).collect())
 }
 
 /// Samples across a strip where friction varies.

@@ -2,6 +2,7 @@
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::friction::law::FrictionLaw;
+use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
@@ -271,7 +272,7 @@ fn point_solution(
     };
     PointSolution {
         motion: (*motion).into(),
-        normalised: normalised(case, patch, limit, motion),
+        normalised: normalised(&case.problem.elasticity, patch.area, limit, motion),
         force_x_n: found.force_x,
         force_y_n: found.force_y,
         moment_z_n_mm: found.moment_z,
@@ -426,9 +427,9 @@ fn zone_areas(
     zones
 }
 
-/// Power of a patch in N that the slips from the pressure of unlike bodies add to that of its forces; the moment against rolling gives it.
+/// Power of a patch in N that slips beyond those of its motion add to that of its forces; of unlike bodies the moment against rolling gives it.
 fn pressure_power(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64 {
-    let Some([x, y]) = &level.pressure_slip else {
+    let Some([x, y]) = &level.surface_slip else {
         return 0.0;
     };
     let [tx, ty] = &fields.tangential.traction;
@@ -438,13 +439,14 @@ fn pressure_power(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64
 }
 
 /// Creepages made dimensionless with E = 2G(1+ν) and c = √(A/π) (Kalker 1990).
-fn normalised(case: &CheckedCase, patch: &Patch, limit: f64, motion: &Motion) -> NormalisedMotion {
-    let c = (patch.area / std::f64::consts::PI).sqrt();
-    let unit = 2.0 * case.problem.elasticity.shear_modulus
-        / (1.0 - case.problem.elasticity.poisson_ratio)
-        * c
-        * c
-        / limit;
+pub(crate) fn normalised(
+    elasticity: &Elasticity,
+    area: f64,
+    limit: f64,
+    motion: &Motion,
+) -> NormalisedMotion {
+    let c = (area / std::f64::consts::PI).sqrt();
+    let unit = 2.0 * elasticity.contact_modulus() * c * c / limit;
     let scaled = |value: f64| (limit > 0.0).then_some(value * unit);
     NormalisedMotion {
         creepage_x: scaled(motion.creepage_x),

@@ -5,7 +5,8 @@ use serde_json::Value;
 use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, number, shown};
 use crate::contact::case::words::contact::{
-    Contact, CrossSection, FormatName, SideName, Smoothing, SmoothingWord, UnitName,
+    Contact, CrossSection, FormatName, InfluenceName, SideName, Smoothing, SmoothingWord,
+    SurfaceName, UnitName,
 };
 use crate::contact::geometry::profile::{POINTS_MAX, POINTS_MIN};
 
@@ -28,13 +29,19 @@ pub(crate) const PLACE: AllowedRange = AllowedRange::closed(-1e3, 1e3, "mm");
 pub(crate) const DEPTH: AllowedRange = AllowedRange::closed(0.0, 100.0, "mm");
 pub(crate) const CANT: AllowedRange = AllowedRange::closed(-0.5, 0.5, "rad");
 pub(crate) const ANGLE: AllowedRange = AllowedRange::closed(-0.3, 0.3, "rad");
+const SURFACES: [(&str, SurfaceName); 2] =
+    [("plane", SurfaceName::Plane), ("curve", SurfaceName::Curve)];
+const INFLUENCES: [(&str, InfluenceName); 2] = [
+    ("angle_corrected", InfluenceName::AngleCorrected),
+    ("half_space", InfluenceName::HalfSpace),
+];
 const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const SMOOTHING: AllowedRange = AllowedRange::closed(0.0, 50.0, "mm");
 /// Characters of a file.
 const TEXT_MAX: usize = 4_000_000;
 /// Faulty points of one cross-section that are listed one by one.
 const POINT_FAULTS_MAX: usize = 5;
-const MEMBERS: [&str; 15] = [
+const MEMBERS: [&str; 17] = [
     "type",
     "rail",
     "wheel",
@@ -50,6 +57,8 @@ const MEMBERS: [&str; 15] = [
     "yaw_rad",
     "roll_rad",
     "accept_rough_profiles",
+    "reference_surface",
+    "influence",
 ];
 
 /// Reads the members of the contact; whether the cross-sections are sound is told when they are laid over each other.
@@ -77,6 +86,21 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
     let flange_back_position_mm = optional_place(block, "flange_back_position_mm");
     let place = rail_place(block);
     let accept_rough_profiles = flag(block, "accept_rough_profiles");
+    let reference_surface = match block.has("reference_surface") {
+        true => block.word("reference_surface", &SURFACES, &[]),
+        false => Some(SurfaceName::default()),
+    };
+    let influence = match block.has("influence") {
+        true => block.word("influence", &INFLUENCES, &[]).map(Some),
+        false => Some(None),
+    };
+    if reference_surface == Some(SurfaceName::Plane) && matches!(influence, Some(Some(_))) {
+        block.fault(
+            "influence",
+            "given for planes of contact, which are half-spaces; give reference_surface: \"curve\" too, or leave it out",
+        );
+        return None;
+    }
     Some(Contact::Profiles {
         rail: Box::new(rail?),
         wheel: Box::new(wheel?),
@@ -92,6 +116,8 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
         yaw_rad: yaw_rad?,
         roll_rad: roll_rad?,
         accept_rough_profiles: accept_rough_profiles?.unwrap_or(false),
+        reference_surface: reference_surface?,
+        influence: influence?,
     })
 }
 

@@ -108,6 +108,14 @@ pub enum Contact {
         #[serde(skip_serializing_if = "is_false")]
         #[schema(required = false)]
         accept_rough_profiles: bool,
+        /// The surface on which the contact is solved. `plane` when left out.
+        #[serde(skip_serializing_if = "SurfaceName::is_plane")]
+        #[schema(required = false)]
+        reference_surface: SurfaceName,
+        /// How cells of a curved surface act on each other; only with `reference_surface: "curve"`, `angle_corrected` when left out.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false)]
+        influence: Option<InfluenceName>,
     },
     /// A wheelset on both rails of a track, by their cross-sections. Its roll and its height are found, and every patch of both wheels.
     Wheelset {
@@ -318,6 +326,37 @@ pub enum SideName {
     Left,
     /// The rail at negative y of the track.
     Right,
+}
+
+/// The surface on which the contact of a wheel on a rail is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = ReferenceSurface)]
+pub enum SurfaceName {
+    /// A plane of contact for each patch, or for patches near each other.
+    #[default]
+    Plane,
+    /// The cross-section of the rail: normals, slips and influences follow the bend of its surface, and all patches of a wheel are one problem. For one
+    /// motion and bodies that do not differ.
+    Curve,
+}
+
+impl SurfaceName {
+    fn is_plane(&self) -> bool {
+        *self == SurfaceName::Plane
+    }
+}
+
+/// How cells of a curved contact surface act on each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = SurfaceInfluence)]
+pub enum InfluenceName {
+    /// As on a half-space with factors for the turn of the surface between them, across the whole contact.
+    #[default]
+    AngleCorrected,
+    /// As on a half-space, among strips that touch less than 4 mm from each other: for comparison with other programs.
+    HalfSpace,
 }
 
 /// A file format of cross-sections.

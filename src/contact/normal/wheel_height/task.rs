@@ -1,6 +1,7 @@
 //! A wheel over its rail, with what presses them together: what is asked of the search for its height.
 
 use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::half_space::bent_surface::Influence;
 
 /// Bounds of the tolerance of the force, which is the target of the resultants' error. The contact is then scaled to the force as Hertz's
 /// contacts scale; the error left is of second order for these, and at worst about a third of the tolerance in pressures and lengths.
@@ -29,6 +30,18 @@ pub struct WheelTask {
     pub contact_modulus: f64,
     /// What the case says about the trust in the profiles.
     pub trust: ProfileTrust,
+    /// The surface on which the contact is solved.
+    pub surface: ReferenceSurface,
+}
+
+/// The surface on which the contact of a wheel on a rail is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ReferenceSurface {
+    /// A plane for each patch, or for patches near each other.
+    #[default]
+    Planes,
+    /// The cross-section of the rail, with the influence between its strips.
+    Curve(Influence),
 }
 
 /// What a case says about the trust in its profiles.

@@ -95,6 +95,27 @@ macro_rules! wheel_remarks {
                 "the rail is inclined to the plane of contact by up to {turn_rad:.2} rad under the patches, which leaves forces uncertain by {:.1} % of μN ({:.1} % by the direction of the normals)", 100.0 * share, 100.0 * of_normals
             ),
 
+            /// The surface turns over the contact, which is solved on the curve of the rail: factors for the turn change the forces, and leave a part open.
+            TurnCorrected {
+                /// Turn of the rail's surface from one end of the contact to the other.
+                turn_rad: f64 = 0.75,
+                /// Change of the longitudinal force by the factors, relative to μN.
+                change_x: f64 = -0.03,
+                /// Change of the lateral force.
+                change_y: f64 = 0.13,
+                /// Error of either force that the factors leave, relative to μN.
+                open: f64 = 0.03,
+                /// Turn up to which they were compared with boundary elements.
+                range_rad: f64 = 1.25,
+            }
+            code: "turn-corrected",
+            severity: Info,
+            advice: "Take the part that is left open as a further error of the forces; `error_estimate` does not have it. Beyond the range of the factors it is not known.",
+            detail: format!(
+                "the surface turns by {turn_rad:.2} rad over the contact; factors of the influence for this turn, known up to {range_rad} rad, change forces by {:+.1} and \
+                 {:+.1} % of μN, and leave them uncertain by {:.1} %", 100.0 * change_x, 100.0 * change_y, 100.0 * open
+            ),
+
             /// The force jumps at the height of the wheel that carries the load, where patches merge; forces were scaled to the load.
             ForceJumps {
                 /// Load over force found.

@@ -52,7 +52,7 @@ impl LevelRun<'_> {
     /// Rigid slip of a motion, with that of the pressure of unlike bodies where they roll.
     pub(super) fn rigid(&self, of: &StepEquations, motion: &Motion) -> Vec<f64> {
         let rolls = matches!(of.kind, StepKind::Steady | StepKind::Roll { .. });
-        let source = self.level.pressure_slip.as_ref().filter(|_| rolls);
+        let source = self.level.surface_slip.as_ref().filter(|_| rolls);
         of.equations
             .given(motion, source.map(|[x, y]| SlipSource { x, y }))
     }

@@ -124,7 +124,7 @@ impl<'a> RuleSequence<'a> {
 
     /// Slips of the motion and of the pressure.
     fn rigid(&self, equations: &SlipEquations) -> Vec<f64> {
-        let source = self.level.pressure_slip.as_ref();
+        let source = self.level.surface_slip.as_ref();
         equations.given(self.motion, source.map(|[x, y]| SlipSource { x, y }))
     }
 

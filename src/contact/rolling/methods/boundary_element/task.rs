@@ -26,7 +26,7 @@ pub struct LevelTask<'a> {
 impl LevelTask<'_> {
     /// The answer where nothing moves, or where the rigid slip decides alone, as it does unless bounds depend on the slip.
     pub(crate) fn without_iteration(&self) -> Option<LevelAnswer> {
-        if self.level.pressure_slip.is_some() {
+        if self.level.surface_slip.is_some() {
             return None;
         }
         let answer = full_slip::rigid_answer(self.level, self.motion)?;

@@ -1,0 +1,888 @@
+//! Solves a wheel on a rail on its reference curve: pressures at one height of the wheel and tractions on the unfolded surface, in turn, until each
+//! belongs to the other.
+//!
+//! Coordinates of the surface are x and the arc length s of the rail's cross-section. The rigid slip of every point is that of the wheel's
+//! undeformed surface above it, so that spin, rolling radius and direction follow the bend. Friction carries a part of a vertical load, tractions
+//! open the gap and pressures make the surfaces slip; each round solves one with the other of the round before.
+
+use std::sync::Arc;
+
+use crate::contact::case::words::solver::Output;
+use crate::contact::error::SolveError;
+use crate::contact::friction::on_rail::on_curve;
+use crate::contact::geometry::frame::Frame;
+use crate::contact::geometry::reference_curve::{
+    CurvePlace, ReferenceCurve, RigidMotion, WheelOver,
+};
+use crate::contact::half_space::bent_surface::{Influence, TURN_MAX};
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::gap::grid::GridFineness;
+use crate::contact::normal::on_curve::{CurveContact, CurveTask, Friction, Workspace};
+use crate::contact::normal::pressure_field::field::PressureField;
+use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
+use crate::contact::normal::surface_slip::SurfaceSlip;
+use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
+use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
+use crate::contact::normal_stage::SolvedFootprint;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::problem::run::Run;
+use crate::contact::remark::entry::{RemarkEntry, merged};
+use crate::contact::remark::list::Remark;
+use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::rolling_stage;
+use crate::contact::solution::assemble::normalised;
+use crate::contact::solution::track_axes::both;
+use crate::contact::solution::words::answer::{
+    ErrorEstimate, NormalReport, Origin, PatchSolution, Position, Solution, Total,
+};
+use crate::contact::solution::words::fields::{Fields, PatchFields};
+use crate::contact::time_limit::TimeLimit;
+use crate::contact::wheel_balance::next_share;
+
+/// Allowed error of the resultants in the rounds before the last ones, relative to μN.
+const TARGET_OF_ROUNDS: f64 = 0.02;
+/// Rounds at most; 3 to 6 suffice.
+const ROUNDS_MAX: u32 = 16;
+/// Change of the forces relative to μN over the target that ends the rounds.
+const CHANGE: f64 = 0.05;
+/// When the rounds are used up, a change of the forces relative to μN up to this is answered with a remark.
+const CHANGE_POOR: f64 = 5e-3;
+/// A surface that turns by less than this over the contact, in rad, has no remark.
+const TURN_REMARKED: f64 = 0.05;
+/// Turn of a patch, in rad, from which half-spaces describe it only roughly.
+const TURN_OF_HALF_SPACE: f64 = 0.35;
+/// What the factors for the turn leave open: this part of the change that they make, and of μN. Both cover the differences to boundary elements of
+/// seven wheels on rails, on which they were chosen.
+const OPEN: [f64; 2] = [0.15, 0.01];
+/// Axes, origins and signs in words.
+const FRAME: &str = "every patch on the surface of the rail: x along rolling (leading edge at larger x), y to the left along the cross-section, \
+                     z out of the rail, origin at its load centre; forces of a patch at its mean contact angle; total in track axes: x along \
+                     rolling, y to the left, z up; forces, moments and tractions act on the lower body, slip is that of the upper body relative \
+                     to the lower one";
+
+/// Solves a case of one motion on the curve of the rail. `before` is asked before tractions are solved whether there is any point in it.
+///
+/// # Errors
+/// A named reason why there is no answer.
+pub(crate) fn solve(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    contact: &WheelTask,
+    influence: Influence,
+    before: &mut dyn FnMut(&WheelContact) -> Result<(), SolveError>,
+    monitor: &dyn Monitor,
+) -> Result<(WheelContact, Solution, Fields), SolveError> {
+    let watch = TimeLimit::new(monitor, case.run.time_limit, 1);
+    let solve = CurveSolve::new(operators, case, contact, influence, &watch);
+    let solved = solve.and_then(|solve| {
+        let workspace = &mut Workspace::default();
+        let began = watch.elapsed();
+        let contact = solve.task().rest(workspace, &watch)?;
+        let mut at_rest = solve.wheel(&contact, 0.0)?;
+        before(&at_rest)?;
+        let found = solve.rounds(contact, &case.run, workspace)?;
+        let rest = (watch.elapsed() - began).as_secs_f64();
+        at_rest = solve.wheel(&found.contact, found.lift)?;
+        at_rest.remarks.extend(found.remarks.iter().cloned());
+        let change = solve.change_by_turn(&found, workspace)?;
+        solve.answer(found, at_rest, change, rest)
+    });
+    solved.map_err(|error| watch.explained(error, case))
+}
+
+/// A wheel on the curve of its rail.
+struct CurveSolve<'a> {
+    operators: &'a Arc<OperatorStore>,
+    case: &'a CheckedCase,
+    contact: &'a WheelTask,
+    influence: Influence,
+    curve: ReferenceCurve<'a>,
+    touch: f64,
+    expected: f64,
+    watch: &'a TimeLimit<'a>,
+}
+
+/// The end of the rounds.
+struct Found {
+    contact: CurveContact,
+    /// Vertical force of the tractions in N.
+    lift: f64,
+    parts: Vec<Part>,
+    /// Force on the rail in track axes in N.
+    force: [f64; 3],
+    remarks: Vec<RemarkEntry>,
+}
+
+/// Patches that are solved together.
+struct Part {
+    /// x and s in mm of the origin of its coordinates.
+    origin: [f64; 2],
+    patches: Vec<GridPressure>,
+    solution: Solution,
+    fields: Fields,
+}
+
+/// Sums over the cells of a patch, in N.
+#[derive(Clone, Copy, Default)]
+struct PatchForces {
+    /// Pressures times the sine and the cosine of the angle of their strips.
+    pressed: [f64; 2],
+    /// Tractions along x, and those along s times the cosine and the sine.
+    sheared: [f64; 3],
+}
+
+impl PatchForces {
+    /// The angle at which the pressures have no resultant along the tangent.
+    fn angle(&self) -> f64 {
+        self.pressed[0].atan2(self.pressed[1])
+    }
+
+    /// The force on the rail in track axes.
+    fn in_track(&self) -> [f64; 3] {
+        let ([across, down], [x, y, z]) = (self.pressed, self.sheared);
+        [x, y + across, z - down]
+    }
+}
+
+impl<'a> CurveSolve<'a> {
+    fn new(
+        operators: &'a Arc<OperatorStore>,
+        case: &'a CheckedCase,
+        contact: &'a WheelTask,
+        influence: Influence,
+        watch: &'a TimeLimit<'a>,
+    ) -> Result<CurveSolve<'a>, SolveError> {
+        let search = contact
+            .search()
+            .map_err(|reason| SolveError::NormalProblem { reason })?;
+        let expected = match contact.loading {
+            WheelLoad::Lowering(lowering) => lowering,
+            WheelLoad::Vertical(_) | WheelLoad::Normal(_) => {
+                search.estimated.map_or(0.05, |[_, lowering]| lowering)
+            }
+        };
+        Ok(CurveSolve {
+            operators,
+            case,
+            contact,
+            influence,
+            curve: ReferenceCurve::new(&contact.geometry),
+            touch: search.touch,
+            expected,
+            watch,
+        })
+    }
+
+    fn task(&self) -> CurveTask<'_> {
+        CurveTask {
+            curve: &self.curve,
+            elasticity: &self.case.problem.elasticity,
+            influence: self.influence,
+            loading: self.contact.loading,
+            touch: self.touch,
+            expected: self.expected,
+            fineness: GridFineness::for_answer(self.case.run.target()),
+        }
+    }
+
+    /// Pressures and tractions in turn, from a rest without friction.
+    fn rounds(
+        &self,
+        mut contact: CurveContact,
+        run: &Run,
+        workspace: &mut Workspace,
+    ) -> Result<Found, SolveError> {
+        let last_run = with_tractions(run, &run.outputs);
+        let rough = with_tractions(&run.for_resultants(TARGET_OF_ROUNDS), &[]);
+        let shares = matches!(self.contact.loading, WheelLoad::Vertical(_));
+        let coupled = (shares || self.influence == Influence::AngleCorrected)
+            && !self.case.problem.friction.is_frictionless();
+        let tolerance = CHANGE * run.resolution.target_or_usual();
+        let mut exact = !coupled;
+        let mut counted = 0.0;
+        let mut earlier: Option<(f64, f64)> = None;
+        let mut before: Option<[f64; 3]> = None;
+        let mut change = f64::INFINITY;
+        for round in 0..ROUNDS_MAX {
+            let exactly = exact || round + 1 == ROUNDS_MAX;
+            let parts = self.tractions(
+                &contact,
+                if exactly { &last_run } else { &rough },
+                workspace,
+            )?;
+            let forces = self.forces(&contact, &parts);
+            let force = sum(forces.iter().flatten().map(PatchForces::in_track));
+            let lift: f64 = forces.iter().flatten().map(|patch| patch.sheared[2]).sum();
+            let limit = self.limit(&parts);
+            if let Some(before) = before {
+                let moved = [0, 1, 2].map(|k| (force[k] - before[k]).abs());
+                change = moved.into_iter().fold(0.0, f64::max) / limit.max(f64::MIN_POSITIVE);
+            }
+            let settled = change <= tolerance;
+            if !coupled || exactly && settled || round + 1 == ROUNDS_MAX {
+                let mut remarks = Vec::new();
+                if coupled && !settled {
+                    if change > CHANGE_POOR {
+                        return Err(SolveError::NormalProblem {
+                            reason: format!(
+                                "pressures and tractions on the curve of the rail do not come to agree in {ROUNDS_MAX} rounds: forces still change by \
+                                 {:.1} % of the friction limit; give reference_surface \"plane\"",
+                                100.0 * change
+                            ),
+                        });
+                    }
+                    let remark = Remark::IterationInexact {
+                        iteration: "pressures and tractions on the curve of the rail",
+                        reason: "the rounds were used up",
+                        residual: change,
+                        tolerance,
+                    };
+                    remarks.push(remark.into());
+                }
+                return Ok(Found {
+                    contact,
+                    lift,
+                    parts,
+                    force,
+                    remarks,
+                });
+            }
+            exact |= settled;
+            before = Some(force);
+            let next = next_share((counted, lift), earlier.replace((counted, lift)));
+            counted = next;
+            let traction = self.on_grid(&contact, &parts);
+            let friction = Friction {
+                lift: if shares { next } else { 0.0 },
+                opened: contact.operator.opened_by_traction(&traction, workspace),
+            };
+            contact = self
+                .task()
+                .again(contact, &friction, workspace, self.watch)?;
+        }
+        unreachable!("the last round ends them")
+    }
+
+    /// The tractions of all parts of a contact.
+    fn tractions(
+        &self,
+        contact: &CurveContact,
+        run: &Run,
+        workspace: &mut Workspace,
+    ) -> Result<Vec<Part>, SolveError> {
+        let slip = contact
+            .operator
+            .slip_of_pressure(&contact.pressure, workspace);
+        let parts = contact.parts(self.influence);
+        let watch = TimeLimit::new(self.watch, run.time_limit, parts.len());
+        let mut solved = Vec::with_capacity(parts.len());
+        for strips in parts {
+            let patches = contact.patches(strips)?;
+            solved.push(self.part(contact, patches, slip.as_ref(), run, &watch)?);
+        }
+        Ok(solved)
+    }
+
+    /// Solves the tractions of some patches together; `slip` is that of the pressures.
+    fn part(
+        &self,
+        contact: &CurveContact,
+        patches: Vec<GridPressure>,
+        slip: Option<&[Vec<f64>; 2]>,
+        run: &Run,
+        watch: &TimeLimit,
+    ) -> Result<Part, SolveError> {
+        let CheckedCase { problem, label, .. } = self.case;
+        let field = CurveContact::field(patches.clone())?;
+        let loads = field.patches();
+        let heaviest = (0..loads.len())
+            .max_by(|a, b| loads[*a].normal_force.total_cmp(&loads[*b].normal_force))
+            .unwrap_or(0);
+        let origin = field.load_centre(Some(heaviest));
+        let (place, over) = self.load_centre(contact, origin)?;
+        let rigid = self.rigid(contact, &field)?;
+        let motion = creepages(&rigid[heaviest], origin[0], &place, &over);
+        let slip = self.surface_slip(contact, &field, &rigid, slip, origin, &motion);
+        let report = NormalReport {
+            force_residual: contact.missed,
+            ..contact.work.with_time(0.0)
+        };
+        let extents = loads.iter().map(|patch| patch.extent);
+        let friction = on_curve(
+            &problem.friction,
+            &self.contact.geometry,
+            extents,
+            origin[1],
+            |s| self.curve.at(s).rail,
+        );
+        let solved = SolvedFootprint {
+            footprint: Footprint::computed(field.from_origin(origin), contact.missed)
+                .with_slip(slip),
+            report: Some(report),
+            coupling_error: 0.0,
+            remarks: Vec::new(),
+        };
+        let part = CheckedCase {
+            problem: problem.of_gap(friction, vec![motion]),
+            run: run.clone(),
+            label: label.clone(),
+            remarks: Vec::new(),
+        };
+        part.fits(&solved.footprint)?;
+        let (solution, fields) = rolling_stage::solve(self.operators, &part, &solved, watch)?;
+        Ok(Part {
+            origin,
+            patches,
+            solution,
+            fields,
+        })
+    }
+
+    /// The place of a load centre `[x, s]` and the wheel over it.
+    fn load_centre(
+        &self,
+        contact: &CurveContact,
+        [x, s]: [f64; 2],
+    ) -> Result<(CurvePlace, WheelOver), SolveError> {
+        let place = self.curve.at(s);
+        let nearest = self.curve.nearest(&place, contact.centre);
+        let over =
+            nearest.and_then(|(_, start)| self.curve.over(&place, x, contact.centre, &start));
+        let over = over.ok_or_else(|| SolveError::NormalProblem {
+            reason: format!(
+                "the wheel's surface was not found over the place x = {x:.3} mm, s = {s:.3} mm of the rail"
+            ),
+        })?;
+        Ok((place, over))
+    }
+
+    /// The motion of the wheel as a rigid body at each patch: the same at all if the case gives that of a wheelset, else the one with the given creepages
+    /// at its load centre.
+    fn rigid(
+        &self,
+        contact: &CurveContact,
+        field: &PressureField,
+    ) -> Result<Vec<RigidMotion>, SolveError> {
+        let (problem, geometry) = (&self.case.problem, &self.contact.geometry);
+        let patches = 0..field.patches().len();
+        if let Some(wheelset) = &problem.wheelset {
+            let motion = RigidMotion::of_wheelset(geometry, contact.centre, wheelset);
+            return Ok(patches.map(|_| motion).collect());
+        }
+        let Motion {
+            creepage_x,
+            creepage_y,
+            spin_per_mm,
+        } = problem.motions[0];
+        let of = |patch: usize| {
+            let centre = field.load_centre(Some(patch));
+            let (place, over) = self.load_centre(contact, centre)?;
+            let point = place.point(centre[0], over.gap);
+            let creepages = [creepage_x, creepage_y, spin_per_mm];
+            Ok(RigidMotion::of_creepages(point, &place, creepages))
+        };
+        patches.map(of).collect()
+    }
+
+    /// The slip of the surface beyond a motion about an origin `[x, s]`.
+    fn surface_slip(
+        &self,
+        contact: &CurveContact,
+        field: &PressureField,
+        rigid: &[RigidMotion],
+        of_pressure: Option<&[Vec<f64>; 2]>,
+        origin: [f64; 2],
+        motion: &Motion,
+    ) -> SurfaceSlip {
+        let grid = &contact.grid;
+        let extents: Vec<[f64; 4]> = field.patches().iter().map(|patch| patch.extent).collect();
+        let patch_of = |s: f64| {
+            let far = |k: &usize| {
+                let [.., low, high] = extents[*k];
+                (low - s).max(s - high).max(0.0)
+            };
+            (0..extents.len()).min_by(|a, b| far(a).total_cmp(&far(b)))
+        };
+        let mut slip = [Vec::new(), Vec::new()];
+        for (j, place) in grid.places.iter().enumerate() {
+            let rigid = &rigid[patch_of(place.s).unwrap_or(0)];
+            for (i, x) in grid.x.iter().enumerate() {
+                let k = j * grid.x.len() + i;
+                let gap = contact.over[k].map_or(0.0, |over| over.gap);
+                let own = rigid.slip(place.point(*x, gap), place);
+                let [dx, ds] = [x - origin[0], place.s - origin[1]];
+                let plane = [
+                    motion.creepage_x - motion.spin_per_mm * ds,
+                    motion.creepage_y + motion.spin_per_mm * dx,
+                ];
+                for (axis, slip) in slip.iter_mut().enumerate() {
+                    let pressed = of_pressure.map_or(0.0, |of_pressure| of_pressure[axis][k]);
+                    slip.push(own[axis] - plane[axis] + pressed);
+                }
+            }
+        }
+        SurfaceSlip {
+            first: [grid.x[0] - origin[0], grid.places[0].s - origin[1]],
+            step: grid.step,
+            samples: grid.cells(),
+            slip,
+        }
+    }
+
+    /// Forces of every patch of every part: of the pressures on the grid, and of the tractions, corrected to their extrapolated resultants.
+    fn forces(&self, contact: &CurveContact, parts: &[Part]) -> Vec<Vec<PatchForces>> {
+        let of_part = |part: &Part| {
+            let field = part.solution.patches.iter().enumerate();
+            let of_patch = |(k, patch): (usize, &PatchSolution)| {
+                let mut forces = PatchForces {
+                    pressed: self.pressed(contact, part, k),
+                    ..PatchForces::default()
+                };
+                let (mut shear, mut plain) = ([0.0; 3], [0.0; 2]);
+                each_cell(part, k, |place, _, area, [x, y, _]| {
+                    let (sin, cos) = self.curve.at(place[1]).angle.sin_cos();
+                    plain = [plain[0] + area * x, plain[1] + area * y];
+                    shear[1] += area * y * cos;
+                    shear[2] += area * y * sin;
+                });
+                let (sin, cos) = forces.angle().sin_cos();
+                let point = &patch.points[0];
+                let beyond = point.force_y_n - plain[1];
+                forces.sheared = [
+                    point.force_x_n,
+                    shear[1] + beyond * cos,
+                    shear[2] + beyond * sin,
+                ];
+                forces
+            };
+            field.map(of_patch).collect()
+        };
+        parts.iter().map(of_part).collect()
+    }
+
+    /// Pressures of a patch times the sine and the cosine of their angles, in N.
+    fn pressed(&self, contact: &CurveContact, part: &Part, patch: usize) -> [f64; 2] {
+        let grid = &contact.grid;
+        let [x_min, x_max, s_min, s_max] = part.solution.patches[patch].extent_mm;
+        let alone = part.solution.patches.len() == 1 && contact.parts(self.influence).len() == 1;
+        let mut sums = [0.0; 2];
+        for (j, place) in grid.places.iter().enumerate() {
+            let s = place.s - part.origin[1];
+            let row = &contact.pressure[j * grid.x.len()..(j + 1) * grid.x.len()];
+            if !alone && !(s_min - grid.step[1]..=s_max + grid.step[1]).contains(&s) {
+                continue;
+            }
+            let inside = |x: f64| {
+                let x = x - part.origin[0];
+                alone || (x_min - grid.step[0]..=x_max + grid.step[0]).contains(&x)
+            };
+            let cells = grid.x.iter().zip(row).filter(|(x, _)| inside(**x));
+            let load: f64 = cells.map(|(_, p)| p).sum();
+            let (sin, cos) = place.angle.sin_cos();
+            sums = [sums[0] + load * sin, sums[1] + load * cos];
+        }
+        sums.map(|sum| sum * grid.area())
+    }
+
+    /// Tractions on the cells of the grid in MPa, with the same forces.
+    fn on_grid(&self, contact: &CurveContact, parts: &[Part]) -> [Vec<f64>; 2] {
+        let grid = &contact.grid;
+        let [nx, ny] = grid.cells();
+        let mut traction = [vec![0.0; nx * ny], vec![0.0; nx * ny]];
+        let low = [
+            grid.x[0] - 0.5 * grid.step[0],
+            grid.places[0].s - 0.5 * grid.step[1],
+        ];
+        for part in parts {
+            for k in 0..part.solution.patches.len() {
+                each_cell(part, k, |place, size, _, [x, y, _]| {
+                    // The cells that it covers, and the part of each.
+                    let [along, across] = [0, 1].map(|axis| {
+                        let ends = [-0.5, 0.5].map(|half| {
+                            (place[axis] + half * size[axis] - low[axis]) / grid.step[axis]
+                        });
+                        covered(ends, [nx, ny][axis])
+                    });
+                    for (j, height) in &across {
+                        for (i, width) in &along {
+                            let share = width * height;
+                            traction[0][j * nx + i] += share * x;
+                            traction[1][j * nx + i] += share * y;
+                        }
+                    }
+                });
+            }
+        }
+        traction
+    }
+
+    /// The friction limit of all parts in N.
+    fn limit(&self, parts: &[Part]) -> f64 {
+        let patches = parts.iter().flat_map(|part| &part.solution.patches);
+        patches.filter_map(|patch| patch.friction_limit_n).sum()
+    }
+
+    /// What the factors for the turn change in the forces on the rail, as error and remark; none where the surface hardly turns.
+    fn change_by_turn(
+        &self,
+        found: &Found,
+        workspace: &mut Workspace,
+    ) -> Result<Option<Remark>, SolveError> {
+        let turn = turn(&found.contact);
+        let limit = self.limit(&found.parts);
+        if self.influence != Influence::AngleCorrected || turn < TURN_REMARKED || limit <= 0.0 {
+            return Ok(None);
+        }
+        let unfolded = CurveSolve {
+            influence: Influence::Unfolded,
+            curve: self.curve.clone(),
+            ..*self
+        };
+        let run = self.case.run.for_resultants(TARGET_OF_ROUNDS);
+        let rest = unfolded.task().rest(workspace, self.watch)?;
+        let other = unfolded.rounds(rest, &run, workspace)?;
+        let [change_x, change_y] = [0, 1].map(|k| (found.force[k] - other.force[k]) / limit);
+        Ok(Some(Remark::TurnCorrected {
+            turn_rad: turn,
+            change_x,
+            change_y,
+            open: OPEN[0] * change_x.abs().max(change_y.abs()) + OPEN[1],
+            range_rad: TURN_MAX,
+        }))
+    }
+
+    /// The wheel at rest, with the vertical force of tractions in N.
+    fn wheel(&self, contact: &CurveContact, lift: f64) -> Result<WheelContact, SolveError> {
+        let mut gaps = Vec::new();
+        for strips in contact.parts(self.influence) {
+            for patch in contact.patches(strips)? {
+                let field = CurveContact::field(vec![patch])?;
+                let centre = field.load_centre(None);
+                let (place, over) = self.load_centre(contact, centre)?;
+                let [_, y, z] = place.point(centre[0], 0.0);
+                gaps.push(GapContact {
+                    frame: Frame {
+                        origin: [centre[0], y, z],
+                        angle: place.angle,
+                        rail: place.rail,
+                        wheel: over.wheel,
+                    },
+                    approach: -over.gap,
+                    field: field.from_origin(centre),
+                    report: contact.work,
+                    remarks: Vec::new(),
+                    start: None,
+                });
+            }
+        }
+        let forces = gaps.iter().map(GapContact::normal_force);
+        let mut wheel = WheelContact {
+            lowering: self.touch - contact.centre,
+            found: [forces.sum(), 0.0],
+            load_error: contact.missed,
+            force_residual: contact.missed,
+            centre: contact.centre,
+            heights: contact.heights,
+            friction_share: 0.0,
+            met: false,
+            patches: gaps,
+            remarks: Vec::new(),
+        };
+        wheel.friction_share = -lift / wheel.vertical_force();
+        Ok(wheel)
+    }
+
+    /// The answer of all parts.
+    fn answer(
+        &self,
+        found: Found,
+        wheel: WheelContact,
+        change: Option<Remark>,
+        seconds: f64,
+    ) -> Result<(WheelContact, Solution, Fields), SolveError> {
+        let forces = self.forces(&found.contact, &found.parts);
+        let Found { contact, parts, .. } = found;
+        let mut remarks = self.case.remarks.clone();
+        remarks.extend(wheel.remarks.iter().cloned());
+        remarks.extend(change.map(RemarkEntry::from));
+        let centre = load_centre_of_all(&self.curve, &parts);
+        let mut total = Total {
+            force_x_n: 0.0,
+            force_y_n: 0.0,
+            force_z_n: Some(0.0),
+            moment_z_n_mm: 0.0,
+            error_estimate: Some(ErrorEstimate::default()),
+            profile_uncertainty: None,
+        };
+        let mut whole: Option<(Solution, Fields)> = None;
+        for (mut part, forces) in parts.into_iter().zip(forces) {
+            let first = whole.as_ref().map_or(0, |(whole, _)| whole.patches.len());
+            remarks.extend(part.solution.remarks.iter().map(|remark| RemarkEntry {
+                patch: remark.patch.map(|patch| patch + first),
+                ..remark.clone()
+            }));
+            for (k, forces) in forces.iter().enumerate() {
+                let own = self.add_patch(&contact, &mut part, k, forces, centre)?;
+                add(&mut total, &own);
+                let [.., low, high] = part.solution.patches[k].extent_mm;
+                let turned = [low, high].map(|s| self.curve.at(s + part.origin[1]).angle);
+                let turn_rad = (turned[1] - turned[0]).abs();
+                if self.influence == Influence::HalfSpace && turn_rad > TURN_OF_HALF_SPACE {
+                    remarks.push(Remark::ContactTurns { turn_rad }.at_patch(first + k));
+                }
+            }
+            for k in 0..part.solution.patches.len() {
+                self.about_load_centre(&mut part, k);
+            }
+            match &mut whole {
+                None => whole = Some((part.solution, part.fields)),
+                Some((all, fields)) => {
+                    all.normal = both(all.normal, part.solution.normal);
+                    all.patches.extend(part.solution.patches);
+                    fields.patches.extend(part.fields.patches);
+                }
+            }
+        }
+        let Some((mut solution, mut fields)) = whole else {
+            unreachable!("a wheel at rest touches its rail")
+        };
+        drop_unasked(&self.case.run, &mut fields);
+        if let Some(normal) = &mut solution.normal {
+            normal.seconds = seconds;
+        }
+        let solution = Solution {
+            total: vec![total],
+            remarks: merged(remarks),
+            wheel_lowering_mm: Some(wheel.lowering),
+            origin: Origin {
+                x_mm: centre[0],
+                y_mm: centre[1],
+                meaning: "load centre of all patches in track axes, for the total; the origin of a patch is in its position"
+                    .to_owned(),
+            },
+            frame: FRAME.to_owned(),
+            ..solution
+        };
+        Ok((wheel, solution, fields))
+    }
+
+    /// Completes a patch with its position, its force at its mean angle and the motion at its load centre; returns its part of the total, with the
+    /// moment about the vertical line through a point `[x, y]`.
+    fn add_patch(
+        &self,
+        contact: &CurveContact,
+        part: &mut Part,
+        k: usize,
+        forces: &PatchForces,
+        about: [f64; 2],
+    ) -> Result<Total, SolveError> {
+        let geometry = &self.contact.geometry;
+        let centre = self.centre_of(part, k)?;
+        let (place, over) = self.load_centre(contact, centre)?;
+        let [_, y, z] = place.point(centre[0], 0.0);
+        let rigid = match &self.case.problem.wheelset {
+            Some(wheelset) => RigidMotion::of_wheelset(geometry, contact.centre, wheelset),
+            None => {
+                let given = self.case.problem.motions[0];
+                let point = place.point(centre[0], over.gap);
+                let creepages = [given.creepage_x, given.creepage_y, given.spin_per_mm];
+                RigidMotion::of_creepages(point, &place, creepages)
+            }
+        };
+        let motion = creepages(&rigid, centre[0], &place, &over);
+        let mut moment = 0.0;
+        each_cell(part, k, |cell, _, area, [q_x, q_s, p]| {
+            let place = self.curve.at(cell[1]);
+            let (sin, cos) = place.angle.sin_cos();
+            let across = q_s * cos + p * sin;
+            moment += area * ((cell[0] - about[0]) * across - (place.at[0] - about[1]) * q_x);
+        });
+        let angle = forces.angle();
+        let (sin, cos) = angle.sin_cos();
+        let [along, y_share, z_share] = forces.sheared;
+        let origin = part.origin;
+        let patch = &mut part.solution.patches[k];
+        let limit = patch.friction_limit_n.unwrap_or(0.0);
+        patch.position = Some(Position {
+            track_mm: [centre[0], y, z],
+            rail_mm: geometry.on_rail(place.rail),
+            wheel_mm: geometry.on_wheel(over.wheel),
+            contact_angle_rad: angle,
+            rolling_radius_mm: geometry.meridian(over.wheel).radius,
+            origin_track_mm: [centre[0], y, z],
+        });
+        patch.approach_mm = Some(-over.gap);
+        let elasticity = &self.case.problem.elasticity;
+        let point = &mut patch.points[0];
+        point.moment_z_n_mm +=
+            -(centre[0] - origin[0]) * point.force_y_n + (centre[1] - origin[1]) * point.force_x_n;
+        point.force_y_n = y_share * cos + z_share * sin;
+        point.motion = motion.into();
+        point.normalised = normalised(elasticity, patch.area_mm2, limit, &motion);
+        point.friction_power_without_spin_n =
+            (motion.creepage_x * along).abs() + (motion.creepage_y * point.force_y_n).abs();
+        let [force_x_n, force_y_n, force_z_n] = forces.in_track();
+        let error_estimate = point.error_estimate.map(|error| {
+            let across = error.force_y_n * cos.abs();
+            let arm = [centre[0] - about[0], y - about[1]];
+            ErrorEstimate {
+                force_x_n: error.force_x_n,
+                force_y_n: across,
+                moment_z_n_mm: error.moment_z_n_mm * cos.abs()
+                    + arm[0].abs() * across
+                    + arm[1].abs() * error.force_x_n,
+            }
+        });
+        Ok(Total {
+            force_x_n,
+            force_y_n,
+            force_z_n: Some(force_z_n),
+            moment_z_n_mm: moment,
+            error_estimate,
+            profile_uncertainty: None,
+        })
+    }
+
+    /// The load centre `[x, s]` of a patch of a part.
+    fn centre_of(&self, part: &Part, k: usize) -> Result<[f64; 2], SolveError> {
+        let field = CurveContact::field(part.patches.clone())?;
+        Ok(field.load_centre(Some(k)))
+    }
+
+    /// Moves the coordinates of a patch to its load centre.
+    fn about_load_centre(&self, part: &mut Part, k: usize) {
+        let Ok(centre) = self.centre_of(part, k) else {
+            return;
+        };
+        let by = [0, 1].map(|axis| centre[axis] - part.origin[axis]);
+        let patch = &mut part.solution.patches[k];
+        for (end, by) in patch.extent_mm.iter_mut().zip([by[0], by[0], by[1], by[1]]) {
+            *end -= by;
+        }
+        let fields = part.fields.patches.get_mut(k);
+        for cells in fields.into_iter().flat_map(|fields| &mut fields.meshes) {
+            cells.x_mm.iter_mut().for_each(|x| *x -= by[0]);
+            cells.y_mm.iter_mut().for_each(|y| *y -= by[1]);
+        }
+    }
+}
+
+/// A run with tractions and pressures among its outputs.
+fn with_tractions(run: &Run, outputs: &[Output]) -> Run {
+    let needed = [Output::Resultants, Output::Tractions, Output::Pressure];
+    let mut outputs: Vec<Output> = outputs.iter().copied().chain(needed).collect();
+    outputs.sort_unstable();
+    outputs.dedup();
+    Run {
+        outputs,
+        ..run.clone()
+    }
+}
+
+/// Removes values per cell that were not asked for.
+fn drop_unasked(run: &Run, fields: &mut Fields) {
+    let kept = |output| run.wants(output);
+    if !run.outputs.iter().any(|output| output.is_per_cell()) {
+        fields.patches.clear();
+        return;
+    }
+    for PatchFields { meshes, points } in &mut fields.patches {
+        if !kept(Output::Pressure) {
+            meshes
+                .iter_mut()
+                .for_each(|cells| cells.pressure_mpa = None);
+        }
+        if !kept(Output::Tractions) {
+            for point in points {
+                (point.traction_x_mpa, point.traction_y_mpa) = (None, None);
+            }
+        }
+    }
+}
+
+/// Creepages and spin at a place, at x in mm.
+fn creepages(rigid: &RigidMotion, x: f64, place: &CurvePlace, over: &WheelOver) -> Motion {
+    let [creepage_x, creepage_y] = rigid.slip(place.point(x, over.gap), place);
+    Motion {
+        creepage_x,
+        creepage_y,
+        spin_per_mm: rigid.spin(place),
+    }
+}
+
+/// Calls with the place `[x, s]`, the size and the area of every cell of a patch, in mm and mm², and with its tractions and pressure in MPa.
+fn each_cell(part: &Part, patch: usize, mut call: impl FnMut([f64; 2], [f64; 2], f64, [f64; 3])) {
+    let Some(fields) = part.fields.patches.get(patch) else {
+        return;
+    };
+    let (cells, point) = (fields.cells(0), &fields.points[0]);
+    let (Some(x), Some(y), Some(p)) = (
+        &point.traction_x_mpa,
+        &point.traction_y_mpa,
+        &cells.pressure_mpa,
+    ) else {
+        return;
+    };
+    for i in 0..cells.x_mm.len() {
+        let place = [
+            cells.x_mm[i] + part.origin[0],
+            cells.y_mm[i] + part.origin[1],
+        ];
+        let size = [cells.dx_mm[i], cells.dy_mm[i]];
+        call(place, size, size[0] * size[1], [x[i], y[i], p[i]]);
+    }
+}
+
+/// Cells between two places counted in cells, with the part of each that lies between.
+fn covered([from, to]: [f64; 2], cells: usize) -> Vec<(usize, f64)> {
+    let [first, last] = [from, to].map(|end| (end.max(0.0).floor() as usize).min(cells - 1));
+    let part = |cell: usize| to.min(cell as f64 + 1.0) - from.max(cell as f64);
+    (first..=last)
+        .map(|cell| (cell, part(cell)))
+        .filter(|(_, part)| *part > 0.0)
+        .collect()
+}
+
+/// The turn of the surface from the first to the last strip in contact, in rad.
+fn turn(contact: &CurveContact) -> f64 {
+    let nx = contact.grid.x.len();
+    let rows = contact.pressure.chunks_exact(nx).zip(&contact.grid.places);
+    let touching = rows.filter(|(row, _)| row.iter().any(|p| *p > 0.0));
+    let nothing = [f64::INFINITY, f64::NEG_INFINITY];
+    let [low, high] = touching.fold(nothing, |[low, high], (_, place)| {
+        [low.min(place.angle), high.max(place.angle)]
+    });
+    (high - low).max(0.0)
+}
+
+/// Mean place `[x, y]` of all patches in track axes, weighted with their normal forces.
+fn load_centre_of_all(curve: &ReferenceCurve, parts: &[Part]) -> [f64; 2] {
+    let (mut load, mut sum) = (0.0, [0.0; 2]);
+    for part in parts {
+        for k in 0..part.solution.patches.len() {
+            each_cell(part, k, |[x, s], _, area, [.., p]| {
+                load += area * p;
+                sum = [sum[0] + area * p * x, sum[1] + area * p * curve.at(s).at[0]];
+            });
+        }
+    }
+    sum.map(|sum| sum / load.max(f64::MIN_POSITIVE))
+}
+
+fn sum(forces: impl Iterator<Item = [f64; 3]>) -> [f64; 3] {
+    forces.fold([0.0; 3], |sum, force| [0, 1, 2].map(|k| sum[k] + force[k]))
+}
+
+/// Adds the part of a patch to a total.
+fn add(total: &mut Total, own: &Total) {
+    total.force_x_n += own.force_x_n;
+    total.force_y_n += own.force_y_n;
+    total.force_z_n = total.force_z_n.zip(own.force_z_n).map(|(a, b)| a + b);
+    total.moment_z_n_mm += own.moment_z_n_mm;
+    total.error_estimate = total
+        .error_estimate
+        .zip(own.error_estimate)
+        .map(|(a, b)| a.plus(b));
+}
