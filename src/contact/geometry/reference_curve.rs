@@ -54,6 +54,8 @@ pub struct WheelOver {
     pub wheel: f64,
     /// Change of the gap with the height of the wheel's centre.
     pub lift: f64,
+    /// Angle in rad that the rail would have if it followed the wheel there.
+    pub angle: f64,
 }
 
 impl CurvePlace {
@@ -174,6 +176,7 @@ impl<'g> ReferenceCurve<'g> {
             gap,
             wheel,
             lift: place.angle.cos(),
+            angle: place.angle,
         };
         Some((x, self.over(place, x, centre, &start)?))
     }
@@ -232,6 +235,7 @@ impl<'g> ReferenceCurve<'g> {
                     gap,
                     wheel,
                     lift: outward[2] / facing,
+                    angle: outward[1].atan2(-outward[2]),
                 });
             }
         }

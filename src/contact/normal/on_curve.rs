@@ -187,6 +187,17 @@ impl CurveGrid {
         over
     }
 
+    /// Mean angles of the strips: of the rail and of the wheel where it is nearest, at a height of its centre; both bodies bend, and each deforms as its
+    /// own surface does.
+    fn mean_angles(&self, curve: &ReferenceCurve, centre: f64) -> Vec<f64> {
+        let of = |place: &CurvePlace| {
+            let nearest = curve.nearest(place, centre);
+            let nearest = nearest.filter(|(_, wheel)| wheel.gap < APART);
+            nearest.map_or(place.angle, |(_, wheel)| 0.5 * (place.angle + wheel.angle))
+        };
+        self.places.iter().map(of).collect()
+    }
+
     /// First and last strip of each run of strips in contact.
     fn runs(&self, pressure: &[f64]) -> Vec<[usize; 2]> {
         let mut runs: Vec<[usize; 2]> = Vec::new();
@@ -326,6 +337,7 @@ impl CurveTask<'_> {
             centre: coarse.centre,
             slope: coarse.slope,
             heights: coarse.heights,
+            iterations: coarse.work.iterations,
         };
         self.settled(contact, &Friction::default(), FORCE, workspace, monitor)
     }
@@ -348,6 +360,7 @@ impl CurveTask<'_> {
             centre: before.centre,
             slope: before.slope,
             heights: before.heights,
+            iterations: before.work.iterations,
         };
         self.settled(start, friction, FORCE, workspace, monitor)
     }
@@ -385,6 +398,7 @@ impl CurveTask<'_> {
                 centre: self.touch - lowering,
                 slope: 0.0,
                 heights: 0,
+                iterations: 0,
             };
             let found =
                 self.settled(start, &Friction::default(), FORCE_FIRST, workspace, monitor)?;
@@ -514,6 +528,7 @@ impl CurveTask<'_> {
                 centre: found.centre,
                 slope: found.slope,
                 heights: found.heights,
+                iterations: found.work.iterations,
             };
         }
         Err(NormalError::NoAnswer(
@@ -537,9 +552,10 @@ impl CurveTask<'_> {
             mut centre,
             mut slope,
             mut heights,
+            mut iterations,
         } = start;
         let strips = BentStrips {
-            angle: grid.places.iter().map(|place| place.angle).collect(),
+            angle: grid.mean_angles(self.curve, centre),
             run: grid.run_of_strips(&runs),
             corrected: self.influence == Influence::AngleCorrected,
         };
@@ -555,7 +571,6 @@ impl CurveTask<'_> {
                     .to_owned(),
             ));
         }
-        let mut iterations = 0;
         let mut bounds = [0.0, f64::INFINITY];
         let mut before: Option<[f64; 2]> = None;
         for height in 0..HEIGHTS_MAX {
@@ -572,7 +587,7 @@ impl CurveTask<'_> {
                     gap: &gap,
                     cell: grid.area(),
                     loading: NormalLoad::Approach(0.0),
-                    tolerance: VIOLATION.max(0.01 * tolerance),
+                    tolerance: VIOLATION.max(0.2 * tolerance),
                 };
                 let found = solve_pressure(&task, &operator, start, workspace, monitor)?;
                 iterations += found.iterations;
@@ -649,6 +664,7 @@ struct Start {
     centre: f64,
     slope: f64,
     heights: u32,
+    iterations: u32,
 }
 
 /// The gap of the cells: the wheel over the rail, and what tractions open.
