@@ -10,6 +10,7 @@ mod carter;
 mod case_faults;
 mod case_mutations;
 mod cases;
+mod conformal;
 mod convergence_domain;
 mod cylinders;
 #[path = "../../benches/stress/damaged.rs"]

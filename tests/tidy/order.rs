@@ -33,6 +33,7 @@ const ORDER: &[&str] = &[
     "contact::unlike_bodies",
     "contact::unlike_motions",
     "contact::wheel_balance",
+    "contact::wheel_on_curve",
     "contact::wheel_on_rail",
     "contact::profile_trust",
     "contact::pulled_rolling",

@@ -58,7 +58,8 @@ pub struct BentOperator {
     curvature: Vec<f64>,
     /// 2κ.
     coupling: f64,
-    own: f64,
+    /// Normal influence at a distance of i cells along x and j along s, at `j * cells[0] + i`.
+    coefficients: Vec<f64>,
     dx: f64,
 }
 
@@ -98,16 +99,16 @@ impl BentOperator {
             normal,
             along,
             coupling: 1.17 * (1.0 + 1.0 / (1.0 - nu)),
-            own: known[0],
             dx: step[0],
             convolution,
+            coefficients: known,
         }
     }
 
     /// Displacement of a cell by its own unit pressure in mm/MPa.
     #[must_use]
     pub fn own(&self) -> f64 {
-        self.own
+        self.coefficients[0]
     }
 
     fn is_corrected(&self) -> bool {
@@ -168,6 +169,34 @@ impl BentOperator {
                     _ => {}
                 }
             }
+        }
+    }
+
+    /// Adds the gap in mm that changed pressures in MPa open, cell by cell.
+    pub fn add_opened(&self, changes: &[(usize, f64)], gap: &mut [f64]) {
+        let nx = self.convolution.cells[0];
+        for (cell, pressure) in changes {
+            let (column, strip) = (cell % nx, cell / nx);
+            for (j, row) in gap.chunks_exact_mut(nx).enumerate() {
+                let line = &self.coefficients[j.abs_diff(strip) * nx..][..nx];
+                let share = pressure * self.share(j, strip);
+                for (i, gap) in row.iter_mut().enumerate() {
+                    *gap += share * line[i.abs_diff(column)];
+                }
+            }
+        }
+    }
+
+    /// The factor of the normal influence of a strip on another.
+    fn share(&self, strip: usize, of: usize) -> f64 {
+        let BentStrips {
+            angle,
+            run,
+            corrected,
+        } = &self.strips;
+        match corrected {
+            true => (TURN_OF_PRESSURE * (angle[strip] - angle[of])).cos(),
+            false => f64::from(u8::from(run[strip] == run[of])),
         }
     }
 
@@ -478,6 +507,10 @@ mod tests {
             &gap,
             &dense(&strips, |_, _, turn, _| (1.25 * turn).cos(), &p),
         );
+        let changes: Vec<(usize, f64)> = p.iter().copied().enumerate().collect();
+        let mut summed = vec![0.0; p.len()];
+        operator.add_opened(&changes, &mut summed);
+        assert_alike(&summed, &gap);
         let coupling = 1.17 * (1.0 + 1.0 / (1.0 - NU));
         let (a, b) = (-0.226 * (1.0 - 2.0 * NU), 1.29 * NU - 0.163);
         let along = |x: f64, d: f64, turn: f64, own: f64| match d == 0.0 {

@@ -28,8 +28,8 @@ use crate::contact::numerics::flood_fill::groups;
 const LOOK: f64 = 0.1;
 /// Cells across the overlaps on the grid that finds the contact.
 const FIRST: f64 = 24.0;
-/// Least and largest number of cells along x and s.
-const CELLS: [usize; 2] = [8, 600];
+/// Largest number of cells along x and s.
+const CELLS_MAX: usize = 600;
 /// A finer grid is not needed where the present one has this part of the wanted cells.
 const FINE_ENOUGH: f64 = 0.9;
 /// A strip whose least gap is larger than this, in mm, is no part of the contact.
@@ -112,15 +112,15 @@ pub(crate) struct Friction {
 pub(crate) type Workspace = BentWorkspace;
 
 impl PressureInfluence for BentOperator {
-    const CHANGES_MAX: usize = 0;
+    const CHANGES_MAX: usize = 12;
     type Workspace = BentWorkspace;
 
     fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut BentWorkspace) {
         self.opened_by_pressure(pressure, displacement, workspace);
     }
 
-    fn add(&self, changes: &[(usize, f64)], _: &mut [f64]) {
-        debug_assert!(changes.is_empty());
+    fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
+        self.add_opened(changes, displacement);
     }
 
     fn own(&self) -> f64 {
@@ -456,7 +456,7 @@ impl CurveTask<'_> {
             let margin = FREE as f64 * step[k];
             [window[k][0] - margin, window[k][1] + margin]
         });
-        let step = [0, 1].map(|k| step[k].max((window[k][1] - window[k][0]) / CELLS[1] as f64));
+        let step = [0, 1].map(|k| step[k].max((window[k][1] - window[k][0]) / CELLS_MAX as f64));
         Ok(CurveGrid::new(self.curve, window, step))
     }
 
@@ -492,7 +492,7 @@ impl CurveTask<'_> {
             let wanted = step[axis].min(heaviest.1[axis]);
             match grid.step[axis] * FINE_ENOUGH < wanted {
                 true => grid.step[axis],
-                false => wanted.max(length / CELLS[1] as f64),
+                false => wanted.max(length / CELLS_MAX as f64),
             }
         })
     }

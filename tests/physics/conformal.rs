@@ -1,0 +1,467 @@
+//! Is the contact of a wheel on the curve of its rail right? Against CONTACT with curved surfaces of contact, against boundary elements, and where the
+//! rail does not bend against planes.
+
+use railhead::contact::case::limits::Limits;
+use railhead::contact::check;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::solution::words::answer::Solution;
+use serde_json::{Value, json};
+
+use crate::cases::assert_fault;
+use crate::profile_reference_files::reference_file;
+
+const RAIL: &str = include_str!("../../src/contact/examples/60e1.txt");
+const WHEEL: &str = include_str!("../../src/contact/examples/s1002.txt");
+
+fn solve(case: &Value) -> Solution {
+    let checked = check(case, &Limits::default()).unwrap_or_else(|error| panic!("{error}"));
+    let (solution, _) = railhead::contact::solve(&checked, &Unmonitored).unwrap();
+    solution
+}
+
+fn states() -> Vec<Value> {
+    let text = include_str!("../data/conformal.json");
+    let all: Value = serde_json::from_str(text).unwrap();
+    all["states"].as_array().unwrap().clone()
+}
+
+/// Points of an arc about `(0, centre)` from one angle to another, z down.
+fn arc(centre: f64, radius: f64, [from, to]: [f64; 2], count: usize) -> Vec<[f64; 2]> {
+    let at = |k: usize| from + (to - from) * k as f64 / count as f64;
+    let points = (0..=count).map(|k| [radius * at(k).sin(), centre - radius * at(k).cos()]);
+    points.collect()
+}
+
+/// A gauge corner of 12.7 mm beside a crown of 300 mm.
+fn gauge_corner() -> Vec<[f64; 2]> {
+    let mut points = arc(12.7, 12.7, [-1.35, 0.0], 200);
+    let [y, z] = points[0];
+    let face = (1..=15).rev().map(|k| {
+        let down = f64::from(k);
+        [y - down * 1.35_f64.cos(), z + down * 1.35_f64.sin()]
+    });
+    points.splice(0..0, face);
+    points.extend((1..=160).map(|k| {
+        let y = 0.25 * f64::from(k);
+        [y, y * y / 600.0]
+    }));
+    points
+}
+
+/// A root of a flange of a radius, beside a tread that falls off.
+fn flange_root(radius: f64) -> Vec<[f64; 2]> {
+    let mut points = arc(radius, radius, [-1.3, 0.0], 200);
+    let [y, z] = points[0];
+    let face = (1..=8).rev().map(|k| {
+        let down = f64::from(k);
+        [y - down * 1.3_f64.cos(), z + down * 1.3_f64.sin()]
+    });
+    points.splice(0..0, face);
+    points.extend((1..=120).map(|k| {
+        let y = 0.375 * f64::from(k);
+        [
+            y,
+            if y < 15.0 {
+                -y * y / 600.0
+            } else {
+                -0.05 * y + 0.375
+            },
+        ]
+    }));
+    points
+}
+
+/// A groove of a radius in a flat rail.
+fn groove(radius: f64) -> Vec<[f64; 2]> {
+    let floor = |k: i32| {
+        let y = 0.1 * f64::from(k);
+        let down = radius * radius - y * y;
+        [
+            y,
+            if down > 0.0 {
+                down.sqrt() - radius
+            } else {
+                -radius
+            },
+        ]
+    };
+    (-206..=206).map(floor).collect()
+}
+
+/// A wheel whose tread is half a circle of 10 mm.
+fn round_wheel() -> Vec<[f64; 2]> {
+    let tread = |k: i32| {
+        let y = 0.1 * f64::from(k);
+        [y, (100.0 - y * y).sqrt() - 10.0]
+    };
+    (-99..=99).map(tread).collect()
+}
+
+/// A section of a state: made here, or a file beside the checkout.
+fn section(file: &str) -> Option<Value> {
+    let points = |points: Vec<[f64; 2]>| {
+        Some(json!({ "points_mm": points, "mirror_y": false, "mirror_z": false }))
+    };
+    match file {
+        "gc_r12.7.prr" => points(gauge_corner()),
+        "fr_r13.0.prw" => points(flange_root(13.0)),
+        "fr_r13.3.prw" => points(flange_root(13.3)),
+        "groove_r1025.prr" => points(groove(10.25)),
+        "circ_r10.prw" => points(round_wheel()),
+        file => {
+            let text = reference_file(&format!("extended/profiles/{file}"))?;
+            Some(json!({ "format": "simpack", "text": text }))
+        }
+    }
+}
+
+/// The case of a state on the curve of its rail, if its sections are at hand.
+fn case_of(state: &Value, influence: &str) -> Option<Value> {
+    let mut contact = state["contact"].clone();
+    contact["type"] = json!("profiles");
+    contact["rail"] = section(state["rail_file"].as_str()?)?;
+    contact["wheel"] = section(state["wheel_file"].as_str()?)?;
+    contact["accept_rough_profiles"] = json!(true);
+    contact["reference_surface"] = json!("curve");
+    contact["influence"] = json!(influence);
+    Some(json!({
+        "material": { "shear_modulus_mpa": state["shear_modulus_mpa"], "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": contact,
+        "load": { "vertical_force_n": state["vertical_force_n"] },
+        "motion": { "wheelset": {
+            "speed_mm_per_s": state["speed_mm_per_s"],
+            "angular_velocity_rad_per_s": state["angular_velocity_rad_per_s"]
+        } },
+        "solver": { "target_error": 0.005 },
+        "outputs": ["resultants"]
+    }))
+}
+
+fn limit(solution: &Solution) -> f64 {
+    0.3 * solution
+        .patches
+        .iter()
+        .map(|p| p.normal_force_n)
+        .sum::<f64>()
+}
+
+fn pressure(solution: &Solution) -> f64 {
+    let pressures = solution.patches.iter().map(|p| p.pressure_max_mpa);
+    pressures.fold(0.0, f64::max)
+}
+
+/// The steep state under 5 GPa is left out: there CONTACT takes the normal 0.1 mm beside the place where the bodies are pressed together, which changes
+/// the lateral force by 3.6 % of μN.
+#[test]
+fn half_spaces_on_the_curve_agree_with_conformal_contact() {
+    let mut compared = 0;
+    for state in states()
+        .iter()
+        .filter(|s| s["id"] != "mb_y7.0_75kN_yaw16.8")
+    {
+        let Some(case) = case_of(state, "half_space") else {
+            continue;
+        };
+        let (id, known) = (&state["id"], &state["half_space"]);
+        let solution = solve(&case);
+        let (total, limit) = (&solution.total[0], limit(&solution));
+        for (name, found) in [
+            ("force_x_n", total.force_x_n),
+            ("force_y_n", total.force_y_n),
+        ] {
+            let [value, unc] = ["value", "unc"].map(|part| known[name][part].as_f64().unwrap());
+            let off = (found - value).abs();
+            assert!(
+                off < 0.01 * limit + unc,
+                "{id} {name}: {found} {value}, μN {limit}"
+            );
+        }
+        let load = state["vertical_force_n"].as_f64().unwrap();
+        assert!(
+            (total.force_z_n.unwrap() / -load - 1.0).abs() < 2e-4,
+            "{id}"
+        );
+        let known_pressure = known["pressure_max_mpa"].as_f64().unwrap();
+        assert!(
+            (pressure(&solution) / known_pressure - 1.0).abs() < 0.02,
+            "{id}"
+        );
+        // Lobes of one patch there may be patches of their own here.
+        let forces = known["patch_forces_n"].as_array().unwrap();
+        let all: f64 = forces.iter().map(|force| force.as_f64().unwrap()).sum();
+        let found: f64 = solution.patches.iter().map(|p| p.normal_force_n).sum();
+        assert!((found - all).abs() < 0.01 * load, "{id}: {found} {all}");
+        for force in forces.iter().filter(|_| forces.len() > 1) {
+            let force = force.as_f64().unwrap();
+            let nearest = |p: &f64| (p - force).abs();
+            let patches = solution.patches.iter().map(|p| p.normal_force_n);
+            let off = patches.map(|p| nearest(&p)).fold(f64::INFINITY, f64::min);
+            assert!(off < 0.01 * load, "{id}: no patch with {force} N");
+        }
+        compared += 1;
+    }
+    assert!(compared >= 3, "the states on made profiles need no file");
+}
+
+#[test]
+fn the_factors_for_the_turn_give_the_forces_of_boundary_elements() {
+    let mut compared = 0;
+    for state in states() {
+        let Some(exact) = state.get("boundary_elements") else {
+            continue;
+        };
+        let Some(case) = case_of(&state, "angle_corrected") else {
+            continue;
+        };
+        let solution = solve(&case);
+        let (total, limit) = (&solution.total[0], limit(&solution));
+        let remark = solution.remarks.iter().find(|r| r.code == "turn-corrected");
+        let figures = serde_json::to_value(remark.unwrap()).unwrap();
+        let open = figures["open"].as_f64().unwrap();
+        for (name, found) in [
+            ("force_x_n", total.force_x_n),
+            ("force_y_n", total.force_y_n),
+        ] {
+            let off = (found - exact[name].as_f64().unwrap()).abs() / limit;
+            assert!(off < 0.02, "{} {name}: {off}", state["id"]);
+            assert!(
+                off < open + 0.005,
+                "{} {name}: {off}, {open} left open",
+                state["id"]
+            );
+        }
+        compared += 1;
+    }
+    assert!(compared >= 1, "the state on made profiles needs no file");
+}
+
+/// Li's grooves (CONTACT's conformal example): the closer the wheel fits, the less half-spaces with and without factors agree.
+#[test]
+fn grooves_have_the_pressures_and_approaches_of_conformal_contact() {
+    let state = states()
+        .into_iter()
+        .find(|s| s["id"] == "groove_r10.25_10kN")
+        .unwrap();
+    for (radius, pressures, approach) in [
+        (10.25, [530.2, 520.6], 0.02237),
+        (10.1, [409.3, 397.6], 0.01939),
+        (10.05, [348.7, 336.1], 0.01743),
+        (10.02, [296.8, 283.6], 0.01541),
+    ] {
+        for (influence, known) in ["half_space", "angle_corrected"].into_iter().zip(pressures) {
+            let mut case = case_of(&state, influence).unwrap();
+            let floor =
+                json!({ "points_mm": groove(radius), "mirror_y": false, "mirror_z": false });
+            case["contact"]["rail"] = floor;
+            let solution = solve(&case);
+            let found = pressure(&solution);
+            assert!(
+                (found / known - 1.0).abs() < 0.02,
+                "{radius} {influence}: {found} {known}"
+            );
+            if influence == "half_space" {
+                let found = solution.wheel_lowering_mm.unwrap();
+                assert!(
+                    (found / approach - 1.0).abs() < 0.01,
+                    "{radius}: {found} {approach}"
+                );
+            }
+        }
+    }
+}
+
+/// S1002 on 60E1 without inclination, right wheel.
+fn usual(surface: &str, shift: f64, yaw: f64) -> Value {
+    json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": {
+            "type": "profiles",
+            "rail": { "format": "columns", "text": RAIL },
+            "wheel": { "format": "columns", "text": WHEEL },
+            "side": "right",
+            "rolling_radius_mm": 460,
+            "cant_rad": 0.025,
+            "lateral_shift_mm": shift,
+            "yaw_rad": yaw,
+            "reference_surface": surface
+        },
+        "load": { "vertical_force_n": 75e3 },
+        "motion": { "wheelset": { "speed_mm_per_s": 20e3, "free_rolling_radius_mm": 460.3 } },
+        "solver": { "target_error": 0.005 },
+        "outputs": ["resultants"]
+    })
+}
+
+fn mirrored(case: &Value) -> Value {
+    let mut case = case.clone();
+    let contact = &mut case["contact"];
+    contact["side"] = json!("left");
+    for name in ["lateral_shift_mm", "yaw_rad"] {
+        contact[name] = json!(-contact[name].as_f64().unwrap());
+    }
+    case
+}
+
+#[test]
+fn a_rail_that_hardly_bends_has_the_forces_of_a_plane() {
+    for shift in [0.0, 2.0] {
+        let [curve, plane] = ["curve", "plane"].map(|surface| solve(&usual(surface, shift, 0.002)));
+        let limit = limit(&plane);
+        let (found, known) = (&curve.total[0], &plane.total[0]);
+        for (found, known) in [
+            (found.force_x_n, known.force_x_n),
+            (found.force_y_n, known.force_y_n),
+        ] {
+            assert!(
+                (found - known).abs() < 0.015 * limit,
+                "{shift}: {found} {known}, μN {limit}"
+            );
+        }
+        assert!((pressure(&curve) / pressure(&plane) - 1.0).abs() < 0.01);
+        let lowering = [&curve, &plane].map(|s| s.wheel_lowering_mm.unwrap());
+        assert!(
+            (lowering[0] / lowering[1] - 1.0).abs() < 0.005,
+            "{lowering:?}"
+        );
+    }
+}
+
+#[test]
+fn the_left_wheel_is_the_mirror_image_of_the_right_one() {
+    let right = usual("curve", -6.0, 0.003);
+    let (right, left) = (solve(&right), solve(&mirrored(&right)));
+    let limit = limit(&right);
+    let [r, l] = [&right, &left].map(|s| s.total[0]);
+    assert!((r.force_x_n - l.force_x_n).abs() < 2e-4 * limit);
+    assert!((r.force_y_n + l.force_y_n).abs() < 2e-4 * limit);
+    assert_eq!(right.patches.len(), left.patches.len());
+}
+
+/// Loads that belong to each other, and creepages in place of the wheelset's motion.
+#[test]
+fn loads_and_motions_may_be_given_in_every_way() {
+    let vertical = usual("curve", -6.0, 0.003);
+    let known = solve(&vertical);
+    let limit = limit(&known);
+    let forces = |solution: &Solution| {
+        let total = &solution.total[0];
+        [total.force_x_n, total.force_y_n, total.force_z_n.unwrap()]
+    };
+    let normal: f64 = known.patches.iter().map(|p| p.normal_force_n).sum();
+    for load in [
+        json!({ "normal_force_n": normal }),
+        json!({ "approach_mm": known.wheel_lowering_mm }),
+    ] {
+        let mut case = vertical.clone();
+        case["load"] = load;
+        let found = solve(&case);
+        for (found, known) in forces(&found).into_iter().zip(forces(&known)) {
+            assert!((found - known).abs() < 3e-3 * limit, "{found} {known}");
+        }
+    }
+    // The wheel turns about more than the normal, which creepages at one place do not tell.
+    let mut case = vertical.clone();
+    case["motion"] = serde_json::to_value(known.patches[0].points[0].motion).unwrap();
+    let found = solve(&case);
+    for (found, known) in forces(&found).into_iter().zip(forces(&known)) {
+        assert!((found - known).abs() < 0.02 * limit, "{found} {known}");
+    }
+}
+
+/// Neighbours of a sweep on the tread differ by no more than their errors from a line.
+#[test]
+fn forces_do_not_jump_from_one_shift_to_the_next() {
+    let forces: Vec<[f64; 2]> = (0..8)
+        .map(|k| {
+            let solution = solve(&usual("curve", -3.0 - 0.05 * f64::from(k), 0.003));
+            let limit = limit(&solution);
+            [
+                solution.total[0].force_x_n / limit,
+                solution.total[0].force_y_n / limit,
+            ]
+        })
+        .collect();
+    for three in forces.windows(3) {
+        for k in [0, 1] {
+            let bend = three[0][k] - 2.0 * three[1][k] + three[2][k];
+            assert!(bend.abs() < 0.004, "{forces:?}");
+        }
+    }
+}
+
+#[test]
+fn fields_lie_about_the_load_centres_and_carry_the_forces() {
+    let mut case = usual("curve", -6.0, 0.003);
+    case["outputs"] = json!(["resultants", "zones", "tractions", "pressure", "slip"]);
+    let checked = check(&case, &Limits::default()).unwrap();
+    let (solution, fields) = railhead::contact::solve(&checked, &Unmonitored).unwrap();
+    for (patch, fields) in solution.patches.iter().zip(&fields.patches) {
+        let (cells, point) = (fields.cells(0), &fields.points[0]);
+        let pressure = cells.pressure_mpa.as_ref().unwrap();
+        let (x, y) = (
+            point.traction_x_mpa.as_ref().unwrap(),
+            point.traction_y_mpa.as_ref().unwrap(),
+        );
+        assert!(point.slip_x.is_some() && point.zone.is_some());
+        let (mut load, mut moment) = (0.0, [0.0; 2]);
+        for i in 0..pressure.len() {
+            let part = pressure[i] * cells.dx_mm[i] * cells.dy_mm[i];
+            load += part;
+            moment = [
+                moment[0] + part * cells.x_mm[i],
+                moment[1] + part * cells.y_mm[i],
+            ];
+            assert!(x[i].hypot(y[i]) <= 0.3 * pressure[i] * 1.000_001);
+        }
+        assert!((load / patch.normal_force_n - 1.0).abs() < 1e-6);
+        assert!(
+            moment[0].abs() < 0.05 * load && moment[1].abs() < 0.05 * load,
+            "{moment:?}"
+        );
+    }
+    assert!(solution.patches[0].points[0].slip_area_mm2.unwrap() > 0.0);
+}
+
+#[test]
+fn what_is_not_solved_on_the_curve_is_refused() {
+    let case = usual("curve", 0.0, 0.0);
+    let with = |pointer: &str, value: Value| crate::cases::with(&case, pointer, Some(value));
+    let motions = json!([{ "creepage_x": 0.001 }, { "creepage_x": 0.002 }]);
+    assert_fault(
+        &with("/motion", motions),
+        "/motion",
+        &["one motion", "plane"],
+    );
+    let history = json!({ "history": {
+        "distance_mm": [0.0, 5.0], "creepage_x": [0.0, 0.001]
+    } });
+    assert_fault(
+        &with("/motion", history),
+        "/motion/history",
+        &["history", "plane"],
+    );
+    let bodies = json!({
+        "upper": { "young_modulus_mpa": 210e3, "poisson_ratio": 0.3 },
+        "lower": { "young_modulus_mpa": 70e3, "poisson_ratio": 0.33 }
+    });
+    assert_fault(
+        &with("/material", bodies),
+        "/material",
+        &["differ", "plane"],
+    );
+    assert_fault(
+        &with("/solver", json!({ "method": "table" })),
+        "/solver/method",
+        &["boundary_element"],
+    );
+    assert_fault(
+        &with("/outputs", json!(["resultants", "gradients"])),
+        "/outputs/1",
+        &["plane"],
+    );
+    let plane = usual("plane", 0.0, 0.0);
+    let influence = crate::cases::with(&plane, "/contact/influence", Some(json!("half_space")));
+    assert_fault(&influence, "/contact/influence", &["curve"]);
+}
