@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::contact::case::limits::Limits;
 use crate::contact::case::words::contact::{
-    Contact, CrossSection, FormatName, Load, SideName, Smoothing, SurfaceName,
+    Contact, CrossSection, FormatName, InfluenceName, Load, SideName, Smoothing, SurfaceName,
 };
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::{Elastic, Material};
@@ -295,6 +295,41 @@ impl Contact {
             reference_surface: SurfaceName::Plane,
             influence: None,
         }
+    }
+
+    /// The same, if it is a wheel on a rail, solved on the curve of the rail.
+    ///
+    /// ```
+    /// use railhead_contact::{
+    ///     Case, Contact, CrossSection, Format, Friction, Load, Material, Side, SurfaceInfluence, Wheelset,
+    /// };
+    ///
+    /// let rail = CrossSection::text(Format::Columns, include_str!("examples/60e1.txt"));
+    /// let wheel = CrossSection::text(Format::Columns, include_str!("examples/s1002.txt"));
+    /// let contact = Contact::profiles(rail, wheel, Side::Right, 460.0);
+    /// let solution = Case::new(
+    ///     Material::steel(),
+    ///     Friction::coulomb(0.3),
+    ///     contact.on_curve(SurfaceInfluence::AngleCorrected),
+    /// )
+    /// .load(Load::vertical_force(75e3))
+    /// .motion(Wheelset::rolling_freely(20e3, 460.0))
+    /// .solve()?;
+    /// assert!((solution.total[0].force_z_n.unwrap() + 75e3).abs() < 10.0);
+    /// # Ok::<(), railhead_contact::Error>(())
+    /// ```
+    #[must_use]
+    pub fn on_curve(mut self, asked: InfluenceName) -> Contact {
+        if let Contact::Profiles {
+            reference_surface,
+            influence,
+            ..
+        } = &mut self
+        {
+            *reference_surface = SurfaceName::Curve;
+            *influence = Some(asked);
+        }
+        self
     }
 }
 

@@ -53,7 +53,8 @@ pub mod contact;
 
 pub use contact::case::limits::Limits;
 pub use contact::case::words::contact::{
-    Contact, CrossSection, FormatName as Format, Load, SideName as Side,
+    Contact, CrossSection, FormatName as Format, InfluenceName as SurfaceInfluence, Load,
+    SideName as Side, SurfaceName as ReferenceSurface,
 };
 pub use contact::case::words::friction::Friction;
 pub use contact::case::words::material::{Elastic, Material};

@@ -45,10 +45,16 @@ const GRIDS_MAX: usize = 12;
 const FORCE_FIRST: f64 = 0.03;
 /// Tolerance of the force.
 const FORCE: f64 = 2e-5;
+/// A force that is missed by more than this is no answer.
+const FORCE_POOR: f64 = 5e-3;
 /// Violation of the contact conditions relative to the deepest overlap.
 const VIOLATION: f64 = 2e-5;
 /// Least lowering of the wheel in mm that is tried.
 const LOWERING_LEAST: f64 = 1e-4;
+/// Largest step of the lowering over the lowering.
+const STEP_LARGEST: f64 = 0.6;
+/// A bracket of the lowering narrower than this part of it is closed.
+const BRACKET_MIN: f64 = 1e-9;
 /// Runs of contact on a half-space that lie nearer than this, in mm, act on each other.
 const APART_ON_HALF_SPACE: f64 = 4.0;
 
@@ -172,15 +178,18 @@ impl CurveGrid {
             };
             let mut row = vec![None; self.x.len()];
             let from = self.x.partition_point(|centre| *centre < x);
+            let (behind, ahead) = row.split_at_mut(from);
+            let (behind, ahead) = (behind.iter_mut().rev(), ahead.iter_mut());
+            let behind = behind.zip(self.x[..from].iter().rev());
             let mut start = Some(nearest);
-            for i in (0..from).rev() {
-                start = start.and_then(|start| curve.over(place, self.x[i], centre, &start));
-                row[i] = start;
+            for (wheel, x) in behind {
+                start = start.and_then(|start| curve.over(place, *x, centre, &start));
+                *wheel = start;
             }
             start = Some(nearest);
-            for i in from..self.x.len() {
-                start = start.and_then(|start| curve.over(place, self.x[i], centre, &start));
-                row[i] = start;
+            for (wheel, x) in ahead.zip(&self.x[from..]) {
+                start = start.and_then(|start| curve.over(place, *x, centre, &start));
+                *wheel = start;
             }
             over.extend(row);
         }
@@ -550,7 +559,7 @@ impl CurveTask<'_> {
             runs,
             mut pressure,
             mut centre,
-            mut slope,
+            slope,
             mut heights,
             mut iterations,
         } = start;
@@ -571,8 +580,11 @@ impl CurveTask<'_> {
                     .to_owned(),
             ));
         }
-        let mut bounds = [0.0, f64::INFINITY];
-        let mut before: Option<[f64; 2]> = None;
+        let mut search = HeightSearch {
+            bounds: [0.0, f64::INFINITY],
+            before: None,
+            slope,
+        };
         for height in 0..HEIGHTS_MAX {
             let over = grid.over(self.curve, centre);
             let gap = gap(&over, friction.opened.as_deref());
@@ -600,8 +612,13 @@ impl CurveTask<'_> {
             let carried = carried(self.loading, &grid, &pressure);
             let lowering = self.touch - centre;
             let missed = wanted.map_or(0.0, |wanted| carried / wanted - 1.0);
-            let narrow = bounds[1] - bounds[0] < 1e-9 * lowering.abs();
-            if missed.abs() <= tolerance || narrow || height + 1 == HEIGHTS_MAX {
+            if missed.abs() <= tolerance || search.is_closed() || height + 1 == HEIGHTS_MAX {
+                if missed.abs() > tolerance.max(FORCE_POOR) {
+                    return Err(NormalError::NoAnswer(format!(
+                        "no height of the wheel was found on the curve of the rail at which it carries its load, which is missed by {:.1} %",
+                        100.0 * missed.abs()
+                    )));
+                }
                 let work = NormalWork {
                     cells: grid.cells(),
                     grids: 1,
@@ -619,40 +636,65 @@ impl CurveTask<'_> {
                     work,
                     heights,
                     missed: missed.abs(),
-                    slope,
+                    slope: search.slope,
                 });
             }
             let wanted = wanted.unwrap_or(carried);
-            if carried < wanted {
-                bounds[0] = bounds[0].max(lowering);
-            } else {
-                bounds[1] = bounds[1].min(lowering);
-            }
-            let power = |force: f64| force.max(0.0).powf(2.0 / 3.0);
-            if let Some([at, was]) = before
-                && (at - lowering).abs() > 1e-12
-                && (power(carried) - was) / (lowering - at) > 0.0
-            {
-                slope = (power(carried) - was) / (lowering - at);
-            } else if slope <= 0.0 && carried > 0.0 {
-                slope = power(carried) / lowering.max(LOWERING_LEAST);
-            }
-            before = Some([lowering, power(carried)]);
-            let step = match slope > 0.0 {
-                true => (power(wanted) - power(carried)) / slope,
-                false => lowering.max(LOWERING_LEAST),
-            };
-            let largest = 0.6 * lowering.abs().max(LOWERING_LEAST);
-            let mut next = lowering + step.clamp(-largest, largest);
-            if next <= bounds[0] || next >= bounds[1] {
-                next = match bounds[1].is_finite() {
-                    true => 0.5 * (bounds[0] + bounds[1]),
-                    false => 1.5 * lowering.max(LOWERING_LEAST),
-                };
-            }
-            centre = self.touch - next;
+            centre = self.touch - search.next([lowering, carried], wanted);
         }
         unreachable!("the last height ends the search")
+    }
+}
+
+/// The search for the lowering of a wheel that carries a force: secant steps in the force to the power 2/3, kept between what carries too little and
+/// too much.
+struct HeightSearch {
+    bounds: [f64; 2],
+    /// The last lowering in mm, and the power of its force.
+    before: Option<[f64; 2]>,
+    /// Power of the force per mm; 0 where it is not known.
+    slope: f64,
+}
+
+impl HeightSearch {
+    fn is_closed(&self) -> bool {
+        self.bounds[1] - self.bounds[0] < BRACKET_MIN * self.bounds[1]
+    }
+
+    /// The lowering to try after one in mm with its force in N.
+    fn next(&mut self, [lowering, carried]: [f64; 2], wanted: f64) -> f64 {
+        let [low, high] = &mut self.bounds;
+        if carried < wanted {
+            *low = low.max(lowering);
+        } else {
+            *high = high.min(lowering);
+        }
+        let power = |force: f64| force.max(0.0).powf(2.0 / 3.0);
+        let here = power(carried);
+        let secant = self
+            .before
+            .filter(|[at, _]| *at != lowering)
+            .map(|[at, was]| (here - was) / (lowering - at));
+        let least = lowering.max(LOWERING_LEAST);
+        match secant.filter(|slope| *slope > 0.0) {
+            Some(slope) => self.slope = slope,
+            None if self.slope <= 0.0 => self.slope = here / least,
+            None => {}
+        }
+        self.before = Some([lowering, here]);
+        let step = match self.slope > 0.0 {
+            true => (power(wanted) - here) / self.slope,
+            false => least,
+        };
+        let next = lowering + step.clamp(-STEP_LARGEST * least, STEP_LARGEST * least);
+        let [low, high] = self.bounds;
+        if next > low && next < high {
+            next
+        } else if high.is_finite() {
+            0.5 * (low + high)
+        } else {
+            (1.0 + STEP_LARGEST) * least
+        }
     }
 }
 
