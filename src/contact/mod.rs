@@ -9,7 +9,8 @@
 //! | motions, from coarse to fine levels | footprint, [`friction`] | [`MotionAnswer`](rolling::motion_answer::MotionAnswer) | [`rolling_stage`], [`rolling`], [`mesh`], [`half_space`] |
 //! | answer | answers of motions | [`Solution`], [`Fields`] | [`post`], [`solution`] |
 //!
-//! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`] (in `unlike_motions`), [`wheel_on_rail`] (in [`profile_trust`]), [`wheelset`].
+//! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`] (in `unlike_motions`), [`wheel_on_rail`] (in [`profile_trust`]), on the curve of the rail in
+//! `wheel_on_curve`, [`wheelset`].
 //! Frame, signs, units and words: [`conventions`].
 //!
 //! # The way of a motion

@@ -101,6 +101,7 @@ struct CurveSolve<'a> {
     curve: ReferenceCurve<'a>,
     touch: f64,
     expected: f64,
+    fineness: GridFineness,
     watch: &'a TimeLimit<'a>,
 }
 
@@ -171,6 +172,7 @@ impl<'a> CurveSolve<'a> {
             curve: ReferenceCurve::new(&contact.geometry),
             touch: search.touch,
             expected,
+            fineness: GridFineness::for_answer(case.run.target()),
             watch,
         })
     }
@@ -183,7 +185,7 @@ impl<'a> CurveSolve<'a> {
             loading: self.contact.loading,
             touch: self.touch,
             expected: self.expected,
-            fineness: GridFineness::for_answer(self.case.run.target()),
+            fineness: self.fineness,
         }
     }
 
@@ -538,6 +540,7 @@ impl<'a> CurveSolve<'a> {
         let unfolded = CurveSolve {
             influence: Influence::Unfolded,
             curve: self.curve.clone(),
+            fineness: GridFineness::for_answer(TARGET_OF_ROUNDS),
             ..*self
         };
         let run = self.case.run.for_resultants(TARGET_OF_ROUNDS);
