@@ -626,9 +626,15 @@ impl<'a> CurveSolve<'a> {
                 patch: remark.patch.map(|patch| patch + first),
                 ..remark.clone()
             }));
+            let error = self.error_of(&part, centre);
+            total.error_estimate = total.error_estimate.zip(error).map(|(a, b)| a.plus(b));
             for (k, forces) in forces.iter().enumerate() {
-                let own = self.add_patch(&contact, &mut part, k, forces, centre)?;
-                add(&mut total, &own);
+                let moment = self.add_patch(&contact, &mut part, k, forces, centre)?;
+                let [x, y, z] = forces.in_track();
+                total.force_x_n += x;
+                total.force_y_n += y;
+                total.force_z_n = total.force_z_n.map(|sum| sum + z);
+                total.moment_z_n_mm += moment;
                 let [.., low, high] = part.solution.patches[k].extent_mm;
                 let turned = [low, high].map(|s| self.curve.at(s + part.origin[1]).angle);
                 let turn_rad = (turned[1] - turned[0]).abs();
@@ -671,8 +677,8 @@ impl<'a> CurveSolve<'a> {
         Ok((wheel, solution, fields))
     }
 
-    /// Completes a patch with its position, its force at its mean angle and the motion at its load centre; returns its part of the total, with the
-    /// moment about the vertical line through a point `[x, y]`.
+    /// Completes a patch with its position, its force at its mean angle and the motion at its load centre; returns its moment about the
+    /// vertical line through a point `[x, y]` of the track.
     fn add_patch(
         &self,
         contact: &CurveContact,
@@ -680,7 +686,7 @@ impl<'a> CurveSolve<'a> {
         k: usize,
         forces: &PatchForces,
         about: [f64; 2],
-    ) -> Result<Total, SolveError> {
+    ) -> Result<f64, SolveError> {
         let geometry = &self.contact.geometry;
         let centre = self.centre_of(part, k)?;
         let (place, over) = self.load_centre(contact, centre)?;
@@ -726,25 +732,19 @@ impl<'a> CurveSolve<'a> {
         point.normalised = normalised(elasticity, patch.area_mm2, limit, &motion);
         point.friction_power_without_spin_n =
             (motion.creepage_x * along).abs() + (motion.creepage_y * point.force_y_n).abs();
-        let [force_x_n, force_y_n, force_z_n] = forces.in_track();
-        let error_estimate = point.error_estimate.map(|error| {
-            let across = error.force_y_n * cos.abs();
-            let arm = [centre[0] - about[0], y - about[1]];
-            ErrorEstimate {
-                force_x_n: error.force_x_n,
-                force_y_n: across,
-                moment_z_n_mm: error.moment_z_n_mm * cos.abs()
-                    + arm[0].abs() * across
-                    + arm[1].abs() * error.force_x_n,
-            }
-        });
-        Ok(Total {
-            force_x_n,
-            force_y_n,
-            force_z_n: Some(force_z_n),
-            moment_z_n_mm: moment,
-            error_estimate,
-            profile_uncertainty: None,
+        Ok(moment)
+    }
+
+    /// The errors of the forces of a part in track axes, of its moment about the vertical line through a point `[x, y]`.
+    fn error_of(&self, part: &Part, about: [f64; 2]) -> Option<ErrorEstimate> {
+        let [x, s] = part.origin;
+        let arm = [x - about[0], self.curve.at(s).at[0] - about[1]];
+        let error = part.solution.total[0].error_estimate?;
+        Some(ErrorEstimate {
+            moment_z_n_mm: error.moment_z_n_mm
+                + arm[0].abs() * error.force_y_n
+                + arm[1].abs() * error.force_x_n,
+            ..error
         })
     }
 
@@ -876,16 +876,4 @@ fn load_centre_of_all(curve: &ReferenceCurve, parts: &[Part]) -> [f64; 2] {
 
 fn sum(forces: impl Iterator<Item = [f64; 3]>) -> [f64; 3] {
     forces.fold([0.0; 3], |sum, force| [0, 1, 2].map(|k| sum[k] + force[k]))
-}
-
-/// Adds the part of a patch to a total.
-fn add(total: &mut Total, own: &Total) {
-    total.force_x_n += own.force_x_n;
-    total.force_y_n += own.force_y_n;
-    total.force_z_n = total.force_z_n.zip(own.force_z_n).map(|(a, b)| a + b);
-    total.moment_z_n_mm += own.moment_z_n_mm;
-    total.error_estimate = total
-        .error_estimate
-        .zip(own.error_estimate)
-        .map(|(a, b)| a.plus(b));
 }
