@@ -18,7 +18,9 @@ const BODIES = /** @type {const} */ (['rail', 'wheel']);
 const KEPT = 'railhead.case';
 const PAUSE_MS = 120;
 const WAIT_S = 10;
-const TYPED_WAIT_S = 5;
+const TYPED_WAIT_S = 8;
+/** A job that is cancelled may still run for a moment, and cannot be removed before. */
+const CANCELLED_MS = 1500;
 /** The example that a new tab begins with: a new wheel on a new rail, rolling freely. */
 const FIRST = 'wheel-rail';
 /** Estimated seconds up to which a case is solved while it is written; the first one may take longer, since nobody waits for the next. */
@@ -222,8 +224,9 @@ async function solveTyped(app, digest) {
     }
   } finally {
     app.compose({ preview: answer });
-    if (job.state === 'queued' || job.state === 'running') await cancel('jobs', job.id).catch(() => {});
-    await remove('jobs', job.id).catch(() => {});
+    const open = job.state === 'queued' || job.state === 'running';
+    if (open) await cancel('jobs', job.id).catch(() => {});
+    setTimeout(() => remove('jobs', job.id).catch(() => {}), open ? CANCELLED_MS : 0);
   }
 }
 

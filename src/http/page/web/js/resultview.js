@@ -3,7 +3,7 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { cancel } from './api.js';
 import { curveOf, isHistory } from './curvedata.js';
-import { isObject } from './document.js';
+import { isObject, put } from './document.js';
 import { damagePanel } from './damageview.js';
 import { downloads } from './downloads.js';
 import { drawProfiles } from './drawing/profiles.js';
@@ -52,6 +52,13 @@ function edit(app, looked) {
   app.go(formatRoute('compose'));
 }
 
+/** Solves a case whose profiles are too rough. @param {App} app @param {Looked} looked */
+function allTheSame(app, looked) {
+  if (!looked.document) return;
+  editDocument(app, put(looked.document, '/contact/accept_rough_profiles', true));
+  solve(app);
+}
+
 /** A job without a result. @param {App} app @param {Looked} looked */
 function waiting(app, looked) {
   const { job } = looked;
@@ -67,8 +74,9 @@ function waiting(app, looked) {
     case 'cancelled':
       return html`<section class="panel wait"><p class="fault big">${job.state === 'failed' ? (job.error?.title ?? 'Failed') : 'Cancelled'}</p>
         <p>${job.error?.detail ?? ''}</p>
-        ${(job.error?.errors ?? []).map((fault) => html`<p><code>${fault.pointer}</code> ${fault.detail}</p>`)}
-        <button @click=${() => edit(app, looked)}>Open the case</button></section>`;
+        ${(job.error?.errors ?? []).filter(({ detail }) => detail !== job.error?.detail).map((fault) => html`<p><code>${fault.pointer}</code> ${fault.detail}</p>`)}
+        <div class="actions"><button @click=${() => edit(app, looked)}>Open the case</button>
+        ${job.error?.detail?.includes('accept_rough_profiles') ? html`<button @click=${() => allTheSame(app, looked)}>Solve it all the same</button>` : nothing}</div></section>`;
     default:
       return html`<p class="pad quiet">Loading …</p>`;
   }
