@@ -7,7 +7,7 @@ use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, Components};
 use utoipa::openapi::{Discriminator, OpenApi, Ref, RefOr, Schema};
 
 /// Schemas that requests are made of; what they lead to belongs to them.
-const REQUESTS: [&str; 3] = ["Case", "CaseWithOptions", "EvaluateRequest"];
+const REQUESTS: [&str; 4] = ["Case", "CaseWithOptions", "EvaluateRequest", "TableUpload"];
 
 /// Names for the forms of a choice that have none, in their order.
 const FORMS: [(&str, &[&str]); 6] = [
