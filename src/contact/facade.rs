@@ -297,7 +297,7 @@ impl Contact {
         }
     }
 
-    /// The same, if it is a wheel on a rail, solved on the curve of the rail.
+    /// Chooses the curved surface of the rail for a contact of profiles. Other contacts stay unchanged.
     ///
     /// ```
     /// use railhead_contact::{

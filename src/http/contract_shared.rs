@@ -1,4 +1,4 @@
-//! What operations of the contract have in common is written once, in `components`, and referred to.
+//! Writes what several operations of the contract share once, in `components`, with references to it.
 
 use std::collections::BTreeMap;
 
@@ -67,7 +67,7 @@ fn write(value: &Value, path: &[&str], text: &mut String) {
     }
 }
 
-/// What is shared.
+/// A kind of component that operations share.
 #[derive(Debug, Clone, Copy)]
 enum Kind {
     Responses,
@@ -138,7 +138,7 @@ fn visit(document: &mut Value, kind: Kind, with: &mut impl FnMut(&str, &mut Valu
     }
 }
 
-/// The members of the member `name` of an object; nothing if there is none.
+/// The members of the member `name` of an object; empty if there is no such member.
 fn members<'v>(
     value: &'v mut Value,
     name: &str,

@@ -103,7 +103,7 @@ impl Footprint {
         }
     }
 
-    /// The same on a surface that slips beyond the motion of a plane.
+    /// Returns this footprint with a rigid slip of its own in every cell, added to that of the motion.
     #[must_use]
     pub(crate) fn with_slip(self, slip: SurfaceSlip) -> Footprint {
         Footprint {

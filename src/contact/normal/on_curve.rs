@@ -114,7 +114,7 @@ pub(crate) struct Friction {
     pub(crate) opened: Option<Vec<f64>>,
 }
 
-/// What is kept from solve to solve.
+/// Buffers that successive solves reuse.
 pub(crate) type Workspace = BentWorkspace;
 
 impl PressureInfluence for BentOperator {

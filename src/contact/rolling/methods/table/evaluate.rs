@@ -176,7 +176,7 @@ impl EllipseTable<'_> {
         creep
     }
 
-    /// The same as interpolated: F may be larger than μN by its error.
+    /// The interpolated values before they are limited: the force may exceed μN by the error of the table.
     #[must_use]
     #[inline(always)]
     pub(crate) fn interpolated(&self, creepage: [f64; 3]) -> Creep {
