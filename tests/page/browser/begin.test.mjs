@@ -141,3 +141,33 @@ test('a rail whose points jump says so, and is solved all the same on request', 
   await page.getByLabel('solve although the profiles are rough').click();
   assert.equal((await json(page)).contact.accept_rough_profiles, undefined);
 }));
+
+test('a curve radius sets the yaw rate, and another speed keeps the radius', () => onPage('', async (page) => {
+  await ready(page);
+  const radius = page.getByLabel('Curve radius');
+  await radius.fill('-300');
+  await page.getByText('to the right; rolls without slip at Δr = 2.3 mm').waitFor();
+  const rate = async () => (await json(page)).motion.wheelset.yaw_rate_rad_per_s;
+  assert.ok(Math.abs(await rate() - 20 / -300) < 1e-12);
+  await page.getByLabel('Speed').fill('36');
+  assert.ok(Math.abs(await rate() - 10 / -300) < 1e-12);
+  await radius.blur();
+  assert.equal(await radius.inputValue(), '-300');
+  await ready(page);
+  await radius.fill('');
+  assert.equal(await rate(), undefined);
+}));
+
+test('the contact can be solved on the curve of the rail, without the outputs that planes alone have', () => onPage('', async (page) => {
+  await ready(page);
+  await page.getByLabel('Contact surface').selectOption('curve of the rail');
+  await page.getByText('The contact bends around the rail').waitFor();
+  await page.getByLabel('Influence of cells').selectOption('as on a half-space');
+  const { contact, outputs, damage } = await json(page);
+  assert.deepEqual([contact.reference_surface, contact.influence, damage], ['curve', 'half_space', undefined]);
+  assert.ok(!outputs.includes('damage') && outputs.includes('temperature'));
+  await ready(page);
+  await page.getByLabel('Contact surface').selectOption('planes');
+  assert.deepEqual([(await json(page)).contact.reference_surface, (await json(page)).contact.influence], [undefined, undefined]);
+  await ready(page);
+}));

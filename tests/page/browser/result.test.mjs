@@ -320,3 +320,27 @@ function numpyReads(path, length) {
   const sum = execFileSync(python, ['-c', 'import numpy, sys; print(len(numpy.load(sys.argv[1])["traction_x_mpa"]))', path]);
   assert.equal(Number(sum.toString()), length);
 }
+
+test('on the curve of the rail the pressure stands along the rail', () => onPage('', async (page) => {
+  const bent = withFields('wheel-rail');
+  Object.assign(bent.contact, { reference_surface: 'curve', lateral_shift_mm: -6 });
+  const { id } = await service.solved(bent);
+  await page.goto(`${service.base}/#/jobs/${id}`);
+  const comb = page.locator('.drawing .patch .comb');
+  await comb.waitFor();
+  assert.ok(await page.getByRole('radio', { name: 'Contact', exact: true }).isChecked());
+  await page.getByText('pressure along the curve of the rail').waitFor();
+  // The base of the pressure lies on the rail within a pixel.
+  const away = await page.evaluate(() => {
+    const [rail, base] = ['.drawing .rail', '.drawing .patch .comb'].map((name) => (document.querySelector(name)?.getAttribute('d') ?? '')
+      .split(/[MLZ]/).filter(Boolean).map((pair) => pair.split(' ').map(Number)));
+    return Math.max(...base.slice(0, base.length / 2).map(([x, y]) => Math.min(...rail.slice(1).map(([x1, y1], at) => {
+      const [x0, y0] = rail[at];
+      const share = Math.min(1, Math.max(0, ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / ((x1 - x0) ** 2 + (y1 - y0) ** 2 || 1)));
+      return Math.hypot(x - x0 - share * (x1 - x0), y - y0 - share * (y1 - y0));
+    }))));
+  });
+  assert.ok(away < 1, `${away}`);
+  await page.getByRole('radio', { name: 'Whole head' }).check();
+  await page.getByRole('button', { name: 'Solve again on planes, with damage' }).waitFor();
+}));

@@ -1,7 +1,7 @@
 // What drawings compute, what files say, and the order of a case.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { gapOf } from '../../../src/http/page/web/js/placing.js';
+import { gapOf, unfolded } from '../../../src/http/page/web/js/placing.js';
 import { inOrder } from '../../../src/http/page/web/js/starts.js';
 import { bodiesOf, decoded, profileKind } from '../../../src/http/page/web/js/files.js';
 import { parseGapCurve, parseGrid } from '../../../src/http/page/web/js/tables.js';
@@ -87,4 +87,17 @@ test('a case is written in the order that a person would choose, and loses nothi
   assert.deepEqual(Object.keys(ordered), ['name', 'contact', 'motion', 'outputs', 'extra']);
   assert.deepEqual(Object.keys(/** @type {object} */ (ordered.contact)), ['type', 'lateral_mm']);
   assert.deepEqual(ordered, document);
+});
+
+test('places over an arc are found from the arc length, whichever way its points run', () => {
+  /** @type {[number, number][]} */
+  const arc = Array.from({ length: 401 }, (_, at) => [10 * Math.sin(-1 + at / 200), 10 * Math.cos(-1 + at / 200)]);
+  for (const line of [arc, [...arc].reverse()]) {
+    const on = unfolded(line, [10 * Math.sin(0.3), 10 * Math.cos(0.3)]);
+    for (const [s, height] of [[0, 0], [3, 0], [-5, 2]]) {
+      const [y, z] = on(s, height);
+      const angle = 0.3 + s / 10;
+      assert.ok(Math.hypot(y - (10 + height) * Math.sin(angle), z - (10 + height) * Math.cos(angle)) < 0.01, `${s}, ${height}: ${y}, ${z}`);
+    }
+  }
 });

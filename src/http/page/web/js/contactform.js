@@ -3,7 +3,7 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt, put } from './document.js';
 import { change, editDocument, isUntouched } from './editing.js';
-import { hasSections, lacksSection, PROFILES, standardSection, withContact, withEverything, withoutNameOf } from './starts.js';
+import { hasSections, isBent, lacksSection, onSurface, PROFILES, standardSection, withContact, withEverything, withoutNameOf } from './starts.js';
 import { choice, faultAt, field, fieldId } from './field.js';
 import { count, fixed, number } from './format.js';
 import { bodiesOf, decoded, profileKind } from './files.js';
@@ -57,7 +57,22 @@ function profileFields(app) {
       ${field(app, '/contact/roll_rad', 'Roll', 'mrad', { factor: 0.001, empty: '0' })}</div>
     <label class="slide"><span class="visually-hidden">Move the wheelset to the left</span>
       <input type="range" min="-8" max="8" step="0.05" .value=${String(shift)} @input=${slide}></label>
-    ${trackFields(app)}`;
+    ${trackFields(app)}
+    ${surfaceFields(app)}`;
+}
+
+const SURFACES = /** @type {const} */ ([[undefined, 'planes'], ['curve', 'curve of the rail']]);
+const INFLUENCES = /** @type {const} */ ([[undefined, 'corrected for the bend'], ['half_space', 'as on a half-space']]);
+
+/** The surface on which the contact is solved. @param {App} app */
+function surfaceFields(app) {
+  const { document } = app.store.get().compose;
+  const bent = isBent(document);
+  return html`<div class="pair">${choice(app, '/contact/reference_surface', 'Contact surface', SURFACES, { take: (value) => editDocument(app, onSurface(document ?? {}, value)) })}
+      ${bent ? choice(app, '/contact/influence', 'Influence of cells', INFLUENCES) : nothing}</div>
+    <p class="hint">${bent
+      ? 'The contact bends around the rail: for the gauge corner and conformal contact. One motion; without wear, fatigue and stress below the surface.'
+      : 'A plane of contact for each patch. At a gauge corner the contact bends: there choose the curve of the rail.'}</p>`;
 }
 
 /** Dimensions of the track and of the wheelset. @param {App} app */

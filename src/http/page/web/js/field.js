@@ -19,6 +19,7 @@ import { parse, parseList, textOf } from './written.js';
  * @property {boolean} [list] Takes one number or several.
  * @property {(value: JsonValue | undefined) => string} [format] What is shown of the value, where a unit does not say it.
  * @property {(written: string) => JsonValue | undefined} [read] The value of what was written.
+ * @property {(value: JsonValue | undefined) => void} [take] Changes the case where more than this value follows from it.
  */
 
 /** The id of the field of a pointer. @param {string} pointer */
@@ -50,7 +51,7 @@ export function field(app, pointer, label, unit, look = {}) {
     const { value } = /** @type {HTMLInputElement} */ (event.target);
     app.compose({ typing: { pointer, text: value } });
     const read = look.read ?? (look.text ? (text) => text || undefined : look.list ? (text) => parseList(text, look.factor) : (text) => parse(text, look.factor));
-    change(app, pointer, read(value));
+    (look.take ?? ((taken) => change(app, pointer, taken)))(read(value));
   };
   return html`<div class=${fault ? 'field bad' : 'field'}>
     <label for=${id}>${label}</label>
@@ -71,16 +72,17 @@ export function field(app, pointer, label, unit, look = {}) {
  * @param {string} pointer
  * @param {string} label
  * @param {readonly (readonly [JsonValue | undefined, string])[]} options Values and their texts; the first is undefined, the default of the service.
+ * @param {{ hint?: string, take?: (value: JsonValue | undefined) => void }} [look] As of a field.
  */
-export function choice(app, pointer, label, options) {
+export function choice(app, pointer, label, options, { hint, take = (value) => change(app, pointer, value) } = {}) {
   const value = at(app.store.get().compose.document ?? undefined, pointer);
   const known = options.some(([option]) => option === value);
   const fault = faultAt(app, pointer);
-  const pick = (/** @type {Event} */ event) => change(app, pointer, options[/** @type {HTMLSelectElement} */ (event.target).selectedIndex]?.[0]);
+  const pick = (/** @type {Event} */ event) => take(options[/** @type {HTMLSelectElement} */ (event.target).selectedIndex]?.[0]);
   return html`<div class=${fault ? 'field bad' : 'field'}><label for=${fieldId(pointer)}>${label}</label>
     <select id=${fieldId(pointer)} @change=${pick}>${options.map(([option, text]) => html`<option ?selected=${option === value}>${text}</option>`)}
       ${known ? nothing : html`<option selected>${JSON.stringify(value)}</option>`}</select>
-    ${fault ? html`<p class="fault">${fault.detail}</p>` : nothing}</div>`;
+    ${fault ? html`<p class="fault">${fault.detail}</p>` : hint ? html`<p class="hint">${hint}</p>` : nothing}</div>`;
 }
 
 /**

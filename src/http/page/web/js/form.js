@@ -7,6 +7,7 @@ import { fixed, number } from './format.js';
 import { contactFields } from './contactform.js';
 import { freeRolling, hasSections, ONE_MOTION, outputsOf, withContact, withEverything, withOutput, withoutExtras, withoutNameOf } from './starts.js';
 import { faultAt, field } from './field.js';
+import { parseRadius, radiusText } from './written.js';
 import { FIRST_HISTORY, historyFields } from './historyform.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -118,15 +119,34 @@ function wheelFields(app, type) {
     const kept = Object.fromEntries(Object.entries(given).filter(([member]) => !SIDEWAYS.some((known) => known.member === member)));
     change(app, '/motion/wheelset', { ...kept, [value]: SIDEWAYS.find(({ member }) => member === value)?.start ?? 0 });
   };
-  return html`<div class="pair">${field(app, '/motion/wheelset/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H })}
-      <div class="field"><label for="turning">Rotation</label><select id="turning" @change=${turn}>
+  const speed = numberAt(given, '/speed_mm_per_s');
+  const rate = numberAt(given, '/yaw_rate_rad_per_s');
+  // Another speed on the same curve.
+  const drive = (/** @type {JsonValue | undefined} */ next) => change(app, '/motion/wheelset', {
+    ...given, speed_mm_per_s: next ?? null, ...(rate && speed && Number(next) > 0 ? { yaw_rate_rad_per_s: (rate * Number(next)) / speed } : {}),
+  });
+  return html`<div class="pair">${field(app, '/motion/wheelset/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H, take: drive })}
+      ${field(app, '/motion/wheelset/yaw_rate_rad_per_s', 'Curve radius', 'm', {
+        empty: 'straight', format: (value) => radiusText(value, speed), read: (text) => parseRadius(text, speed), hint: curveNote(app, speed / rate),
+      })}</div>
+    <div class="pair"><div class="field"><label for="turning">Rotation</label><select id="turning" @change=${turn}>
         <option value="" ?selected=${free}>free, without torque</option>
-        ${ways.map(({ member, label }) => html`<option value=${member} ?selected=${!free && member === way?.member}>${label}</option>`)}</select></div></div>
-    <div class="pair">${free || !way ? nothing : field(app, `/motion/wheelset/${way.member}`, way.label, way.unit, { factor: way.factor })}
-      ${type === 'wheelset' ? nothing : html`<div class="field"><label for="sideways">Sideways</label><select id="sideways" @change=${move}>
+        ${ways.map(({ member, label }) => html`<option value=${member} ?selected=${!free && member === way?.member}>${label}</option>`)}</select></div>
+      ${free || !way ? nothing : field(app, `/motion/wheelset/${way.member}`, way.label, way.unit, { factor: way.factor })}</div>
+    <div class="pair">${type === 'wheelset' ? nothing : html`<div class="field"><label for="sideways">Sideways</label><select id="sideways" @change=${move}>
         ${SIDEWAYS.map(({ member, label }) => html`<option value=${member} ?selected=${member === across.member}>${label}</option>`)}</select></div>`}
       ${field(app, `/motion/wheelset/${across.member}`, across.label, across.unit, { factor: across.factor, empty: '0' })}</div>
     <p class="hint">${turningNote(app, way?.member, Boolean(free), numberAt(given, '/free_rolling_radius_mm'))}</p>`;
+}
+
+/** Half the distance of the two contacts of a wheelset on standard gauge, in mm. */
+const HALF_BASE_MM = 750;
+
+/** What a curve asks of a wheelset. @param {App} app @param {number} radius In mm. */
+function curveNote(app, radius) {
+  const wheel = numberAt(app.store.get().compose.document ?? undefined, '/contact/rolling_radius_mm');
+  const needed = Math.abs((2 * HALF_BASE_MM * wheel) / radius);
+  return Number.isFinite(needed) ? `to the ${radius > 0 ? 'left' : 'right'}; rolls without slip at Δr = ${number(needed, 2)} mm` : '+ to the left, − to the right';
 }
 
 /** What the rotation of the wheel means for its longitudinal force. @param {App} app @param {string | undefined} member @param {boolean} free @param {number} radius */

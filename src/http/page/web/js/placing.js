@@ -60,3 +60,35 @@ function envelope(line, pick) {
   }
   return heights;
 }
+
+/**
+ * Places over a line by the arc length from one of its points, positive to the left, and the height along its normal.
+ * @param {readonly Readonly<Place>[]} line From end to end.
+ * @param {Readonly<Place>} from A place on the line, or close to it.
+ * @returns {(along: number, height: number) => Place}
+ */
+export function unfolded(line, from) {
+  const points = line[0][0] < line[line.length - 1][0] ? line : [...line].reverse();
+  const lengths = [0];
+  for (let i = 1; i < points.length; i += 1) lengths.push(lengths[i - 1] + Math.hypot(points[i][0] - points[i - 1][0], points[i][1] - points[i - 1][1]));
+  let start = 0;
+  let nearest = Infinity;
+  for (let i = 1; i < points.length; i += 1) {
+    const [[y, z], [y1, z1]] = [points[i - 1], points[i]];
+    const length = lengths[i] - lengths[i - 1];
+    const share = length ? Math.min(1, Math.max(0, ((from[0] - y) * (y1 - y) + (from[1] - z) * (z1 - z)) / length ** 2)) : 0;
+    const away = Math.hypot(y + share * (y1 - y) - from[0], z + share * (z1 - z) - from[1]);
+    if (away >= nearest) continue;
+    nearest = away;
+    start = lengths[i - 1] + share * length;
+  }
+  return (along, height) => {
+    const at = start + along;
+    const after = lengths.findIndex((length) => length > at);
+    const i = after < 0 ? points.length - 1 : Math.max(1, after);
+    const length = lengths[i] - lengths[i - 1] || 1;
+    const [cos, sin] = [(points[i][0] - points[i - 1][0]) / length, (points[i][1] - points[i - 1][1]) / length];
+    const beyond = at - lengths[i - 1];
+    return [points[i - 1][0] + beyond * cos - height * sin, points[i - 1][1] + beyond * sin + height * cos];
+  };
+}

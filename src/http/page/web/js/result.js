@@ -7,7 +7,7 @@ import { hasFields, loadField } from './fields.js';
 import { offered, quantityOf, rangeOf } from './field/quantities.js';
 import { placed } from './placing.js';
 import { formatRoute } from './routes.js';
-import { hasSections } from './starts.js';
+import { hasSections, isBent } from './starts.js';
 import { flangeAngle, oneWheel, sideOf } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -32,6 +32,7 @@ import { flangeAngle, oneWheel, sideOf } from './wheelloads.js';
  * @property {Partial<Record<'left' | 'right', number>>} flange Angle of the flange of each wheel in rad, where it has one.
  * @property {'rail' | 'wheel'} wornBody On which cross-section wear is shown.
  * @property {boolean} ownScale Colours of one patch and motion alone, not one range for all.
+ * @property {boolean} near Of the profiles, only what is around the patches is drawn.
  * @property {number} patch
  * @property {number} point
  * @property {string} quantity Its key; empty if there is no field.
@@ -58,7 +59,7 @@ export function tellingPoint(points) {
 
 /** @param {Job} job @returns {Looked} */
 const fresh = (job) => ({
-  job, result: null, document: null, placed: null, asked: new Map(), fields: [], stresses: new Map(), flange: {}, wornBody: 'rail', ownScale: true, patch: 0, point: -1, quantity: '',
+  job, result: null, document: null, placed: null, asked: new Map(), fields: [], stresses: new Map(), flange: {}, wornBody: 'rail', ownScale: true, near: false, patch: 0, point: -1, quantity: '',
   held: null, border: true, arrows: true, mesh: false, curve: 'forces', wheelset: 'radii',
 });
 
@@ -147,6 +148,7 @@ async function followJob(app) {
 function show(app, result) {
   if (!looked) return;
   looked.result = result;
+  looked.near = isBent(looked.document);
   placeProfiles(app).catch(app.refused);
   looked.patch = Math.min(looked.patch, result.patches.length - 1);
   const { points } = result.patches[looked.patch];

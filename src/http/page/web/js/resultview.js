@@ -10,7 +10,7 @@ import { drawProfiles } from './drawing/profiles.js';
 import { editDocument, solve } from './editing.js';
 import { loadsPanel } from './loadsview.js';
 import { remarkList } from './remarks.js';
-import { inOrder, withEverything, withFields, withSpeed } from './starts.js';
+import { inOrder, isBent, onSurface, withEverything, withFields, withSpeed } from './starts.js';
 import { indexOf } from './field/cells.js';
 import { hasFields } from './fields.js';
 import { chooseAmounts, chosenAmounts } from './field/palette.js';
@@ -24,6 +24,7 @@ import { wheelsetPanel } from './wheelsetview.js';
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./result.js').Looked} Looked */
 /** @typedef {import('./api.js').Patch} Patch */
+/** @typedef {import('./document.js').JsonObject} JsonObject */
 /** @typedef {import('./api.js').Point} Point */
 /** @typedef {import('./api.js').JobResult} JobResult */
 /** @typedef {import('./fieldmap.js').CrosshairEvent} CrosshairEvent */
@@ -92,7 +93,7 @@ function loaded(app, looked, answer) {
     ${remarkList(answer.remarks ?? [], (place) => choose(app, place))}
     <div class=${mapped ? 'cols' : 'cols nofield'}>
       ${mapped ? fieldPanel(app, looked, answer) : html`<section class="panel wait"><p>The case asked for no fields, so there is no map.</p>
-        <button class="primary" @click=${() => again(app, looked)}>Solve again with fields</button></section>`}
+        <button class="primary" @click=${() => again(app, looked.document)}>Solve again with fields</button></section>`}
       <div class="aside">
         ${looked.placed && patch.position ? profilePanel(app, looked, answer) : nothing}
         ${answer.wheelset ? wheelsetPanel(app, looked, answer.wheelset) : nothing}
@@ -102,14 +103,14 @@ function loaded(app, looked, answer) {
         ${factsPanel(answer, patch, point)}
       </div>
     </div>
-    ${damagePanel(app, looked, answer, () => again(app, looked))}`;
+    ${damagePanel(app, looked, answer, () => again(app, looked.document && onSurface(looked.document, undefined)))}`;
 }
 
-/** @param {App} app @param {Looked} looked */
-function again(app, looked) {
-  if (!looked.document) return;
-  editDocument(app, isObject(looked.document.motion) && 'history' in looked.document.motion
-    ? { ...looked.document, outputs: withFields(looked.document.outputs) } : withEverything(withSpeed(looked.document)));
+/** Solves a case again with all that is drawn. @param {App} app @param {JsonObject | null} document */
+function again(app, document) {
+  if (!document) return;
+  const steady = !(isObject(document.motion) && 'history' in document.motion);
+  editDocument(app, steady && !isBent(document) ? withEverything(withSpeed(document)) : { ...document, outputs: withFields(document.outputs) });
   solve(app);
 }
 
@@ -235,10 +236,13 @@ function combOf(field) {
 function profilePanel(app, looked, answer) {
   const standing = {
     patches: answer.patches, combs: answer.patches.map((_, at) => combOf(looked.fields[at])), chosen: looked.patch,
-    choose: (/** @type {number} */ patch) => choose(app, { patch }),
+    choose: (/** @type {number} */ patch) => choose(app, { patch }), bent: isBent(looked.document), near: looked.near,
   };
+  const parts = /** @type {const} */ ([[false, 'Whole head'], [true, 'Contact']]);
   return html`<section class="panel" aria-labelledby="h-profiles"><header class="bar"><h2 id="h-profiles">On the profiles</h2>
-    <span class="hint">${standing.combs[0] ? 'with the pressure on the rail' : ''}</span></header>
+    <span class="hint">${standing.combs[0] ? `pressure ${standing.bent ? 'along the curve of the rail' : 'on the rail'}` : ''}</span>
+    <div class="segs" role="group" aria-label="Part of the profiles">${parts.map(([near, label]) => html`<label class="seg">
+      <input type="radio" name="near" .checked=${looked.near === near} @change=${() => choose(app, { near })}><span>${label}</span></label>`)}</div></header>
     <div class="figure">${drawProfiles(looked.placed, standing)}</div></section>`;
 }
 

@@ -64,3 +64,12 @@ export function parseInclination(written) {
   const steps = ratio ? Number(ratio[2].replace(',', '.')) : 0;
   return ratio && steps > 0 ? (ratio[1] ? -1 : 1) * Number((1 / steps).toPrecision(12)) : parse(written);
 }
+
+/** A curve radius in m, positive to the left, of a yaw rate; empty on straight track. @param {JsonValue | undefined} rate In rad/s. @param {number} speed In mm/s. */
+export const radiusText = (rate, speed) => (typeof rate !== 'number' ? textOf(rate) : rate === 0 ? '' : textOf(Number((speed / rate / 1000).toPrecision(6))));
+
+/** The yaw rate in rad/s on a curve whose radius was written in m; undefined on straight track. @param {string} written @param {number} speed In mm/s. */
+export function parseRadius(written, speed) {
+  const radius = parse(written, 1000);
+  return typeof radius !== 'number' ? radius : radius === 0 || !(speed > 0) ? undefined : speed / radius;
+}

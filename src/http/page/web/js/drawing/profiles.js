@@ -2,6 +2,7 @@
 
 import { html, nothing, svg } from '../../vendor/lit-html.js';
 import { degrees, number, tickLabel, ticks } from '../format.js';
+import { unfolded } from '../placing.js';
 import { grid, path, scaleOf } from './axes.js';
 
 /** @typedef {import('../placing.js').Placed} Placed */
@@ -16,12 +17,17 @@ import { grid, path, scaleOf } from './axes.js';
  * @property {readonly (Comb | null)[]} combs
  * @property {number} chosen
  * @property {(patch: number) => void} choose
+ * @property {boolean} bent The patches follow the curve of the rail.
+ * @property {boolean} near Only the surroundings of the patches are drawn, not the whole head.
  */
 
 const WIDTH = 560;
 const TOP_MM = 27;
-const COMB_MM = 15;
-const TAG_MM = 21;
+/** Heights of the largest pressure and of the number of a patch, as parts of the width that is drawn. */
+const COMB = 0.12;
+const TAG = 0.17;
+/** Surroundings of the patches, as a part of their width. */
+const NEAR = 0.3;
 
 /**
  * @param {Placed | null} placed
@@ -31,29 +37,64 @@ export function drawProfiles(placed, standing) {
   if (!placed) return html`<p class="quiet pad">The drawing appears when both cross-sections can be read. Drop the files of a rail and a wheel.</p>`;
   const { rail, touch } = placed;
   const patches = standing?.patches ?? [];
-  const tips = patches.flatMap(({ position }) => (position ? [position.track_mm[1] - 1.2 * TAG_MM * Math.sin(position.contact_angle_rad)] : []));
-  const y0 = Math.min(...rail.map(([y]) => y - 12), ...tips);
-  const y1 = Math.max(...rail.map(([y]) => y + 12), ...tips);
-  const low = -Math.min(44, 4 - Math.min(...rail.map(([, z]) => z)));
+  const [[y0, y1], [low, top]] = standing?.near ? aroundPatches(placed, standing) : wholeHead(rail, patches);
   const scale = WIDTH / (y1 - y0);
-  const height = (TOP_MM - low) * scale;
+  const height = (top - low) * scale;
   /** @type {(point: Point) => Point} */
-  const T = ([y, z]) => [(y1 - y) * scale, (TOP_MM - z) * scale];
+  const T = ([y, z]) => [(y1 - y) * scale, (top - z) * scale];
   const wheel = placed.wheel.filter(([y]) => y > y0 - 40 && y < y1 + 40).map(T);
   const seen = patches.length
     ? patches.map((patch, at) => `patch ${at} at ${degrees(patch.position?.contact_angle_rad ?? 0)}`).join(', ')
     : `first touch at y ${number(touch[0])} mm`;
   return html`<svg class="drawing" viewBox=${`0 0 ${WIDTH} ${height.toFixed(0)}`} role="img" aria-label=${`Wheel on rail, seen along rolling: ${seen}`}>
-    ${lattice([y0, y1], [low, TOP_MM], T, height)}
+    ${lattice([y0, y1], [low, top], T, height)}
     <path class="rail" d=${closed(rail.map(T), height + 20)}/>
     ${wheel.length > 1 ? svg`<path class="wheel" d=${closed(wheel, -20)}/>` : nothing}
-    ${latticeNumbers([y0, y1], [low, TOP_MM], T, height)}
+    ${latticeNumbers([y0, y1], [low, top], T, height)}
     <g class="bodies">
       <text x=${WIDTH / 2} y="22" text-anchor="middle">wheel</text>
-      <text x=${T([mean(rail), 0])[0]} y=${height - 34} text-anchor="middle">rail</text>
+      <text x=${standing?.near ? WIDTH / 2 : T([mean(rail), 0])[0]} y=${height - 34} text-anchor="middle">rail</text>
     </g>
-    ${standing && patches.length ? standPatches(standing, T) : drawTouch(T(touch))}
+    ${standing && patches.length ? standPatches(standing, rail, y1 - y0, T) : drawTouch(T(touch))}
   </svg>`;
+}
+
+/** What is drawn of the whole head: across and up. @param {readonly Point[]} rail @param {readonly Patch[]} patches @returns {[Point, Point]} */
+function wholeHead(rail, patches) {
+  const ys = rail.map(([y]) => y);
+  const [y0, y1] = [Math.min(...ys) - 12, Math.max(...ys) + 12];
+  const tips = patches.flatMap(({ position }) => (position ? [position.track_mm[1] - 1.2 * TAG * (y1 - y0) * Math.sin(position.contact_angle_rad)] : []));
+  const low = -Math.min(44, 4 - Math.min(...rail.map(([, z]) => z)));
+  return [[Math.min(y0, ...tips), Math.max(y1, ...tips)], [low, TOP_MM]];
+}
+
+/** What is drawn around the patches, with room for the pressure on them: across and up. @param {Placed} placed @param {Standing} standing @returns {[Point, Point]} */
+function aroundPatches({ rail }, standing) {
+  const places = standing.patches.flatMap((patch) => {
+    const on = surfaceOf(patch, rail, standing.bent);
+    return on ? [on(patch.extent_mm[2], 0), on(patch.extent_mm[3], 0)] : [];
+  });
+  const [ys, zs] = [places.map(([y]) => y), places.map(([, z]) => z)];
+  const size = Math.max(12, Math.max(...ys) - Math.min(...ys), 1.6 * (Math.max(...zs) - Math.min(...zs)));
+  const middle = (Math.max(...ys) + Math.min(...ys)) / 2;
+  const half = (0.5 + NEAR) * size;
+  const top = Math.max(...zs) + 2.6 * TAG * half;
+  return [[middle - half, middle + half], [Math.min(top - 1.1 * half, Math.min(...zs) - NEAR * half), top]];
+}
+
+/**
+ * Places over the surface of a patch, by the coordinate across the patch and the height over it: a plane, or the rail itself.
+ * @param {Patch} patch
+ * @param {readonly Point[]} rail
+ * @param {boolean} bent
+ * @returns {((across: number, height: number) => Point) | null} Null for a patch without a place.
+ */
+function surfaceOf({ position }, rail, bent) {
+  if (!position) return null;
+  const [, y0, z0] = position.origin_track_mm;
+  if (bent) return unfolded(rail, [y0, z0]);
+  const [cos, sin] = [Math.cos(position.contact_angle_rad), Math.sin(position.contact_angle_rad)];
+  return (across, height) => [y0 + across * cos - height * sin, z0 + across * sin + height * cos];
 }
 
 /**
@@ -125,21 +166,20 @@ function latticeNumbers([y0, y1], [low, high], T, height) {
 /**
  * Pressure stands on the rail at every patch; a click chooses one.
  * @param {Standing} standing
+ * @param {readonly Point[]} rail
+ * @param {number} width Of what is drawn, in mm.
  * @param {(point: Point) => Point} T
  */
-function standPatches({ patches, combs, chosen, choose }, T) {
-  const scale = COMB_MM / Math.max(...patches.map((patch) => patch.pressure_max_mpa));
+function standPatches({ patches, combs, chosen, choose, bent, near }, rail, width, T) {
+  const scale = (COMB * width) / Math.max(...patches.map((patch) => patch.pressure_max_mpa));
   return patches.map((patch, at) => {
-    const { position } = patch;
-    if (!position) return nothing;
-    const [cos, sin] = [Math.cos(position.contact_angle_rad), Math.sin(position.contact_angle_rad)];
-    const [, y0, z0] = position.origin_track_mm;
-    const [, y, z] = position.track_mm;
-    /** @type {(across: number, height: number) => Point} */
-    const on = (across, height) => T([y0 + across * cos - height * sin, z0 + across * sin + height * cos]);
+    const surface = surfaceOf(patch, rail, bent);
+    if (!surface || !patch.position) return nothing;
+    const angle = patch.position.contact_angle_rad;
+    const [, y, z] = patch.position.track_mm;
     const comb = combs[at];
-    const shape = comb && [...comb.y.map((across) => on(across, 0)), ...comb.y.map((across, i) => on(across, comb.pressure[i] * scale)).reverse()];
-    const [x, top] = T([y - TAG_MM * sin, z + TAG_MM * cos]);
+    const shape = comb && [...comb.y.map((across) => surface(across, 0)), ...comb.y.map((across, i) => surface(across, comb.pressure[i] * scale)).reverse()].map(T);
+    const [x, top] = T([y - TAG * width * Math.sin(angle), z + TAG * width * Math.cos(angle)]);
     const [cx, cy] = T([y, z]);
     return svg`<g class=${`patch ${at === chosen ? 'chosen' : ''}`} data-patch=${at} @click=${() => choose(at)}>
       ${shape ? svg`<path class="comb" d=${`${path(shape)}Z`}/>` : nothing}
@@ -147,6 +187,7 @@ function standPatches({ patches, combs, chosen, choose }, T) {
       <circle class="dot" cx=${cx} cy=${cy} r="4"/>
       <circle class="tag" cx=${x} cy=${top} r="12"/>
       <text class="tag" x=${x} y=${top + 4.5} text-anchor="middle">${at}</text>
+      ${near ? svg`<text class="strong" x=${x < cx ? x - 18 : x + 18} y=${top + 4.5} text-anchor=${x < cx ? 'end' : 'start'}>${number(patch.pressure_max_mpa, 4)} MPa</text>` : nothing}
     </g>`;
   });
 }
