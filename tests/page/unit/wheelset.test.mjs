@@ -1,6 +1,9 @@
 // The curves of a wheelset.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { readFileSync } from 'node:fs';
+import { WINDOWS, windowAt } from '../../../src/http/page/web/js/en15302.js';
+import { placeOn } from '../../../src/http/page/web/js/placing.js';
 import { nearest, wheelsetCurve } from '../../../src/http/page/web/js/wheelsetdata.js';
 
 const side = (/** @type {number} */ sign) => ({ rolling_radius_mm: [459, 460, 461], contact_angle_rad: [0.02, 0.035, 0.05].map((angle) => sign * angle), rail_y_mm: [0, 0, 0], wheel_y_mm: [0, 0, 0] });
@@ -38,4 +41,31 @@ test('an amplitude without a conicity is no point, and both errors count', () =>
 test('the nearest of equal values is the first', () => {
   assert.equal(nearest([0, 2, 4], 2.9), 1);
   assert.equal(nearest([1, 1], 1), 0);
+});
+
+test('windows of the conicity are those of the benchmark, and between its amplitudes in between', () => {
+  const { pairs } = JSON.parse(readFileSync(new URL('../../data/en15302/benchmark.json', import.meta.url), 'utf8'));
+  assert.deepEqual(Object.keys(WINDOWS), Object.keys(pairs));
+  for (const [name, { amplitude_mm: amplitudes, window }] of Object.entries(pairs)) {
+    for (const [at, amplitude] of amplitudes.entries()) {
+      windowAt(name, amplitude)?.forEach((limit, end) => assert.ok(Math.abs(limit - window[at][end]) < 1e-9, `${name} at ${amplitude}`));
+      assert.ok(windowAt(name, amplitude));
+    }
+  }
+  assert.deepEqual(windowAt('WheelARailA', 1.1)?.map((limit) => Math.round(1e4 * limit)), [775, 1775]);
+  assert.equal(windowAt('WheelARailA', 0.9), null);
+  assert.equal(windowAt('', 3), null);
+});
+
+test('a place on a turned rail is found by its y on the cross-section', () => {
+  /** @type {[number, number][]} */
+  const own = [[-36, -20], [-35, -5], [-20, 0], [0, 1], [20, 0], [35, -5], [36, -20]];
+  const cant = 0.05;
+  for (const side of /** @type {const} */ (['left', 'right'])) {
+    const sign = side === 'left' ? 1 : -1;
+    // Turned with its top toward the track centre, and laid 750 mm from it.
+    const laid = own.map(([f, u]) => /** @type {[number, number]} */ ([sign * (750 + f * Math.cos(cant) - u * Math.sin(cant)), f * Math.sin(cant) + u * Math.cos(cant)]));
+    const on = placeOn(laid, laid[3], 0, side, cant);
+    for (const [at, [f]] of own.entries()) if (Math.abs(f) <= 20) assert.ok(Math.hypot(on(f)[0] - laid[at][0], on(f)[1] - laid[at][1]) < 1e-9, `${side} ${f}`);
+  }
 });

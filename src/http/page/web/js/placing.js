@@ -1,5 +1,8 @@
 // Cross-sections of rail and wheel where the service places them, and the gap between the two.
 
+import { outward } from './wheelloads.js';
+import { nearest } from './wheelsetdata.js';
+
 /** @typedef {import('./api.js').CheckedCase} CheckedCase */
 /** @typedef {NonNullable<NonNullable<CheckedCase['understood']>['placement']>} Placement */
 /** @typedef {[number, number]} Place y to the left and z up, in mm. */
@@ -90,5 +93,30 @@ export function unfolded(line, from) {
     const [cos, sin] = [(points[i][0] - points[i - 1][0]) / length, (points[i][1] - points[i - 1][1]) / length];
     const beyond = at - lengths[i - 1];
     return [points[i - 1][0] + beyond * cos - height * sin, points[i - 1][1] + beyond * sin + height * cos];
+  };
+}
+
+/**
+ * The place on a line whose coordinate of the cross-section, y to the field side, is given.
+ * @param {readonly Place[]} line In track axes.
+ * @param {Place} from A place of the line in track axes,
+ * @param {number} fromY its y on the cross-section,
+ * @param {import('./wheelloads.js').Side} side
+ * @param {number} cant Turn of the cross-section with its top toward the track centre, in rad.
+ * @returns {(y: number) => Place}
+ */
+export function placeOn(line, from, fromY, side, cant) {
+  const own = (/** @type {Place} */ [y, z]) => fromY + outward(side, y - from[0]) * Math.cos(cant) + (z - from[1]) * Math.sin(cant);
+  const ys = line.map(own);
+  return (wanted) => {
+    /** @type {Place | null} */
+    let highest = null;
+    for (let i = 1; i < line.length; i += 1) {
+      const share = (wanted - ys[i - 1]) / (ys[i] - ys[i - 1]);
+      if (!(share >= 0 && share <= 1)) continue;
+      const z = line[i - 1][1] + share * (line[i][1] - line[i - 1][1]);
+      if (!highest || z > highest[1]) highest = [line[i - 1][0] + share * (line[i][0] - line[i - 1][0]), z];
+    }
+    return highest ?? line[nearest(ys, wanted)];
   };
 }

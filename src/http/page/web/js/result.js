@@ -20,6 +20,15 @@ import { flangeAngle, oneWheel, sideOf } from './wheelloads.js';
 /** @typedef {import('./field/quantities.js').Quantity} Quantity */
 
 /**
+ * @typedef {object} Standing
+ * A wheel on its rail in track axes.
+ * @property {import('./placing.js').Placed} placed
+ * @property {import('./placing.js').Placement['first_touch']} touch
+ * @property {number} shift Of the wheelset to the left, in mm.
+ * @property {number} cant Of the rail, in rad.
+ */
+
+/**
  * @typedef {object} Looked
  * A job with its result, and what is chosen of it.
  * @property {Job} job
@@ -29,6 +38,7 @@ import { flangeAngle, oneWheel, sideOf } from './wheelloads.js';
  * @property {Map<string, Promise<Field>>} asked Fields by patch and motion.
  * @property {(Field | undefined)[]} fields Those of the chosen motion, by patch.
  * @property {Map<string, Stresses | null>} stresses Below the surface, by patch and motion; null while they are being loaded.
+ * @property {Partial<Record<'left' | 'right', Standing>>} wheels Wheels of a wheelset.
  * @property {Partial<Record<'left' | 'right', number>>} flange Angle of the flange of each wheel in rad, where it has one.
  * @property {'rail' | 'wheel'} wornBody On which cross-section wear is shown.
  * @property {boolean} ownScale Colours of one patch and motion alone, not one range for all.
@@ -42,6 +52,7 @@ import { flangeAngle, oneWheel, sideOf } from './wheelloads.js';
  * @property {boolean} mesh
  * @property {import('./curvedata.js').CurveKind} curve
  * @property {import('./wheelsetdata.js').Kind} wheelset
+ * @property {string} window The pair of EN 15302 whose window is drawn; empty for none.
  */
 
 /** @type {Looked | null} */
@@ -59,8 +70,8 @@ export function tellingPoint(points) {
 
 /** @param {Job} job @returns {Looked} */
 const fresh = (job) => ({
-  job, result: null, document: null, placed: null, asked: new Map(), fields: [], stresses: new Map(), flange: {}, wornBody: 'rail', ownScale: true, near: false, patch: 0, point: -1, quantity: '',
-  held: null, border: true, arrows: true, mesh: false, curve: 'forces', wheelset: 'radii',
+  job, result: null, document: null, placed: null, asked: new Map(), fields: [], stresses: new Map(), wheels: {}, flange: {}, wornBody: 'rail', ownScale: true, near: false, patch: 0, point: -1, quantity: '',
+  held: null, border: true, arrows: true, mesh: false, curve: 'forces', wheelset: 'radii', window: '',
 });
 
 /**
@@ -167,8 +178,10 @@ async function placeProfiles(app) {
   const sides = type === 'profiles' ? [sideOf(document)] : /** @type {const} */ (['left', 'right']);
   await Promise.all(sides.map(async (side) => {
     const checked = await checkCase(JSON.stringify(oneWheel(document, side, shift)), new AbortController().signal);
-    const here = placed(checked.understood?.placement);
-    if (!here) return;
+    const placement = checked.understood?.placement;
+    const here = placed(placement);
+    if (!placement || !here) return;
+    mine.wheels[side] = { placed: here, touch: placement.first_touch, shift, cant: numberAt(document, '/contact/cant_rad') || 0 };
     const angle = flangeAngle(here.wheel, side);
     if (Number.isFinite(angle)) mine.flange[side] = angle;
     if (type === 'profiles') mine.placed = here;

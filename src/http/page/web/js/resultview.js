@@ -12,6 +12,7 @@ import { loadsPanel } from './loadsview.js';
 import { remarkList } from './remarks.js';
 import { inOrder, isBent, onSurface, withEverything, withFields, withSpeed } from './starts.js';
 import { indexOf } from './field/cells.js';
+import { combOf } from './field/comb.js';
 import { hasFields } from './fields.js';
 import { chooseAmounts, chosenAmounts } from './field/palette.js';
 import { offered, quantityOf } from './field/quantities.js';
@@ -91,12 +92,13 @@ function loaded(app, looked, answer) {
   return html`
     ${figures(looked, patch, point)}
     ${remarkList(answer.remarks ?? [], (place) => choose(app, place))}
+    ${answer.wheelset?.kinematics ? wheelsetPanel(app, looked, answer.wheelset) : nothing}
     <div class=${mapped ? 'cols' : 'cols nofield'}>
       ${mapped ? fieldPanel(app, looked, answer) : html`<section class="panel wait"><p>The case asked for no fields, so there is no map.</p>
         <button class="primary" @click=${() => again(app, looked.document)}>Solve again with fields</button></section>`}
       <div class="aside">
         ${looked.placed && patch.position ? profilePanel(app, looked, answer) : nothing}
-        ${answer.wheelset ? wheelsetPanel(app, looked, answer.wheelset) : nothing}
+        ${answer.wheelset && !answer.wheelset.kinematics ? wheelsetPanel(app, looked, answer.wheelset) : nothing}
         ${patch.points.length > 2 ? curvePanel(app, looked, patch) : nothing}
         ${loadsPanel(app, looked, answer)}
         ${answer.patches.length > 1 && !patch.position ? totalPanel(answer, looked.point) : nothing}
@@ -221,15 +223,6 @@ function cellTable({ cells }) {
   };
   return html`<details class="as-table" @toggle=${fill}><summary>As a table${rows < cells.x_mm.length ? `, the first ${rows} of ${count(cells.x_mm.length)} cells` : ''}</summary>
     <div class="scroll" tabindex="0" role="region" aria-label="Cells of the field"><table><thead><tr>${columns.map((name) => html`<th scope="col">${name}</th>`)}</tr></thead><tbody></tbody></table></div></details>`;
-}
-
-/** The largest pressure of every strip. @param {import('./fields.js').Field | undefined} field */
-function combOf(field) {
-  if (!field?.cells.pressure_mpa) return null;
-  const { strips } = indexOf(field);
-  const pressure = field.cells.pressure_mpa;
-  const largest = strips.map(({ first, end }) => pressure.slice(first, end).reduce((most, value) => Math.max(most, value), 0));
-  return { y: [strips[0].low, ...strips.map(({ y }) => y), strips[strips.length - 1].high], pressure: [0, ...largest, 0] };
 }
 
 /** @param {App} app @param {Looked} looked @param {JobResult} answer */

@@ -1,5 +1,7 @@
 // The curves of a wheelset: Δr and contact angles over its shift, equivalent conicity over the amplitude.
 
+import { windowAt } from './en15302.js';
+
 /** @typedef {import('./api.js').JobResult} JobResult */
 /** @typedef {import('./curvedata.js').Curve} Curve */
 /** @typedef {NonNullable<NonNullable<JobResult['wheelset']>['kinematics']>} Kinematics */
@@ -13,10 +15,11 @@ const DEGREE = Math.PI / 180;
  * A curve of the rigid wheelset without yaw.
  * @param {Kinematics} kinematics
  * @param {Kind} kind
+ * @param {string} [pair] The pair of EN 15302 whose window stands at the conicity.
  * @returns {Curve | null} Null where there are fewer than two values.
  */
-export function wheelsetCurve(kinematics, kind) {
-  const curve = kind === 'conicity' ? conicity(kinematics) : overShift(kinematics, kind);
+export function wheelsetCurve(kinematics, kind, pair = '') {
+  const curve = kind === 'conicity' ? conicity(kinematics, pair) : overShift(kinematics, kind);
   return curve.x.length > 1 ? curve : null;
 }
 
@@ -43,11 +46,12 @@ function overShift(kinematics, kind) {
   };
 }
 
-/** Amplitudes without a stable equilibrium, or beyond the shifts that were asked for, have no conicity. @param {Kinematics} kinematics @returns {Curve} */
-function conicity(kinematics) {
+/** Amplitudes without a stable equilibrium, or beyond the shifts that were asked for, have no conicity. @param {Kinematics} kinematics @param {string} pair @returns {Curve} */
+function conicity(kinematics, pair) {
   const known = kinematics.conicity.filter((of) => typeof of.conicity === 'number');
   const of = (/** @type {'conicity' | 'conicity_with_roll' | 'conicity_harmonic'} */ name) => known.map((at) => at[name] ?? NaN);
   const none = known.map(() => null);
+  const limit = (/** @type {0 | 1} */ end) => known.map(({ amplitude_mm }) => windowAt(pair, amplitude_mm)?.[end] ?? NaN);
   return {
     xLabel: 'amplitude / mm',
     yLabel: 'equivalent conicity',
@@ -57,6 +61,10 @@ function conicity(kinematics) {
       { label: 'EN 15302', unit: '', colour: '--c1', y: of('conicity'), error: known.map((at) => Math.hypot(at.error_estimate ?? 0, at.profile_uncertainty ?? 0)) },
       { label: 'with roll', unit: '', colour: '--c2', dash: [7, 4], y: of('conicity_with_roll'), error: none },
       { label: 'harmonic', unit: '', colour: '--c3', dash: [2, 3], y: of('conicity_harmonic'), error: none },
+      ...(pair ? [
+        { label: 'window from', unit: '', colour: '--bad', dash: [5, 3], y: limit(0), error: none },
+        { label: 'to', unit: '', colour: '--bad', dash: [5, 3], y: limit(1), error: none },
+      ] : []),
     ],
     bound: NaN,
   };
@@ -65,3 +73,17 @@ function conicity(kinematics) {
 /** The index of the value nearest to another. @param {readonly number[]} values @param {number} wanted */
 export const nearest = (values, wanted) =>
   values.reduce((best, value, at) => (Math.abs(value - wanted) < Math.abs(values[best] - wanted) ? at : best), 0);
+
+/** Amplitudes in mm at which the conicity is outside the window of a pair of EN 15302, and how many are inside. @param {Kinematics} kinematics @param {string} pair */
+export function againstWindow({ conicity }, pair) {
+  /** @type {number[]} */
+  const outside = [];
+  let inside = 0;
+  for (const { amplitude_mm: amplitude, conicity: value } of conicity) {
+    const window = windowAt(pair, amplitude);
+    if (!window || typeof value !== 'number') continue;
+    if (value < window[0] || value > window[1]) outside.push(amplitude);
+    else inside += 1;
+  }
+  return { inside, outside };
+}

@@ -9,7 +9,7 @@ import { grid, path, scaleOf } from './axes.js';
 /** @typedef {import('../api.js').Patch} Patch */
 /** @typedef {import('./axes.js').Point} Point */
 
-/** @typedef {{ y: number[], pressure: number[] }} Comb The largest pressure of every strip, across the patch. */
+/** @typedef {import('../field/comb.js').Comb} Comb */
 
 /**
  * @typedef {object} Standing
@@ -89,7 +89,7 @@ function aroundPatches({ rail }, standing) {
  * @param {boolean} bent
  * @returns {((across: number, height: number) => Point) | null} Null for a patch without a place.
  */
-function surfaceOf({ position }, rail, bent) {
+export function surfaceOf({ position }, rail, bent) {
   if (!position) return null;
   const [, y0, z0] = position.origin_track_mm;
   if (bent) return unfolded(rail, [y0, z0]);

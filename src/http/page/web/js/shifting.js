@@ -1,0 +1,148 @@
+// A wheelset that is shifted by hand: both wheels with their axle level, what they carry, and the pressure on their rails.
+
+import { cancel, evaluate, remove, submit } from './api.js';
+import { at, isObject, numberAt, put } from './document.js';
+import { loadField } from './fields.js';
+import { combOf } from './field/comb.js';
+import { gapOf } from './placing.js';
+import { TYPED } from './typed.js';
+import { oneWheel, outward } from './wheelloads.js';
+import { nearest } from './wheelsetdata.js';
+
+/** @typedef {import('./state.js').App} App */
+/** @typedef {import('./document.js').JsonObject} JsonObject */
+/** @typedef {import('./placing.js').Place} Place */
+/** @typedef {import('./wheelloads.js').Side} Side */
+/** @typedef {import('./wheelsetdata.js').Kinematics} Kinematics */
+/** @typedef {import('./result.js').Standing} Standing */
+/** @typedef {import('./field/comb.js').Comb} Comb */
+/** @typedef {import('./api.js').Patch} Patch */
+
+/**
+ * @typedef {object} Carried
+ * What a wheel carries at a shift; forces on the rail.
+ * @property {number} normal_n
+ * @property {number} y_n Lateral force, positive to the field side.
+ * @property {number} x_n
+ * @property {number} pressure_mpa
+ * @property {number} area_mm2
+ * @property {number} power_n
+ */
+
+/**
+ * @typedef {object} Shifting
+ * @property {Kinematics} kinematics
+ * @property {number} at The place in the lists of the kinematics.
+ * @property {boolean} apart Wheels are drawn over their rails, with lines between the places of contact.
+ * @property {Partial<Record<Side, Carried>>} carried
+ * @property {Partial<Record<Side, { patch: Patch, comb: Comb | null }[]>>} pressed
+ * @property {string} failure Why there are no numbers.
+ */
+
+const SIDES = /** @type {const} */ (['left', 'right']);
+
+/** @type {Shifting | null} */
+let shifting = null;
+/** The shift that is being computed, or that is to be next. */
+let wanted = -1;
+let busy = false;
+
+/** The shifted wheelset of a result, at its first position to begin with. @param {Kinematics} kinematics @param {number} shift In mm. */
+export function shiftingOf(kinematics, shift) {
+  if (shifting?.kinematics !== kinematics) {
+    shifting = { kinematics, at: nearest(kinematics.lateral_shift_mm, shift), apart: false, carried: {}, pressed: {}, failure: '' };
+    wanted = -1;
+  }
+  return shifting;
+}
+
+/** A rail and its wheel in track axes at a shift, the wheel on the rail with its axle level. @param {Standing} standing @param {number} shift In mm. */
+export function shifted({ placed, shift: before }, shift) {
+  const moved = placed.wheel.map(([y, z]) => /** @type {Place} */ ([y + shift - before, z]));
+  const lift = Math.min(...gapOf(placed.rail, moved).map(([, gap]) => gap));
+  return { rail: placed.rail, wheel: Number.isFinite(lift) ? moved.map(([y, z]) => /** @type {Place} */ ([y, z - lift])) : moved };
+}
+
+/**
+ * A case of one wheel that rolls with the wheelset: at the mean of both rolling radii, where the wheelset's motion is given.
+ * @param {JsonObject} document
+ * @param {Side} side
+ * @param {Kinematics} kinematics
+ * @param {number} place
+ */
+export function rollingWheel(document, side, { lateral_shift_mm: shifts, left, right }, place) {
+  const motion = Array.isArray(document.motion) ? document.motion[0] : document.motion;
+  const rolling = at(motion, '/wheelset/0') ?? at(motion, '/wheelset');
+  const speed = numberAt(rolling, '/speed_mm_per_s') || 20000;
+  const radius = (left.rolling_radius_mm[place] + right.rolling_radius_mm[place]) / 2;
+  const one = oneWheel(document, side, shifts[place]);
+  return put(one, '/motion', isObject(rolling) || !isObject(motion) || 'sweep' in motion ? { wheelset: { speed_mm_per_s: speed, free_rolling_radius_mm: radius } } : motion);
+}
+
+/** Computes the first shift, once. @param {App} app @param {JsonObject} document @param {Shifting} of */
+export function begin(app, document, of) {
+  if (of === shifting && wanted < 0) setTimeout(() => shiftTo(app, document, of.at).catch(app.refused));
+}
+
+/** Moves the wheelset; the newest shift is computed as soon as the one before is. @param {App} app @param {JsonObject} document @param {number} place */
+export async function shiftTo(app, document, place) {
+  if (!shifting) return;
+  shifting.at = wanted = place;
+  app.redraw();
+  if (busy) return;
+  busy = true;
+  try {
+    for (let now = -1; now !== wanted;) {
+      now = wanted;
+      const began = performance.now();
+      await compute(app, shifting, document, now);
+      performance.measure('shift', { start: began });
+    }
+  } finally {
+    busy = false;
+  }
+}
+
+/** @param {App} app @param {Shifting} of @param {JsonObject} document @param {number} place */
+async function compute(app, of, document, place) {
+  try {
+    const cases = SIDES.map((side) => rollingWheel(document, side, of.kinematics, place));
+    const [carried, pressed] = await Promise.all([
+      Promise.all(SIDES.map((side, at) => carriedBy(cases[at], side, of.kinematics.lateral_shift_mm[place]))),
+      Promise.all(cases.map(pressureUnder)),
+    ]);
+    of.carried = { left: carried[0], right: carried[1] };
+    of.pressed = { left: pressed[0], right: pressed[1] };
+    of.failure = '';
+  } catch (error) {
+    of.carried = {};
+    of.pressed = {};
+    of.failure = error instanceof Error ? error.message : String(error);
+  }
+  app.redraw();
+}
+
+/** @param {JsonObject} template @param {Side} side @param {number} shift @returns {Promise<Carried | undefined>} Undefined where the wheel is off the rail. */
+async function carriedBy(template, side, shift) {
+  const { columns } = await evaluate(template, { '/contact/lateral_shift_mm': [shift] });
+  const first = (/** @type {readonly (number | null)[] | undefined} */ column) => column?.[0] ?? NaN;
+  if (!Number.isFinite(first(columns.normal_force_n))) return undefined;
+  return {
+    normal_n: first(columns.normal_force_n), y_n: outward(side, first(columns.force_y_n)), x_n: first(columns.force_x_n),
+    pressure_mpa: first(columns.pressure_max_mpa), area_mm2: first(columns.area_mm2), power_n: first(columns.friction_power_n),
+  };
+}
+
+/** Pressures of the patches of a wheel. Its job does not stay. @param {JsonObject} document */
+async function pressureUnder(document) {
+  const job = await submit(JSON.stringify({ ...document, outputs: ['resultants', 'pressure'], ...TYPED }), { wait: 10 });
+  try {
+    const { result } = job;
+    if (!result) return [];
+    const fields = await Promise.all(result.patches.map((_, patch) => loadField(job.id, result, patch, 0)));
+    return result.patches.map((patch, at) => ({ patch, comb: combOf(fields[at]) }));
+  } finally {
+    if (job.state === 'queued' || job.state === 'running') await cancel('jobs', job.id).catch(() => {});
+    remove('jobs', job.id).catch(() => {});
+  }
+}
