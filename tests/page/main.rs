@@ -1,8 +1,8 @@
 //! Does the page do what it shows? Its modules in Node, its types against the contract, and all of it in a browser against the real
 //! program.
 //!
-//! Node, its packages and Chromium are installed by `.ci/run`. Where they are missing the tests say so and do nothing; in continuous
-//! integration that is a failure.
+//! Node, its packages, Chromium and Firefox are installed by `.ci/run`. Where they are missing the tests say so and do nothing; in
+//! continuous integration that is a failure.
 
 use std::env;
 use std::fs;

@@ -17,7 +17,7 @@ const MARKED_MAX = 60;
 export class CreepCurve extends HTMLElement {
   /** @type {uPlot | null} */ #plot = null;
   /** @type {Shown | null} */ #shown = null;
-  #resized = new ResizeObserver(() => this.#resize());
+  #resized = new ResizeObserver(() => requestAnimationFrame(() => this.#resize()));
   #themed = new MutationObserver(() => this.#build());
 
   connectedCallback() {

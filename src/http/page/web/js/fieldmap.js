@@ -47,7 +47,7 @@ export class FieldMap extends HTMLElement {
   #live = document.createElement('output');
   /** Milliseconds of the last drawing of the picture and of the crosshair. */
   took = { picture: 0, crosshair: 0 };
-  #resized = new ResizeObserver(() => this.draw());
+  #resized = new ResizeObserver(() => requestAnimationFrame(() => this.draw()));
   #themed = new MutationObserver(() => this.draw());
   #scheme = matchMedia('(prefers-color-scheme: dark)');
   #redraw = () => this.draw();

@@ -31,7 +31,7 @@ export class LineStrips extends HTMLElement {
   /** @type {Shown | null} */ #shown = null;
   /** @type {uPlot[]} */ #plots = [];
   #zooming = false;
-  #resized = new ResizeObserver(() => this.#resize());
+  #resized = new ResizeObserver(() => requestAnimationFrame(() => this.#resize()));
   #themed = new MutationObserver(() => this.#build());
 
   connectedCallback() {
