@@ -79,7 +79,7 @@ test('a batch stands along its label, with limits, the worst places and the way 
   assert.equal(new Set(scales).size, 1);
   await page.reload();
   await page.locator('line-strips canvas').nth(3).waitFor();
-  assert.ok(page.url().includes('pressure=1200'));
+  await page.waitForFunction(() => location.hash.includes('pressure=1200'));
   const kept = await page.locator('line-strips').evaluate((strips) => /** @type {HTMLElement & { plots: { scales: { x: { min: number } } }[] }} */ (strips).plots[0].scales.x.min);
   assert.ok(Math.abs(kept - scales[0]) < 1e-6);
   await page.locator('section[aria-labelledby="h-worst"] a').first().click();
@@ -152,7 +152,7 @@ test('a run stands along its kilometres: totals by section, exceedances, the wor
   await page.getByLabel('Limit of wear number').blur();
   const over = totals.all.columns.friction_power_n.above['20'];
   await page.getByText(new RegExp(`^${String(over)} of 3000 rows reach the limit of 20`)).waitFor();
-  assert.ok(page.url().includes('friction_power_n=20'));
+  await page.waitForFunction(() => location.hash.includes('friction_power_n=20'));
   const curve = totals.sections.find((/** @type {{ value: string }} */ of) => of.value === 'curve');
   await page.waitForFunction((count) => [...document.querySelectorAll('table.sections tbody tr')].some((row) => row.querySelector('th')?.textContent === 'curve' && Number(row.lastElementChild?.textContent) === count), curve.columns.friction_power_n.above['20']);
   // The worst row is the one of the largest value, and opens as a job with its fields.

@@ -24,20 +24,21 @@ const GLYPHS = { queued: '○', running: '◔', succeeded: '●', failed: '✕',
 /** @param {App} app */
 export function jobsView(app) {
   const queue = queueSeen();
+  const jobs = jobsShown();
   const newest = [...queue.batches.values()].filter(isThere).sort((one, two) => (one.id < two.id ? 1 : -1));
   // Those that go on are always in sight; of the others the newest few.
   const shown = newest.filter((batch, at) => !batch.ended || at < ENDED_SHOWN);
   const counted = queue.shown === 'all' || queue.batch !== '';
   const more = queue.cursor !== '' && (!counted || queue.more);
-  const number = queue.loaded ? html` <span class="quiet n">${count(Math.max(counted ? queue.total : 0, jobsShown().length))}${more ? ' or more' : ''}</span>` : nothing;
+  const number = queue.loaded ? html` <span class="quiet n">${count(Math.max(counted ? queue.total : 0, jobs.length))}${more ? ' or more' : ''}</span>` : nothing;
   return html`<h1 class="visually-hidden">Jobs</h1>
     ${shown.map((batch) => batchPanel(app, batch))}
     <section class="panel jobs" aria-labelledby="h-jobs">
       <header class="bar"><h2 id="h-jobs">Jobs${number}</h2>${filters(app)}</header>
-      ${chosenBar(app)}
+      ${chosenBar(app, jobs)}
       ${usage(queue.me)}
-      <div class="rows head"><span>${allMark(app)}</span><span>State</span><span>Name</span><span>Labels</span><span>Submitted</span><span>Took</span><span></span></div>
-      ${list(app)}
+      <div class="rows head"><span>${allMark(app, jobs)}</span><span>State</span><span>Name</span><span>Labels</span><span>Submitted</span><span>Took</span><span></span></div>
+      ${list(app, jobs)}
     </section>`;
 }
 
@@ -77,16 +78,16 @@ function filters(app) {
     <label class="inline">Label <input class="search" placeholder="line:A12" .value=${queue.label} @input=${text('label')}></label>`;
 }
 
-/** Ticks all jobs that are loaded, or none. @param {App} app */
-function allMark(app) {
-  const ids = jobsShown().map(({ id }) => id);
-  const all = ids.length > 0 && ids.every((id) => marked().includes(id));
+/** Ticks all jobs that are loaded, or none. @param {App} app @param {readonly Job[]} jobs */
+function allMark(app, jobs) {
+  const ids = jobs.map(({ id }) => id);
+  const all = ids.length > 0 && marked().size >= ids.length && ids.every((id) => marked().has(id));
   return html`<input type="checkbox" aria-label="Choose all jobs of the list" .checked=${all} @change=${() => mark(app, all ? [] : ids)}>`;
 }
 
-/** What can be done with the ticked jobs. @param {App} app */
-function chosenBar(app) {
-  const jobs = jobsShown().filter(({ id }) => marked().includes(id));
+/** What can be done with the ticked jobs. @param {App} app @param {readonly Job[]} shown */
+function chosenBar(app, shown) {
+  const jobs = marked().size ? shown.filter(({ id }) => marked().has(id)) : [];
   if (!jobs.length) return nothing;
   const ended = jobs.filter(({ state }) => !isOpen(state)).map(({ id }) => id);
   const solved = jobs.filter(({ state }) => state === 'succeeded').map(({ id }) => id);
@@ -104,11 +105,10 @@ function chosenBar(app) {
 /** @param {State} state */
 const isOpen = (state) => state === 'queued' || state === 'running';
 
-/** @param {App} app */
-function list(app) {
+/** @param {App} app @param {readonly Job[]} jobs */
+function list(app, jobs) {
   const queue = queueSeen();
   const height = Math.max(320, innerHeight - 190);
-  const jobs = jobsShown();
   const first = Math.max(0, Math.min(jobs.length, Math.floor(queue.top / ROW)) - SPARE_ROWS);
   const rows = jobs.slice(first, first + Math.ceil(height / ROW) + 2 * SPARE_ROWS);
   const scrolled = (/** @type {Event} */ event) => {
@@ -142,7 +142,7 @@ function row(app, job) {
     else removeLater(app, 'jobs', [job.id], name);
   };
   return html`<div class="rows job">
-    <span><input type="checkbox" aria-label=${`Choose ${name}`} .checked=${marked().includes(job.id)}
+    <span><input type="checkbox" aria-label=${`Choose ${name}`} .checked=${marked().has(job.id)}
       @change=${() => toggleMark(app, job.id)}></span>
     <span class=${`state ${job.state}`}><i aria-hidden="true">${GLYPHS[job.state]}</i> ${job.state}${job.state === 'running'
       ? html` <progress max="1" .value=${job.progress} aria-label="Progress"></progress>` : nothing}</span>

@@ -20,9 +20,11 @@ import { createStore } from './store.js';
 const HEALTH_MS = 10_000;
 const TOAST_MS = 4000;
 const CURVES_MS = 2000;
+const ADDRESS_MS = 150;
 
 const store = createStore(initialState());
 let toastTimer = 0;
+let addressTimer = 0;
 
 /** @type {App} */
 const app = {
@@ -45,14 +47,19 @@ const app = {
     if (location.hash === address) follow();
     else location.hash = address;
   },
+  // Writing the address takes milliseconds, and browsers refuse to do it often.
   remember(address) {
-    history.replaceState(null, '', address);
-    store.set({ route: parseRoute(address) });
+    clearTimeout(addressTimer);
+    addressTimer = window.setTimeout(() => {
+      history.replaceState(null, '', address);
+      store.set({ route: parseRoute(address) });
+    }, ADDRESS_MS);
   },
 };
 
 /** Shows what the address says. */
 function follow() {
+  clearTimeout(addressTimer);
   const before = store.get().route;
   const route = parseRoute(location.hash);
   store.set({ route });

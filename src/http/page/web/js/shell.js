@@ -41,7 +41,7 @@ export function renderShell(app, root) {
 function topBar(app) {
   const { route, health } = app.store.get();
   const looked = lookedAt();
-  const ids = marked().slice(0, COMPARED_MAX);
+  const ids = [...marked()].slice(0, COMPARED_MAX);
   /** @type {[View, string][]} */
   const tabs = [
     ['compose', formatRoute('compose')], ['jobs', formatRoute('jobs')],

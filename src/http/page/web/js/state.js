@@ -61,7 +61,7 @@
  * @property {(text: string, action?: Action, duration?: number) => void} say Shows a short message, for some milliseconds.
  * @property {(error: unknown) => void} refused Shows why something failed; a missing key opens its line.
  * @property {(address: string) => void} go To an address of the page.
- * @property {(address: string) => void} remember Writes what is shown into the address, without a step in the history.
+ * @property {(address: string) => void} remember Writes what is shown into the address, without a step in the history and some time later.
  */
 
 /** @returns {PageState} */
