@@ -101,3 +101,22 @@ test('forces of the patches add up to those of the wheel in track axes', async (
     assert.ok(Math.abs((await range()) - bound) < 1e-6 * bound);
   });
 });
+
+test('from a noisy worn pair to its damage, smoothed, and against new profiles', () => onPage('', async (page) => {
+  await page.locator('.verdict .checked').waitFor();
+  await dropFiles(page, 'main', { 'km37.ban': file('noisy-worn.ban'), 'unit3.whl': file('noisy-worn.whl') });
+  await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'unit3 on km37');
+  await page.getByRole('button', { name: 'The points are noisy: smooth the rail by 2.0 mm and the wheel by 2.0 mm, as advised' }).waitFor();
+  await page.getByRole('button', { name: /^Solve/ }).click();
+  await drawn(page);
+  await page.locator('.remark[data-code="profile-noise"]').first().waitFor();
+  await page.getByRole('button', { name: 'Solve again with the wheel smoothed by 2.0 mm and the rail smoothed by 2.0 mm' }).click();
+  await page.waitForFunction(() => document.querySelector('field-map.main') && !document.querySelector('.remark[data-code="profile-noise"]'));
+  // Of two patches the one that carries most is looked at.
+  assert.ok(parsed(await page.locator('.figures .figure-of').filter({ has: page.locator('dt', { hasText: /^N$/ }) }).locator('b').innerText()) > 37.5);
+  await page.getByRole('button', { name: 'Compare with new profiles' }).click();
+  await page.getByText('Worn area').waitFor();
+  const area = parsed((await page.locator('[aria-labelledby="h-overlay"] b').first().innerText()));
+  assert.ok(area > 10 && area < 60, `${area}`);
+  await page.screenshot({ path: join(OUTPUT, 'worn-against-new.png'), fullPage: true });
+}));

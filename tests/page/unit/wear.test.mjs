@@ -38,6 +38,8 @@ test('the angle of a flange is that of its flank, and Nadal\'s limit follows fro
   const wheel = /** @type {[number, number][]} */ ([[-700, 10], [-700, -20], ...flank, ...Array.from({ length: 60 }, (_, i) => /** @type {[number, number]} */ ([-721 - i, i / 40]))]);
   wheel.sort(() => 0);
   assert.ok(Math.abs(flangeAngle(wheel, 'right') - radians) < 0.02, `${(flangeAngle(wheel, 'right') * 180) / Math.PI}`);
+  // The face of the rim is steep too.
+  assert.ok(Math.abs(flangeAngle([...wheel, [-780.01, 40]], 'right') - radians) < 0.02);
   assert.ok(Number.isNaN(flangeAngle(wheel.filter(([, z]) => z >= 0), 'right')));
   assert.ok(Math.abs(nadal(radians, 0.3) - 1.342) < 2e-3);
 });

@@ -11,7 +11,7 @@ import { placed } from './placing.js';
 import { formatRoute } from './routes.js';
 import { hasSections } from './starts.js';
 import { bestFit, wearBetween } from './wear.js';
-import { oneWheel, outward, sideOf } from './wheelloads.js';
+import { firstPatch, oneWheel, outward, sideOf } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./api.js').Job} Job */
@@ -72,7 +72,7 @@ export async function openComparison(app, ids, query) {
  */
 async function loadSide(id, patch, point) {
   const [job, result, document] = await Promise.all([jobOf(id), resultOf(id), caseOf(id)]);
-  const which = Math.min(result.patches.length - 1, Math.max(0, Number(patch) || 0));
+  const which = Math.min(result.patches.length - 1, patch === undefined ? firstPatch(result) : Math.max(0, Number(patch) || 0));
   const { points } = result.patches[which];
   const chosen = point === undefined ? tellingPoint(points) : Math.min(points.length - 1, Math.max(0, Number(point) || 0));
   const [field, sections] = await Promise.all([fieldOf({ id, result, patch: which, point: chosen }), sectionsOf(document)]);

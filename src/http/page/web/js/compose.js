@@ -149,7 +149,8 @@ function previewOf(app, { preview, document, checked, understood }) {
   if (!checked) return nothing;
   if (preview?.failure) return html`<section class="preview" aria-label="Result while typing"><p class="fault">Solving it fails: ${preview.failure}</p>
     ${preview.failure.includes('accept_rough_profiles') ? html`<button class="small" @click=${() => change(app, '/contact/accept_rough_profiles', true)}>Solve it all the same</button>` : nothing}</section>`;
-  if (!preview?.result) return nothing;
+  if (!preview) return nothing;
+  if (!preview.result) return html`<section class="preview" aria-label="Result while typing"><p class="quiet">This case takes longer than a look while typing: solve it.</p></section>`;
   const { result, patch, point, field } = preview;
   const { patches } = result;
   const of = patches[patch].points[point];
@@ -175,7 +176,7 @@ function previewOf(app, { preview, document, checked, understood }) {
     patches.length > 1 ? `${patches.length} patches; the one drawn carries ${number(patches[patch].normal_force_n / 1000, 3)} kN` : '',
     patches[patch].points.length > 1 ? `motion ${point + 1} of ${patches[patch].points.length}` : '',
   ].filter(Boolean).join('; ');
-  return html`<section class="preview" aria-label="Result while typing">
+  return html`<section class=${preview.digest === checked.digest ? 'preview' : 'preview stale'} aria-label="Result while typing">
     ${shown ? html`<field-map .shown=${shown}></field-map>` : nothing}
     <dl>${rows.map(([name, value, error, unit]) => {
       const text = withError(value, error);

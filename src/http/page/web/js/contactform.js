@@ -128,9 +128,22 @@ function sectionZones(app) {
   const there = BODIES.filter((body) => document && isObject(at(document, `/contact/${body}`)) && !lacksSection(document, body));
   return html`<div class="pair">${sectionZone(app, 'rail')}${sectionZone(app, 'wheel')}</div>
     ${there.length === 2 ? html`<button class="link" @click=${() => exchange(app)}>Exchange rail and wheel</button>` : nothing}
+    ${adviceOf(app, there)}
     ${there.map((body) => readingFields(app, body))}
     ${at(document ?? undefined, '/contact/accept_rough_profiles') === true ? html`<div class="checks"><label><input type="checkbox" checked
       @change=${() => change(app, '/contact/accept_rough_profiles', undefined)}> solve although the profiles are rough</label></div>` : nothing}`;
+}
+
+/** The smoothing that the noise of the files asks for, on one click. @param {App} app @param {readonly Body[]} there */
+function adviceOf(app, there) {
+  const { document, checked } = app.store.get().compose;
+  const advised = there.flatMap((body) => {
+    const length = checked?.quality?.[body]?.smoothing_suggested_mm ?? 0;
+    return length && at(document ?? undefined, `/contact/${body}/smoothing_mm`) === undefined ? [{ body, length }] : [];
+  });
+  if (!advised.length || !document) return nothing;
+  const smooth = () => editDocument(app, advised.reduce((of, { body, length }) => put(of, `/contact/${body}/smoothing_mm`, length), document));
+  return html`<button class="link" @click=${smooth}>The points are noisy: smooth ${advised.map(({ body, length }) => `the ${body} by ${number(length, 2)} mm`).join(' and ')}, as advised</button>`;
 }
 
 const UNITS = /** @type {const} */ ([[undefined, 'as in the file, else mm'], ['mm', 'mm'], ['cm', 'cm'], ['m', 'm'], ['inch', 'inch']]);
@@ -159,7 +172,6 @@ function readingFields(app, body) {
   return html`<details class="reading" ?open=${needed || unfolded.has(body)} @toggle=${toggled}><summary>How the ${body} is read <span class="hint">${told}</span></summary>
     <div class="pair">${choice(app, `${pointer}/unit`, 'Unit', UNITS)}
       ${field(app, `${pointer}/smoothing_mm`, 'Smoothing', 'mm', { empty: '0 = none', hint: advised ? '' : 'none is needed', read: (text) => (/^\s*auto\s*$/i.test(text) ? 'auto' : parse(text)) })}</div>
-    ${advised && smoothing !== advised ? html`<button class="link" @click=${() => change(app, `${pointer}/smoothing_mm`, advised)}>Smooth by ${number(advised, 2)} mm, as advised</button>` : nothing}
     <div class="pair">${choice(app, `${pointer}/mirror_y`, 'y is positive', [[undefined, found('y')], [false, 'to the field side'], [true, 'to the track centre']])}
       ${choice(app, `${pointer}/mirror_z`, 'z is positive', [[undefined, found('z')], [false, 'down'], [true, 'up']])}</div></details>`;
 }

@@ -8,7 +8,7 @@ import { offered, quantityOf, rangeOf } from './field/quantities.js';
 import { placed } from './placing.js';
 import { formatRoute } from './routes.js';
 import { hasSections, isBent } from './starts.js';
-import { flangeAngle, oneWheel, sideOf } from './wheelloads.js';
+import { firstPatch, flangeAngle, oneWheel, sideOf } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./api.js').Job} Job */
@@ -70,7 +70,7 @@ export function tellingPoint(points) {
 
 /** @param {Job} job @returns {Looked} */
 const fresh = (job) => ({
-  job, result: null, document: null, placed: null, asked: new Map(), fields: [], stresses: new Map(), wheels: {}, flange: {}, wornBody: 'rail', ownScale: true, near: false, patch: 0, point: -1, quantity: '',
+  job, result: null, document: null, placed: null, asked: new Map(), fields: [], stresses: new Map(), wheels: {}, flange: {}, wornBody: 'rail', ownScale: true, near: false, patch: -1, point: -1, quantity: '',
   held: null, border: true, arrows: true, mesh: false, curve: 'forces', wheelset: 'radii', window: '',
 });
 
@@ -161,6 +161,7 @@ function show(app, result) {
   looked.result = result;
   looked.near = isBent(looked.document);
   placeProfiles(app).catch(app.refused);
+  if (looked.patch < 0) looked.patch = firstPatch(result);
   looked.patch = Math.min(looked.patch, result.patches.length - 1);
   const { points } = result.patches[looked.patch];
   if (looked.point < 0 || looked.point >= points.length) looked.point = tellingPoint(points);

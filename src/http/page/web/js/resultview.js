@@ -1,16 +1,16 @@
 // Result: the numbers with their errors, the field, the patches on the profiles, the creep curve, and how it was computed.
 
 import { html, nothing } from '../vendor/lit-html.js';
-import { cancel } from './api.js';
+import { cancel, submit } from './api.js';
 import { curveOf, isHistory } from './curvedata.js';
-import { isObject, put } from './document.js';
+import { at, isObject, put } from './document.js';
 import { damagePanel } from './damageview.js';
 import { downloads } from './downloads.js';
 import { drawProfiles } from './drawing/profiles.js';
 import { editDocument, solve } from './editing.js';
 import { loadsPanel } from './loadsview.js';
 import { remarkList } from './remarks.js';
-import { inOrder, isBent, onSurface, withEverything, withFields, withSpeed } from './starts.js';
+import { inOrder, isBent, onSurface, standardSection, withEverything, withFields, withSpeed } from './starts.js';
 import { indexOf } from './field/cells.js';
 import { combOf } from './field/comb.js';
 import { hasFields } from './fields.js';
@@ -41,6 +41,7 @@ export function result(app) {
     <div><h1>${job.name || `Job ${job.id.slice(0, 8)}`}</h1>
       <p class="quiet">${Object.entries(job.labels ?? {}).map(([key, value]) => html`<span class="chip">${key}: ${value}</span>`)} <code>${job.id}</code></p></div>
     ${looked.result ? html`<div class="downloads" role="group" aria-label="Download">${downloads(app, looked)}
+      ${isWorn(app, looked.document) ? html`<button class="small" @click=${() => compareWithNew(app, looked).catch(app.refused)}>Compare with new profiles</button>` : nothing}
       <button class="small primary" @click=${() => edit(app, looked)}>Edit case</button></div>` : nothing}
   </header>`;
   if (!looked.result) return html`<div class="result">${head}${waiting(app, looked)}</div>`;
@@ -52,6 +53,24 @@ function edit(app, looked) {
   if (looked.document) editDocument(app, inOrder(looked.document));
   app.compose({ example: '' });
   app.go(formatRoute('compose'));
+}
+
+const BODIES = /** @type {const} */ (['rail', 'wheel']);
+
+/** Is this a wheel on a rail that are not both new ones of the examples? @param {App} app @param {JsonObject | null} document */
+function isWorn(app, document) {
+  const { examples } = app.store.get().compose;
+  const differs = (/** @type {'rail' | 'wheel'} */ body) => JSON.stringify(at(document ?? undefined, `/contact/${body}`)) !== JSON.stringify(standardSection(examples, body));
+  return examples.length > 0 && at(document ?? undefined, '/contact/type') === 'profiles' && BODIES.some(differs);
+}
+
+/** Solves the same case with a new 60E1 rail and a new S1002 wheel, and compares both. @param {App} app @param {Looked} looked */
+async function compareWithNew(app, { document, job }) {
+  const { examples } = app.store.get().compose;
+  const fresh = BODIES.reduce((of, body) => put(of, `/contact/${body}`, standardSection(examples, body)), put(document ?? {}, '/contact/flange_back_position_mm', undefined));
+  const other = await submit(JSON.stringify({ ...fresh, name: 'new S1002 on new 60E1' }), { wait: 10 });
+  if (other.state !== 'succeeded') return app.go(formatRoute('result', [other.id]));
+  app.go(formatRoute('compare', [other.id, job.id]));
 }
 
 /** Solves a case whose profiles are too rough. @param {App} app @param {Looked} looked */
@@ -92,6 +111,7 @@ function loaded(app, looked, answer) {
   return html`
     ${figures(looked, patch, point)}
     ${remarkList(answer.remarks ?? [], (place) => choose(app, place))}
+    ${smoothAgain(app, looked, answer)}
     ${answer.wheelset?.kinematics ? wheelsetPanel(app, looked, answer.wheelset) : nothing}
     <div class=${mapped ? 'cols' : 'cols nofield'}>
       ${mapped ? fieldPanel(app, looked, answer) : html`<section class="panel wait"><p>The case asked for no fields, so there is no map.</p>
@@ -106,6 +126,23 @@ function loaded(app, looked, answer) {
       </div>
     </div>
     ${damagePanel(app, looked, answer, () => again(app, looked.document && onSurface(looked.document, undefined)))}`;
+}
+
+/** Solves a case again with the smoothing that warnings on its profiles advise. @param {App} app @param {Looked} looked @param {JobResult} answer */
+function smoothAgain(app, looked, answer) {
+  /** @type {Record<string, number>} */
+  const lengths = {};
+  for (const remark of answer.remarks ?? []) {
+    if (remark.severity !== 'warning' || !remark.pointer || !('smoothing_mm' in remark) || typeof remark.smoothing_mm !== 'number') continue;
+    lengths[remark.pointer] = Math.max(lengths[remark.pointer] ?? 0, remark.smoothing_mm);
+  }
+  const advised = Object.entries(lengths);
+  if (!advised.length || !looked.document) return nothing;
+  const solveSmooth = () => {
+    editDocument(app, advised.reduce((of, [pointer, length]) => put(of, `${pointer}/smoothing_mm`, length), /** @type {JsonObject} */ (looked.document)));
+    solve(app);
+  };
+  return html`<p class="advice"><button class="small" @click=${solveSmooth}>Solve again with ${advised.map(([pointer, length]) => `the ${pointer.split('/').pop()} smoothed by ${number(length, 2)} mm`).join(' and ')}</button></p>`;
 }
 
 /** Solves a case again with all that is drawn. @param {App} app @param {JsonObject | null} document */

@@ -21,6 +21,8 @@ import { at, numberAt, put } from './document.js';
 const CHORD_MM = 2;
 /** A flank that is less steep is no flange. */
 const FLANGE_MIN_RAD = 0.7;
+/** Less steep than this is the tread. */
+const TREAD_MAX_RAD = 0.35;
 
 /** Positive to the field side. @param {Side} side @param {number} toTheLeft */
 export const outward = (side, toTheLeft) => (side === 'left' ? toTheLeft : -toTheLeft);
@@ -83,7 +85,11 @@ export function flangeAngle(wheel, side) {
   for (let from = tip, to = tip; to < line.length; to += 1) {
     while (from < to && Math.hypot(line[to][0] - line[from + 1][0], line[to][1] - line[from + 1][1]) >= CHORD_MM) from += 1;
     const [y, z] = [line[to][0] - line[from][0], line[to][1] - line[from][1]];
-    if (Math.hypot(y, z) >= CHORD_MM) steepest = Math.max(steepest, Math.atan2(z, Math.max(y, 0)));
+    if (Math.hypot(y, z) < CHORD_MM) continue;
+    const angle = Math.atan2(z, Math.max(y, 0));
+    // The tread begins; a steep face behind it is that of the rim.
+    if (steepest >= FLANGE_MIN_RAD && angle < TREAD_MAX_RAD) break;
+    steepest = Math.max(steepest, angle);
   }
   return steepest >= FLANGE_MIN_RAD ? steepest : NaN;
 }
@@ -104,3 +110,7 @@ export function oneWheel(document, side, shift) {
   const { damage, subsurface, thermal, ...plain } = document;
   return put({ ...plain, contact: own, load: { vertical_force_n: load }, outputs: ['resultants'] }, '/motion', { creepage_x: 0, creepage_y: 0, spin_per_mm: 0 });
 }
+
+/** The patch to look at first: of one wheel that which carries most. @param {JobResult} result */
+export const firstPatch = ({ patches, wheelset }) =>
+  wheelset ? 0 : patches.reduce((most, { normal_force_n: load }, at) => (load > patches[most].normal_force_n ? at : most), 0);
