@@ -1,4 +1,4 @@
-// Frames of the page with much data: a run of a million rows, a field of 400 × 400 cells, ten thousand jobs. Not a test: it prints times.
+// Frames of the page with much data: a run of a million rows, a field of 400 × 400 cells, a wheelset that is shifted, ten thousand jobs. Not a test: it prints times.
 //   RAILHEAD_BINARY=target/release/railhead RAILHEAD_TEST_BROWSER=/usr/bin/chromium node tests/page/bench.mjs [rows]
 import { drawn, example, launch, Service, withFields } from './browser/harness.mjs';
 
@@ -68,7 +68,8 @@ try {
     await page.mouse.up();
     await page.locator('line-strips').press('Escape');
   }, 12);
-  await page.getByRole('button', { name: /^Search all/ }).click();
+  // Few rows are searched at once.
+  if (ROWS > 200_000) await page.getByRole('button', { name: /^Search all/ }).click();
   await frames('run: searching the worst rows', () => page.locator('[aria-labelledby="h-worst"] tbody tr').first().waitFor(), 1);
 
   const { id } = await service.solved(withFields('hertz-steel'));
@@ -91,6 +92,19 @@ try {
   }, step), 120);
   const map = /** @type {{ x: number, y: number, width: number, height: number }} */ (await page.locator('field-map.main .over').boundingBox());
   await frames(`field of ${SIDE} × ${SIDE}: crosshair`, (step) => page.mouse.move(map.x + 80 + (map.width * step) / 500, map.y + 120 + (map.height * step) / 600), 240);
+
+  const wheelset = await service.solved(withFields('wheelset'));
+  await page.goto(`${service.base}/#/jobs/${wheelset.id}`);
+  await page.locator('.shifting .comb').first().waitFor();
+  await frames('wheelset: shifted by hand', async (step) => {
+    await page.locator('.shifting input[type=range]').evaluate((input, to) => {
+      /** @type {HTMLInputElement} */ (input).value = String(to);
+      input.dispatchEvent(new Event('input', { bubbles: true }));
+    }, 40 + step);
+    await page.waitForTimeout(16);
+  }, 80);
+  const steps = await page.evaluate(() => performance.getEntriesByName('shift').map(({ duration }) => Math.round(duration)).sort((one, two) => one - two));
+  console.log(JSON.stringify({ name: 'wheelset: wheels, forces and pressures of a shift', steps: steps.length, median: steps[steps.length >> 1], longest: steps.at(-1) }));
 
   const line = JSON.stringify({ ...example('hertz-steel'), outputs: ['resultants'] });
   const batch = await service.ask('/v1/batches', { body: Array.from({ length: JOBS }, (_, job) => line.replace('UIC60 crown, 100 kN', `case ${job}`)).join('\n'), headers: { 'Content-Type': 'application/x-ndjson' } });
