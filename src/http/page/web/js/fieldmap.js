@@ -25,6 +25,7 @@ import { drawSections } from './field/sections.js';
  * @property {number} [scale] Pixels per mm: a small picture without axes.
  * @property {{ x: number, y: number } | null} [held] Where the crosshair is held.
  * @property {number} [tallest] Most pixels of the map's height.
+ * @property {boolean} [bent] Across is the arc length along the rail.
  * @property {string} [name] What it is, for those who do not see it.
  */
 
@@ -119,7 +120,7 @@ export class FieldMap extends HTMLElement {
     const range = shown.range ?? rangeOf(shown.quantity, [shown.field.cells], NaN);
     this.#scene = {
       index, quantity: shown.quantity, values, range, friction: shown.friction ?? NaN, compact,
-      border: shown.border ?? false, arrows: shown.arrows ?? false, mesh: shown.mesh ?? false,
+      border: shown.border ?? false, arrows: shown.arrows ?? false, mesh: shown.mesh ?? false, bent: shown.bent ?? false,
     };
     const width = this.clientWidth;
     if (!compact && !width) return;

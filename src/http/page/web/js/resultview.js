@@ -186,7 +186,7 @@ function fieldPanel(app, looked, answer) {
   const toggles = /** @type {const} */ ([['border', 'stick–slip line'], ['arrows', 'arrows'], ['mesh', 'cells']]);
   const shown = field && quantity && all.includes(quantity) ? {
     field, quantity, range: rangeShown(looked, quantity), friction: frictionOf(looked), border: looked.border, arrows: looked.arrows,
-    mesh: looked.mesh, held: looked.held, name: `${quantity.heading} of patch ${looked.patch}`,
+    mesh: looked.mesh, held: looked.held, bent: isBent(looked.document), name: `${quantity.heading} of patch ${looked.patch}`,
   } : null;
   const moved = (/** @type {CrosshairEvent} */ { detail: { x, y, held } }) => {
     looked.held = held ? { x, y } : null;

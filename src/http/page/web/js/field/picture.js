@@ -24,6 +24,7 @@ import { stickBorder } from './stick.js';
  * @property {boolean} arrows
  * @property {boolean} mesh Show the cells as they were computed.
  * @property {boolean} compact
+ * @property {boolean} bent The coordinate across is the arc length along the rail.
  */
 
 const ARROW_STEP = 30;
@@ -50,7 +51,7 @@ export function drawPicture(pen, scene, layout, density, ink) {
   if (scene.arrows) drawArrows(pen, scene, layout);
   pen.restore();
   if (scene.compact) return;
-  drawAxes(pen, layout, ink);
+  drawAxes(pen, layout, ink, scene.bent ? 's along the rail, to the left / mm' : 'y to the left / mm');
   drawBar(pen, scene, layout, ink);
 }
 
@@ -310,8 +311,9 @@ function addArrow(path, x, y, dx, dy) {
  * @param {Pen} pen
  * @param {Layout} layout
  * @param {Ink} ink
+ * @param {string} across
  */
-function drawAxes(pen, layout, ink) {
+function drawAxes(pen, layout, ink, across) {
   const { map, X, Y } = layout;
   const marks = ticksOf(layout);
   pen.font = `12px ${ink.font}`;
@@ -335,7 +337,7 @@ function drawAxes(pen, layout, ink) {
   pen.rotate(-Math.PI / 2);
   pen.textAlign = 'center';
   pen.textBaseline = 'middle';
-  pen.fillText('y to the left / mm', 0, 0);
+  pen.fillText(across, 0, 0);
   pen.restore();
 }
 
