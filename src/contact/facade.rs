@@ -292,7 +292,7 @@ impl Contact {
             yaw_rad: 0.0,
             roll_rad: 0.0,
             accept_rough_profiles: false,
-            reference_surface: SurfaceName::Plane,
+            reference_surface: None,
             influence: None,
         }
     }
@@ -326,7 +326,7 @@ impl Contact {
             ..
         } = &mut self
         {
-            *reference_surface = SurfaceName::Curve;
+            *reference_surface = Some(SurfaceName::Curve);
             *influence = Some(asked);
         }
         self

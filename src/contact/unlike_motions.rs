@@ -85,7 +85,7 @@ fn with_patches_of(
 }
 
 /// Writes region and pressure of the one motion of a patch into its point.
-fn tell_region(patch: &mut PatchSolution) {
+pub(crate) fn tell_region(patch: &mut PatchSolution) {
     let region = MotionRegion {
         normal_force_n: patch.normal_force_n,
         friction_limit_n: patch.friction_limit_n,

@@ -15,17 +15,20 @@ use crate::contact::geometry::reference_curve::{
     CurvePlace, ReferenceCurve, RigidMotion, WheelOver,
 };
 use crate::contact::half_space::bent_surface::{Influence, TURN_MAX};
-use crate::contact::monitor::Monitor;
+use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::gap::grid::GridFineness;
 use crate::contact::normal::on_curve::{CurveContact, CurveTask, Friction, Workspace};
+use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::surface_slip::SurfaceSlip;
 use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
 use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::normal_stage::SolvedFootprint;
+use crate::contact::post::damage::evaluate::{DamagedPatch, damage};
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::problem::physics::MotionPart;
 use crate::contact::problem::run::Run;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
@@ -33,12 +36,15 @@ use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling_stage;
 use crate::contact::solution::assemble::normalised;
+use crate::contact::solution::moved::move_origin;
 use crate::contact::solution::track_axes::both;
 use crate::contact::solution::words::answer::{
     ErrorEstimate, NormalReport, Origin, PatchSolution, Position, Solution, Total,
 };
+use crate::contact::solution::words::damage::Damage;
 use crate::contact::solution::words::fields::{Fields, PatchFields};
 use crate::contact::time_limit::TimeLimit;
+use crate::contact::unlike_motions::tell_region;
 use crate::contact::wheel_balance::next_share;
 
 /// Allowed error of the resultants in the rounds before the last ones, relative to μN.
@@ -62,7 +68,8 @@ const FRAME: &str = "every patch on the surface of the rail: x along rolling (le
                      rolling, y to the left, z up; forces, moments and tractions act on the lower body, slip is that of the upper body relative \
                      to the lower one";
 
-/// Solves a case of one motion on the curve of the rail. `before` is asked before tractions are solved whether there is any point in it.
+/// Solves a case on the curve of the rail. `before` is asked before tractions are solved whether there is any point in it. Tractions change pressures,
+/// so that every motion has its own; of several motions, the wheel and the patches of the answer are those of the first.
 ///
 /// # Errors
 /// A named reason why there is no answer.
@@ -74,31 +81,42 @@ pub(crate) fn solve(
     before: &mut dyn FnMut(&WheelContact) -> Result<(), SolveError>,
     monitor: &dyn Monitor,
 ) -> Result<(WheelContact, Solution, Fields), SolveError> {
-    let watch = TimeLimit::new(monitor, case.run.time_limit, 1);
-    let solve = CurveSolve::new(operators, case, contact, influence, &watch);
-    let solved = solve.and_then(|solve| {
-        let workspace = &mut Workspace::default();
-        let began = watch.elapsed();
-        let contact = solve.task().rest(workspace, &watch)?;
-        let mut at_rest = solve.wheel(&contact, 0.0)?;
-        before(&at_rest)?;
-        let found = solve.rounds(contact, &case.run, workspace)?;
-        let rest = (watch.elapsed() - began).as_secs_f64();
-        at_rest = solve.wheel(&found.contact, found.lift)?;
-        at_rest.remarks.extend(found.remarks.iter().cloned());
-        let change = solve.change_by_turn(&found, workspace)?;
-        solve.answer(found, at_rest, change, rest)
-    });
-    solved.map_err(|error| watch.explained(error, case))
+    let motions = case.problem.motions.len();
+    let curve = ReferenceCurve::new(&contact.geometry);
+    let mut whole: Option<(WheelContact, Solution, Fields)> = None;
+    for index in 0..motions {
+        let part = case.slice(index..index + 1);
+        let share = MonitorPart {
+            inner: monitor,
+            before: index as f64 / motions as f64,
+            own: 1.0 / motions as f64,
+        };
+        let watch = TimeLimit::new(&share, case.run.time_limit, 1);
+        let solve = CurveSolve::new(operators, &part, contact, influence, &curve, &watch);
+        let solved = solve.and_then(|solve| solve.motion(before));
+        let (wheel, solution, fields) = solved.map_err(|error| watch.explained(error, &part))?;
+        match &mut whole {
+            None => whole = Some((wheel, solution, fields)),
+            Some((_, all, all_fields)) => {
+                all.append(solution);
+                all_fields.append(fields);
+            }
+        }
+    }
+    let Some(whole) = whole else {
+        unreachable!("a case has at least one motion")
+    };
+    Ok(whole)
 }
 
-/// A wheel on the curve of its rail.
+/// A wheel on the curve of its rail, in one motion.
+#[derive(Clone, Copy)]
 struct CurveSolve<'a> {
     operators: &'a Arc<OperatorStore>,
     case: &'a CheckedCase,
     contact: &'a WheelTask,
     influence: Influence,
-    curve: ReferenceCurve<'a>,
+    curve: &'a ReferenceCurve<'a>,
     touch: f64,
     expected: f64,
     fineness: GridFineness,
@@ -121,6 +139,10 @@ struct Part {
     /// x and s in mm of the origin of its coordinates.
     origin: [f64; 2],
     patches: Vec<GridPressure>,
+    /// What the normal problem says of them, about the same origin.
+    loads: Vec<Patch>,
+    /// Their load centres `[x, s]` in mm.
+    centres: Vec<[f64; 2]>,
     solution: Solution,
     fields: Fields,
 }
@@ -153,6 +175,7 @@ impl<'a> CurveSolve<'a> {
         case: &'a CheckedCase,
         contact: &'a WheelTask,
         influence: Influence,
+        curve: &'a ReferenceCurve<'a>,
         watch: &'a TimeLimit<'a>,
     ) -> Result<CurveSolve<'a>, SolveError> {
         let search = contact
@@ -169,7 +192,7 @@ impl<'a> CurveSolve<'a> {
             case,
             contact,
             influence,
-            curve: ReferenceCurve::new(&contact.geometry),
+            curve,
             touch: search.touch,
             expected,
             fineness: GridFineness::for_answer(case.run.target()),
@@ -179,7 +202,7 @@ impl<'a> CurveSolve<'a> {
 
     fn task(&self) -> CurveTask<'_> {
         CurveTask {
-            curve: &self.curve,
+            curve: self.curve,
             elasticity: &self.case.problem.elasticity,
             influence: self.influence,
             loading: self.contact.loading,
@@ -189,17 +212,61 @@ impl<'a> CurveSolve<'a> {
         }
     }
 
-    /// Pressures and tractions in turn, from a rest without friction.
+    /// The wheel at rest, and the answer to the motion.
+    fn motion(
+        &self,
+        before: &mut dyn FnMut(&WheelContact) -> Result<(), SolveError>,
+    ) -> Result<(WheelContact, Solution, Fields), SolveError> {
+        let MotionPart { before: index, all } = self.case.problem.part;
+        let workspace = &mut Workspace::default();
+        let began = self.watch.elapsed();
+        let contact = self.task().rest(workspace, self.watch)?;
+        let at_rest = self.wheel(&contact, 0.0)?;
+        if index == 0 {
+            before(&at_rest)?;
+        }
+        let run = &self.case.run;
+        let mut found = self.rounds(contact, run, true, workspace)?;
+        // An answer has one list of patches, which is that without tractions if there are several motions.
+        let patches: usize = found.parts.iter().map(|part| part.patches.len()).sum();
+        if all > 1 && patches != at_rest.patches.len() {
+            let contact = self.task().rest(workspace, self.watch)?;
+            found = self.rounds(contact, run, false, workspace)?;
+            found
+                .remarks
+                .push(Remark::NormalForcesAloneBalance {}.into());
+        }
+        let rest = (self.watch.elapsed() - began).as_secs_f64();
+        let mut wheel = self.wheel(&found.contact, found.lift)?;
+        wheel.remarks.extend(found.remarks.iter().cloned());
+        if index == 0 {
+            let change = self.change_by_turn(&found, workspace)?;
+            wheel.remarks.extend(change.map(RemarkEntry::from));
+        }
+        if all > 1 {
+            let of_motion = |remark: &mut RemarkEntry| remark.point = Some(index);
+            wheel.remarks.iter_mut().for_each(of_motion);
+        }
+        let (mut solution, fields) = self.answer(found, &wheel, rest)?;
+        if all > 1 {
+            solution.patches.iter_mut().for_each(tell_region);
+        }
+        Ok((wheel, solution, fields))
+    }
+
+    /// Pressures and tractions in turn, from a rest without friction; only once, on the pressures of that rest, unless they are `coupled`.
     fn rounds(
         &self,
         mut contact: CurveContact,
         run: &Run,
+        coupled: bool,
         workspace: &mut Workspace,
     ) -> Result<Found, SolveError> {
         let last_run = with_tractions(run, &run.outputs);
         let rough = with_tractions(&run.for_resultants(TARGET_OF_ROUNDS), &[]);
         let shares = matches!(self.contact.loading, WheelLoad::Vertical(_));
-        let coupled = (shares || self.influence == Influence::AngleCorrected)
+        let coupled = coupled
+            && (shares || self.influence == Influence::AngleCorrected)
             && !self.case.problem.friction.is_frictionless();
         let tolerance = CHANGE * run.resolution.target_or_usual();
         let mut exact = !coupled;
@@ -299,10 +366,13 @@ impl<'a> CurveSolve<'a> {
         let CheckedCase { problem, label, .. } = self.case;
         let field = CurveContact::field(patches.clone())?;
         let loads = field.patches();
+        let centres: Vec<[f64; 2]> = (0..loads.len())
+            .map(|k| field.load_centre(Some(k)))
+            .collect();
         let heaviest = (0..loads.len())
             .max_by(|a, b| loads[*a].normal_force.total_cmp(&loads[*b].normal_force))
             .unwrap_or(0);
-        let origin = field.load_centre(Some(heaviest));
+        let origin = centres[heaviest];
         let (place, over) = self.load_centre(contact, origin)?;
         let rigid = self.rigid(contact, &field)?;
         let motion = creepages(&rigid[heaviest], origin[0], &place, &over);
@@ -321,7 +391,7 @@ impl<'a> CurveSolve<'a> {
         );
         let solved = SolvedFootprint {
             footprint: Footprint::computed(field.from_origin(origin), contact.missed)
-                .with_slip(slip),
+                .on_surface(slip, centres.iter().map(|centre| minus(*centre, origin))),
             report: Some(report),
             coupling_error: 0.0,
             remarks: Vec::new(),
@@ -337,6 +407,8 @@ impl<'a> CurveSolve<'a> {
         Ok(Part {
             origin,
             patches,
+            loads: solved.footprint.patches().to_vec(),
+            centres,
             solution,
             fields,
         })
@@ -389,6 +461,10 @@ impl<'a> CurveSolve<'a> {
     }
 
     /// The slip of the surface beyond a motion about an origin `[x, s]`.
+    ///
+    /// Pressed together, like bodies meet halfway between their undeformed surfaces. The rolling radius of a strip is taken there, less what the
+    /// deepest strip loses, so that this one keeps the radius of the undeformed wheel, to which creepages refer. Along x half-spaces lack other terms of
+    /// the size of the wheel's roundness, so that it is left out: a flat surface has the slip of a plane.
     fn surface_slip(
         &self,
         contact: &CurveContact,
@@ -407,12 +483,14 @@ impl<'a> CurveSolve<'a> {
             };
             (0..extents.len()).min_by(|a, b| far(a).total_cmp(&far(b)))
         };
+        let deepest = least_gap(&contact.over).unwrap_or(0.0);
         let mut slip = [Vec::new(), Vec::new()];
         for (j, place) in grid.places.iter().enumerate() {
             let rigid = &rigid[patch_of(place.s).unwrap_or(0)];
+            let row = &contact.over[j * grid.x.len()..(j + 1) * grid.x.len()];
+            let gap = 0.5 * (deepest + least_gap(row).unwrap_or(deepest));
             for (i, x) in grid.x.iter().enumerate() {
                 let k = j * grid.x.len() + i;
-                let gap = contact.over[k].map_or(0.0, |over| over.gap);
                 let own = rigid.slip(place.point(*x, gap), place);
                 let [dx, ds] = [x - origin[0], place.s - origin[1]];
                 let plane = [
@@ -539,13 +617,12 @@ impl<'a> CurveSolve<'a> {
         }
         let unfolded = CurveSolve {
             influence: Influence::Unfolded,
-            curve: self.curve.clone(),
             fineness: GridFineness::for_answer(TARGET_OF_ROUNDS),
             ..*self
         };
         let run = self.case.run.for_resultants(TARGET_OF_ROUNDS);
         let rest = unfolded.task().rest(workspace, self.watch)?;
-        let other = unfolded.rounds(rest, &run, workspace)?;
+        let other = unfolded.rounds(rest, &run, true, workspace)?;
         let [change_x, change_y] = [0, 1].map(|k| (found.force[k] - other.force[k]) / limit);
         Ok(Some(Remark::TurnCorrected {
             turn_rad: turn,
@@ -601,16 +678,14 @@ impl<'a> CurveSolve<'a> {
     fn answer(
         &self,
         found: Found,
-        wheel: WheelContact,
-        change: Option<Remark>,
+        wheel: &WheelContact,
         seconds: f64,
-    ) -> Result<(WheelContact, Solution, Fields), SolveError> {
+    ) -> Result<(Solution, Fields), SolveError> {
         let forces = self.forces(&found.contact, &found.parts);
         let Found { contact, parts, .. } = found;
         let mut remarks = self.case.remarks.clone();
         remarks.extend(wheel.remarks.iter().cloned());
-        remarks.extend(change.map(RemarkEntry::from));
-        let centre = load_centre_of_all(&self.curve, &parts);
+        let centre = load_centre_of_all(self.curve, &parts);
         let mut total = Total {
             force_x_n: 0.0,
             force_y_n: 0.0,
@@ -636,14 +711,11 @@ impl<'a> CurveSolve<'a> {
                 total.force_z_n = total.force_z_n.map(|sum| sum + z);
                 total.moment_z_n_mm += moment;
                 let [.., low, high] = part.solution.patches[k].extent_mm;
-                let turned = [low, high].map(|s| self.curve.at(s + part.origin[1]).angle);
+                let turned = [low, high].map(|s| self.curve.at(s + part.centres[k][1]).angle);
                 let turn_rad = (turned[1] - turned[0]).abs();
                 if self.influence == Influence::HalfSpace && turn_rad > TURN_OF_HALF_SPACE {
                     remarks.push(Remark::ContactTurns { turn_rad }.at_patch(first + k));
                 }
-            }
-            for k in 0..part.solution.patches.len() {
-                self.about_load_centre(&mut part, k);
             }
             match &mut whole {
                 None => whole = Some((part.solution, part.fields)),
@@ -674,7 +746,7 @@ impl<'a> CurveSolve<'a> {
             frame: FRAME.to_owned(),
             ..solution
         };
-        Ok((wheel, solution, fields))
+        Ok((solution, fields))
     }
 
     /// Completes a patch with its position, its force at its mean angle and the motion at its load centre; returns its moment about the
@@ -688,7 +760,7 @@ impl<'a> CurveSolve<'a> {
         about: [f64; 2],
     ) -> Result<f64, SolveError> {
         let geometry = &self.contact.geometry;
-        let centre = self.centre_of(part, k)?;
+        let centre = part.centres[k];
         let (place, over) = self.load_centre(contact, centre)?;
         let [_, y, z] = place.point(centre[0], 0.0);
         let rigid = match &self.case.problem.wheelset {
@@ -711,7 +783,13 @@ impl<'a> CurveSolve<'a> {
         let angle = forces.angle();
         let (sin, cos) = angle.sin_cos();
         let [along, y_share, z_share] = forces.sheared;
-        let origin = part.origin;
+        let by = minus(part.centres[k], part.origin);
+        move_origin(
+            &mut part.solution.patches[k],
+            part.fields.patches.get_mut(k),
+            by,
+        );
+        let load = part.loads[k];
         let patch = &mut part.solution.patches[k];
         let limit = patch.friction_limit_n.unwrap_or(0.0);
         patch.position = Some(Position {
@@ -725,13 +803,24 @@ impl<'a> CurveSolve<'a> {
         patch.approach_mm = Some(-over.gap);
         let elasticity = &self.case.problem.elasticity;
         let point = &mut patch.points[0];
-        point.moment_z_n_mm +=
-            -(centre[0] - origin[0]) * point.force_y_n + (centre[1] - origin[1]) * point.force_x_n;
         point.force_y_n = y_share * cos + z_share * sin;
         point.motion = motion.into();
         point.normalised = normalised(elasticity, patch.area_mm2, limit, &motion);
         point.friction_power_without_spin_n =
             (motion.creepage_x * along).abs() + (motion.creepage_y * point.force_y_n).abs();
+        if let Some(task) = &self.case.run.after.damage {
+            let across = point.damage.take().and_then(|damage| damage.across);
+            let of = DamagedPatch {
+                patch: &load,
+                point,
+                limit,
+                speed: self.case.problem.speeds[0],
+            };
+            point.damage = Some(Box::new(Damage {
+                across,
+                ..damage(task, of)
+            }));
+        }
         Ok(moment)
     }
 
@@ -747,29 +836,10 @@ impl<'a> CurveSolve<'a> {
             ..error
         })
     }
+}
 
-    /// The load centre `[x, s]` of a patch of a part.
-    fn centre_of(&self, part: &Part, k: usize) -> Result<[f64; 2], SolveError> {
-        let field = CurveContact::field(part.patches.clone())?;
-        Ok(field.load_centre(Some(k)))
-    }
-
-    /// Moves the coordinates of a patch to its load centre.
-    fn about_load_centre(&self, part: &mut Part, k: usize) {
-        let Ok(centre) = self.centre_of(part, k) else {
-            return;
-        };
-        let by = [0, 1].map(|axis| centre[axis] - part.origin[axis]);
-        let patch = &mut part.solution.patches[k];
-        for (end, by) in patch.extent_mm.iter_mut().zip([by[0], by[0], by[1], by[1]]) {
-            *end -= by;
-        }
-        let fields = part.fields.patches.get_mut(k);
-        for cells in fields.into_iter().flat_map(|fields| &mut fields.meshes) {
-            cells.x_mm.iter_mut().for_each(|x| *x -= by[0]);
-            cells.y_mm.iter_mut().for_each(|y| *y -= by[1]);
-        }
-    }
+fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
 }
 
 /// A run with tractions and pressures among its outputs.
@@ -846,6 +916,12 @@ fn covered([from, to]: [f64; 2], cells: usize) -> Vec<(usize, f64)> {
         .map(|cell| (cell, part(cell)))
         .filter(|(_, part)| *part > 0.0)
         .collect()
+}
+
+/// The least gap of some cells in mm.
+fn least_gap(over: &[Option<WheelOver>]) -> Option<f64> {
+    let gaps = over.iter().flatten().map(|over| over.gap);
+    gaps.reduce(f64::min)
 }
 
 /// The turn of the surface from the first to the last strip in contact, in rad.

@@ -304,7 +304,8 @@ fn mirrored(case: &Value) -> Value {
     case
 }
 
-/// A wheel of 300 mm across its tread on a flat rail, where the curve is a plane; the wheel bends, so that half of its turn counts.
+/// A wheel of 300 mm across its tread on a flat rail, where the curve is a plane; the wheel bends, so that half of its turn and of what its rolling
+/// radius loses across the contact counts: 2e-5 of creepage, where 1e-3 slide.
 #[test]
 fn a_flat_rail_has_the_forces_of_a_plane() {
     let flat = |of: fn(f64) -> f64| -> Vec<[f64; 2]> {
@@ -322,8 +323,6 @@ fn a_flat_rail_has_the_forces_of_a_plane() {
         contact["flange_back_distance_mm"] = json!(0.0);
         contact["flange_back_position_mm"] = json!(0.0);
         contact["accept_rough_profiles"] = json!(true);
-        // The roundness of the wheel over the contact changes the slip by 6e-5, which hardly matters near full slip.
-        case["motion"]["wheelset"]["free_rolling_radius_mm"] = json!(462);
         let contact = &mut case["contact"];
         if let Some(influence) = influence {
             contact["influence"] = json!(influence);
@@ -332,7 +331,7 @@ fn a_flat_rail_has_the_forces_of_a_plane() {
     };
     let plane = solve_on("plane", None);
     let limit = limit(&plane);
-    for (influence, allowed) in [("half_space", 0.005), ("angle_corrected", 0.01)] {
+    for (influence, allowed) in [("half_space", 0.006), ("angle_corrected", 0.008)] {
         let curve = solve_on("curve", Some(influence));
         let (found, known) = (&curve.total[0], &plane.total[0]);
         for (found, known) in [
@@ -456,12 +455,6 @@ fn fields_lie_about_the_load_centres_and_carry_the_forces() {
 fn what_is_not_solved_on_the_curve_is_refused() {
     let case = usual("curve", 0.0, 0.0);
     let with = |pointer: &str, value: Value| crate::cases::with(&case, pointer, Some(value));
-    let motions = json!([{ "creepage_x": 0.001 }, { "creepage_x": 0.002 }]);
-    assert_fault(
-        &with("/motion", motions),
-        "/motion",
-        &["one motion", "plane"],
-    );
     let history = json!({ "history": {
         "distance_mm": [0.0, 5.0], "creepage_x": [0.0, 0.001]
     } });
@@ -484,12 +477,144 @@ fn what_is_not_solved_on_the_curve_is_refused() {
         "/solver/method",
         &["boundary_element"],
     );
-    assert_fault(
-        &with("/outputs", json!(["resultants", "gradients"])),
-        "/outputs/1",
-        &["plane"],
-    );
     let plane = usual("plane", 0.0, 0.0);
     let influence = crate::cases::with(&plane, "/contact/influence", Some(json!("half_space")));
     assert_fault(&influence, "/contact/influence", &["curve"]);
+}
+
+/// Several motions are those of as many cases: tractions change the pressures of each.
+#[test]
+fn several_motions_have_the_forces_of_as_many_cases() {
+    let motions = [
+        json!({ "creepage_x": 0.001, "creepage_y": 0.002, "spin_per_mm": 4e-4, "speed_mm_per_s": 2e4 }),
+        json!({ "creepage_x": -0.0005, "creepage_y": -0.002, "spin_per_mm": 1e-4, "speed_mm_per_s": 3e4 }),
+    ];
+    let mut case = usual("curve", -6.0, 0.003);
+    case["outputs"] = json!(["resultants", "tractions", "damage"]);
+    let alone = motions.clone().map(|motion| {
+        let mut case = case.clone();
+        case["motion"] = motion;
+        solve(&case)
+    });
+    case["motion"] = json!(motions);
+    let both = solve(&case);
+    for (k, alone) in alone.iter().enumerate() {
+        let (found, known) = (&both.total[k], &alone.total[0]);
+        assert_eq!(found.force_x_n, known.force_x_n);
+        assert_eq!(found.force_y_n, known.force_y_n);
+        for (patch, known) in both.patches.iter().zip(&alone.patches) {
+            let (found, known_point) = (&patch.points[k], &known.points[0]);
+            assert_eq!(found.damage, known_point.damage);
+            let region = found.region.as_ref().unwrap();
+            assert_eq!(region.normal_force_n, known.normal_force_n);
+        }
+    }
+}
+
+/// Stresses and temperatures are given about each patch's own load centre.
+#[test]
+fn what_follows_from_a_patch_is_given_about_its_load_centre() {
+    let text = include_str!("../../api/examples/wheel-rail-flange.case.json");
+    let mut case: Value = serde_json::from_str(text).unwrap();
+    case["contact"]["reference_surface"] = json!("curve");
+    case["outputs"] = json!([
+        "resultants",
+        "subsurface",
+        "damage",
+        "temperature",
+        "gradients"
+    ]);
+    case["subsurface"] = json!({ "points_mm": [[0.0, 0.0, 1.0]], "worst": true });
+    case["damage"] = json!({ "across": true });
+    case["thermal"] = json!({ "conductivity_w_per_mk": 50, "density_kg_per_m3": 7850, "specific_heat_j_per_kgk": 450, "bulk_c": 20 });
+    let checked = check(&case, &Limits::default()).unwrap_or_else(|error| panic!("{error}"));
+    let (solution, fields) = railhead::contact::solve(&checked, &Unmonitored).unwrap();
+    assert!(solution.patches.len() > 1);
+    for (patch, fields) in solution.patches.iter().zip(&fields.patches) {
+        let point = &patch.points[0];
+        let [x_min, x_max, y_min, y_max] = patch.extent_mm;
+        let inside = |[x, y]: [f64; 2]| {
+            let inside = (x_min..=x_max).contains(&x) && (y_min..=y_max).contains(&y);
+            assert!(inside, "{x} {y} {:?}", patch.extent_mm);
+        };
+        inside([0.0, 0.0]);
+        inside(point.temperature.unwrap().at_mm);
+        let worst = point.subsurface.unwrap().worst.unwrap();
+        inside([worst.at_mm[0], worst.at_mm[1]]);
+        // Under the load centre the stress into the rail is about the pressure, on a patch of any size a part of it.
+        let stored = fields.points[0].subsurface.as_ref().unwrap();
+        assert_eq!(stored[..3], [0.0, 0.0, 1.0]);
+        let down = -stored[5];
+        assert!(down > 0.1 * patch.pressure_max_mpa && down < patch.pressure_max_mpa);
+        let across = point.damage.as_ref().unwrap().across.as_ref().unwrap();
+        assert!(across.y_mm.iter().all(|y| (y_min..=y_max).contains(y)));
+        let spread: f64 = across
+            .t_gamma_n_per_mm
+            .iter()
+            .zip(&across.dy_mm)
+            .map(|(t, dy)| t * dy)
+            .sum();
+        assert!((spread / point.friction_power_n - 1.0).abs() < 1e-6);
+        assert!(point.gradients.is_some());
+    }
+}
+
+/// A wheelset on the curves of both rails in the middle of the track is symmetric, carries its load, and balances a torque.
+#[test]
+fn a_wheelset_rests_on_the_curves_of_both_rails() {
+    let wheel = usual("curve", 0.0, 0.0);
+    let of = |name: &str| wheel["contact"][name].clone();
+    let mut case = wheel.clone();
+    case["contact"] = json!({
+        "type": "wheelset", "rail": of("rail"), "wheel": of("wheel"), "rolling_radius_mm": 460,
+        "cant_rad": 0.025, "lateral_shift_mm": { "values": [0.0, -5.5] }, "yaw_rad": { "values": [0.0, 0.003] }, "reference_surface": "curve"
+    });
+    case["load"] = json!({ "vertical_force_n": 150e3 });
+    case["motion"] = json!({ "wheelset": { "speed_mm_per_s": 20e3, "drive_torque_n_mm": 1e6 } });
+    let solution = solve(&case);
+    let wheelset = solution.wheelset.as_ref().unwrap();
+    let middle = &wheelset.positions[0];
+    assert!((middle.left.force_y_n + middle.right.force_y_n).abs() < 30.0);
+    assert!(middle.roll_rad.abs() < 1e-6);
+    for (position, total) in wheelset.positions.iter().zip(&solution.total) {
+        assert!((total.force_z_n.unwrap() / -150e3 - 1.0).abs() < 1e-3);
+        assert!((position.drive_torque_n_mm / 1e6 - 1.0).abs() < 0.03);
+    }
+}
+
+#[test]
+#[ignore]
+fn scratch() {
+    let of = |name: &str| -> f64 { std::env::var(name).unwrap().parse().unwrap() };
+    let (from, to, step) = (of("FROM"), of("TO"), of("STEP"));
+    let mut before: Vec<[f64; 2]> = Vec::new();
+    for k in 0..=((to - from) / step).round() as usize {
+        let shift = from + step * k as f64;
+        let case = usual("curve", -shift, 0.003);
+        let checked = check(&case, &Limits::default()).unwrap();
+        match railhead::contact::solve(&checked, &Unmonitored) {
+            Err(error) => println!("{shift:.3} {error}"),
+            Ok((s, _)) => {
+                let l = limit(&s);
+                let f = [
+                    100.0 * s.total[0].force_x_n / l,
+                    100.0 * s.total[0].force_y_n / l,
+                ];
+                before.push(f);
+                let n = before.len();
+                let bend = (n > 2)
+                    .then(|| [0, 1].map(|k| before[n - 3][k] - 2.0 * before[n - 2][k] + f[k]));
+                println!(
+                    "{shift:.3} {:.3} {:.3} bend {:.3?} n {:?}",
+                    f[0],
+                    f[1],
+                    bend,
+                    s.patches
+                        .iter()
+                        .map(|p| p.normal_force_n.round())
+                        .collect::<Vec<_>>()
+                );
+            }
+        }
+    }
 }

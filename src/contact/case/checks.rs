@@ -6,7 +6,7 @@ use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::resolution::resolution;
-use crate::contact::case::words::contact::{Contact, Load, SurfaceName};
+use crate::contact::case::words::contact::{Contact, InfluenceName, Load, SurfaceName};
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
 use crate::contact::case::words::motion::Motions;
@@ -15,10 +15,12 @@ use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::case::{contact_task, history, length_units, motions, wheel_task, wheelsets};
 use crate::contact::error::Fault;
 use crate::contact::friction::law::FrictionLaw;
+use crate::contact::half_space::bent_surface::Influence;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::method::Method;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
+use crate::contact::normal::wheel_height::task::ReferenceSurface;
 use crate::contact::problem::memory::{SizeInput, length_over_width, segments, spinning};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -72,20 +74,26 @@ impl CheckedParts {
         // The table says it in its own words.
         let uncoupled = elasticity.zip(method.filter(|method| *method != Method::Table));
         faults.extend(uncoupled.and_then(|(pair, method)| pair.uncoupled_fault(method)));
+        let motions = given.motion.map(|motion| motions::expand(motion, limits));
+        let motions = motions.and_then(|motions| collect_fault(motions, &mut faults));
         let task = normal_task(given.contact, given.load, elasticity.as_ref(), limits);
         let task = match (task, given.contact) {
             (None, Some(contact)) if contact.has_profiles() => {
-                on_rails(contact, &given, elasticity, limits).unwrap_or_else(|found| {
+                let history = motions.as_ref().is_some_and(|all| all.history.is_some());
+                let surface = surface(&given, elasticity, history);
+                let surface = surface.unwrap_or_else(|found| {
+                    faults.extend(found);
+                    ReferenceSurface::Planes
+                });
+                let task = on_rails(contact, &given, elasticity, surface, limits);
+                task.unwrap_or_else(|found| {
                     faults.extend(found);
                     None
                 })
             }
             (task, _) => task.and_then(|task| collect_fault(task, &mut faults)),
         };
-        let motions = given.motion.map(|motion| motions::expand(motion, limits));
-        let motions = motions.and_then(|motions| collect_fault(motions, &mut faults));
         let region = task.as_ref().map(|(task, _)| task);
-        faults.extend(curve_faults(&given, elasticity, motions.as_ref()));
         let force = normal_force(region, given.load);
         faults.extend(motion_faults(&given, motions.as_ref(), force, limits));
         if let Some(history) = motions.as_ref().and_then(|all| all.history.as_ref()) {
@@ -137,48 +145,52 @@ impl CheckedParts {
     }
 }
 
-/// Faults of what does not go with a contact on the curve of the rail.
-fn curve_faults(
+/// The surface on which the contact of profiles is solved.
+///
+/// # Errors
+/// What of the case is not solved on the surface that it asks for.
+fn surface(
     given: &PartialCase,
     elasticity: Option<Elasticity>,
-    motions: Option<&ExpandedMotions>,
-) -> Vec<Fault> {
-    let Some(Contact::Profiles {
-        reference_surface: SurfaceName::Curve,
-        ..
-    }) = given.contact
-    else {
-        return Vec::new();
-    };
-    let mut faults = Vec::new();
-    let mut fault = |pointer: &str, what: &str| {
-        let detail = format!(
-            "{what} with contact.reference_surface \"curve\"; give reference_surface \"plane\" for it"
-        );
-        faults.push(Fault::new(pointer, detail));
-    };
-    if elasticity.is_some_and(|pair| pair.difference != 0.0) {
-        fault("/material", "bodies that differ are not solved");
-    }
-    if motions.is_some_and(|motions| motions.history.is_some()) {
-        fault("/motion/history", "a history is not solved");
-    } else if motions.is_some_and(|motions| motions.motions.len() > 1) {
-        fault("/motion", "only one motion is solved in a case");
+    history: bool,
+) -> Result<ReferenceSurface, Vec<Fault>> {
+    let (asked, influence) = given.contact.map_or((None, None), Contact::surface);
+    if asked != Some(SurfaceName::Curve) {
+        return Ok(ReferenceSurface::Planes);
     }
     let method = given.solver.map(|solver| solver.method);
-    if !matches!(
+    let other_method = !matches!(
         method,
         None | Some(MethodName::Auto | MethodName::BoundaryElement)
-    ) {
-        fault("/solver/method", "only boundary_element is solved");
+    );
+    let differ = elasticity.is_some_and(|pair| pair.difference != 0.0);
+    let refused = [
+        (differ, "/material", "bodies that differ are not solved"),
+        (history, "/motion/history", "a history is not solved"),
+        (
+            other_method,
+            "/solver/method",
+            "only boundary_element is solved",
+        ),
+    ];
+    let faults = refused.into_iter().filter(|(applies, ..)| *applies);
+    let faults: Vec<Fault> = faults
+        .map(|(_, pointer, what)| {
+            let detail = format!(
+                "{what} with contact.reference_surface \"curve\"; give reference_surface \"plane\" for it"
+            );
+            Fault::new(pointer, detail)
+        })
+        .collect();
+    if !faults.is_empty() {
+        return Err(faults);
     }
-    let planar = [Output::Subsurface, Output::Damage, Output::Gradients];
-    for (k, output) in given.outputs.iter().enumerate() {
-        if planar.contains(output) {
-            fault(&format!("/outputs/{k}"), "this output is not computed");
-        }
-    }
-    faults
+    Ok(ReferenceSurface::Curve(
+        match influence.unwrap_or_default() {
+            InfluenceName::AngleCorrected => Influence::AngleCorrected,
+            InfluenceName::HalfSpace => Influence::HalfSpace,
+        },
+    ))
 }
 
 /// Faults of a history beside what it has to go with.
@@ -211,15 +223,16 @@ fn on_rails(
     contact: &Contact,
     given: &PartialCase,
     elasticity: Option<Elasticity>,
+    surface: ReferenceSurface,
     limits: &Limits,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
     let modulus = elasticity.map(|elasticity| elasticity.contact_modulus());
     let unusual = length_units::unusual(contact);
     let task = match contact {
         Contact::Wheelset { .. } => {
-            wheelsets::task(contact, given.load, given.motion, modulus, limits)
+            wheelsets::task(contact, given.load, given.motion, modulus, surface, limits)
         }
-        _ => wheel_task::task(contact, given.load, modulus, given.known),
+        _ => wheel_task::task(contact, given.load, modulus, surface, given.known),
     };
     let task = task.map_err(|faults| length_units::explained(faults, &unusual))?;
     Ok(task.map(|(task, mut remarks)| {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::contact::case::flange_back;
 use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::words::contact::{
-    Contact, CrossSection, FormatName, InfluenceName, Load, Smoothing, SmoothingWord, SurfaceName,
+    Contact, CrossSection, FormatName, Load, Smoothing, SmoothingWord,
 };
 use crate::contact::case::words::motion::{Motions, Wheelset};
 use crate::contact::error::Fault;
@@ -17,7 +17,6 @@ use crate::contact::geometry::orientation::{FormatSenses, Senses, StatedSenses};
 use crate::contact::geometry::profile::{Body, Profile, Reading};
 use crate::contact::geometry::wheel_rail::{NotPlaced, Placement, RailPlace, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
-use crate::contact::half_space::bent_surface::Influence;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::{
     ProfileTrust, ReferenceSurface, WheelLoad, WheelTask,
@@ -37,6 +36,7 @@ pub(crate) fn task(
     contact: &Contact,
     load: Option<&Load>,
     contact_modulus: Option<f64>,
+    surface: ReferenceSurface,
     known: &KnownPair,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
     let (geometry, flange_back) = wheel_rail(contact, known)?;
@@ -58,7 +58,7 @@ pub(crate) fn task(
         loading,
         contact_modulus,
         trust: trust(contact),
-        surface: surface(contact),
+        surface,
     };
     Ok(Some((NormalTask::Wheel(Arc::new(contact)), remarks)))
 }
@@ -297,21 +297,6 @@ fn trust(contact: &Contact) -> ProfileTrust {
     ProfileTrust {
         auto: [auto(rail), auto(wheel)],
         accept_rough: *accept_rough_profiles,
-    }
-}
-
-/// The surface on which the contact is solved.
-fn surface(contact: &Contact) -> ReferenceSurface {
-    match contact {
-        Contact::Profiles {
-            reference_surface: SurfaceName::Curve,
-            influence,
-            ..
-        } => ReferenceSurface::Curve(match influence.unwrap_or_default() {
-            InfluenceName::AngleCorrected => Influence::AngleCorrected,
-            InfluenceName::HalfSpace => Influence::HalfSpace,
-        }),
-        _ => ReferenceSurface::Planes,
     }
 }
 

@@ -36,6 +36,7 @@ pub(crate) fn task(
     load: Option<&Load>,
     motion: Option<&Motions>,
     contact_modulus: Option<f64>,
+    surface: ReferenceSurface,
     limits: &Limits,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
     let Contact::Wheelset {
@@ -80,7 +81,7 @@ pub(crate) fn task(
             loading: WheelLoad::Vertical(share * force),
             contact_modulus,
             trust: trust(contact, sections[k].map(|(_, section)| section)),
-            surface: ReferenceSurface::Planes,
+            surface,
         })
     };
     let (Some(left), Some(right_side)) = (side(0, left), side(1, 1.0 - left)) else {

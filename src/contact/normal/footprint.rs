@@ -19,6 +19,8 @@ pub struct Footprint {
     patches: Vec<Patch>,
     uncertainty: Option<NormalUncertainty>,
     slip: Option<Arc<SurfaceSlip>>,
+    /// Of each patch of a curved surface, the origin `[x, y]` in mm of the coordinates that its places are given in.
+    origins: Vec<[f64; 2]>,
     loads: Once<Vec<LoadAcross>>,
 }
 
@@ -74,6 +76,7 @@ impl Footprint {
             shape: FootprintShape::Hertz(ellipse),
             uncertainty: None,
             slip: None,
+            origins: Vec::new(),
             loads: Once::default(),
         }
     }
@@ -86,6 +89,7 @@ impl Footprint {
             shape: FootprintShape::Sampled(field),
             uncertainty: None,
             slip: None,
+            origins: Vec::new(),
             loads: Once::default(),
         }
     }
@@ -103,13 +107,25 @@ impl Footprint {
         }
     }
 
-    /// Returns this footprint with a rigid slip of its own in every cell, added to that of the motion.
+    /// Returns this footprint on a curved surface: with a rigid slip of its own in every cell, added to that of the motion, and for every patch the
+    /// origin `[x, y]` in mm of the coordinates that its places are given in.
     #[must_use]
-    pub(crate) fn with_slip(self, slip: SurfaceSlip) -> Footprint {
+    pub(crate) fn on_surface(
+        self,
+        slip: SurfaceSlip,
+        origins: impl Iterator<Item = [f64; 2]>,
+    ) -> Footprint {
         Footprint {
             slip: Some(Arc::new(slip)),
+            origins: origins.collect(),
             ..self
         }
+    }
+
+    /// The origin `[x, y]` in mm of the coordinates that places below a patch are given in.
+    #[must_use]
+    pub fn origin(&self, patch: usize) -> [f64; 2] {
+        self.origins.get(patch).copied().unwrap_or_default()
     }
 
     /// The slip of the surface beyond the motion of a plane, where it has one.

@@ -2,6 +2,7 @@
 
 use crate::contact::method::Method;
 use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::normal::wheel_height::task::{ReferenceSurface, WheelTask};
 use crate::contact::problem::physics::Problem;
 use crate::contact::problem::run::Run;
 use crate::contact::remark::list::Remark;
@@ -28,10 +29,16 @@ impl Problem {
         FIRST_ORDER * difference * self.friction.largest()
     }
 
-    /// Is the pressure found together with the tractions? It is of motions and of one pressing alone, where the gap is known. Points of a
-    /// history that goes on share their patches.
+    /// Is the pressure found together with the tractions? It is on the curve of a rail. Where bodies differ it is of motions and of one pressing alone,
+    /// where the gap is known. Points of a history that goes on share their patches.
     #[must_use]
     pub fn is_coupled(&self, run: &Run) -> bool {
+        let on_curve = |wheel: &WheelTask| matches!(wheel.surface, ReferenceSurface::Curve(_));
+        match &self.task {
+            NormalTask::Wheel(wheel) if on_curve(wheel) => return true,
+            NormalTask::Wheelset(wheelset) if on_curve(&wheelset.sides[0]) => return true,
+            _ => {}
+        }
         let solved = match (&self.task, &self.history) {
             (NormalTask::Given(_), _) => false,
             (_, None) => true,

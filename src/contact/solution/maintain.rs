@@ -255,12 +255,9 @@ fn subsurface(
         }
         Ok(values)
     };
-    let shared = match &task.places {
-        StressPlaces::Points(points) => evaluate(points, workspace)?,
-        StressPlaces::BelowWorst(_) => Vec::new(),
-    };
     let below_worst = matches!(task.places, StressPlaces::BelowWorst(_));
     let mut found = Vec::with_capacity(patches.len());
+    let mut shared: Option<([f64; 2], Vec<f64>)> = None;
     for (k, patch) in patches.iter().enumerate() {
         ask(monitor)?;
         let place = PassagesOf {
@@ -277,7 +274,22 @@ fn subsurface(
                 let line: Vec<[f64; 3]> = depths.iter().map(|depth| [x, y, *depth]).collect();
                 evaluate(&line, workspace)?
             }
-            _ => shared.clone(),
+            (StressPlaces::Points(points), _) => {
+                let origin = of.footprint.origin(k);
+                match &shared {
+                    Some((about, known)) if *about == origin => known.clone(),
+                    _ => {
+                        let [x0, y0] = origin;
+                        let points: Vec<[f64; 3]> = points
+                            .iter()
+                            .map(|[x, y, depth]| [x0 + x, y0 + y, *depth])
+                            .collect();
+                        let found = evaluate(&points, workspace)?;
+                        shared.insert((origin, found)).1.clone()
+                    }
+                }
+            }
+            (StressPlaces::BelowWorst(_), None) => Vec::new(),
         };
         let asked = task.passage.zip(worst);
         let judged = asked.map(|(asked, worst)| passage(asked, place, worst, monitor));

@@ -6,6 +6,7 @@ pub mod finish;
 pub mod finite;
 pub(crate) mod history_point;
 pub mod maintain;
+pub(crate) mod moved;
 pub mod plane_error;
 pub mod track_axes;
 pub mod words;

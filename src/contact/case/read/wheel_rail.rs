@@ -86,21 +86,7 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
     let flange_back_position_mm = optional_place(block, "flange_back_position_mm");
     let place = rail_place(block);
     let accept_rough_profiles = flag(block, "accept_rough_profiles");
-    let reference_surface = match block.has("reference_surface") {
-        true => block.word("reference_surface", &SURFACES, &[]),
-        false => Some(SurfaceName::default()),
-    };
-    let influence = match block.has("influence") {
-        true => block.word("influence", &INFLUENCES, &[]).map(Some),
-        false => Some(None),
-    };
-    if reference_surface == Some(SurfaceName::Plane) && matches!(influence, Some(Some(_))) {
-        block.fault(
-            "influence",
-            "given for planes of contact, which are half-spaces; give reference_surface: \"curve\" too, or leave it out",
-        );
-        return None;
-    }
+    let (reference_surface, influence) = surface(block)?;
     Some(Contact::Profiles {
         rail: Box::new(rail?),
         wheel: Box::new(wheel?),
@@ -116,9 +102,29 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
         yaw_rad: yaw_rad?,
         roll_rad: roll_rad?,
         accept_rough_profiles: accept_rough_profiles?.unwrap_or(false),
-        reference_surface: reference_surface?,
-        influence: influence?,
+        reference_surface,
+        influence,
     })
+}
+
+/// Reads the surface of a contact of profiles.
+pub(crate) fn surface(block: &mut Object) -> Option<(Option<SurfaceName>, Option<InfluenceName>)> {
+    let surface = match block.has("reference_surface") {
+        true => Some(block.word("reference_surface", &SURFACES, &[])?),
+        false => None,
+    };
+    let influence = match block.has("influence") {
+        true => Some(block.word("influence", &INFLUENCES, &[])?),
+        false => None,
+    };
+    if surface != Some(SurfaceName::Curve) && influence.is_some() {
+        block.fault(
+            "influence",
+            "given for planes of contact, which are half-spaces; give reference_surface: \"curve\" too, or leave it out",
+        );
+        return None;
+    }
+    Some((surface, influence))
 }
 
 /// How the rail is placed across the track: by gauge and gauge height, or by its origin.

@@ -6,6 +6,7 @@ use crate::contact::case::read::object::{Object, shown};
 use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::read::wheel_rail::{
     ANGLE, CANT, DISTANCE, PLACE, ROLLING_RADIUS, flag, optional_place, rail_place, section,
+    surface,
 };
 use crate::contact::case::words::contact::{Contact, KinematicsWords, Load, RightSide};
 use crate::contact::case::words::motion::{Combine, Swept};
@@ -16,7 +17,7 @@ const STEP: AllowedRange = AllowedRange::positive(5.0, "mm");
 /// Most shifts to one side, and most amplitudes.
 const SHIFTS_MAX: f64 = 1000.0;
 const AMPLITUDES_MAX: usize = 100;
-const MEMBERS: [&str; 15] = [
+const MEMBERS: [&str; 18] = [
     "type",
     "rail",
     "wheel",
@@ -32,15 +33,14 @@ const MEMBERS: [&str; 15] = [
     "yaw_rad",
     "combine",
     "kinematics",
+    "accept_rough_profiles",
+    "reference_surface",
+    "influence",
 ];
 
 /// Reads the members of the contact.
 pub(crate) fn read(block: &mut Object) -> Option<Contact> {
-    let members: Vec<&str> = MEMBERS
-        .into_iter()
-        .chain(["accept_rough_profiles"])
-        .collect();
-    block.only(&members, &[]);
+    block.only(&MEMBERS, &[]);
     let rail = section(block, "rail");
     let wheel = section(block, "wheel");
     let right = right(block);
@@ -59,6 +59,7 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
     let (shifts, yaws, combine) = poses(block)?;
     let kinematics = kinematics(block);
     let accept_rough_profiles = flag(block, "accept_rough_profiles");
+    let (reference_surface, influence) = surface(block)?;
     Some(Contact::Wheelset {
         rail: Box::new(rail?),
         wheel: Box::new(wheel?),
@@ -75,6 +76,8 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
         combine,
         kinematics: kinematics?,
         accept_rough_profiles: accept_rough_profiles?.unwrap_or(false),
+        reference_surface,
+        influence,
     })
 }
 

@@ -109,9 +109,9 @@ pub enum Contact {
         #[schema(required = false)]
         accept_rough_profiles: bool,
         /// The surface on which the contact is solved. `plane` when left out.
-        #[serde(skip_serializing_if = "SurfaceName::is_plane")]
-        #[schema(required = false)]
-        reference_surface: SurfaceName,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false)]
+        reference_surface: Option<SurfaceName>,
         /// How cells of a curved surface act on each other; only with `reference_surface: "curve"`, `angle_corrected` when left out.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schema(nullable = false)]
@@ -174,6 +174,14 @@ pub enum Contact {
         #[serde(skip_serializing_if = "is_false")]
         #[schema(required = false)]
         accept_rough_profiles: bool,
+        /// As of `profiles`.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false)]
+        reference_surface: Option<SurfaceName>,
+        /// As of `profiles`.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schema(nullable = false)]
+        influence: Option<InfluenceName>,
     },
 }
 
@@ -278,6 +286,23 @@ impl Contact {
         matches!(self, Contact::Profiles { .. } | Contact::Wheelset { .. })
     }
 
+    /// The surface of the contact and how its cells act on each other, as far as they are given.
+    pub(crate) fn surface(&self) -> (Option<SurfaceName>, Option<InfluenceName>) {
+        match self {
+            Contact::Profiles {
+                reference_surface,
+                influence,
+                ..
+            }
+            | Contact::Wheelset {
+                reference_surface,
+                influence,
+                ..
+            } => (*reference_surface, *influence),
+            _ => (None, None),
+        }
+    }
+
     /// The word for `contact.type`.
     #[must_use]
     pub fn name(&self) -> &'static str {
@@ -329,22 +354,15 @@ pub enum SideName {
 }
 
 /// The surface on which the contact of a wheel on a rail is solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = ReferenceSurface)]
 pub enum SurfaceName {
     /// A plane of contact for each patch, or for patches near each other.
-    #[default]
     Plane,
-    /// The cross-section of the rail: normals, slips and influences follow the bend of its surface, and all patches of a wheel are one problem. For one
-    /// motion and bodies that do not differ.
+    /// The cross-section of the rail: normals, slips and influences follow the bend of its surface, and all patches of a wheel are one problem. For
+    /// bodies that do not differ, and without a history.
     Curve,
-}
-
-impl SurfaceName {
-    fn is_plane(&self) -> bool {
-        *self == SurfaceName::Plane
-    }
 }
 
 /// How cells of a curved contact surface act on each other.
