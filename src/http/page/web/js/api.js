@@ -123,14 +123,6 @@ export const caseOf = (id) => json(`/v1/jobs/${id}/case`);
 /** @type {(id: string, patch: number, point: number) => Promise<Schemas['Stresses']>} */
 export const stresses = (id, patch, point) => json(`/v1/jobs/${id}/subsurface?patch=${patch}&point=${point}`);
 
-/**
- * Answers rows at once; nothing is stored.
- * @param {JsonObject} template
- * @param {Record<string, readonly (number | string)[]>} columns By the JSON pointers of what they replace.
- * @returns {Promise<Schemas['EvaluateAnswer']>}
- */
-export const evaluate = (template, columns) => json('/v1/evaluate', { method: 'POST', body: JSON.stringify({ template, columns }) });
-
 /** @typedef {{ state?: readonly string[], batch?: string, label?: string, name?: string, fields?: string, cursor?: string, limit?: number }} Filter */
 /** @typedef {Omit<Schemas['JobPage'], 'jobs'> & { jobs: Job[] }} JobPage With all members of the jobs that are asked for. */
 

@@ -1,6 +1,6 @@
 // A wheelset that is shifted by hand: both wheels with their axle level, what they carry, and the pressure on their rails.
 
-import { cancel, evaluate, remove, submit } from './api.js';
+import { cancel, remove, submit } from './api.js';
 import { at, isObject, numberAt, put } from './document.js';
 import { loadField } from './fields.js';
 import { combOf } from './field/comb.js';
@@ -17,6 +17,7 @@ import { nearest } from './wheelsetdata.js';
 /** @typedef {import('./result.js').Standing} Standing */
 /** @typedef {import('./field/comb.js').Comb} Comb */
 /** @typedef {import('./api.js').Patch} Patch */
+/** @typedef {{ patch: Patch, comb: Comb | null }} Pressed */
 
 /**
  * @typedef {object} Carried
@@ -35,7 +36,7 @@ import { nearest } from './wheelsetdata.js';
  * @property {number} at The place in the lists of the kinematics.
  * @property {boolean} apart Wheels are drawn over their rails, with lines between the places of contact.
  * @property {Partial<Record<Side, Carried>>} carried
- * @property {Partial<Record<Side, { patch: Patch, comb: Comb | null }[]>>} pressed
+ * @property {Partial<Record<Side, Pressed[]>>} pressed
  * @property {string} failure Why there are no numbers.
  */
 
@@ -106,41 +107,35 @@ export async function shiftTo(app, document, place) {
 /** @param {App} app @param {Shifting} of @param {JsonObject} document @param {number} place */
 async function compute(app, of, document, place) {
   try {
-    const cases = SIDES.map((side) => rollingWheel(document, side, of.kinematics, place));
-    const [carried, pressed] = await Promise.all([
-      Promise.all(SIDES.map((side, at) => carriedBy(cases[at], side, of.kinematics.lateral_shift_mm[place]))),
-      Promise.all(cases.map(pressureUnder)),
-    ]);
-    of.carried = { left: carried[0], right: carried[1] };
-    of.pressed = { left: pressed[0], right: pressed[1] };
-    of.failure = '';
+    const [left, right] = await Promise.all(SIDES.map((side) => solveWheel(rollingWheel(document, side, of.kinematics, place), side)));
+    Object.assign(of, { carried: { left: left?.carried, right: right?.carried }, pressed: { left: left?.pressed, right: right?.pressed }, failure: '' });
   } catch (error) {
-    of.carried = {};
-    of.pressed = {};
-    of.failure = error instanceof Error ? error.message : String(error);
+    Object.assign(of, { carried: {}, pressed: {}, failure: error instanceof Error ? error.message : String(error) });
   }
   app.redraw();
 }
 
-/** @param {JsonObject} template @param {Side} side @param {number} shift @returns {Promise<Carried | undefined>} Undefined where the wheel is off the rail. */
-async function carriedBy(template, side, shift) {
-  const { columns } = await evaluate(template, { '/contact/lateral_shift_mm': [shift] });
-  const first = (/** @type {readonly (number | null)[] | undefined} */ column) => column?.[0] ?? NaN;
-  if (!Number.isFinite(first(columns.normal_force_n))) return undefined;
-  return {
-    normal_n: first(columns.normal_force_n), y_n: outward(side, first(columns.force_y_n)), x_n: first(columns.force_x_n),
-    pressure_mpa: first(columns.pressure_max_mpa), area_mm2: first(columns.area_mm2), power_n: first(columns.friction_power_n),
-  };
-}
-
-/** Pressures of the patches of a wheel. Its job does not stay. @param {JsonObject} document */
-async function pressureUnder(document) {
+/**
+ * What a wheel carries and the pressures of its patches. The job does not stay.
+ * @param {JsonObject} document
+ * @param {Side} side
+ * @returns {Promise<{ carried: Carried, pressed: Pressed[] } | null>} Null where it cannot be solved, as off the rail.
+ */
+async function solveWheel(document, side) {
   const job = await submit(JSON.stringify({ ...document, outputs: ['resultants', 'pressure'], ...TYPED }), { wait: 10 });
   try {
     const { result } = job;
-    if (!result) return [];
-    const fields = await Promise.all(result.patches.map((_, patch) => loadField(job.id, result, patch, 0)));
-    return result.patches.map((patch, at) => ({ patch, comb: combOf(fields[at]) }));
+    if (!result) return null;
+    const { patches, total: [total] } = result;
+    const sum = (/** @type {(patch: Patch) => number} */ pick) => patches.reduce((all, patch) => all + pick(patch), 0);
+    const fields = await Promise.all(patches.map((_, patch) => loadField(job.id, result, patch, 0)));
+    return {
+      carried: {
+        normal_n: sum((patch) => patch.normal_force_n), y_n: outward(side, total.force_y_n), x_n: total.force_x_n, area_mm2: sum((patch) => patch.area_mm2),
+        pressure_mpa: Math.max(...patches.map((patch) => patch.pressure_max_mpa)), power_n: sum(({ points: [point] }) => point.friction_power_n),
+      },
+      pressed: patches.map((patch, at) => ({ patch, comb: combOf(fields[at]) })),
+    };
   } finally {
     if (job.state === 'queued' || job.state === 'running') await cancel('jobs', job.id).catch(() => {});
     remove('jobs', job.id).catch(() => {});
