@@ -158,16 +158,18 @@ test('a curve radius sets the yaw rate, and another speed keeps the radius', () 
   assert.equal(await rate(), undefined);
 }));
 
-test('the contact can be solved on the curve of the rail, without the outputs that planes alone have', () => onPage('', async (page) => {
+test('the contact can be solved on the curve of the rail, of a wheel and of a wheelset', () => onPage('', async (page) => {
   await ready(page);
   await page.getByLabel('Contact surface').selectOption('curve of the rail');
   await page.getByText('The contact bends around the rail').waitFor();
   await page.getByLabel('Influence of cells').selectOption('as on a half-space');
-  const { contact, outputs, damage } = await json(page);
-  assert.deepEqual([contact.reference_surface, contact.influence, damage], ['curve', 'half_space', undefined]);
-  assert.ok(!outputs.includes('damage') && outputs.includes('temperature'));
+  const { contact } = await json(page);
+  assert.deepEqual([contact.reference_surface, contact.influence], ['curve', 'half_space']);
   await ready(page);
   await page.getByLabel('Contact surface').selectOption('planes');
   assert.deepEqual([(await json(page)).contact.reference_surface, (await json(page)).contact.influence], [undefined, undefined]);
+  await ready(page);
+  await page.getByRole('radio', { name: 'Wheelset' }).check();
+  await page.getByLabel('Contact surface').selectOption('curve of the rail');
   await ready(page);
 }));

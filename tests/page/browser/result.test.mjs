@@ -342,5 +342,5 @@ test('on the curve of the rail the pressure stands along the rail', () => onPage
   });
   assert.ok(away < 1, `${away}`);
   await page.getByRole('radio', { name: 'Whole head' }).check();
-  await page.getByRole('button', { name: 'Solve again on planes, with damage' }).waitFor();
+  await page.getByRole('button', { name: 'Solve again with damage' }).waitFor();
 }));

@@ -3,7 +3,7 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt, put } from './document.js';
 import { change, editDocument, isUntouched } from './editing.js';
-import { hasSections, isBent, lacksSection, onSurface, PROFILES, standardSection, withContact, withEverything, withoutNameOf } from './starts.js';
+import { hasSections, isBent, lacksSection, PROFILES, standardSection, withContact, withEverything, withoutNameOf } from './starts.js';
 import { choice, faultAt, field, fieldId } from './field.js';
 import { count, fixed, number } from './format.js';
 import { bodiesOf, decoded, profileKind } from './files.js';
@@ -68,10 +68,12 @@ const INFLUENCES = /** @type {const} */ ([[undefined, 'corrected for the bend'],
 function surfaceFields(app) {
   const { document } = app.store.get().compose;
   const bent = isBent(document);
-  return html`<div class="pair">${choice(app, '/contact/reference_surface', 'Contact surface', SURFACES, { take: (value) => editDocument(app, onSurface(document ?? {}, value)) })}
+  return html`<div class="pair">${choice(app, '/contact/reference_surface', 'Contact surface', SURFACES, {
+    take: (value) => editDocument(app, put(put(document ?? {}, '/contact/reference_surface', value), '/contact/influence', undefined)),
+  })}
       ${bent ? choice(app, '/contact/influence', 'Influence of cells', INFLUENCES) : nothing}</div>
     <p class="hint">${bent
-      ? 'The contact bends around the rail: for the gauge corner and conformal contact. One motion; without wear, fatigue and stress below the surface.'
+      ? 'The contact bends around the rail: for the gauge corner and conformal contact. It takes longer.'
       : 'A plane of contact for each patch. At a gauge corner the contact bends: there choose the curve of the rail.'}</p>`;
 }
 
@@ -118,6 +120,7 @@ function wheelsetFields(app) {
     ${sectionZones(app)}
     ${place('lateral_shift_mm', 'Shift to the left', 'mm')}${place('yaw_rad', 'Yaw', 'mrad', 0.001)}
     ${trackFields(app)}
+    ${surfaceFields(app)}
     <div class="checks"><label><input type="checkbox" .checked=${asked} @change=${ask}> Δr and equivalent conicity</label></div>
     ${at(document, '/contact/right') === undefined ? nothing : html`<p class="hint">The right side has values of its own; change them in the JSON.</p>`}`;
 }

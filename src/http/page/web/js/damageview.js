@@ -6,7 +6,6 @@ import { indexOf } from './field/cells.js';
 import { fixed, number } from './format.js';
 import { patchesWith } from './loadsview.js';
 import { choose, stressesBelow } from './result.js';
-import { isBent } from './starts.js';
 import { outward, sideOf } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -38,10 +37,8 @@ export function damagePanel(app, looked, answer, again) {
   const chosen = shown.find(({ at }) => at === looked.patch) ?? shown[0];
   if (!hasDamage(chosen.point)) {
     if (chosen.point.history) return nothing;
-    const bent = isBent(looked.document);
-    return html`<section class="panel wait"><p>${bent ? 'Wear, fatigue and stresses below the surface are computed on planes of contact only.'
-      : 'Wear, fatigue, stresses below the surface and temperature were not asked for.'}</p>
-      <button class="primary" @click=${again}>Solve again ${bent ? 'on planes, ' : ''}with damage</button></section>`;
+    return html`<section class="panel wait"><p>Wear, fatigue, stresses below the surface and temperature were not asked for.</p>
+      <button class="primary" @click=${again}>Solve again with damage</button></section>`;
   }
   const figures = answer.damage_parameters;
   return html`<section class="panel damage" aria-labelledby="h-damage">

@@ -10,7 +10,7 @@ import { drawProfiles } from './drawing/profiles.js';
 import { editDocument, solve } from './editing.js';
 import { loadsPanel } from './loadsview.js';
 import { remarkList } from './remarks.js';
-import { inOrder, isBent, onSurface, standardSection, withEverything, withFields, withSpeed } from './starts.js';
+import { inOrder, isBent, standardSection, withEverything, withFields, withSpeed } from './starts.js';
 import { indexOf } from './field/cells.js';
 import { combOf } from './field/comb.js';
 import { hasFields } from './fields.js';
@@ -125,7 +125,7 @@ function loaded(app, looked, answer) {
         ${factsPanel(answer, patch, point)}
       </div>
     </div>
-    ${damagePanel(app, looked, answer, () => again(app, looked.document && onSurface(looked.document, undefined)))}`;
+    ${damagePanel(app, looked, answer, () => again(app, looked.document))}`;
 }
 
 /** Solves a case again with the smoothing that warnings on its profiles advise. @param {App} app @param {Looked} looked @param {JobResult} answer */
@@ -148,8 +148,7 @@ function smoothAgain(app, looked, answer) {
 /** Solves a case again with all that is drawn. @param {App} app @param {JsonObject | null} document */
 function again(app, document) {
   if (!document) return;
-  const steady = !(isObject(document.motion) && 'history' in document.motion);
-  editDocument(app, steady && !isBent(document) ? withEverything(withSpeed(document)) : { ...document, outputs: withFields(document.outputs) });
+  editDocument(app, isObject(document.motion) && 'history' in document.motion ? { ...document, outputs: withFields(document.outputs) } : withEverything(withSpeed(document)));
   solve(app);
 }
 

@@ -1,6 +1,6 @@
 // The beginning of a case of each kind of contact, and the order of its members.
 
-import { at, isObject, put } from './document.js';
+import { at, isObject } from './document.js';
 
 /** @typedef {import('./document.js').JsonObject} JsonObject */
 /** @typedef {import('./document.js').JsonValue} JsonValue */
@@ -132,18 +132,8 @@ const withExtras = (document, wanted) => Object.keys(EXTRAS).reduce((/** @type {
 /** A case that asks for all that is drawn: fields, damage, stresses below the surface, temperature. @param {JsonObject} document */
 export const withEverything = (document) => withExtras({ ...document, outputs: withFields(document.outputs) }, true);
 
-/** Outputs that are computed on planes of contact only. */
-const ON_PLANES = ['damage', 'subsurface'];
-
 /** Is the contact solved on the curve of the rail? @param {JsonObject | null} document */
 export const isBent = (document) => at(document ?? undefined, '/contact/reference_surface') === 'curve';
-
-/** A case on another surface of contact, without the outputs that are not computed there. @param {JsonObject} document @param {JsonValue | undefined} surface @returns {JsonObject} */
-export function onSurface(document, surface) {
-  const next = put(document, '/contact/reference_surface', surface);
-  if (surface === 'curve') return ON_PLANES.reduce((of, output) => withOutput(of, output, false), next);
-  return put(next, '/contact/influence', undefined);
-}
 
 /** A case with a speed, which temperature and Archard's wear need; lists of motions have theirs. @param {JsonObject} document @returns {JsonObject} */
 export function withSpeed(document) {

@@ -7,6 +7,7 @@ import { fixed, number } from './format.js';
 import { placeOn } from './placing.js';
 import { choose } from './result.js';
 import { begin, shifted, shiftingOf, shiftTo } from './shifting.js';
+import { isBent } from './starts.js';
 import { againstWindow, KINDS, nearest, wheelsetCurve } from './wheelsetdata.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -67,7 +68,7 @@ function shiftPart(app, looked, moving) {
   return html`<div class="shifting">
     <div class="segs" role="group" aria-label="Picture of the wheelset">${parts.map(([on, label]) => html`<label class="seg">
       <input type="radio" name="apart" .checked=${apart === on} @change=${show(on)}><span>${label}</span></label>`)}</div>
-    ${drawWheelset(Object.fromEntries(SIDES.flatMap((side) => (looked.wheels[side] ? [[side, drawnSide(looked, moving, side)]] : []))), apart, shifts[at])}
+    ${drawWheelset(Object.fromEntries(SIDES.flatMap((side) => (looked.wheels[side] ? [[side, drawnSide(looked, moving, side)]] : []))), apart, shifts[at], isBent(looked.document))}
     <label class="slide"><span>Shift to the left <output>${fixed(shifts[at], 1)} mm, Δr ${fixed(kinematics.radius_difference_mm[at], 3)} mm</output></span>
       <input type="range" min="0" max=${shifts.length - 1} .value=${String(at)} @input=${move}></label>
     ${carriedTable(moving)}</div>`;

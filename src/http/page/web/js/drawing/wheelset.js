@@ -29,8 +29,8 @@ const COMB_MM = 16;
 /** Least distance of the numbers at contact lines, in pixels. */
 const APART_PX = 30;
 
-/** @param {Partial<Record<Side, DrawnSide>>} sides @param {boolean} apart @param {number} shift */
-export function drawWheelset(sides, apart, shift) {
+/** @param {Partial<Record<Side, DrawnSide>>} sides @param {boolean} apart @param {number} shift @param {boolean} bent Pressures stand along the rail. */
+export function drawWheelset(sides, apart, shift, bent) {
   const all = Object.values(sides);
   if (!all.length) return html`<p class="pad quiet">Loading the cross-sections …</p>`;
   const spans = all.map(({ rail }) => /** @type {const} */ ([Math.min(...rail.map(([y]) => y)) - MARGIN_MM, Math.max(...rail.map(([y]) => y)) + MARGIN_MM]));
@@ -49,7 +49,7 @@ export function drawWheelset(sides, apart, shift) {
         <path class="rail" d=${`${path(side.rail.map(T))}V${height + 20}H${T(side.rail[0])[0]}Z`}/>
         <path class="wheel" d=${`${path(side.wheel.map(T))}V-20H${T(side.wheel[0])[0]}Z`}/>
         ${apart ? contactLines(side, T) : nothing}
-        ${side.pressed.map(({ patch, comb }) => pressure(patch, comb, side.rail, (COMB_MM * patch.pressure_max_mpa) / most, T))}
+        ${side.pressed.map(({ patch, comb }) => pressure(patch, comb, surfaceOf(patch, side.rail, bent), (COMB_MM * patch.pressure_max_mpa) / most, T))}
         ${apart ? nothing : svg`<circle class="dot" cx=${T(side.touch.rail)[0]} cy=${T(side.touch.rail)[1]} r="4"/>`}</svg>`;
       left += width + BETWEEN;
       return part;
@@ -70,9 +70,8 @@ function contactLines({ lines, touch }, T) {
   return [...lines.map((other) => line(other, 'touching')), line(touch, 'touching chosen')];
 }
 
-/** @param {import('../api.js').Patch} patch @param {import('../field/comb.js').Comb | null} comb @param {readonly Place[]} rail @param {number} size Of the largest pressure, in mm. @param {(point: Point) => Point} T */
-function pressure(patch, comb, rail, size, T) {
-  const surface = surfaceOf(patch, rail, false);
+/** @param {import('../api.js').Patch} patch @param {import('../field/comb.js').Comb | null} comb @param {ReturnType<typeof surfaceOf>} surface @param {number} size Of the largest pressure, in mm. @param {(point: Point) => Point} T */
+function pressure(patch, comb, surface, size, T) {
   if (!surface || !comb) return nothing;
   const scale = size / patch.pressure_max_mpa;
   const shape = [...comb.y.map((y) => surface(y, 0)), ...comb.y.map((y, i) => surface(y, comb.pressure[i] * scale)).reverse()];
