@@ -63,7 +63,6 @@ mod results;
 mod retention;
 mod revoked;
 mod run_forces;
-mod run_forms;
 mod runs;
 mod same_answers;
 mod schema;
@@ -88,6 +87,7 @@ mod store_turns;
 mod stored_bytes;
 mod support;
 mod sweeps;
+mod table_forms;
 mod tables_in_turn;
 #[cfg(feature = "otlp")]
 mod traces;

@@ -47,7 +47,13 @@ pub fn of_values(name: &str, pointer: &str, values: &Values, first: u64) -> Vec<
                     figures: Box::new(
                         allowed.figures(FaultCode::OutOfRange, Some(&Value::from(*number))),
                     ),
-                    ..Fault::new(place, format!("{number} given; {allowed} is needed"))
+                    ..Fault::new(
+                        place,
+                        match number.is_nan() {
+                            true => format!("no number given; {allowed} is needed"),
+                            false => format!("{number} given; {allowed} is needed"),
+                        },
+                    )
                 },
                 None => Fault::new(place, "no number given; a finite number is needed"),
             }

@@ -1,8 +1,7 @@
-//! Reads rows: a template case and columns of numbers, as JSON or CSV, straight into columns.
+//! Reads rows in JSON: a template case and columns of numbers or texts, straight into columns.
 
 use std::collections::HashSet;
 use std::fmt;
-use std::io::Cursor;
 
 use axum::body::Bytes;
 use axum::extract::Request;
@@ -12,18 +11,13 @@ use serde::de::{
 };
 use serde_json::Value;
 
-use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::varied::Values;
 use crate::http::extract::arriving::Arriving;
 use crate::http::extract::json::Strict;
-use crate::http::extract::titles::{
-    Place, delimiter, faulty, is_line_of_units, number, places, require_few,
-};
+use crate::http::extract::titles::require_few;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
-use crate::jobs::codec::arrow;
-use crate::jobs::codec::table::{COLUMNS_MAX, TableColumn};
-use crate::jobs::run::head::converted;
+use crate::jobs::codec::table::COLUMNS_MAX;
 
 /// The bytes that a request's body may have, or has as far as it says.
 #[must_use]
@@ -70,142 +64,6 @@ pub fn read_json_columns(text: &[u8]) -> Result<(Value, NamedValues), ApiError> 
 
 /// Columns with their names.
 pub type NamedValues = Vec<(String, Values)>;
-
-/// Columns from CSV, whose first line names them as a table of a batch does; the second line may give their units.
-///
-/// # Errors
-/// `faulty-table` with line and column.
-pub fn read_csv(text: &[u8]) -> Result<Vec<Column>, ApiError> {
-    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-    let end = text
-        .iter()
-        .position(|byte| *byte == b'\n')
-        .unwrap_or(text.len());
-    let delimiter = delimiter(&text[..end]);
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .delimiter(delimiter)
-        .from_reader(text);
-    let unread = |error: csv::Error| faulty(format!("the table cannot be read: {error}"));
-    let mut record = csv::StringRecord::new();
-    reader.read_record(&mut record).map_err(unread)?;
-    require_few(record.len())?;
-    let titles: Vec<String> = record.iter().map(|title| title.trim().to_owned()).collect();
-    let mut record = csv::ByteRecord::new();
-    let mut more = reader.read_byte_record(&mut record).map_err(unread)?;
-    let units: Vec<String> = record.iter().map(|unit| field(unit).to_owned()).collect();
-    let units = Some(units)
-        .filter(|units| more && units.len() == titles.len())
-        .filter(|units| is_line_of_units(units.iter().map(String::as_str)));
-    if units.is_some() {
-        more = reader.read_byte_record(&mut record).map_err(unread)?;
-    }
-    let unit = |place: usize| units.as_ref().map(|units| units[place].as_str());
-    let named = titles.iter().enumerate();
-    let named = places(named.map(|(place, title)| (title.as_str(), unit(place))));
-    let named = named.map_err(|error| {
-        let detail = format!("line 1: {}", error.detail());
-        error.saying(detail)
-    })?;
-    let mut columns = vec![Vec::new(); named.len()];
-    while more {
-        let line = || {
-            let start = record.position().map_or(0, csv::Position::byte);
-            line_at(text, usize::try_from(start).unwrap_or(0))
-        };
-        if record.len() != columns.len() {
-            let detail = format!(
-                "line {} has {} fields, the header has {}",
-                line(),
-                record.len(),
-                columns.len()
-            );
-            return Err(faulty(detail));
-        }
-        for (place, (text, values)) in record.iter().zip(&mut columns).enumerate() {
-            let text = field(text);
-            match number(text, delimiter != b',') {
-                Some(number) if number.is_finite() => values.push(number),
-                _ => {
-                    let detail = format!(
-                        "line {}, column `{}`: `{text}` is not a number",
-                        line(),
-                        named[place].pointer
-                    );
-                    return Err(faulty(detail));
-                }
-            }
-        }
-        more = reader.read_byte_record(&mut record).map_err(unread)?;
-    }
-    Ok(named.into_iter().zip(columns).map(column).collect())
-}
-
-fn field(bytes: &[u8]) -> &str {
-    std::str::from_utf8(bytes).unwrap_or("?").trim()
-}
-
-/// A column from its place and the numbers that were sent.
-#[must_use]
-pub fn column((place, mut values): (Place, Vec<f64>)) -> Column {
-    if place.factor != 1.0 {
-        for value in &mut values {
-            *value = converted(*value, place.factor);
-        }
-    }
-    Column {
-        pointer: place.pointer,
-        values,
-    }
-}
-
-/// Columns from an Arrow stream or file, named as those of CSV are.
-///
-/// # Errors
-/// `faulty-table` with the column.
-pub fn read_arrow(data: Bytes) -> Result<Vec<Column>, ApiError> {
-    let unread =
-        |error: &dyn fmt::Display| faulty(format!("the Arrow data cannot be read: {error}"));
-    let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
-    let mut named = Vec::new();
-    for table in arrow::read(Cursor::new(data)).map_err(|error| unread(&error))? {
-        let table = table.map_err(|error| unread(&error))?;
-        if columns.is_empty() {
-            let titles = table.columns.iter().map(|(title, _)| (&**title, None));
-            named = places(titles)?;
-            let empty = |(title, _): &(String, TableColumn)| (title.clone(), Vec::new());
-            columns = table.columns.iter().map(empty).collect();
-        }
-        for ((title, held), (_, values)) in columns.iter_mut().zip(table.columns) {
-            let numbers = match values {
-                TableColumn::Numbers(numbers) => numbers,
-                #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
-                TableColumn::Integers(values) => values.iter().map(|value| *value as f64).collect(),
-                TableColumn::Texts(_) => {
-                    let detail = format!("column `{title}` holds texts; numbers are needed");
-                    return Err(faulty(detail));
-                }
-            };
-            if let Some(row) = numbers.iter().position(|number| !number.is_finite()) {
-                let row = row + held.len();
-                return Err(faulty(format!("column `{title}`, row {row}: no number")));
-            }
-            held.extend(numbers);
-        }
-    }
-    let values = columns.into_iter().map(|(_, values)| values);
-    Ok(named.into_iter().zip(values).map(column).collect())
-}
-
-/// Number of the line that a record begins on which follows this place, from 1; the reader's own place lies before the end of the line before.
-fn line_at(text: &[u8], place: usize) -> usize {
-    let ends = text[place..]
-        .iter()
-        .take_while(|byte| matches!(byte, b'\n' | b'\r'));
-    let begin = place + ends.count();
-    1 + text[..begin].iter().filter(|byte| **byte == b'\n').count()
-}
 
 /// The JSON body of rows.
 struct RowsBody {
@@ -398,24 +256,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn json_and_csv_of_the_same_rows_are_the_same_columns() {
-        let json = br#"{"columns":{"/motion/creepage_x":[0.1,-2e-3],"/load/normal_force_n":[8e4,9]},"template":{"a":1}}"#;
-        let (template, columns) = read_json_columns(json).unwrap();
-        assert_eq!(template, serde_json::json!({ "a": 1 }));
-        let columns = columns.into_iter();
-        let columns: Vec<Column> = columns
-            .map(|(pointer, values)| match values {
-                Values::Numbers(values) => Column { pointer, values },
-                Values::Texts(_) => unreachable!("numbers"),
-            })
-            .collect();
-        let csv = "\u{feff}creepage_x, /load/normal_force_n\r\n0.1,80000\r\n-2e-3, 9 \r\n";
-        assert_eq!(read_csv(csv.as_bytes()).unwrap(), columns);
-        let units = "creepage_x;Normal force\n[%];[kN]\n10;80\n-0,2;0,009\n";
-        assert_eq!(read_csv(units.as_bytes()).unwrap(), columns);
-    }
-
-    #[test]
     fn faults_name_row_and_column() {
         let text = |error: ApiError| format!("{error:?}");
         let null = br#"{"template":{},"columns":{"/motion/creepage_x":[0.1,null]}}"#;
@@ -424,20 +264,5 @@ mod tests {
             fault.contains("/motion/creepage_x") && fault.contains("row 1"),
             "{fault}"
         );
-        let twice = format!("{:?}", read_csv(b"creepage_x,nu_x [-]\n1,2\n").unwrap_err());
-        assert!(twice.contains("twice"), "{twice}");
-        for (csv, words) in [
-            ("creepage_x\n0.1\nx\n", ["line 3", "creepage_x"]),
-            ("creepage_x\n0.1\nnan\n", ["line 3", "nan"]),
-            ("creepage_x\r\n0.1\r\n\r\nx\r\n", ["line 4", "creepage_x"]),
-            ("creepage_x,spin_per_mm\n0.1\n", ["line 2", "2"]),
-            ("speed\n1\n", ["line 1", "speed"]),
-        ] {
-            let fault = text(read_csv(csv.as_bytes()).unwrap_err());
-            assert!(
-                words.iter().all(|word| fault.contains(word)),
-                "{csv:?}: {fault}"
-            );
-        }
     }
 }

@@ -886,34 +886,6 @@ impl NamedColumns {
     }
 }
 
-/// The places of columns that all vary the case, from their titles and the units in a line of units.
-///
-/// # Errors
-/// `faulty-table`: there are too many columns, a title names no place, or two name the same.
-pub fn places<'a>(
-    titles: impl Iterator<Item = (&'a str, Option<&'a str>)>,
-) -> Result<Vec<Place>, ApiError> {
-    let (mut places, mut seen) = (Vec::new(), HashSet::new());
-    for (title, below) in titles {
-        let found = place(title, below);
-        let found = found.map_err(|detail| faulty(format!("column `{title}`: {detail}")))?;
-        let found = found.ok_or_else(|| {
-            faulty(format!(
-                "`{title}` names no column; {} allowed: {}, a quantity with its unit such as `normal_force [kN]`, or a JSON pointer such as \
-                 `/load/normal_force_n`; other columns are left out, since rows are answered in their order",
-                question(title, below),
-                short_names()
-            ))
-        })?;
-        if !seen.insert(found.pointer.clone()) {
-            return Err(faulty(format!("the column `{title}` is there twice")));
-        }
-        places.push(found);
-        require_few(places.len())?;
-    }
-    Ok(places)
-}
-
 /// What a column of a run is: a place in the case, or nothing if it is carried along. `named` is what the client says of it.
 fn place_of(
     title: &str,

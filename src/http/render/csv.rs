@@ -1,6 +1,7 @@
 //! CSV (RFC 4180): a header with the names, one line per row. Zones are words; what lies outside the patch is empty.
 
 use std::borrow::Cow;
+use std::fmt::Write;
 use std::ops::Range;
 
 use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table};
@@ -116,6 +117,15 @@ pub(crate) fn number_as(value: f64, precision: Precision) -> String {
 #[expect(clippy::cast_possible_truncation, reason = "that is what is asked for")]
 pub(crate) fn single(value: f64) -> f32 {
     value as f32
+}
+
+/// The shortest digits that are read as the same number.
+pub(crate) fn write_number(text: &mut String, number: f64, none: &str) {
+    if number.is_finite() {
+        let _ = write!(text, "{number:?}");
+    } else {
+        text.push_str(none);
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The forms of an answer other than JSON; one format is one file.
 
-pub(super) mod batch_csv;
+pub(super) mod batch_table;
 pub(super) mod csv;
 pub(super) mod forces;
 pub(super) mod format;

@@ -3,8 +3,8 @@
 use std::error::Error;
 use std::fmt::Write;
 
-use crate::http::render::csv::text_field;
-use crate::http::render::rows::write_number;
+use crate::http::render::csv::{text_field, write_number};
+use crate::http::render::format::Format;
 use crate::jobs::codec::arrow::ArrowWriter;
 use crate::jobs::codec::parquet::TableWriter;
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
@@ -25,28 +25,20 @@ pub(crate) enum RowWriter {
 }
 
 impl RowWriter {
-    /// A line for each row under a header.
-    #[must_use]
-    pub(crate) fn csv(columns: &[(String, TableKind)]) -> RowWriter {
-        RowWriter::Csv(columns.iter().map(|(name, _)| name.clone()).collect())
-    }
-
-    /// An Arrow stream.
+    /// Writes tables of these columns as CSV, an Arrow stream or a Parquet file, and as NDJSON in any other form.
     ///
     /// # Errors
-    /// It cannot be begun.
-    pub(crate) fn arrow(columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
-        let writer = ArrowWriter::new(Vec::new(), columns)?;
-        Ok(RowWriter::Arrow(Box::new(writer)))
-    }
-
-    /// A Parquet file.
-    ///
-    /// # Errors
-    /// It cannot be begun.
-    pub(crate) fn parquet(columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
-        let writer = TableWriter::new(Vec::new(), columns)?;
-        Ok(RowWriter::Parquet(Box::new(writer)))
+    /// The stream or the file cannot be begun.
+    pub(crate) fn new(
+        format: Format,
+        columns: &[(String, TableKind)],
+    ) -> Result<RowWriter, WriteError> {
+        Ok(match format {
+            Format::Csv => RowWriter::Csv(columns.iter().map(|(name, _)| name.clone()).collect()),
+            Format::Arrow => RowWriter::Arrow(Box::new(ArrowWriter::new(Vec::new(), columns)?)),
+            Format::Parquet => RowWriter::Parquet(Box::new(TableWriter::new(Vec::new(), columns)?)),
+            _ => RowWriter::Ndjson,
+        })
     }
 
     /// What comes before the first table.
@@ -160,7 +152,8 @@ mod tests {
                 ),
             ],
         };
-        let mut csv = RowWriter::csv(&[("row".to_owned(), TableKind::Integers)]);
+        let names = [("row".to_owned(), TableKind::Integers)];
+        let mut csv = RowWriter::new(Format::Csv, &names).unwrap();
         assert_eq!(csv.head().unwrap(), b"row\n");
         let lines = csv.write(table.clone()).unwrap();
         assert_eq!(lines, b"3,,\"a, \"\"b\"\"\"\n4,0.1,\n");

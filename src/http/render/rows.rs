@@ -1,24 +1,25 @@
-//! Answers to rows as JSON columns and as CSV, piece by piece as the client takes them.
+//! Answers to rows as JSON columns and as tables, piece by piece as the client takes them.
 
 use std::convert::Infallible;
 use std::fmt::Write;
 use std::ops::Range;
-use std::sync::Arc;
 
 use axum::body::Body;
 
 use crate::contact::evaluate::answer::RowsAnswer;
+use crate::http::render::csv::write_number;
+use crate::http::render::format::Format;
 use crate::http::render::pieces::body;
-use crate::jobs::codec::arrow::ArrowWriter;
+use crate::http::render::row_tables::{RowWriter, WriteError};
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
 
 /// Rows written at once.
 const ROWS: usize = 1024;
 
-/// Rows of a batch of Arrow records.
+/// Rows of a batch of Arrow records, or of a group of a Parquet file.
 const BATCH_ROWS: usize = 1 << 15;
 
-/// RowsPart of the JSON text.
+/// A part of the JSON text.
 enum RowsPart {
     Text(String),
     /// Numbers of the column at this place.
@@ -48,49 +49,32 @@ pub(crate) fn json_body(answer: RowsAnswer) -> Body {
     }))
 }
 
-/// A line with the names of the columns, then one for each row; empty where a row has no number.
-pub(crate) fn csv_body(answer: RowsAnswer) -> Body {
-    let answer = Arc::new(answer);
-    let names: Vec<&str> = answer.columns().iter().map(|(name, _)| *name).collect();
-    let head = format!("{},status\n", names.join(",")).into_bytes();
-    let lines = ranges(answer.status.len()).map(move |range| {
-        let columns = answer.columns();
-        let mut text = String::with_capacity(24 * columns.len() * range.len());
-        for row in range {
-            for (_, column) in &columns {
-                write_number(&mut text, column[row], "");
-                text.push(',');
-            }
-            text.push_str(answer.status[row].name());
-            text.push('\n');
-        }
-        text.into_bytes()
-    });
-    body(std::iter::once(head).chain(lines).map(Ok::<_, Infallible>))
-}
-
-/// An Arrow stream of the same columns; null where a row has no number.
-pub(crate) fn arrow_body(answer: RowsAnswer) -> Body {
-    let names = answer.columns().into_iter();
-    let columns: Vec<_> = names
+/// The same columns as a table.
+///
+/// # Errors
+/// It cannot be begun.
+pub(crate) fn table_body(format: Format, answer: RowsAnswer) -> Result<Body, WriteError> {
+    let columns = answer.columns().into_iter();
+    let columns: Vec<_> = columns
         .map(|(name, _)| (name.to_owned(), TableKind::Numbers))
         .chain([("status".to_owned(), TableKind::Texts)])
         .collect();
     let rows = answer.status.len();
-    let starts = (0..rows).step_by(BATCH_ROWS);
-    let mut writer = ArrowWriter::new(Vec::new(), &columns);
-    let pieces = starts.map(Some).chain([None]);
-    body(pieces.map(move |start| {
-        let Ok(writer) = &mut writer else {
-            return Err(std::io::Error::other("an Arrow stream cannot be begun"));
-        };
+    let step = match format {
+        Format::Arrow | Format::Parquet => BATCH_ROWS,
+        _ => ROWS,
+    };
+    let mut writer = RowWriter::new(format, &columns)?;
+    let head = writer.head()?;
+    let starts = (0..rows).step_by(step).map(Some).chain([None]);
+    let pieces = starts.map(move |start| {
         let written = match start {
-            Some(start) => writer.write(part(&answer, start..(start + BATCH_ROWS).min(rows))),
+            Some(start) => writer.write(part(&answer, start..(start + step).min(rows))),
             None => writer.finish(),
         };
-        written.map_err(std::io::Error::other)?;
-        Ok(std::mem::take(writer.inner_mut()))
-    }))
+        written.map_err(std::io::Error::other)
+    });
+    Ok(body(std::iter::once(Ok(head)).chain(pieces)))
 }
 
 fn part(answer: &RowsAnswer, range: Range<usize>) -> RowTable {
@@ -136,15 +120,6 @@ fn statuses(answer: &RowsAnswer, range: Range<usize>) -> String {
     text
 }
 
-/// The shortest digits that are read as the same number.
-pub(crate) fn write_number(text: &mut String, number: f64, none: &str) {
-    if number.is_finite() {
-        let _ = write!(text, "{number:?}");
-    } else {
-        text.push_str(none);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use http_body_util::BodyExt;
@@ -184,7 +159,7 @@ mod tests {
         assert_eq!(read["rows"], json!(rows));
         assert_eq!(read["columns"]["stick_share"][1], Value::Null);
         assert_eq!(read["columns"]["status"][1], json!("not_covered"));
-        let csv = text(csv_body(given.clone())).await;
+        let csv = text(table_body(Format::Csv, given.clone()).unwrap()).await;
         let lines: Vec<&str> = csv.lines().collect();
         assert_eq!(lines.len(), rows + 1);
         for row in [0, 1, ROWS, rows - 1] {

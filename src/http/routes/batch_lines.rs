@@ -1,5 +1,5 @@
-//! The lines of the results of a batch, written while the client takes them. Small results are read a page at a time. A large one is passed
-//! on from its file as NDJSON; for CSV it is read whole, and its memory is counted until its lines have been sent.
+//! The lines of the results of a batch, made while the client takes them. Small results are read a page at a time. A large one is passed
+//! on from its file as NDJSON; for a table it is read whole, and its memory is counted until its lines have been sent.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -19,10 +19,11 @@ use crate::http::limits::shares::Share;
 use crate::http::problem::body::ProblemBody;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
-use crate::http::render::batch_csv::Columns;
-use crate::http::render::csv::finish;
+use crate::http::render::batch_table::Columns;
+use crate::http::render::row_tables::RowWriter;
 use crate::jobs::Jobs;
 use crate::jobs::batch::results::{OpenedItem, PAGE_BYTES};
+use crate::jobs::codec::table::RowTable;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::batch::{BatchItem, ItemFault, ItemResult};
 use crate::jobs::model::job::State as JobState;
@@ -40,9 +41,17 @@ const POINTS: usize = 64;
 pub(crate) struct Source {
     pub jobs: Jobs,
     pub memory: Memory,
-    /// Columns of the CSV; none for NDJSON.
+    /// Columns of the table; none for NDJSON.
     pub columns: Option<Arc<Columns>>,
 }
+
+/// Some lines.
+pub(crate) enum Piece {
+    Text(Bytes),
+    Table(RowTable),
+}
+
+type Pieces = BoxStream<'static, Result<Piece, BoxError>>;
 
 /// The lines of a batch from some place on.
 pub(crate) struct Lines {
@@ -59,16 +68,30 @@ pub(crate) struct Lines {
     /// Jobs that have been read and not yet been written.
     pub read: VecDeque<BatchItem>,
     /// The rest of a large line.
-    pub large: Option<BoxStream<'static, Result<Bytes, BoxError>>>,
+    pub large: Option<Pieces>,
 }
 
 impl Lines {
-    /// The pieces.
-    pub(crate) fn pieces(self) -> impl Stream<Item = Result<Bytes, BoxError>> + Send {
-        try_unfold(self, Lines::next)
+    /// The text, written by `writer`.
+    pub(crate) fn text(
+        self,
+        writer: RowWriter,
+    ) -> impl Stream<Item = Result<Bytes, BoxError>> + Send {
+        let pieces = Box::pin(try_unfold(self, Lines::next));
+        try_unfold(Some((pieces, writer)), async |state| {
+            let Some((mut pieces, mut writer)) = state else {
+                return Ok(None);
+            };
+            let (text, rest) = match pieces.try_next().await? {
+                Some(Piece::Text(text)) => (text, Some((pieces, writer))),
+                Some(Piece::Table(table)) => (writer.write(table)?.into(), Some((pieces, writer))),
+                None => (writer.finish()?.into(), None),
+            };
+            Ok(Some((text, rest)))
+        })
     }
 
-    async fn next(mut self) -> Result<Option<(Bytes, Lines)>, BoxError> {
+    async fn next(mut self) -> Result<Option<(Piece, Lines)>, BoxError> {
         loop {
             if let Some(large) = &mut self.large {
                 match large.try_next().await? {
@@ -92,10 +115,11 @@ impl Lines {
                     let small: Vec<BatchItem> = self.read.drain(..small).collect();
                     let columns = self.source.columns.clone();
                     let written = tokio::task::spawn_blocking(move || match columns {
-                        Some(columns) => write_csv(&columns, &small),
-                        None => write_ndjson(&small),
+                        Some(columns) => Ok(Piece::Table(table_of_small(&columns, &small))),
+                        None => Ok(Piece::Text(write_ndjson(&small)?.into())),
                     });
-                    return Ok(Some((Bytes::from(written.await??), self)));
+                    let written: Result<_, JobsError> = written.await?;
+                    return Ok(Some((written?, self)));
                 }
             }
         }
@@ -123,11 +147,8 @@ impl Lines {
 }
 
 impl Source {
-    /// The text of a job whose result is large.
-    async fn open_large(
-        &self,
-        item: BatchItem,
-    ) -> Result<BoxStream<'static, Result<Bytes, BoxError>>, BoxError> {
+    /// The lines of a job whose result is large.
+    async fn open_large(&self, item: BatchItem) -> Result<Pieces, BoxError> {
         let id = item.job.id;
         let opened = match &item.result {
             Some(ItemResult::Stored(key)) => self.jobs.open_item(id, key).await,
@@ -135,15 +156,15 @@ impl Source {
         };
         let without = |error: ProblemBody| match &self.columns {
             Some(columns) => {
-                let mut out = csv::Writer::from_writer(Vec::new());
-                columns.write_without_result(&mut out, &item, &error.detail)?;
-                Ok::<_, BoxError>(one(finish(out)?))
+                let mut table = columns.empty();
+                columns.add_without_result(&mut table, &item, &error.detail);
+                Ok::<_, BoxError>(one(Piece::Table(table)))
             }
             None => {
                 let mut text = Vec::new();
                 write_json(&mut text, &Front::of(&item, Some(error)))?;
                 text.push(b'\n');
-                Ok(one(text))
+                Ok(one(Piece::Text(text.into())))
             }
         };
         let (bytes, solution) = match opened {
@@ -188,30 +209,31 @@ impl Source {
     }
 }
 
-fn one(text: Vec<u8>) -> BoxStream<'static, Result<Bytes, BoxError>> {
-    stream::iter([Ok(Bytes::from(text))]).boxed()
+fn one(piece: Piece) -> Pieces {
+    stream::iter([Ok(piece)]).boxed()
 }
 
 /// A line of NDJSON; `solution` is an object whose closing brace is missing.
 fn ndjson_of(
     item: &BatchItem,
     solution: BoxStream<'static, Result<Bytes, JobsError>>,
-) -> Result<BoxStream<'static, Result<Bytes, BoxError>>, JobsError> {
+) -> Result<Pieces, JobsError> {
     let mut front = Vec::new();
     open_line(&mut front, item)?;
     let mut tail = Vec::new();
     close_line(&mut tail, item)?;
-    let middle = solution.map_err(BoxError::from);
-    Ok(one(front).chain(middle).chain(one(tail)).boxed())
+    let middle = solution.map_ok(Piece::Text).map_err(BoxError::from);
+    let [front, tail] = [front, tail].map(|text| one(Piece::Text(text.into())));
+    Ok(front.chain(middle).chain(tail).boxed())
 }
 
-/// Lines of CSV of one job, some motions at a time.
+/// The lines of one job, some motions at a time.
 fn table_of(
     columns: Arc<Columns>,
     item: BatchItem,
     solution: Solution,
     share: Option<Share>,
-) -> BoxStream<'static, Result<Bytes, BoxError>> {
+) -> Pieces {
     let held = (columns, item, solution, share);
     let lines = try_unfold((0, held), |(start, held)| async move {
         let (columns, item, solution, _) = &held;
@@ -219,41 +241,33 @@ fn table_of(
         if start == end {
             return Ok(None);
         }
-        let mut out = csv::Writer::from_writer(Vec::new());
-        columns.write(&mut out, item, solution, start..end)?;
-        Ok(Some((Bytes::from(finish(out)?), (end, held))))
+        let mut table = columns.empty();
+        columns.add(&mut table, item, solution, start..end);
+        Ok(Some((Piece::Table(table), (end, held))))
     });
     lines.boxed()
 }
 
-/// Writes lines of CSV of jobs with small results, without the header.
-fn write_csv(columns: &Columns, items: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
-    let mut out = csv::Writer::from_writer(Vec::new());
-    let mut write = || {
-        for item in items {
-            let solution = match &item.result {
-                Some(ItemResult::Solution(text)) => serde_json::from_slice::<Solution>(text).ok(),
-                _ => None,
-            };
-            match solution {
-                Some(solution) => {
-                    let points = 0..solution.total.len();
-                    columns.write(&mut out, item, &solution, points)?;
-                }
-                None => {
-                    let error = failure(item).map(|problem| problem.detail);
-                    let error = error.unwrap_or_else(|| match item.result {
-                        Some(_) => UNREADABLE.to_owned(),
-                        None => String::new(),
-                    });
-                    columns.write_without_result(&mut out, item, &error)?;
-                }
-            }
+/// The lines of jobs with small results.
+fn table_of_small(columns: &Columns, items: &[BatchItem]) -> RowTable {
+    let mut table = columns.empty();
+    for item in items {
+        let solution = match &item.result {
+            Some(ItemResult::Solution(text)) => serde_json::from_slice::<Solution>(text).ok(),
+            _ => None,
+        };
+        if let Some(solution) = solution {
+            columns.add(&mut table, item, &solution, 0..solution.total.len());
+            continue;
         }
-        Ok::<_, csv::Error>(())
-    };
-    let written = write().and_then(|()| finish(out));
-    written.map_err(|error| JobsError::Damaged(error.to_string()))
+        let error = failure(item).map(|problem| problem.detail);
+        let error = error.unwrap_or_else(|| match item.result {
+            Some(_) => UNREADABLE.to_owned(),
+            None => String::new(),
+        });
+        columns.add_without_result(&mut table, item, &error);
+    }
+    table
 }
 
 /// Writes lines of NDJSON of jobs with small results. A stored solution is passed on as it is, without reading it.

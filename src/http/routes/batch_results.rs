@@ -25,8 +25,9 @@ use crate::http::limits::memory::Memory;
 use crate::http::problem::body::ProblemBody;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
-use crate::http::render::batch_csv::Columns;
+use crate::http::render::batch_table::Columns;
 use crate::http::render::format::Format;
+use crate::http::render::row_tables::RowWriter;
 use crate::http::routes::batch_lines::{FIRST_PAGE_JOBS, Lines, STREAM_BYTES, Source};
 use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::jobs::model::job::State as JobState;
@@ -58,7 +59,7 @@ pub(crate) struct BatchLine {
 }
 
 /// The forms that the results of a batch come in.
-const FORMATS: &[Format] = &[Format::Ndjson, Format::Csv];
+const FORMATS: &[Format] = &[Format::Ndjson, Format::Csv, Format::Arrow, Format::Parquet];
 
 query! {
     /// Parameters of the results of a batch.
@@ -68,12 +69,12 @@ query! {
         after: Uuid as String = id("job");
         /// Only lines of jobs in this state; may be repeated for jobs in one of several
         state: Vec<JobState> as Vec<JobState> = Repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
-        /// Columns of the CSV, with commas between, such as `label:km,force_y_n`; with `patch` among them there is a line for each patch. See `docs/formats.md`.
+        /// Columns of a table, with commas between, such as `label:km,force_y_n`; with `patch` among them there is a line for each patch. See `docs/formats.md`.
         /// When left out: the usual columns, and one for each label of the jobs, at most 100
         #[param(example = "label:km,pressure_max_mpa,target_met")]
         columns: Columns as String = reader(Columns::allowed(), Columns::read);
-        /// `ndjson` or `csv`; overrides `Accept`
-        #[param(pattern = "^(ndjson|csv)$", example = "csv")]
+        /// `ndjson`, `csv`, `arrow` or `parquet`; overrides `Accept`
+        #[param(pattern = "^(ndjson|csv|arrow|parquet)$", example = "csv")]
         format: Format as String = one_of(FORMATS);
     }
 }
@@ -85,8 +86,8 @@ problems! {
 
 /// The results of a batch in the order its cases were sent.
 ///
-/// NDJSON: exactly one line per job, nothing else. CSV: a header, then one line per job and motion with the sums over
-/// all patches, or with the column `patch` one line per job, motion and patch; a job without a result has one line without numbers. With a wait, lines are
+/// NDJSON: exactly one line per job, nothing else. A table (CSV, Arrow, Parquet) has one row per job and motion with the sums over
+/// all patches, or with the column `patch` one row per job, motion and patch; a job without a result has one row without numbers. With a wait, lines are
 /// sent as soon as everything before them is there. Without one, unfinished jobs appear with their state.
 #[utoipa::path(
     get,
@@ -99,7 +100,12 @@ problems! {
         WaitQuery,
         ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
     ),
-    responses((status = 200, description = "One line per job", content((BatchLine = "application/x-ndjson"), (String = "text/csv"))), BatchResultProblems)
+    responses((status = 200, description = "One line per job", content(
+        (BatchLine = "application/x-ndjson"),
+        (String = "text/csv"),
+        (Vec<u8> = "application/vnd.apache.arrow.stream"),
+        (Vec<u8> = "application/vnd.apache.parquet")
+    )), BatchResultProblems)
 )]
 pub(crate) async fn results(
     Caller(jobs): Caller,
@@ -112,8 +118,10 @@ pub(crate) async fn results(
 ) -> Result<Response, ApiError> {
     let (query, _) = <(BatchResultsQuery, WaitQuery)>::read(&uri, &())?;
     let format = choose(&headers, query.format, FORMATS)?;
-    if query.columns.is_some() && format != Format::Csv {
-        let detail = "only CSV has columns; ask for it with `format=csv`";
+    let is_table = format != Format::Ndjson;
+    if query.columns.is_some() && !is_table {
+        let detail =
+            "NDJSON has no columns; ask for a table with `format=csv`, `arrow` or `parquet`";
         return Err(ApiError::bad_parameter("columns", detail));
     }
     // Unknown batches are answered before the stream begins.
@@ -122,21 +130,19 @@ pub(crate) async fn results(
     let waits = until.is_some();
     // What a reader holds of small results; large ones are counted one by one.
     let share = memory.ready_answer(jobs.tenant(), STREAM_BYTES)?;
-    let columns = match (format, query.columns) {
-        (Format::Csv, None) => {
+    let columns = match (is_table, query.columns) {
+        (true, None) => {
             let keys = jobs.batch_label_keys(id, LABEL_COLUMNS_MAX).await?;
             Some(Columns::with_labels(&keys))
         }
         (_, columns) => columns,
     };
     let columns = columns.map(Arc::new);
-    let head = match &columns {
-        Some(columns) => {
-            let head = columns.head().map_err(|error| ApiError::internal(&error))?;
-            Some(Bytes::from(head))
-        }
-        None => None,
-    };
+    let kinds = columns
+        .as_ref()
+        .map_or_else(Vec::new, |columns| columns.kinds());
+    let writer = RowWriter::new(format, &kinds).and_then(|mut writer| Ok((writer.head()?, writer)));
+    let (head, writer) = writer.map_err(|error| ApiError::internal(&*error))?;
     let lines = Lines {
         source: Source {
             jobs: jobs.clone(),
@@ -152,8 +158,8 @@ pub(crate) async fn results(
         large: None,
     };
     let revoked = revoked(jobs, key.map(|Extension(key)| key));
-    let head = stream::iter(head.map(Ok));
-    let body = Body::from_stream(until_revoked(head.chain(lines.pieces()), revoked));
+    let head = stream::iter([Ok(Bytes::from(head))]);
+    let body = Body::from_stream(until_revoked(head.chain(lines.text(writer)), revoked));
     let headers = [
         (header::CONTENT_TYPE, format.media_type()),
         (header::VARY, "Accept"),

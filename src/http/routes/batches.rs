@@ -58,7 +58,8 @@ query! {
 /// Submits many cases as one batch of jobs.
 ///
 /// The body is a JSON array of cases, one case per line (`application/x-ndjson`), or a table whose lines fill the cells of
-/// a template case: as `multipart/form-data` with the parts `template` and `table`, or as `text/csv` with `?template=` naming a job. It is read as it arrives. All jobs of
+/// a template case: as `multipart/form-data` with the parts `template` and `table`, or alone with `?template=` naming a job. Tables are CSV,
+/// Arrow, Parquet or NPZ, and with a template also NDJSON with a row per line. JSON, NDJSON and CSV are read as they arrive. All jobs of
 /// a batch answered with `202` are stored durably. Without `on_invalid=skip` one faulty case refuses the whole batch (`422`), and
 /// nothing is stored; every fault names its case, and its line in NDJSON and CSV. A JSON array that is not JSON is `400`; a line that is not JSON is a faulty case.
 #[utoipa::path(
@@ -79,6 +80,9 @@ query! {
         (Cases = "application/json"),
         (String = "application/x-ndjson"),
         (String = "text/csv"),
+        (Vec<u8> = "application/vnd.apache.arrow.stream"),
+        (Vec<u8> = "application/vnd.apache.parquet"),
+        (Vec<u8> = "application/x-npz"),
         (TableUpload = "multipart/form-data")
     ), description = "Cases, at most 200 000, each of at most 8 MiB and together at most 1 GiB"),
     responses(

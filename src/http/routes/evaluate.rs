@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use axum::body::Body;
+use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
@@ -17,7 +17,6 @@ use uuid::Uuid;
 
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::answer::RowsAnswer;
-use crate::contact::evaluate::column::Column;
 use crate::contact::evaluate::many::solve::{NotAtOnce, SOLVED_ROWS_MAX};
 use crate::contact::evaluate::many::task::several_answers;
 use crate::contact::evaluate::request_faults::{column_pointer, of_first_row, of_values};
@@ -26,13 +25,11 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::http::dto::run::CellValue;
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::Caller;
-use crate::http::extract::json::essence;
-use crate::http::extract::multipart::{TableUpload, Template, separate_template, template_missing};
-use crate::http::extract::npz::read_npz;
+use crate::http::extract::multipart::{TableUpload, separate_template};
 use crate::http::extract::query::{Parameters, id, query};
-use crate::http::extract::rows::{
-    NamedValues, declared_bytes, read_arrow, read_body, read_csv, read_json_columns,
-};
+use crate::http::extract::rows::{declared_bytes, read_body, read_json_columns};
+use crate::http::extract::run_body::form;
+use crate::http::extract::tables::{Chunk, TableForm, TableRows, TableSource, too_large};
 use crate::http::extract::titles::{NamedColumns, faulty};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
@@ -43,16 +40,19 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::format::Format;
 use crate::http::render::npz;
-use crate::http::render::rows::{arrow_body, csv_body, json_body};
+use crate::http::render::rows::{json_body, table_body};
 use crate::jobs::Jobs;
+use crate::jobs::run::head::RunColumn;
 
-/// The forms of Arrow data.
-const ARROW_STREAM: &str = "application/vnd.apache.arrow.stream";
-const ARROW_FILE: &str = "application/vnd.apache.arrow.file";
-/// NumPy's archive of arrays.
-const NPZ: &str = "application/x-npz";
 /// The forms of an answer.
-const FORMATS: &[Format] = &[Format::Json, Format::Csv, Format::Arrow, Format::Npz];
+const FORMATS: &[Format] = &[
+    Format::Json,
+    Format::Csv,
+    Format::Ndjson,
+    Format::Arrow,
+    Format::Parquet,
+    Format::Npz,
+];
 
 /// Rows to evaluate: a case, and columns of numbers that stand in place of some of its numbers.
 #[derive(Debug, Serialize, ToSchema)]
@@ -179,8 +179,8 @@ query! {
         /// The job whose case is the template of a table; not with `multipart/form-data`, which holds the template itself
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
-        /// `json`, `csv`, `arrow` or `npz`; overrides `Accept`
-        #[param(pattern = "^(json|csv|arrow|npz)$", example = "csv")]
+        /// `json`, `csv`, `ndjson`, `arrow`, `parquet` or `npz`; overrides `Accept`
+        #[param(pattern = "^(json|csv|ndjson|arrow|parquet|npz)$", example = "csv")]
         format: Format as String = one_of(FORMATS);
     }
 }
@@ -197,8 +197,8 @@ query! {
     tag = "cases",
     operation_id = "evaluate_rows",
     params(EvaluateQuery),
-    request_body(content((EvaluateRequest = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/x-npz"), (TableUpload = "multipart/form-data")), description = "At most 1 000 000 rows and 64 MiB"),
-    responses((status = 200, description = "The rows' resultants", content((EvaluateAnswer = "application/json"), (String = "text/csv"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/x-npz"))), EvaluateProblems)
+    request_body(content((EvaluateRequest = "application/json"), (String = "text/csv"), (String = "application/x-ndjson"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/vnd.apache.parquet"), (Vec<u8> = "application/x-npz"), (TableUpload = "multipart/form-data")), description = "At most 1 000 000 rows and 64 MiB"),
+    responses((status = 200, description = "The rows' resultants", content((EvaluateAnswer = "application/json"), (String = "text/csv"), (String = "application/x-ndjson"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/vnd.apache.parquet"), (Vec<u8> = "application/x-npz"))), EvaluateProblems)
 )]
 pub(crate) async fn evaluate(
     Caller(jobs): Caller,
@@ -210,25 +210,22 @@ pub(crate) async fn evaluate(
     let format = choose(request.headers(), format, FORMATS)?;
     let (request, template) =
         separate_template(&jobs, &memory, &options, template, request).await?;
-    let essence = essence(request.headers());
-    let (template, template_share) = match table_template(&essence, template)? {
-        Some(template) => {
+    let (form, template, template_share) = match form(request.headers(), template)? {
+        Some((form, template)) => {
             let (case, share) = template.case(&jobs).await?;
-            (Some(case), share)
+            (Some(form), case, share)
         }
-        None => (None, None),
+        None => (None, Value::Null, None),
     };
+    let packed = form.is_some_and(TableForm::packed);
     // First the text and its numbers, then these and the answer: about twice the text at any time.
-    let bytes = match &*essence {
-        // May be packed.
-        NPZ => options.evaluate_max_bytes,
-        _ => declared_bytes(&request, &options).min(options.evaluate_max_bytes),
+    let bytes = match packed {
+        true => options.evaluate_max_bytes,
+        false => declared_bytes(&request, &options).min(options.evaluate_max_bytes),
     };
     let mut share = memory.rows(jobs.tenant(), 2 * bytes).await?;
     let text = read_body(request, &options).await?;
-    if essence != NPZ
-        && let Some(share) = &mut share
-    {
+    if !packed && let Some(share) = &mut share {
         share.keep(2 * text.len());
     }
     let mut computation = memory.computation(jobs.tenant());
@@ -241,28 +238,35 @@ pub(crate) async fn evaluate(
     };
     let work = computation.run(move |pace| {
         let _held = template_share;
-        let (template, columns) = match template {
-            Some(template) if essence == NPZ => {
-                (template, varied(read_npz(text.clone(), bytes_max)?))
-            }
-            Some(template) if essence == "text/csv" => (template, varied(read_csv(&text)?)),
-            Some(template) => (template, varied(read_arrow(text.clone())?)),
+        let (template, columns) = match form {
+            Some(form) => (
+                template,
+                read_columns(form, &text, (evaluation.rows_max, bytes_max), pace)?,
+            ),
             None => {
                 let (template, columns) = read_json_columns(&text)?;
-                (template, named(columns)?)
+                let titles = columns.iter();
+                let titles = titles
+                    .map(|(title, values)| (&**title, None, matches!(values, Values::Texts(_))));
+                let named = NamedColumns::default().columns(titles)?;
+                let values = columns.into_iter().map(|(_, values)| values).collect();
+                (template, varied(&named, values)?)
             }
         };
         drop(text);
         let answer = evaluation.answer(template, &columns, pace)?;
         let (bytes, body) = match format {
-            Format::Csv => (answer.bytes(), csv_body(answer)),
-            Format::Arrow => (answer.bytes(), arrow_body(answer)),
+            Format::Json => (answer.bytes(), json_body(answer)),
             Format::Npz => {
                 let archive =
                     npz::write_rows(&answer).map_err(|error| ApiError::internal(&error))?;
                 (archive.len(), Body::from(archive))
             }
-            _ => (answer.bytes(), json_body(answer)),
+            _ => {
+                let bytes = answer.bytes();
+                let body = table_body(format, answer);
+                (bytes, body.map_err(|error| ApiError::internal(&*error))?)
+            }
         };
         if let Some(share) = &mut share {
             share.keep(bytes);
@@ -281,13 +285,52 @@ pub(crate) async fn evaluate(
     Ok(hold_while_sent(response, share))
 }
 
-/// Columns of JSON, named by pointers, short names or quantities with units, as those of a run are.
-fn named(columns: NamedValues) -> Result<Vec<VariedColumn>, ApiError> {
-    let kinds = columns.iter();
-    let kinds = kinds.map(|(title, values)| (&**title, None, matches!(values, Values::Texts(_))));
-    let named = NamedColumns::default().columns(kinds)?;
+/// All rows of a table, at most `most` rows and, if it is packed, bytes of numbers.
+fn read_columns(
+    form: TableForm,
+    text: &Bytes,
+    (rows_max, bytes_max): (usize, usize),
+    pace: &mut Pace,
+) -> Result<Vec<VariedColumn>, ApiError> {
+    let source = TableSource::Memory(text.clone());
+    let table = TableRows::new(form, source, bytes_max)?;
+    let named = table.named(&NamedColumns::default())?;
+    let mut values: Option<Chunk> = None;
+    for chunk in table {
+        pace.step()?;
+        let chunk = chunk?;
+        let Some(held) = &mut values else {
+            values = Some(chunk);
+            continue;
+        };
+        for (place, (held, more)) in held.iter_mut().zip(chunk).enumerate() {
+            match (held, more) {
+                (Values::Numbers(held), Values::Numbers(more)) => held.extend(more),
+                (Values::Texts(held), Values::Texts(more)) => held.extend(more),
+                _ => {
+                    let name = &named[place].name;
+                    return Err(faulty(format!(
+                        "the column `{name}` holds numbers in some rows and texts in others"
+                    )));
+                }
+            }
+        }
+        let rows = held.first().map_or(0, Values::len);
+        if rows > rows_max {
+            return Err(too_many(rows, rows_max));
+        }
+        if form.packed() && rows * held.len() * size_of::<f64>() > bytes_max {
+            return Err(too_large(bytes_max));
+        }
+    }
+    varied(&named, values.unwrap_or_default())
+}
+
+/// Columns that all stand for something in the case.
+fn varied(named: &[RunColumn], values: Chunk) -> Result<Vec<VariedColumn>, ApiError> {
     let mut varied: Vec<VariedColumn> = Vec::new();
-    for (column, (title, values)) in named.iter().zip(columns) {
+    for (column, values) in named.iter().zip(values) {
+        let title = &column.name;
         let Some(pointer) = column.pointer.clone() else {
             return Err(faulty(format!(
                 "the column `{title}` stands for nothing in the case; only runs carry columns along"
@@ -295,7 +338,7 @@ fn named(columns: NamedValues) -> Result<Vec<VariedColumn>, ApiError> {
         };
         if varied.iter().any(|before| before.pointer == pointer) {
             return Err(faulty(format!(
-                "the column `{title}` stands for `{pointer}`, as another one does"
+                "the column `{title}` is there twice: another one stands for `{pointer}` too"
             )));
         }
         let values = match values {
@@ -310,33 +353,9 @@ fn named(columns: NamedValues) -> Result<Vec<VariedColumn>, ApiError> {
     Ok(varied)
 }
 
-fn varied(columns: Vec<Column>) -> Vec<VariedColumn> {
-    let columns = columns.into_iter();
-    columns
-        .map(|Column { pointer, values }| VariedColumn {
-            pointer,
-            values: Values::Numbers(values),
-        })
-        .collect()
-}
-
-/// The template of a table; nothing for JSON, which has its own.
-fn table_template(essence: &str, template: Option<Template>) -> Result<Option<Template>, ApiError> {
-    match (essence, template) {
-        ("application/json", None) => Ok(None),
-        ("application/json", Some(_)) => Err(ApiError::bad_parameter(
-            "template",
-            "`template` belongs to a table; JSON has a `template` of its own",
-        )),
-        ("text/csv" | ARROW_STREAM | ARROW_FILE | NPZ, Some(template)) => Ok(Some(template)),
-        ("text/csv" | ARROW_STREAM | ARROW_FILE | NPZ, None) => Err(template_missing()),
-        (other, _) => Err(ApiError::new(
-            ProblemKind::UnsupportedMediaType,
-            format!(
-                "the content type is `{other}`; send `application/json` with `template` and `columns`, or a table with `text/csv`, `application/vnd.apache.arrow.stream` or `application/x-npz`, or a template and a table with `multipart/form-data`"
-            ),
-        )),
-    }
+fn too_many(rows: usize, rows_max: usize) -> ApiError {
+    let detail = format!("{rows} rows given; 1 to {rows_max} are allowed (`--evaluate-max-rows`)");
+    CaseError(vec![Fault::new("/columns", detail)]).into()
 }
 
 /// The rows with the limits that they are answered under.
@@ -357,9 +376,7 @@ impl Evaluation {
         let rows_max = self.rows_max;
         let rows = columns.first().map_or(0, |column| column.values.len());
         if rows == 0 || rows > rows_max {
-            let detail =
-                format!("{rows} rows given; 1 to {rows_max} are allowed (`--evaluate-max-rows`)");
-            return Err(CaseError(vec![Fault::new("/columns", detail)]).into());
+            return Err(too_many(rows, rows_max));
         }
         let faults = faults_of_columns(columns, rows);
         if !faults.is_empty() {

@@ -123,7 +123,8 @@ pub(crate) async fn results(
     require_ended(&run)?;
     let columns = selected(&run, query.columns)?;
     let share = memory.ready_answer(jobs.tenant(), STREAM_BYTES)?;
-    let mut writer = writer(format, &columns).map_err(|error| ApiError::internal(&error))?;
+    let mut writer =
+        RowWriter::new(format, &columns).map_err(|error| ApiError::internal(&error))?;
     let head = writer.head().map_err(|error| ApiError::internal(&error))?;
     let rows = query.rows.unwrap_or(0..u64::MAX);
     let mut answers = Answers {
@@ -206,15 +207,6 @@ pub(crate) fn selected(
     }
     columns.retain(|(name, _)| wanted.contains(name));
     Ok(columns)
-}
-
-fn writer(format: Format, columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
-    match format {
-        Format::Csv => Ok(RowWriter::csv(columns)),
-        Format::Arrow => RowWriter::arrow(columns),
-        Format::Parquet => RowWriter::parquet(columns),
-        _ => Ok(RowWriter::Ndjson),
-    }
 }
 
 /// The chunks of a run, one after the other.

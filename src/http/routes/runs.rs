@@ -14,7 +14,7 @@ use crate::http::extract::ids::RunId;
 use crate::http::extract::labels::{name, new_label};
 use crate::http::extract::multipart::{TableUpload, separate_template};
 use crate::http::extract::query::{Parameters, Repeated, count, id, query, reader};
-use crate::http::extract::run_rows::body::{form, read_run};
+use crate::http::extract::run_body::{form, read_run};
 use crate::http::extract::submit_options::SubmitQuery;
 use crate::http::extract::titles::{NamedColumns, named_column};
 use crate::http::limits::memory::Memory;
@@ -127,11 +127,11 @@ pub(crate) async fn submit(
     };
     let (request, template) =
         separate_template(&jobs, &memory, &options, run.template, request).await?;
-    let form = (form(request.headers(), template.as_ref())?, template);
+    let table = form(request.headers(), template)?;
     let carried = run.carry.unwrap_or_default().into_iter();
     let named = run.column.unwrap_or_default().into_iter();
     let named = named.chain(carried.map(|title| (title, String::new())));
-    let read = (form, NamedColumns(named.collect()));
+    let read = (table, NamedColumns(named.collect()));
     let draft = read_run(&jobs, &memory, &options, read, request).await?;
     let (mut run, replayed) = jobs.submit_run(draft, options_of_run).await?;
     let id = run.chunks.id;

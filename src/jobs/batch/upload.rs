@@ -53,7 +53,7 @@ pub struct BatchCase {
 }
 
 /// A row of a table: what it puts into the template, and its own options.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct BatchRow {
     /// What the row puts into the template.
     pub cells: Vec<Cell>,

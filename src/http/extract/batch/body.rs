@@ -9,9 +9,11 @@ use crate::contact::error::Fault;
 use crate::http::extract::arriving::Arriving;
 use crate::http::extract::batch::own_options;
 use crate::http::extract::batch::splitter::{Element, Layout, Splitter};
-use crate::http::extract::batch::table::TableBody;
+use crate::http::extract::batch::table::{TableBody, columns_of, rows_of};
 use crate::http::extract::json::{essence, read_strict, weigh_case};
 use crate::http::extract::multipart::{Template, template_missing};
+use crate::http::extract::run_body::spool;
+use crate::http::extract::tables::{TableForm, TableRows, TableSource, unsupported};
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
 use crate::http::limits::shares::Share;
 use crate::http::limits::turns::Computation;
@@ -28,20 +30,29 @@ const PORTION_BYTES: usize = 256 << 10;
 /// The form of a body.
 #[derive(Debug)]
 pub enum Form {
+    /// Cases one after the other, checked while they arrive.
+    Cases(CasesForm),
+    /// A table, other than CSV, that fills a template.
+    Rows(TableForm, Value),
+}
+
+/// The form of cases that stand one after the other.
+#[derive(Debug)]
+pub enum CasesForm {
     /// A JSON array of cases.
     Array,
     /// One case per line.
     Lines,
-    /// A table that fills a template.
+    /// CSV that fills a template.
     Table(Box<TableBody>, Value),
 }
 
-impl Form {
+impl CasesForm {
     fn layout(&self) -> Layout {
         match self {
-            Form::Array => Layout::Array,
-            Form::Lines => Layout::Lines,
-            Form::Table(..) => Layout::Rows,
+            CasesForm::Array => Layout::Array,
+            CasesForm::Lines => Layout::Lines,
+            CasesForm::Table(..) => Layout::Rows,
         }
     }
 }
@@ -56,30 +67,32 @@ pub async fn form(
     template: Option<Template>,
 ) -> Result<(Form, Option<Share>), ApiError> {
     let essence = essence(headers);
-    if template.is_some() && essence != "text/csv" {
-        return Err(ApiError::bad_parameter(
-            "template",
-            "`template` belongs to a table; send it with `Content-Type: text/csv`",
-        ));
-    }
-    match (essence.as_str(), template) {
-        ("application/json", _) => Ok((Form::Array, None)),
-        ("application/x-ndjson" | "application/ndjson" | "application/jsonl", _) => {
-            Ok((Form::Lines, None))
+    let table = TableForm::of(&essence);
+    let (form, template) = match (table, template) {
+        (Some(form), Some(template)) => (form, template),
+        (table, template) => {
+            return match (essence.as_str(), table, template) {
+                ("application/json", _, None) => Ok((Form::Cases(CasesForm::Array), None)),
+                (_, Some(TableForm::Ndjson), None) => Ok((Form::Cases(CasesForm::Lines), None)),
+                (_, Some(_), None) => Err(template_missing()),
+                ("application/json", _, Some(_)) => Err(ApiError::bad_parameter(
+                    "template",
+                    "`template` belongs to a table, such as `text/csv`; an array has whole cases",
+                )),
+                _ => Err(unsupported(
+                    &essence,
+                    "an array with `application/json`, one case per line with `application/x-ndjson`",
+                )),
+            };
         }
-        ("text/csv", Some(template)) => {
-            let (case, share) = template.case(jobs).await?;
-            let case = jobs.with_profiles(case).await?;
-            Ok((Form::Table(Box::default(), case), share))
-        }
-        ("text/csv", None) => Err(template_missing()),
-        (other, _) => Err(ApiError::new(
-            ProblemKind::UnsupportedMediaType,
-            format!(
-                "the content type is `{other}`; send an array with `application/json`, one case per line with `application/x-ndjson`, a table with `text/csv`, or a template and a table with `multipart/form-data`"
-            ),
-        )),
-    }
+    };
+    let (case, share) = template.case(jobs).await?;
+    let case = jobs.with_profiles(case).await?;
+    let form = match form {
+        TableForm::Csv => Form::Cases(CasesForm::Table(Box::default(), case)),
+        form => Form::Rows(form, case),
+    };
+    Ok((form, share))
 }
 
 /// Reads and checks the body as it arrives.
@@ -90,7 +103,7 @@ pub async fn read_draft(
     jobs: &Jobs,
     memory: &Memory,
     options: &HttpOptions,
-    mut form: Form,
+    form: Form,
     request: Request<Body>,
 ) -> Result<BatchUpload, ApiError> {
     let mut arriving = Arriving::new(
@@ -100,7 +113,15 @@ pub async fn read_draft(
         request,
     )?;
     let mut draft = jobs.draft(Kind::Cases)?;
-    if let Form::Table(_, template) = &mut form {
+    let mut form = match form {
+        Form::Cases(form) => form,
+        Form::Rows(form, template) => {
+            draft.set_row_template(template);
+            let source = TableSource::File(spool(jobs, arriving).await?);
+            return read_rows((jobs, memory, options), draft, form, source).await;
+        }
+    };
+    if let CasesForm::Table(_, template) = &mut form {
         draft.set_row_template(template.take());
     }
     let mut splitter = Splitter::new(form.layout(), options.body_max_bytes);
@@ -133,6 +154,34 @@ pub async fn read_draft(
     Ok(draft)
 }
 
+/// Adds the rows of a table that has arrived.
+async fn read_rows(
+    (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
+    mut draft: BatchUpload,
+    form: TableForm,
+    source: TableSource,
+) -> Result<BatchUpload, ApiError> {
+    let bytes = 2 * options.evaluate_max_bytes;
+    let share = memory.rows(jobs.tenant(), bytes).await?;
+    let mut computation = memory.computation(jobs.tenant());
+    let options = options.clone();
+    let read = computation.run(move |pace| {
+        let _held = share;
+        let rows = TableRows::new(form, source, options.evaluate_max_bytes)?;
+        let columns = columns_of(&rows.titles)?;
+        for chunk in rows {
+            for row in rows_of(&columns, &chunk?) {
+                pace.step()?;
+                let row = row.map_err(|detail| vec![Fault::new("", detail)]);
+                draft.add_row(None, b"", row)?;
+                require_count(&draft, &options)?;
+            }
+        }
+        Ok(draft)
+    });
+    read.await
+}
+
 fn require_count(draft: &BatchUpload, options: &HttpOptions) -> Result<(), ApiError> {
     if draft.cases <= options.batch_max_cases {
         return Ok(());
@@ -157,9 +206,9 @@ impl Checking {
     async fn check(
         &mut self,
         mut draft: BatchUpload,
-        mut form: Form,
+        mut form: CasesForm,
         portion: Vec<Element>,
-    ) -> Result<(BatchUpload, Form), ApiError> {
+    ) -> Result<(BatchUpload, CasesForm), ApiError> {
         if portion.is_empty() {
             return Ok((draft, form));
         }
@@ -178,24 +227,24 @@ impl Checking {
 /// Adds one case to a draft, with its faults if it has any.
 fn add(
     draft: &mut BatchUpload,
-    form: &mut Form,
+    form: &mut CasesForm,
     element: &Element,
     parsed_max_bytes: usize,
 ) -> Result<(), ApiError> {
     weigh_case(&element.text, parsed_max_bytes)?;
     match form {
-        Form::Array => {
+        CasesForm::Array => {
             let case = read_strict(&element.text)
                 .map_err(|error| ApiError::malformed_element(draft.cases, &error))?;
             draft.add(element.line, &element.text, own_options::read(case))?;
         }
-        Form::Lines => {
+        CasesForm::Lines => {
             let case = read_strict(&element.text)
                 .map_err(|error| vec![Fault::new("", format!("the line is not JSON: {error}"))])
                 .and_then(own_options::read);
             draft.add(element.line, &element.text, case)?;
         }
-        Form::Table(table, _) => {
+        CasesForm::Table(table, _) => {
             if let Some(row) = table.take(&element.text)? {
                 let row = row.map_err(|detail| vec![Fault::new("", detail)]);
                 draft.add_row(element.line, &element.text, row)?;

@@ -9,14 +9,15 @@ use std::collections::HashSet;
 use serde_json::Value;
 
 use crate::contact::evaluate::placing::members;
+use crate::contact::evaluate::varied::Values;
 use crate::http::extract::batch::own_options;
+use crate::http::extract::tables::{Chunk, Title};
 use crate::http::extract::titles::{
     Place, delimiter, faulty, is_line_of_units, number, place, question, require_few, short_names,
 };
 use crate::http::problem::error::ApiError;
 use crate::jobs::batch::template::Cell;
 use crate::jobs::batch::upload::BatchRow;
-use crate::jobs::model::submit_options::CaseOptions;
 use crate::jobs::run::head::converted;
 
 /// A table under way.
@@ -38,8 +39,9 @@ struct Header {
 /// What a line puts into the template, or why it stands for no case.
 pub type Row = Result<BatchRow, String>;
 
+/// A column of a table that fills a template.
 #[derive(Debug, PartialEq)]
-struct TemplateColumn {
+pub struct TemplateColumn {
     /// As it stands in the header.
     title: String,
     /// The members that lead to the value; none for an option of the line.
@@ -101,23 +103,76 @@ impl Header {
     }
 
     fn columns(&self, units: Option<&[String]>) -> Result<Vec<TemplateColumn>, ApiError> {
-        let mut seen = HashSet::new();
-        let mut columns = Vec::with_capacity(self.titles.len());
-        for (number, title) in self.titles.iter().enumerate() {
-            let unit = units.and_then(|units| units.get(number));
-            let column = column(title, unit.map(|unit| unit.trim()));
-            let column = column.map_err(|detail| faulty(format!("line 1: {detail}")))?;
-            let place = match column.path.is_empty() {
-                true => vec![String::new(), column.title.clone()],
-                false => column.path.clone(),
-            };
-            if !seen.insert(place) {
-                let detail = format!("line 1: the column `{title}` is there twice");
-                return Err(faulty(detail));
-            }
-            columns.push(column);
+        let unit = |place: usize| units.and_then(|units| Some(units.get(place)?.trim()));
+        let titles = self.titles.iter().enumerate();
+        let columns = template_columns(titles.map(|(place, title)| (title.as_str(), unit(place))));
+        columns.map_err(|detail| faulty(format!("line 1: {detail}")))
+    }
+}
+
+/// The columns of these titles, each with its unit in a line of units.
+fn template_columns<'a>(
+    titles: impl Iterator<Item = (&'a str, Option<&'a str>)>,
+) -> Result<Vec<TemplateColumn>, String> {
+    let mut seen = HashSet::new();
+    let mut columns = Vec::new();
+    for (title, unit) in titles {
+        let column = column(title, unit)?;
+        let place = match column.path.is_empty() {
+            true => vec![String::new(), column.title.clone()],
+            false => column.path.clone(),
+        };
+        if !seen.insert(place) {
+            return Err(format!("the column `{title}` is there twice"));
         }
-        Ok(columns)
+        columns.push(column);
+    }
+    Ok(columns)
+}
+
+/// The columns of a table that is not read line by line.
+///
+/// # Errors
+/// `faulty-table`: a title names no column, or two the same.
+pub fn columns_of(titles: &[Title]) -> Result<Vec<TemplateColumn>, ApiError> {
+    let titles = titles.iter();
+    let columns = template_columns(titles.map(|title| (&*title.name, title.unit.as_deref())));
+    columns.map_err(faulty)
+}
+
+/// The rows of a part of such a table.
+pub fn rows_of(columns: &[TemplateColumn], chunk: &Chunk) -> impl Iterator<Item = Row> {
+    let rows = chunk.first().map_or(0, Values::len);
+    (0..rows).map(move |row| {
+        let mut filled = BatchRow::default();
+        for (column, values) in columns.iter().zip(chunk) {
+            let value = match values {
+                Values::Texts(texts) => match texts[row].as_deref().map(str::trim) {
+                    None | Some("") => continue,
+                    Some(text) => Value::from(text),
+                },
+                Values::Numbers(numbers) if numbers[row].is_nan() => continue,
+                Values::Numbers(numbers) if column.text => numbers[row].to_string().into(),
+                Values::Numbers(numbers) if column.path.is_empty() => {
+                    serde_json::from_str(&numbers[row].to_string()).unwrap_or_default()
+                }
+                Values::Numbers(numbers) => Value::from(converted(numbers[row], column.factor)),
+            };
+            column.put(value, &mut filled)?;
+        }
+        Ok(filled)
+    })
+}
+
+impl TemplateColumn {
+    /// Puts the value of a row where it belongs.
+    fn put(&self, value: Value, row: &mut BatchRow) -> Result<(), String> {
+        if self.path.is_empty() {
+            return own_options::set(&mut row.own, &self.title, &value)
+                .map_err(|detail| format!("the column `{}`: {detail}", self.title));
+        }
+        row.cells.push(Cell(self.path.clone(), value));
+        Ok(())
     }
 }
 
@@ -170,8 +225,7 @@ fn read_row(columns: &[TemplateColumn], delimiter: u8, line: &[u8]) -> Row {
             columns.len()
         ));
     }
-    let mut cells = Vec::new();
-    let mut own = CaseOptions::default();
+    let mut row = BatchRow::default();
     for (column, field) in columns.iter().zip(&fields) {
         let field = field.trim();
         if field.is_empty() {
@@ -181,14 +235,9 @@ fn read_row(columns: &[TemplateColumn], delimiter: u8, line: &[u8]) -> Row {
             true => Value::from(field),
             false => read_value(field, column.factor, delimiter != b','),
         };
-        if column.path.is_empty() {
-            own_options::set(&mut own, &column.title, &value)
-                .map_err(|detail| format!("the column `{}`: {detail}", column.title))?;
-            continue;
-        }
-        cells.push(Cell(column.path.clone(), value));
+        column.put(value, &mut row)?;
     }
-    Ok(BatchRow { cells, own })
+    Ok(row)
 }
 
 /// A number in the unit of the case, `true`, `false` or `null` as JSON has them; everything else is text, and the case says whether it may be.

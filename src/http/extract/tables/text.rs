@@ -5,25 +5,26 @@ use std::io::{BufRead, Chain, Cursor, Read};
 use serde_json::{Map, Value};
 
 use crate::contact::evaluate::varied::Values;
-use crate::http::extract::titles::{
-    NamedColumns, delimiter, faulty, is_line_of_units, number, require_few,
-};
+use crate::http::extract::tables::{Chunk, Title};
+use crate::http::extract::titles::{delimiter, faulty, is_line_of_units, number, require_few};
 use crate::http::problem::error::ApiError;
-use crate::jobs::run::head::RunColumn;
 
 /// Rows that are read at once.
 const ROWS: usize = 8192;
 /// Longest line in bytes.
 const LINE_BYTES_MAX: u64 = 1 << 20;
 
+/// A source from its first line on, with an end of line behind it.
+type Ended<R> = Chain<Chain<Cursor<Vec<u8>>, R>, &'static [u8]>;
+
 /// Rows in CSV, whose first line names the columns; fields are parted by what parts the titles, commas, semicolons or tabs. A second line may give
 /// the units.
 pub(super) struct CsvRows<R: Read> {
-    reader: csv::Reader<Chain<Cursor<Vec<u8>>, R>>,
+    reader: csv::Reader<Ended<R>>,
     /// Commas may stand in numbers.
     decimal_comma: bool,
-    /// The columns.
-    pub columns: Vec<RunColumn>,
+    /// The titles of the columns.
+    pub titles: Vec<Title>,
     /// The next row, if there is one.
     record: Option<csv::StringRecord>,
 }
@@ -33,16 +34,24 @@ impl<R: BufRead> CsvRows<R> {
     ///
     /// # Errors
     /// `faulty-table`
-    pub(super) fn new(mut source: R, named: &NamedColumns) -> Result<CsvRows<R>, ApiError> {
+    pub(super) fn new(mut source: R) -> Result<CsvRows<R>, ApiError> {
         let mut first = Vec::new();
         let read = (&mut source).take(LINE_BYTES_MAX);
         let read = { read }.read_until(b'\n', &mut first);
         read.map_err(|error| ApiError::internal(&error))?;
         let delimiter = delimiter(&first);
+        // With this end of line the reader counts lines exactly; other files end their lines with `\r` alone.
+        let terminator = match first.ends_with(b"\r\n") || !first.contains(&b'\r') {
+            true => csv::Terminator::Any(b'\n'),
+            false => csv::Terminator::CRLF,
+        };
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
+            .terminator(terminator)
+            .flexible(true)
             .delimiter(delimiter)
-            .from_reader(Cursor::new(first).chain(source));
+            // The last line ends as the others do.
+            .from_reader(Cursor::new(first).chain(source).chain(&b"\n"[..]));
         let titles = reader.headers();
         let titles = titles.map_err(|error| faulty(format!("line 1: {error}")))?;
         require_few(titles.len())?;
@@ -53,7 +62,7 @@ impl<R: BufRead> CsvRows<R> {
         let mut rows = CsvRows {
             reader,
             decimal_comma: delimiter != b',',
-            columns: Vec::new(),
+            titles: Vec::new(),
             record: Some(csv::StringRecord::new()),
         };
         rows.advance()?;
@@ -68,23 +77,31 @@ impl<R: BufRead> CsvRows<R> {
             let field = first.and_then(|record| record.get(place)).unwrap_or("");
             !field.is_empty() && number(field, rows.decimal_comma).is_none()
         };
-        let columns = titles.iter().enumerate();
-        let columns = columns.map(|(place, title)| (&**title, unit(place), text(place)));
-        rows.columns = named.columns(columns)?;
+        let titles = titles.into_iter().enumerate().map(|(place, name)| Title {
+            name,
+            unit: unit(place).map(str::to_owned),
+            text: text(place),
+        });
+        rows.titles = titles.collect();
         Ok(rows)
     }
 
-    /// Some more rows, column by column; nothing at the end.
-    ///
-    /// # Errors
-    /// `faulty-table` with line and column.
-    pub(super) fn next(&mut self) -> Result<Option<Vec<Values>>, ApiError> {
-        let mut values = empty(&self.columns);
+    /// Some more rows, none at the end.
+    fn read(&mut self) -> Result<Chunk, ApiError> {
+        let mut values = empty(&self.titles);
         for _ in 0..ROWS {
             let Some(record) = &self.record else { break };
-            for ((field, column), values) in record.iter().zip(&self.columns).zip(&mut values) {
+            if record.len() != self.titles.len() {
+                return Err(faulty(format!(
+                    "line {} has {} fields, the header has {}",
+                    self.line(record),
+                    record.len(),
+                    self.titles.len()
+                )));
+            }
+            for ((field, column), values) in record.iter().zip(&self.titles).zip(&mut values) {
                 let wrong = || {
-                    let line = record.position().map_or(0, csv::Position::line);
+                    let line = self.line(record);
                     faulty(format!(
                         "line {line}, column `{}`: `{field}` is not a number; the first row has a number in this column",
                         column.name
@@ -102,18 +119,27 @@ impl<R: BufRead> CsvRows<R> {
             }
             self.advance()?;
         }
-        let there = values.first().is_some_and(|column| !column.is_empty());
-        Ok(there.then_some(values))
+        Ok(values)
     }
 
+    /// Reads the next record that is no blank line.
     fn advance(&mut self) -> Result<(), ApiError> {
-        if let Some(record) = &mut self.record {
+        while let Some(record) = &mut self.record {
             let more = self.reader.read_record(record);
             if !more.map_err(|error| faulty(format!("the table cannot be read: {error}")))? {
                 self.record = None;
+            } else if record.len() > 1 || record.get(0) != Some("") {
+                break;
             }
         }
         Ok(())
+    }
+
+    /// Number of the line on which the record begins that was read last.
+    fn line(&self, record: &csv::StringRecord) -> u64 {
+        let inside = record.as_slice().bytes().filter(|byte| *byte == b'\n');
+        let after = self.reader.position().line();
+        after.saturating_sub(1 + inside.count() as u64)
     }
 }
 
@@ -121,8 +147,8 @@ impl<R: BufRead> CsvRows<R> {
 pub(super) struct JsonRows<R: BufRead> {
     source: R,
     line: u64,
-    /// The columns: the members of the first row.
-    pub columns: Vec<RunColumn>,
+    /// The titles of the columns: the members of the first row.
+    pub titles: Vec<Title>,
     row: Option<Map<String, Value>>,
 }
 
@@ -131,31 +157,33 @@ impl<R: BufRead> JsonRows<R> {
     ///
     /// # Errors
     /// `faulty-table`
-    pub(super) fn new(source: R, named: &NamedColumns) -> Result<JsonRows<R>, ApiError> {
+    pub(super) fn new(source: R) -> Result<JsonRows<R>, ApiError> {
         let mut rows = JsonRows {
             source,
             line: 0,
-            columns: Vec::new(),
+            titles: Vec::new(),
             row: None,
         };
         rows.advance()?;
         let members = rows.row.iter().flatten();
-        let members = members.map(|(title, value)| (&**title, None, value.is_string()));
-        rows.columns = named.columns(members)?;
+        let titles = members.map(|(name, value)| Title {
+            name: name.clone(),
+            unit: None,
+            text: value.is_string(),
+        });
+        rows.titles = titles.collect();
+        require_few(rows.titles.len())?;
         Ok(rows)
     }
 
-    /// Some more rows, column by column; nothing at the end.
-    ///
-    /// # Errors
-    /// `faulty-table` with line and member.
-    pub(super) fn next(&mut self) -> Result<Option<Vec<Values>>, ApiError> {
-        let mut values = empty(&self.columns);
+    /// Some more rows, none at the end.
+    fn read(&mut self) -> Result<Chunk, ApiError> {
+        let mut values = empty(&self.titles);
         for _ in 0..ROWS {
             let Some(mut row) = self.row.take() else {
                 break;
             };
-            for (column, values) in self.columns.iter().zip(&mut values) {
+            for (column, values) in self.titles.iter().zip(&mut values) {
                 match (values, row.remove(&column.name)) {
                     (Values::Texts(texts), Some(Value::String(text))) => texts.push(Some(text)),
                     (Values::Texts(texts), Some(Value::Null)) => texts.push(None),
@@ -180,8 +208,7 @@ impl<R: BufRead> JsonRows<R> {
             }
             self.advance()?;
         }
-        let there = values.first().is_some_and(|column| !column.is_empty());
-        Ok(there.then_some(values))
+        Ok(values)
     }
 
     /// Reads the next line that is not blank.
@@ -210,32 +237,62 @@ impl<R: BufRead> JsonRows<R> {
     }
 }
 
-fn empty(columns: &[RunColumn]) -> Vec<Values> {
-    let empty = |column: &RunColumn| match column.text {
+impl<R: BufRead> Iterator for CsvRows<R> {
+    type Item = Result<Chunk, ApiError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.read().map(there).transpose()
+    }
+}
+
+impl<R: BufRead> Iterator for JsonRows<R> {
+    type Item = Result<Chunk, ApiError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.read().map(there).transpose()
+    }
+}
+
+fn empty(titles: &[Title]) -> Chunk {
+    let empty = |title: &Title| match title.text {
         true => Values::Texts(Vec::new()),
         false => Values::Numbers(Vec::new()),
     };
-    columns.iter().map(empty).collect()
+    titles.iter().map(empty).collect()
+}
+
+/// The chunk, unless it has no row.
+fn there(chunk: Chunk) -> Option<Chunk> {
+    let some = chunk.first().is_some_and(|column| !column.is_empty());
+    some.then_some(chunk)
 }
 
 #[cfg(test)]
 mod tests {
+    use axum::body::Bytes;
+
     use super::*;
+    use crate::http::extract::tables::{TableForm, TableRows, TableSource};
+    use crate::http::extract::titles::NamedColumns;
+
+    fn rows(form: TableForm, text: &'static str) -> Result<TableRows, ApiError> {
+        let source = TableSource::Memory(Bytes::from_static(text.as_bytes()));
+        TableRows::new(form, source, text.len())
+    }
 
     #[test]
     fn csv_and_ndjson_of_the_same_rows_are_the_same_columns() {
         let csv = "\u{feff}creepage_x, km ,section\r\n0.1,,a\r\n-2e-3,37.5,\"b, c\"\r\n";
         let json = "{\"creepage_x\":0.1,\"km\":null,\"section\":\"a\"}\n\n{\"section\":\"b, c\",\"km\":37.5,\"creepage_x\":-2e-3}";
-        let named = NamedColumns::default();
-        let mut by_csv = CsvRows::new(csv.as_bytes(), &named).unwrap();
-        let mut by_json = JsonRows::new(json.as_bytes(), &named).unwrap();
-        assert_eq!(by_csv.columns, by_json.columns);
-        let pointers: Vec<_> = by_csv
-            .columns
-            .iter()
-            .map(|column| column.pointer.as_deref())
-            .collect();
-        assert_eq!(pointers, [Some("/motion/creepage_x"), None, None]);
+        let mut by_csv = rows(TableForm::Csv, csv).unwrap();
+        let mut by_json = rows(TableForm::Ndjson, json).unwrap();
+        assert_eq!(by_csv.titles, by_json.titles);
+        let columns = by_csv.named(&NamedColumns::default()).unwrap();
+        let pointers = columns.iter().map(|column| column.pointer.as_deref());
+        assert_eq!(
+            pointers.collect::<Vec<_>>(),
+            [Some("/motion/creepage_x"), None, None]
+        );
         let values = by_csv.next().unwrap().unwrap();
         assert_eq!(
             format!("{values:?}"),
@@ -246,7 +303,7 @@ mod tests {
             values[2],
             Values::Texts(["a", "b, c"].map(|text| Some(text.to_owned())).to_vec())
         );
-        assert!(by_csv.next().unwrap().is_none() && by_json.next().unwrap().is_none());
+        assert!(by_csv.next().is_none() && by_json.next().is_none());
     }
 
     #[test]
@@ -257,8 +314,9 @@ mod tests {
             "time;Normal force [kN];longitudinal creepage;spin (1/m)\r\n0,1;80;0,001;4,0e-1\r\n";
         let tab = "time\tnormal_force\tcreepage_x\tspin\ns\tkN\t-\t1/m\n0.1\t80\t0.001\t0.4\n";
         for text in [comma, semicolon, tab] {
-            let mut rows = CsvRows::new(text.as_bytes(), &NamedColumns::default()).unwrap();
-            let places: Vec<_> = (rows.columns.iter())
+            let mut rows = rows(TableForm::Csv, text).unwrap();
+            let columns = rows.named(&NamedColumns::default()).unwrap();
+            let places: Vec<_> = (columns.iter())
                 .map(|column| (column.pointer.as_deref(), column.factor))
                 .collect();
             let expected = [
@@ -276,21 +334,26 @@ mod tests {
 
     #[test]
     fn an_empty_first_row_is_a_row() {
-        let named = NamedColumns::default();
-        let mut rows = CsvRows::new("km,creepage_x\n,\n2,3\n".as_bytes(), &named).unwrap();
+        let mut rows = rows(TableForm::Csv, "km,creepage_x\n,\n2,3\n").unwrap();
         assert_eq!(rows.next().unwrap().unwrap()[0].len(), 2);
     }
 
     #[test]
     fn faults_name_the_line() {
-        let named = NamedColumns::default();
-        let csv =
-            |text: &str| CsvRows::new(text.as_bytes(), &named).and_then(|mut rows| rows.next());
-        let json =
-            |text: &str| JsonRows::new(text.as_bytes(), &named).and_then(|mut rows| rows.next());
+        let read = |form, text| rows(form, text).and_then(|mut rows| rows.next().transpose());
+        let csv = |text| read(TableForm::Csv, text);
+        let json = |text| read(TableForm::Ndjson, text);
         for (read, words) in [
             (csv("creepage_x\n0.1\nx\n"), ["line 3", "creepage_x"]),
-            (csv("creepage_x,s\n0.1\n"), ["the table", "fields"]),
+            (
+                csv("creepage_x\r\n0.1\r\n\r\nx\r\n"),
+                ["line 4", "creepage_x"],
+            ),
+            (csv("creepage_x,s\n0.1\n"), ["line 2", "1 fields"]),
+            (
+                csv("creepage_x,s\n\n0,\"a\nb\"\n\nx,"),
+                ["line 6", "creepage_x"],
+            ),
             (json("{\"s\":1}\n{\"b\":1}"), ["line 2", "`s`"]),
             (json("{\"s\":1}\n{\"s\":\"x\"}"), ["line 2", "kind"]),
             (json("{\"s\":1}\n{\"s\":1,\"b\":2}"), ["line 2", "`b`"]),

@@ -7,36 +7,21 @@ use std::io::{Cursor, Read};
 use axum::body::Bytes;
 use zip::ZipArchive;
 
-use crate::contact::evaluate::column::Column;
-use crate::http::extract::rows::column;
-use crate::http::extract::titles::{faulty, places, require_few};
+use crate::http::extract::titles::{faulty, require_few};
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 
 /// What an array may hold.
 const KINDS: &str = "float32, float64, or integers";
 
-/// Columns of an archive, named by its arrays as those of CSV are by their titles; unpacked they have no more than `max_bytes`.
-///
-/// # Errors
-/// `faulty-table` with the array; `body-too-large` if there is more in it.
-pub fn read_npz(data: Bytes, max_bytes: usize) -> Result<Vec<Column>, ApiError> {
-    let arrays = read_arrays(data, max_bytes)?;
-    let named = places(arrays.iter().map(|(name, _)| (name.as_str(), None)))?;
-    for (name, values) in &arrays {
-        if let Some(row) = values.iter().position(|value| !value.is_finite()) {
-            return Err(faulty(format!("array `{name}`, row {row}: no number")));
-        }
-    }
-    let values = arrays.into_iter().map(|(_, values)| values);
-    Ok(named.into_iter().zip(values).map(column).collect())
-}
-
 /// The arrays of an archive with their names, all of one length.
 ///
 /// # Errors
-/// As [`read_npz`], but for numbers that are not finite.
-pub fn read_arrays(data: Bytes, max_bytes: usize) -> Result<Vec<(String, Vec<f64>)>, ApiError> {
+/// `faulty-table` with the array; `body-too-large`: unpacked they have more than `max_bytes`.
+pub(super) fn read_arrays(
+    data: Bytes,
+    max_bytes: usize,
+) -> Result<Vec<(String, Vec<f64>)>, ApiError> {
     let unread =
         |error: &dyn std::fmt::Display| faulty(format!("the NPZ archive cannot be read: {error}"));
     let mut archive = ZipArchive::new(Cursor::new(data)).map_err(|error| unread(&error))?;

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
-use crate::http::render::csv::{finish, number, text_field};
 use crate::http::render::forces::Forces;
+use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
 use crate::jobs::model::batch::BatchItem;
 
 /// Columns of a table for which none are named: these, [`Forces::COLUMNS`] and the rest.
@@ -88,60 +88,80 @@ impl Columns {
         )
     }
 
-    /// The line with the names.
-    ///
-    /// # Errors
-    /// None that memory does not have.
-    pub(crate) fn head(&self) -> Result<Vec<u8>, csv::Error> {
-        let mut out = csv::Writer::from_writer(Vec::new());
-        out.write_record(self.0.iter().map(|name| text_field(name).into_owned()))?;
-        finish(out)
+    /// The names with the kinds of their values.
+    pub(crate) fn kinds(&self) -> Vec<(String, TableKind)> {
+        let kind = |name: &String| match name.as_str() {
+            "index" | "point" | "patch" => TableKind::Integers,
+            "id" | "name" | "state" | "cached" | "target_met" | "saturated" | "remarks"
+            | "error" => TableKind::Texts,
+            name if name.starts_with(LABEL) => TableKind::Texts,
+            _ => TableKind::Numbers,
+        };
+        self.0
+            .iter()
+            .map(|name| (name.clone(), kind(name)))
+            .collect()
     }
 
-    /// The line of a job without a result, with `error` saying why.
-    ///
-    /// # Errors
-    /// None that memory does not have.
-    pub(crate) fn write_without_result(
-        &self,
-        out: &mut csv::Writer<Vec<u8>>,
-        item: &BatchItem,
-        error: &str,
-    ) -> Result<(), csv::Error> {
-        out.write_record(self.0.iter().map(|name| match name.as_str() {
-            "error" => text_field(error).into_owned(),
-            name => of_job(item, name).unwrap_or_default(),
-        }))
+    /// A table without rows.
+    #[must_use]
+    pub(crate) fn empty(&self) -> RowTable {
+        let columns = self.kinds().into_iter();
+        let columns = columns.map(|(name, kind)| (name, kind.without_values(0)));
+        RowTable {
+            columns: columns.collect(),
+        }
     }
 
-    /// The lines of these motions of a job.
-    ///
-    /// # Errors
-    /// None that memory does not have.
-    pub(crate) fn write(
+    /// Adds the line of a job without a result, with `error` saying why.
+    pub(crate) fn add_without_result(&self, table: &mut RowTable, item: &BatchItem, error: &str) {
+        for (name, column) in &mut table.columns {
+            match column {
+                TableColumn::Integers(values) => values.push(match name.as_str() {
+                    "index" => i64::from(item.index),
+                    _ => 0,
+                }),
+                TableColumn::Numbers(values) => values.push(f64::NAN),
+                TableColumn::Texts(values) => values.push(match name.as_str() {
+                    "error" => Some(error.to_owned()).filter(|error| !error.is_empty()),
+                    name => of_job(item, name),
+                }),
+            }
+        }
+    }
+
+    /// Adds the lines of these motions of a job.
+    pub(crate) fn add(
         &self,
-        out: &mut csv::Writer<Vec<u8>>,
+        table: &mut RowTable,
         item: &BatchItem,
         solution: &Solution,
         points: Range<usize>,
-    ) -> Result<(), csv::Error> {
+    ) {
         let by_patch = self.0.iter().any(|name| name == "patch");
         for point in points {
-            let rows = match by_patch {
+            let patches: Vec<_> = match by_patch {
                 true => (0..solution.patches.len()).map(Some).collect(),
                 false => vec![None],
             };
-            for patch in rows {
-                let row = TableLine {
+            for patch in patches {
+                let line = TableLine {
                     item,
                     solution,
                     point,
                     patch,
                 };
-                out.write_record(self.0.iter().map(|name| row.value(name)))?;
+                for (name, column) in &mut table.columns {
+                    match column {
+                        TableColumn::Integers(values) => values.push(line.place_of(name)),
+                        TableColumn::Numbers(values) => {
+                            values.push(line.number(name).unwrap_or(f64::NAN));
+                        }
+                        TableColumn::Texts(values) => values.push(line.text(name)),
+                    }
+                }
             }
         }
-        Ok(())
     }
 }
 
@@ -149,20 +169,16 @@ fn default_names() -> impl Iterator<Item = &'static str> {
     FIRST.into_iter().chain(Forces::COLUMNS).chain(LAST)
 }
 
-/// What a column says of the job itself.
+/// What a column of texts says of the job itself.
 fn of_job(item: &BatchItem, name: &str) -> Option<String> {
     let job = &item.job;
-    Some(match name {
-        "index" => item.index.to_string(),
-        "id" => job.id.to_string(),
-        "name" => text_field(job.name.as_deref().unwrap_or_default()).into_owned(),
-        "state" => job.state.name().to_owned(),
-        "cached" => job.cached.to_string(),
-        _ => {
-            let label = job.labels.get(name.strip_prefix(LABEL)?);
-            text_field(label.map_or("", String::as_str)).into_owned()
-        }
-    })
+    match name {
+        "id" => Some(job.id.to_string()),
+        "name" => job.name.clone(),
+        "state" => Some(job.state.name().to_owned()),
+        "cached" => Some(job.cached.to_string()),
+        _ => job.labels.get(name.strip_prefix(LABEL)?).cloned(),
+    }
 }
 
 /// One line: a motion of a job, of one patch or of all of them together.
@@ -174,20 +190,20 @@ struct TableLine<'a> {
 }
 
 impl TableLine<'_> {
-    fn value(&self, name: &str) -> String {
-        if let Some(text) = of_job(self.item, name) {
-            return text;
-        }
+    fn place_of(&self, name: &str) -> i64 {
         match name {
-            "point" => self.point.to_string(),
-            "patch" => self
-                .patch
-                .map_or_else(String::new, |patch| patch.to_string()),
-            "remarks" => codes(&self.solution.remarks, self.point, self.patch),
+            "index" => i64::from(self.item.index),
+            "point" => self.point as i64,
+            _ => self.patch.unwrap_or(0) as i64,
+        }
+    }
+
+    fn text(&self, name: &str) -> Option<String> {
+        match name {
+            "remarks" => Some(codes(&self.solution.remarks, self.point, self.patch)),
             "target_met" => self.verdict(|point| point.target_met, false),
             "saturated" => self.verdict(|point| Some(point.saturated), true),
-            "error" => String::new(),
-            name => self.number(name).map_or_else(String::new, number),
+            name => of_job(self.item, name),
         }
     }
 
@@ -199,16 +215,14 @@ impl TableLine<'_> {
     }
 
     /// True if it is of all patches, or of any of them; nothing where it is not told.
-    fn verdict(&self, of: fn(&PointSolution) -> Option<bool>, any: bool) -> String {
+    fn verdict(&self, of: fn(&PointSolution) -> Option<bool>, any: bool) -> Option<String> {
         let mut told = self.parts().filter_map(|(_, point)| of(point)).peekable();
-        if told.peek().is_none() {
-            return String::new();
-        }
-        match any {
+        told.peek()?;
+        let verdict = match any {
             true => told.any(|verdict| verdict),
             false => told.all(|verdict| verdict),
-        }
-        .to_string()
+        };
+        Some(verdict.to_string())
     }
 
     fn number(&self, name: &str) -> Option<f64> {

@@ -1,0 +1,253 @@
+//! Tables of rows in every form that requests send them in: runs, batches and evaluations read them here.
+
+mod npz;
+mod text;
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, Read, Seek};
+
+use axum::body::Bytes;
+
+use self::npz::read_arrays;
+pub use self::npz::too_large;
+use self::text::{CsvRows, JsonRows};
+use crate::contact::evaluate::varied::Values;
+use crate::http::extract::titles::{NamedColumns, Titled, faulty, require_few};
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+use crate::jobs::codec::arrow;
+use crate::jobs::codec::parquet::TableReader;
+use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+use crate::jobs::run::head::RunColumn;
+
+/// Largest group of rows of a Parquet file, unpacked, in bytes.
+const GROUP_BYTES_MAX: i64 = 1 << 28;
+
+/// The form of a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TableForm {
+    /// A line for each row, the first names the columns.
+    Csv,
+    /// An object for each row, one in a line.
+    Ndjson,
+    /// An Arrow stream or file.
+    Arrow,
+    /// A Parquet file.
+    Parquet,
+    /// NumPy's archive of arrays.
+    Npz,
+}
+
+impl TableForm {
+    /// The forms in words, for the fault of a request in none of them.
+    pub const ALLOWED: &str = "a table with `text/csv`, `application/x-ndjson`, `application/vnd.apache.arrow.stream`, \
+                               `application/vnd.apache.parquet` or `application/x-npz`, or a template and a table with `multipart/form-data`";
+
+    /// The form of this media type.
+    #[must_use]
+    pub fn of(essence: &str) -> Option<TableForm> {
+        Some(match essence {
+            "text/csv" => TableForm::Csv,
+            "application/x-ndjson" | "application/ndjson" | "application/jsonl" => {
+                TableForm::Ndjson
+            }
+            "application/vnd.apache.arrow.stream" | "application/vnd.apache.arrow.file" => {
+                TableForm::Arrow
+            }
+            "application/vnd.apache.parquet" => TableForm::Parquet,
+            "application/x-npz" => TableForm::Npz,
+            _ => return None,
+        })
+    }
+
+    /// The values may take far more bytes than the table.
+    #[must_use]
+    pub fn packed(self) -> bool {
+        matches!(self, TableForm::Parquet | TableForm::Npz)
+    }
+}
+
+/// The fault of a body that is neither JSON nor a table.
+pub fn unsupported(essence: &str, json: &str) -> ApiError {
+    ApiError::new(
+        ProblemKind::UnsupportedMediaType,
+        format!(
+            "the content type is `{essence}`; send {json}, or {}",
+            TableForm::ALLOWED
+        ),
+    )
+}
+
+/// The bytes of a table.
+#[derive(Debug)]
+pub enum TableSource {
+    /// In a file, from its beginning.
+    File(File),
+    /// In memory.
+    Memory(Bytes),
+}
+
+/// What tables are read from.
+trait Seekable: BufRead + Seek + Send {}
+
+impl<T: BufRead + Seek + Send> Seekable for T {}
+
+impl TableSource {
+    fn reader(self) -> Box<dyn Seekable> {
+        match self {
+            TableSource::File(file) => Box::new(BufReader::new(file)),
+            TableSource::Memory(bytes) => Box::new(Cursor::new(bytes)),
+        }
+    }
+}
+
+/// The title of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Title {
+    /// As it was sent.
+    pub name: String,
+    /// Its unit in a line of units.
+    pub unit: Option<String>,
+    /// It holds texts; otherwise numbers.
+    pub text: bool,
+}
+
+/// Some rows, column by column; numbers are NaN where a row has none.
+pub type Chunk = Vec<Values>;
+
+/// A table, read some rows at a time.
+pub struct TableRows {
+    /// The titles of the columns.
+    pub titles: Vec<Title>,
+    chunks: Box<dyn Iterator<Item = Result<Chunk, ApiError>>>,
+}
+
+impl Iterator for TableRows {
+    type Item = Result<Chunk, ApiError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.chunks.next()
+    }
+}
+
+impl TableRows {
+    /// Begins to read a table. Blocks, as reading its rows does. An archive of arrays is held in memory as a whole, with at most `unpacked_max` bytes.
+    ///
+    /// # Errors
+    /// `faulty-table`: it is not of its form, or has too many columns; `body-too-large`: an archive has more bytes.
+    pub fn new(
+        form: TableForm,
+        source: TableSource,
+        unpacked_max: usize,
+    ) -> Result<TableRows, ApiError> {
+        match form {
+            TableForm::Csv => {
+                let rows = CsvRows::new(source.reader())?;
+                Ok(TableRows {
+                    titles: rows.titles.clone(),
+                    chunks: Box::new(rows),
+                })
+            }
+            TableForm::Ndjson => {
+                let rows = JsonRows::new(source.reader())?;
+                Ok(TableRows {
+                    titles: rows.titles.clone(),
+                    chunks: Box::new(rows),
+                })
+            }
+            TableForm::Arrow => {
+                let damaged = |error| faulty(format!("the Arrow data cannot be read: {error}"));
+                let tables = arrow::read(source.reader()).map_err(damaged)?;
+                TableRows::of_tables(tables.map(move |table| table.map_err(damaged)))
+            }
+            TableForm::Parquet => match source {
+                TableSource::File(file) => TableRows::of_tables(groups(TableReader::new(file))?),
+                TableSource::Memory(bytes) => {
+                    TableRows::of_tables(groups(TableReader::new(bytes))?)
+                }
+            },
+            TableForm::Npz => {
+                let table = npz_table(source.reader(), unpacked_max);
+                TableRows::of_tables(std::iter::once(table))
+            }
+        }
+    }
+
+    /// The columns, as a run names them.
+    ///
+    /// # Errors
+    /// As [`NamedColumns::columns`].
+    pub fn named(&self, named: &NamedColumns) -> Result<Vec<RunColumn>, ApiError> {
+        let titles = self.titles.iter();
+        named.columns(
+            titles.map(|title| -> Titled<'_> { (&title.name, title.unit.as_deref(), title.text) }),
+        )
+    }
+
+    /// The rows of tables that all have the columns of the first.
+    fn of_tables(
+        mut tables: impl Iterator<Item = Result<RowTable, ApiError>> + 'static,
+    ) -> Result<TableRows, ApiError> {
+        let first = tables
+            .next()
+            .ok_or_else(|| faulty("the table has no rows"))??;
+        require_few(first.columns.len())?;
+        let titles = first.columns.iter().map(|(name, values)| Title {
+            name: name.clone(),
+            unit: None,
+            text: values.kind() == TableKind::Texts,
+        });
+        Ok(TableRows {
+            titles: titles.collect(),
+            chunks: Box::new(
+                std::iter::once(Ok(first))
+                    .chain(tables)
+                    .map(|table| Ok(table?.columns.into_iter().map(plain).collect())),
+            ),
+        })
+    }
+}
+
+/// The arrays of an NPZ archive.
+fn npz_table(source: impl Read, bytes_max: usize) -> Result<RowTable, ApiError> {
+    let mut archive = Vec::new();
+    source
+        .take(bytes_max as u64 + 1)
+        .read_to_end(&mut archive)
+        .map_err(|error| faulty(format!("the NPZ archive cannot be read: {error}")))?;
+    if archive.len() > bytes_max {
+        return Err(too_large(bytes_max));
+    }
+    let arrays = read_arrays(archive.into(), bytes_max)?.into_iter();
+    let columns = arrays.map(|(name, values)| (name, TableColumn::Numbers(values)));
+    Ok(RowTable {
+        columns: columns.collect(),
+    })
+}
+
+/// The groups of rows of a Parquet file.
+fn groups<R: parquet::file::reader::ChunkReader + 'static>(
+    reader: parquet::errors::Result<TableReader<R>>,
+) -> Result<impl Iterator<Item = Result<RowTable, ApiError>>, ApiError> {
+    let damaged = |error| faulty(format!("the Parquet file cannot be read: {error}"));
+    let reader = reader.map_err(damaged)?;
+    require_few(reader.names().len())?;
+    let large = (0..reader.groups()).find(|group| reader.group_size(*group).1 > GROUP_BYTES_MAX);
+    if let Some(group) = large {
+        return Err(faulty(format!(
+            "the group of rows {group} unpacks to more than {GROUP_BYTES_MAX} bytes; write smaller groups"
+        )));
+    }
+    Ok((0..reader.groups()).map(move |group| reader.read(group, |_| true).map_err(damaged)))
+}
+
+fn plain((_, column): (String, TableColumn)) -> Values {
+    match column {
+        TableColumn::Numbers(numbers) => Values::Numbers(numbers),
+        TableColumn::Texts(texts) => Values::Texts(texts),
+        #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+        TableColumn::Integers(values) => {
+            Values::Numbers(values.into_iter().map(|value| value as f64).collect())
+        }
+    }
+}

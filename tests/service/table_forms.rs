@@ -1,0 +1,427 @@
+//! Rows in every form of table, sent and answered, and more of them than is allowed.
+
+use std::io::Cursor;
+
+use axum::body::Bytes;
+use railhead::jobs::codec::arrow::{ArrowWriter, read};
+use railhead::jobs::codec::parquet::{TableReader, encode};
+use railhead::jobs::codec::table::{RowTable, TableColumn, TableKind};
+use reqwest::Method;
+use serde_json::{Value, json};
+
+use crate::batches::results;
+use crate::errors::assert_problem;
+use crate::evaluate::npz;
+use crate::runs::{columns, ended, template};
+use crate::server::{Answer, Server, Setup};
+
+/// Rows with the columns `normal_force_n`, `creepage_x` and, if it is given, one of texts.
+fn rows(texts: Option<&str>) -> RowTable {
+    let numbers = [
+        ("normal_force_n", vec![5e4, 6e4, 7e4]),
+        ("/motion/creepage_x", vec![1e-3, 0.0, -2e-3]),
+    ];
+    let numbers = numbers.map(|(title, values)| (title.to_owned(), TableColumn::Numbers(values)));
+    let words = ["a", "b", "a"].map(|text| Some(text.to_owned())).to_vec();
+    let texts = texts.map(|title| (title.to_owned(), TableColumn::Texts(words)));
+    RowTable {
+        columns: numbers.into_iter().chain(texts).collect(),
+    }
+}
+
+fn kinds(table: &RowTable) -> Vec<(String, TableKind)> {
+    let columns = table.columns.iter();
+    columns
+        .map(|(name, column)| (name.clone(), column.kind()))
+        .collect()
+}
+
+/// The table in every form that a request may have, with its media type. NPZ holds numbers only.
+fn forms(table: &RowTable) -> Vec<(&'static str, Vec<u8>)> {
+    let mut arrow = ArrowWriter::new(Vec::new(), &kinds(table)).expect("a stream");
+    arrow.write(table.clone()).expect("a batch");
+    arrow.finish().expect("the end");
+    let value = |column: &TableColumn, row: usize| match column {
+        TableColumn::Numbers(numbers) => json!(numbers[row]),
+        TableColumn::Texts(texts) => json!(texts[row]),
+        TableColumn::Integers(numbers) => json!(numbers[row]),
+    };
+    let titles: Vec<&str> = table
+        .columns
+        .iter()
+        .map(|(title, _)| title.as_str())
+        .collect();
+    let (mut csv, mut ndjson) = (titles.join(",") + "\n", String::new());
+    for row in 0..table.row_count() {
+        let cells = table.columns.iter();
+        let cells = cells.map(|(title, column)| (title.clone(), value(column, row)));
+        let cells: Vec<(String, Value)> = cells.collect();
+        let plain = cells.iter().map(|(_, cell)| match cell {
+            Value::String(text) => text.clone(),
+            number => number.to_string(),
+        });
+        csv += &(plain.collect::<Vec<_>>().join(",") + "\n");
+        ndjson += &(Value::Object(cells.into_iter().collect()).to_string() + "\n");
+    }
+    let mut forms = vec![
+        ("text/csv", csv.into_bytes()),
+        ("application/x-ndjson", ndjson.into_bytes()),
+        (
+            "application/vnd.apache.arrow.stream",
+            std::mem::take(arrow.inner_mut()),
+        ),
+        (
+            "application/vnd.apache.parquet",
+            encode(table).expect("a file"),
+        ),
+    ];
+    let numbers: Option<Vec<(&str, Vec<f64>)>> = table
+        .columns
+        .iter()
+        .map(|(title, column)| match column {
+            TableColumn::Numbers(numbers) => Some((title.as_str(), numbers.clone())),
+            _ => None,
+        })
+        .collect();
+    if let Some(arrays) = numbers {
+        forms.push(("application/x-npz", npz(&arrays)));
+    }
+    forms
+}
+
+/// Sends a table over a stored template.
+async fn send_form(
+    server: &Server,
+    path: &str,
+    template: &str,
+    (form, body): (&str, Vec<u8>),
+) -> Answer {
+    let path = format!("{path}template={template}");
+    let send = |request: reqwest::RequestBuilder| request.header("content-type", form).body(body);
+    server.send(Method::POST, &path, send).await
+}
+
+#[tokio::test]
+async fn a_run_answers_the_same_rows_alike_whatever_form_they_come_in() {
+    let server = Server::start().await;
+    let template = kept_template(&server).await;
+    let mut answers = Vec::new();
+    for form in forms(&rows(Some("section"))) {
+        let name = form.0;
+        let answer = send_form(&server, "/v1/runs?", &template, form).await;
+        assert_eq!(answer.status, 202, "{name}: {}", answer.text);
+        let run = answer.header("location").expect("a location").to_owned();
+        ended(&server, &run).await;
+        answers.push(server.get(&format!("{run}/results?format=csv")).await.text);
+    }
+    let first = answers[0].lines().nth(1).expect("a row");
+    assert!(first.starts_with("0,a,ok,table,"), "{first}");
+    let same = answers.iter().all(|answer| *answer == answers[0]);
+    assert!(same, "{answers:#?}");
+}
+
+#[tokio::test]
+async fn an_evaluation_answers_the_same_rows_alike_in_every_form_in_and_out() {
+    let server = Server::start().await;
+    let template = kept_template(&server).await;
+    let mut answers = Vec::new();
+    for form in forms(&rows(None)) {
+        let name = form.0;
+        let answer = send_form(&server, "/v1/evaluate?", &template, form).await;
+        assert_eq!(answer.status, 200, "{name}: {}", answer.text);
+        answers.push(answer.json);
+    }
+    assert_eq!(answers.len(), 5);
+    let expected = &answers[0]["columns"];
+    assert_eq!(expected["status"], json!(["ok", "ok", "ok"]));
+    let same = answers.iter().all(|answer| answer["columns"] == *expected);
+    assert!(same, "{answers:#?}");
+    for format in ["csv", "ndjson", "arrow", "parquet"] {
+        let path = format!("/v1/evaluate?format={format}&");
+        let csv = forms(&rows(None)).remove(0);
+        let answer = send_form(&server, &path, &template, csv).await;
+        for (row, line) in lines_of(format, &answer).iter().enumerate() {
+            for (name, values) in expected.as_object().expect("columns") {
+                assert_eq!(line[name], values[row], "{format}, row {row}, {name}");
+            }
+        }
+    }
+    // What is carried along by a run has no place here.
+    let carried = forms(&rows(Some("section"))).remove(0);
+    let refused = send_form(&server, "/v1/evaluate?", &template, carried).await;
+    assert_problem(
+        &refused,
+        422,
+        "faulty-table",
+        "only runs carry columns along",
+    );
+}
+
+/// The rows of an answer in some form of table, three of them.
+fn lines_of(format: &str, answer: &Answer) -> Vec<Value> {
+    assert_eq!(answer.status, 200, "{format}: {}", answer.text);
+    let lines: Vec<Value> = match format {
+        "ndjson" => {
+            let lines = answer.text.lines();
+            lines.map(|line| line.parse().expect("JSON")).collect()
+        }
+        "csv" => {
+            let mut reader = csv::Reader::from_reader(answer.text.as_bytes());
+            let names: Vec<String> = reader
+                .headers()
+                .expect("names")
+                .iter()
+                .map(Into::into)
+                .collect();
+            let lines = reader.records().map(|record| {
+                let record = record.expect("a line");
+                let cells = record.iter().map(|cell| match cell {
+                    "" => Value::Null,
+                    cell => cell
+                        .parse::<f64>()
+                        .map_or_else(|_| json!(cell), |number| json!(number)),
+                });
+                names.iter().cloned().zip(cells).collect()
+            });
+            lines.collect()
+        }
+        "arrow" => rows_of(
+            &read(Cursor::new(answer.bytes.clone()))
+                .expect("a stream")
+                .next()
+                .expect("a batch")
+                .expect("a table"),
+        ),
+        _ => rows_of(
+            &TableReader::new(Bytes::from(answer.bytes.clone()))
+                .expect("a file")
+                .read(0, |_| true)
+                .expect("a group"),
+        ),
+    };
+    assert_eq!(lines.len(), 3, "{format}");
+    lines
+}
+
+fn rows_of(table: &RowTable) -> Vec<Value> {
+    let cell = |column: &TableColumn, row: usize| match column {
+        TableColumn::Integers(values) => json!(values[row] as f64),
+        TableColumn::Numbers(values) => json!(values[row]),
+        TableColumn::Texts(values) => json!(values[row]),
+    };
+    let row = |row| {
+        let columns = table.columns.iter();
+        columns
+            .map(|(name, column)| (name.clone(), cell(column, row)))
+            .collect()
+    };
+    (0..table.row_count()).map(row).collect()
+}
+
+#[tokio::test]
+async fn a_batch_makes_the_same_cases_of_every_form_and_answers_them_alike_in_every_table() {
+    let server = Server::start().await;
+    let template = kept_template(&server).await;
+    let mut answers = Vec::new();
+    for form in forms(&rows(Some("label:section"))) {
+        let name = form.0;
+        let batch = send_form(&server, "/v1/batches?wait=60&", &template, form).await;
+        assert_eq!(batch.status, 200, "{name}: {}", batch.text);
+        let lines = results(&server, &batch.json, "").await;
+        let said = lines.iter().map(|line| {
+            let patches = &line["result"]["patches"];
+            json!([
+                line["labels"],
+                patches[0]["normal_force_n"],
+                patches[0]["points"]
+            ])
+        });
+        answers.push((name, said.collect::<Vec<_>>(), batch));
+    }
+    let (_, expected, batch) = &answers[0];
+    assert_eq!(expected[1][0]["section"], "b");
+    for (name, said, _) in &answers {
+        assert_eq!(said, expected, "{name}");
+    }
+    let path = batch.json["links"]["results"].as_str().expect("a link");
+    let columns = "index,id,point,label:section,force_x_n,error_force_x_n,target_met,remarks,error";
+    let mut tables = Vec::new();
+    for format in ["csv", "arrow", "parquet"] {
+        let answer = server
+            .get(&format!("{path}?format={format}&columns={columns}"))
+            .await;
+        let mut lines = lines_of(format, &answer);
+        // A text without letters is none in CSV.
+        for line in &mut lines {
+            line.as_object_mut()
+                .expect("a row")
+                .retain(|_, cell| *cell != json!(""));
+            line.as_object_mut()
+                .expect("a row")
+                .retain(|_, cell| !cell.is_null());
+        }
+        tables.push(lines);
+    }
+    assert_eq!(tables[0][2]["label:section"], "a");
+    assert!(tables[0][2]["force_x_n"].is_number());
+    assert!(
+        tables.iter().all(|lines| *lines == tables[0]),
+        "{tables:#?}"
+    );
+}
+
+#[tokio::test]
+async fn faults_of_rows_in_any_form_are_named() {
+    let server = Server::idle().await;
+    let template = kept_template(&server).await;
+    let mut wrong = rows(None);
+    wrong.columns[0].1 = TableColumn::Numbers(vec![5e4, -5e4, 7e4]);
+    for form in forms(&wrong) {
+        let name = form.0;
+        for (path, kind) in [
+            ("/v1/runs?", "faulty-case"),
+            ("/v1/evaluate?", "faulty-case"),
+            ("/v1/batches?", "faulty-batch"),
+        ] {
+            let form = (name, form.1.clone());
+            let refused = send_form(&server, path, &template, form).await;
+            assert_problem(&refused, 422, kind, "1");
+            assert!(refused.text.contains("-50000"), "{name}: {}", refused.text);
+        }
+    }
+    for form in [
+        "application/vnd.apache.arrow.stream",
+        "application/vnd.apache.parquet",
+        "application/x-npz",
+    ] {
+        for path in ["/v1/runs?", "/v1/evaluate?", "/v1/batches?"] {
+            let broken = send_form(&server, path, &template, (form, b"neither".to_vec())).await;
+            assert_problem(&broken, 422, "faulty-table", "cannot be read");
+        }
+    }
+}
+
+#[tokio::test]
+async fn more_rows_or_bytes_than_allowed_are_refused() {
+    let mut setup = Setup::new();
+    setup.working = false;
+    (setup.http.run_max_rows, setup.http.run_max_bytes) = (100, 4096);
+    let server = setup.start().await;
+    let body = json!({ "template": template("table"), "columns": columns(101) });
+    assert_problem(
+        &server.post("/v1/runs", &body).await,
+        413,
+        "body-too-large",
+        "run-max-rows",
+    );
+    let template = kept_template(&server).await;
+    let send = |request: reqwest::RequestBuilder| {
+        request
+            .header("content-type", "text/csv")
+            .body("creepage_x\n".repeat(1000))
+    };
+    let answer = server
+        .send(Method::POST, &format!("/v1/runs?template={template}"), send)
+        .await;
+    assert_problem(&answer, 413, "body-too-large", "4096");
+    let send = |request: reqwest::RequestBuilder| {
+        request.header("content-type", "text/csv").body("a\n1\n")
+    };
+    assert_problem(
+        &server.send(Method::POST, "/v1/runs", send).await,
+        400,
+        "bad-query",
+        "template",
+    );
+}
+
+/// The id of a job whose case rows by the table are filled into.
+async fn kept_template(server: &Server) -> String {
+    let mut case = template("table");
+    case["load"]["normal_force_n"] = json!(1e5);
+    let job = server.submit(&case).await;
+    job.rsplit('/').next().expect("an id").to_owned()
+}
+
+/// Sends a table in CSV over a template.
+async fn send_table(server: &Server, template: &str, table: &'static str) -> Answer {
+    let path = format!("/v1/runs?template={template}");
+    let csv =
+        |request: reqwest::RequestBuilder| request.header("content-type", "text/csv").body(table);
+    server.send(Method::POST, &path, csv).await
+}
+
+/// A table as a simulation writes it, and the same rows in the words of this service.
+#[tokio::test]
+async fn a_table_of_a_simulation_is_read_with_its_units() {
+    let server = Server::start().await;
+    let template = kept_template(&server).await;
+    let tables = [
+        (
+            "",
+            "normal_force_n,creepage_x,spin_per_mm,time\n5e4,1e-3,4e-4,0.1\n6e4,-2e-3,-3e-4,0.2\n",
+        ),
+        (
+            "",
+            "Normal force;longitudinal creepage;spin;time\n[kN];[%];[1/m];[s]\n50;0,1;0,4;0,1\n60;-0,2;-0,3;0,2\n",
+        ),
+        (
+            "&column=Fz:normal_force%20%5BkN%5D&column=nu.x:creepage_x&column=phi:spin%20%5B1/m%5D",
+            "Fz\tnu.x\tphi\ttime\n50\t0.001\t0.4\t0.1\n60\t-0.002\t-0.3\t0.2\n",
+        ),
+    ];
+    let mut answers = Vec::new();
+    for (query, table) in tables {
+        let sent = send_table(&server, &format!("{template}{query}"), table).await;
+        assert_eq!(sent.status, 202, "{}", sent.text);
+        assert_eq!(sent.json["columns"][0]["pointer"], "/load/normal_force_n");
+        let factor = if query.is_empty() && table.starts_with("normal") {
+            1.0
+        } else {
+            1e3
+        };
+        assert_eq!(sent.json["columns"][0]["factor"], factor);
+        let run = sent.header("location").expect("a location").to_owned();
+        assert_eq!(ended(&server, &run).await["rows_without_answer"], 0);
+        let results = format!("{run}/results?format=ndjson&columns=time,force_x_n,normal_force_n");
+        answers.push(crate::runs::lines(&server.get(&results).await));
+    }
+    for other in &answers[1..] {
+        for (row, same) in answers[0].iter().zip(other) {
+            assert_eq!(row["time"], same["time"]);
+            let [force, other] = [row, same].map(|row| row["force_x_n"].as_f64().expect("a force"));
+            assert!((force / other - 1.0).abs() < 1e-12, "{row} {same}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_table_whose_units_are_not_clear_is_refused() {
+    let server = Server::start().await;
+    let template = kept_template(&server).await;
+    for (query, table, words) in [
+        (
+            "",
+            "normal_force_n,spin\n5e4,0.4\n",
+            ["`spin`", "has no unit"],
+        ),
+        (
+            "",
+            "normal_force_n,yaw [grad]\n5e4,0.4\n",
+            ["`yaw [grad]`", "mrad"],
+        ),
+        (
+            "&column=Q:creepage_x",
+            "normal_force_n,q\n5e4,0.4\n",
+            ["`Q`", "no title"],
+        ),
+    ] {
+        let refused = send_table(&server, &format!("{template}{query}"), table).await;
+        assert_problem(&refused, 422, "faulty-table", words[0]);
+        assert!(
+            words.iter().all(|word| refused.text.contains(word)),
+            "{}",
+            refused.text
+        );
+    }
+}
