@@ -154,6 +154,8 @@ function again(app, document) {
 
 /** @param {Looked} looked @param {Patch} patch @param {Point} point */
 function figures(looked, patch, point) {
+  // Some motions have a region and a pressure of their own.
+  const region = { ...patch, ...point.region };
   const errors = point.error_estimate;
   const friction = frictionOf(looked);
   const figure = (/** @type {unknown} */ label, /** @type {number} */ value, /** @type {string} */ unit, /** @type {number | null | undefined} */ error) => {
@@ -161,15 +163,15 @@ function figures(looked, patch, point) {
     return html`<div class="figure-of"><dt>${label}</dt><dd><b>${text.value}</b>${text.error
       ? html`<span class="err" title="estimated error"> ± ${text.error}</span>` : nothing}<span class="unit"> ${unit}</span></dd></div>`;
   };
-  const share = typeof point.stick_area_mm2 === 'number' ? point.stick_area_mm2 / patch.area_mm2 : NaN;
-  const used = (100 * Math.hypot(point.force_x_n, point.force_y_n)) / (friction * patch.normal_force_n);
+  const share = typeof point.stick_area_mm2 === 'number' ? point.stick_area_mm2 / region.area_mm2 : NaN;
+  const used = (100 * Math.hypot(point.force_x_n, point.force_y_n)) / (friction * region.normal_force_n);
   return html`<dl class="figures" tabindex="0" aria-label="Numbers of the chosen patch and motion; forces on the rail">
     ${figure(html`F<sub>x</sub>`, point.force_x_n / 1000, 'kN', errors && errors.force_x_n / 1000)}
     ${figure(html`F<sub>y</sub>`, point.force_y_n / 1000, 'kN', errors && errors.force_y_n / 1000)}
     ${figure(html`M<sub>z</sub>`, point.moment_z_n_mm / 1000, 'N·m', errors && errors.moment_z_n_mm / 1000)}
-    ${figure(html`N`, patch.normal_force_n / 1000, 'kN', undefined)}
-    ${figure(html`p<sub>max</sub>`, patch.pressure_max_mpa, 'MPa', point.profile_uncertainty?.pressure_max_mpa ?? undefined)}
-    ${figure('area', patch.area_mm2, 'mm²', undefined)}
+    ${figure(html`N`, region.normal_force_n / 1000, 'kN', undefined)}
+    ${figure(html`p<sub>max</sub>`, region.pressure_max_mpa, 'MPa', point.profile_uncertainty?.pressure_max_mpa ?? undefined)}
+    ${figure('area', region.area_mm2, 'mm²', undefined)}
     ${Number.isFinite(used) ? html`<div class="figure-of"><dt>friction used</dt><dd><b>${number(used, 3)}</b><span class="unit"> % of μN</span></dd></div>` : nothing}
     ${Number.isFinite(share) ? html`<div class="figure-of"><dt>stick</dt><dd><b>${number(100 * share, 3)}</b><span class="unit"> % of the area</span></dd>
       <svg class="share" viewBox="0 0 100 5" preserveAspectRatio="none" aria-hidden="true"><rect class="slip" width="100" height="5"/><rect class="stick" width=${100 * share} height="5"/></svg></div>` : nothing}
