@@ -34,6 +34,7 @@ pub mod case;
 pub mod conventions;
 pub mod error;
 pub mod evaluate;
+pub mod evolution;
 pub mod facade;
 pub mod forecast;
 pub mod friction;

@@ -115,7 +115,7 @@ fn page(module: &str) -> &str {
 /// The stages behind the check. Slices are cut, and rows are put together, from cases.
 fn checked_once(sources: &Sources) -> Findings {
     let before = |module: &str| {
-        let parts = ["case", "evaluate", "facade", "slices"];
+        let parts = ["case", "evaluate", "evolution", "facade", "slices"];
         module == "contact"
             || parts.iter().any(|part| {
                 module

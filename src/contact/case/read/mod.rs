@@ -3,6 +3,7 @@
 pub mod contact;
 pub mod damage;
 pub mod draft;
+pub mod evolution;
 pub mod faults;
 pub mod friction;
 pub mod history;

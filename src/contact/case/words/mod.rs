@@ -3,6 +3,7 @@
 pub mod canonical;
 pub mod contact;
 pub mod damage;
+pub mod evolution;
 pub mod friction;
 pub mod history;
 pub mod material;

@@ -137,6 +137,60 @@ macro_rules! motion_remarks {
             detail: format!(
                 "{iteration} ended before its tolerance was met: {reason}; the residual is {residual:.2e}, {tolerance:.2e} was wanted"
             ),
+
+            /// The scatter of the wear coefficients is not published; a stated factor stands for it.
+            CoefficientScatterStated {
+                /// The factor.
+                factor: f64 = 2.0,
+            }
+            code: "coefficient-scatter-stated",
+            severity: Info,
+            advice: "Give the factor that your own measurements leave as `coefficient_factor`.",
+            detail: format!(
+                "no scatter of the coefficients of this wear map is published; it is taken as a factor of {factor}, with a probability of 90 %"
+            ),
+
+            /// A profile has worn to a pressure at which steel flows.
+            PressureAboveHardness {
+                /// Largest pressure of the evolution.
+                largest_mpa: f64 = 3100.0,
+                /// Hardness.
+                hardness_mpa: f64 = 2550.0,
+            }
+            code: "pressure-above-hardness",
+            severity: Warning,
+            advice: "Plastic flow would round the section there. Add states of traction, braking and other shifts to the traffic: a traffic without them leaves a ridge where nothing slips.",
+            detail: format!(
+                "the largest pressure is {largest_mpa:.0} MPa, above the hardness of {hardness_mpa:.0} MPa; plastic flow is not modelled"
+            ),
+
+            /// A condensed traffic does not meet its tolerance.
+            TrafficCoarse {
+                /// Its error.
+                traffic_error: f64 = 0.06,
+                /// The tolerance.
+                tolerance_asked: f64 = 0.03,
+            }
+            code: "traffic-coarse",
+            severity: Warning,
+            advice: "Raise `accuracy.states_max`.",
+            detail: format!(
+                "twice the states would change the distribution of wear by {:.1} %; {:.1} % were asked for",
+                100.0 * traffic_error, 100.0 * tolerance_asked
+            ),
+
+            /// Some of the traffic has no answer and wears nothing.
+            StatesUnsolved {
+                /// Largest share of the traffic without an answer.
+                unsolved_share: f64 = 0.03,
+            }
+            code: "states-unsolved",
+            severity: Warning,
+            advice: "`failure` in the states of the records says why.",
+            detail: format!(
+                "up to {:.1} % of the traffic have no answer; they wear nothing",
+                100.0 * unsolved_share
+            ),
         }
     };
 }

@@ -163,6 +163,14 @@ pub struct WearAcross {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     #[schema(nullable = false)]
     pub archard_depth_nm: Option<Vec<f64>>,
+    /// Its parts from cells where wear is mild, severe, and catastrophic.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub usfd_regimes_nm: Option<Vec<[f64; 3]>>,
+    /// The parts of Archard's depth from cells where wear is mild, severe, and seizure.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub archard_regimes_nm: Option<Vec<[f64; 3]>>,
 }
 
 /// The figures that damage was computed with.

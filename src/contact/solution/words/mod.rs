@@ -2,6 +2,7 @@
 
 pub mod answer;
 pub mod damage;
+pub mod evolution;
 pub mod fields;
 pub mod found_by;
 pub mod maintenance;

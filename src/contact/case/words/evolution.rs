@@ -1,0 +1,159 @@
+//! What is asked of an evolution: which bodies wear, by which law, how far, with which events and limits.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::contact::case::words::contact::CrossSection;
+use crate::contact::case::words::damage::DamageModel;
+
+/// How profiles wear under a traffic, apart from the case and the traffic themselves.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[schema(as = EvolutionPlan)]
+pub struct EvolutionWords {
+    /// Which bodies wear; `both` when left out.
+    #[schema(required = false)]
+    pub wearing: WearingBodies,
+    /// Law of wear: `usfd_wear` (when left out) or `archard_wear`. Its figures are those of `damage.parameters` in the template.
+    #[schema(required = false)]
+    pub wear_model: DamageModel,
+    /// Traffic over the rail and distance of the wheel.
+    pub extent: EvolutionExtent,
+    /// Stored steps after the start, equally spaced over the extent; 10 when left out.
+    #[schema(required = false, minimum = 1, maximum = 500)]
+    pub records: u32,
+    /// Tolerances of the condensed traffic and of the steps.
+    #[schema(required = false)]
+    pub accuracy: EvolutionAccuracy,
+    /// Losses whose time is wanted.
+    #[schema(required = false)]
+    pub limits: WearLimits,
+    /// Maintenance, in any order.
+    #[schema(required = false)]
+    pub events: Vec<EvolutionEvent>,
+    /// Uncertainty of a wear coefficient whose scatter is not published: it lies between the value divided and multiplied by this with a
+    /// probability of 90 %; 2 when left out.
+    #[schema(required = false, minimum = 1.0)]
+    pub coefficient_factor: f64,
+}
+
+/// The bodies that wear.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WearingBodies {
+    /// The rail.
+    Rail,
+    /// The wheel.
+    Wheel,
+    /// Both.
+    #[default]
+    Both,
+}
+
+impl WearingBodies {
+    /// Does the rail wear, and does the wheel?
+    #[must_use]
+    pub fn flags(self) -> [bool; 2] {
+        [self != WearingBodies::Wheel, self != WearingBodies::Rail]
+    }
+}
+
+/// How far an evolution goes. Rail and wheel advance in proportion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct EvolutionExtent {
+    /// Traffic over the rail in million gross tonnes; a row of the traffic counts twice its wheel load.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub mgt: Option<f64>,
+    /// The same as a number of axles. Excludes `mgt`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub axle_passes: Option<f64>,
+    /// Distance that the wheel rolls under this traffic in km; needed where the wheel wears.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub wheel_distance_km: Option<f64>,
+}
+
+/// Tolerances of an evolution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct EvolutionAccuracy {
+    /// Most representative states; 24 when left out.
+    #[schema(required = false, minimum = 1, maximum = 200)]
+    pub states_max: u32,
+    /// Error of the condensed traffic relative to the worn area, measured with twice the states; 0.03 when left out.
+    #[schema(required = false, exclusive_minimum = 0.0)]
+    pub states_tolerance: f64,
+    /// Change of the distribution of wear over a step, relative to the worn area; 0.1 when left out.
+    #[schema(required = false, exclusive_minimum = 0.0)]
+    pub step_tolerance: f64,
+    /// Largest depth that one step removes, in mm; 0.03 when left out.
+    #[schema(required = false, exclusive_minimum = 0.0)]
+    pub step_depth_mm: f64,
+    /// Most steps; 1000 when left out.
+    #[schema(required = false, minimum = 1)]
+    pub steps_max: u32,
+    /// Standard deviation in mm of the kernel that smooths the wear of a step along the section; 0.5 when left out.
+    #[schema(required = false, minimum = 0.0)]
+    pub smoothing_mm: f64,
+}
+
+impl Default for EvolutionAccuracy {
+    fn default() -> EvolutionAccuracy {
+        EvolutionAccuracy {
+            states_max: 24,
+            states_tolerance: 0.03,
+            step_tolerance: 0.1,
+            step_depth_mm: 0.03,
+            steps_max: 1000,
+            smoothing_mm: 0.5,
+        }
+    }
+}
+
+/// Losses at which a profile has to be replaced, in mm. What is left out is not watched.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema)]
+pub struct WearLimits {
+    /// W1: height of the rail in its middle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub height_mm: Option<f64>,
+    /// W2: gauge face, 14 mm below the top of the new rail.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub gauge_face_mm: Option<f64>,
+    /// W3: gauge corner, at 45°.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub gauge_corner_mm: Option<f64>,
+    /// Tread of the wheel, at y = 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub tread_mm: Option<f64>,
+    /// Flange of the wheel, 10 mm below its tread at y = 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub flange_mm: Option<f64>,
+}
+
+/// Maintenance at one time.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct EvolutionEvent {
+    /// When, in the unit of the extent: `mgt` or `axle_passes`, and km where only the wheel wears.
+    #[schema(minimum = 0.0)]
+    pub at: f64,
+    /// Grinds the rail to this section, lowered until it lies nowhere above the present one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, inline = false)]
+    pub grind: Option<Box<CrossSection>>,
+    /// Turns the wheel to this section, moved toward the axle until it lies nowhere outside the present one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, inline = false)]
+    pub reprofile: Option<Box<CrossSection>>,
+    /// Depth in mm by which grinding or turning goes beyond that; 0 when left out.
+    #[schema(required = false, minimum = 0.0)]
+    pub depth_mm: f64,
+    /// Coefficient of friction of all states from then on, as of a lubricator.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false, minimum = 0.0)]
+    pub friction_coefficient: Option<f64>,
+}

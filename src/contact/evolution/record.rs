@@ -1,0 +1,294 @@
+//! What is answered of an evolution: records, losses, uncertainties, limits.
+
+use crate::contact::case::words::damage::DamageModel;
+use crate::contact::evolution::pass::Evaluation;
+use crate::contact::evolution::section::{distance, lengths};
+use crate::contact::evolution::task::Evolution;
+use crate::contact::geometry::conicity::RadiusDifference;
+use crate::contact::geometry::profile::{Body, Profile, Reading};
+use crate::contact::geometry::wheel_rail::{Placement, RailPlace, WheelRail};
+use crate::contact::geometry::wheelset_pose::PairOfRails;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
+use crate::contact::solution::words::evolution::{
+    BodyState, ContactRange, EvolutionAnswer, EvolutionRecord, EvolutionState, LimitReached,
+    StateContact, WearLosses, WearUncertainty, WornBody,
+};
+
+/// Depth of W2 below the top of the rail in mm.
+const GAUGE_DEPTH: f64 = 14.0;
+/// Depth of the flange's thickness below the tread in mm.
+const FLANGE_DEPTH: f64 = 10.0;
+/// Amplitude of the conicity in mm, as EN 15302 has it, and the shifts that are sampled.
+const AMPLITUDE: f64 = 3.0;
+/// See [`AMPLITUDE`].
+const SHIFTS: [f64; 2] = [8.0, 0.25];
+/// Samples of the wear coefficients.
+const SAMPLES: u32 = 2000;
+
+/// The record of a state.
+pub(crate) fn record(
+    task: &Evolution,
+    state: &EvolutionState,
+    now: &Evaluation,
+) -> EvolutionRecord {
+    let traffic = state
+        .traffic
+        .as_ref()
+        .map_or([0.0; 2], |traffic| traffic.error);
+    EvolutionRecord {
+        progress: task.progress(state.share),
+        events_done: state.events_done,
+        losses: losses(state),
+        conicity: conicity(task, state),
+        contact: range(&now.states),
+        states: now.states.clone(),
+        rail: with_uncertainty(task, &state.rail, traffic[0]),
+        wheel: with_uncertainty(task, &state.wheel, traffic[1]),
+    }
+}
+
+fn with_uncertainty(task: &Evolution, body: &BodyState, states: f64) -> WornBody {
+    let worn = body.worn.worn_area_mm2;
+    let over = |area: f64| if worn > 0.0 { area / worn } else { 0.0 };
+    let changed = body
+        .step_change_mm
+        .iter()
+        .zip(lengths(&body.worn.points_mm));
+    WornBody {
+        uncertainty: WearUncertainty {
+            steps: over(changed.map(|(depth, length)| depth.abs() * length).sum()),
+            states: if worn > 0.0 { states } else { 0.0 },
+            contact: over(body.contact_mm2),
+            coefficients: coefficients(task, &body.regimes_mm2),
+        },
+        ..body.worn.clone()
+    }
+}
+
+/// Factors of the worn area that bound 90 % of the samples of the coefficients.
+///
+/// Archard's coefficients are sampled between the ends of their ranges, uniformly in their logarithm and independently in each regime, at the points
+/// of Halton's sequence. The wear map has no published scatter; its factor is stated. The sections are those of the mean coefficients.
+fn coefficients(task: &Evolution, areas: &[f64; 3]) -> [f64; 2] {
+    let all: f64 = areas.iter().sum();
+    if task.plan.wear_model != DamageModel::ArchardWear || all <= 0.0 {
+        let factor = task.plan.coefficient_factor;
+        return [1.0 / factor, factor];
+    }
+    let figures = task.figures.archard;
+    let ranges = [figures.mild, figures.severe, figures.seizure];
+    let mut samples: Vec<f64> = (1..=SAMPLES)
+        .map(|k| {
+            let places = [2, 3, 5].map(|base| halton(k, base));
+            let part = |r: usize| areas[r] * (ranges[r][1] / ranges[r][0]).powf(places[r] - 0.5);
+            (0..3).map(part).sum::<f64>() / all
+        })
+        .collect();
+    samples.sort_by(f64::total_cmp);
+    [0.05, 0.95].map(|share| samples[(share * f64::from(SAMPLES - 1)).round() as usize])
+}
+
+/// Element of Halton's sequence (Halton 1960).
+fn halton(mut k: u32, base: u32) -> f64 {
+    let (mut sum, mut part) = (0.0, 1.0);
+    while k > 0 {
+        part /= f64::from(base);
+        sum += part * f64::from(k % base);
+        k /= base;
+    }
+    sum
+}
+
+fn losses(state: &EvolutionState) -> WearLosses {
+    let [rail, wheel] = [&state.rail, &state.wheel];
+    let loss = |body: &BodyState, from: [f64; 2], direction: [f64; 2]| {
+        let now = distance(&body.worn.points_mm, from, direction);
+        Some(now? - distance(&body.start_mm, from, direction)?)
+    };
+    let top = rail
+        .start_mm
+        .iter()
+        .map(|at| at[1])
+        .fold(f64::INFINITY, f64::min);
+    let face = distance(&rail.start_mm, [-1e3, top + GAUGE_DEPTH], [1.0, 0.0]);
+    let tread = distance(&wheel.start_mm, [0.0, 1e3], [0.0, -1.0]).map(|off| 1e3 - off);
+    let slant = std::f64::consts::FRAC_1_SQRT_2;
+    WearLosses {
+        height_mm: loss(rail, [0.0, top - 1e3], [0.0, 1.0]),
+        gauge_face_mm: loss(rail, [-1e3, top + GAUGE_DEPTH], [1.0, 0.0]),
+        gauge_corner_mm: face.and_then(|face| loss(rail, [face - 1e3, top], [slant, slant])),
+        tread_mm: loss(wheel, [0.0, 1e3], [0.0, -1.0]),
+        flange_mm: tread.and_then(|tread| loss(wheel, [0.0, tread + FLANGE_DEPTH], [-1.0, 0.0])),
+    }
+}
+
+fn conicity(task: &Evolution, state: &EvolutionState) -> Option<f64> {
+    let reading = Reading {
+        mirror_y: Some(false),
+        mirror_z: Some(false),
+        smoothing: 0.0,
+    };
+    let rail = Profile::new(Body::Rail, &state.rail.worn.points_mm, reading).ok()?;
+    let wheel = Profile::new(Body::Wheel, &state.wheel.worn.points_mm, reading).ok()?;
+    let placement = Placement {
+        rail: RailPlace::Origin(task.geometry.rail_origin()),
+        ..task.geometry.placement
+    };
+    let own = WheelRail::new(rail, wheel, placement).ok()?;
+    let other = own.mirrored().ok()?;
+    let sides = match placement.side.sign() > 0.0 {
+        true => [own, other],
+        false => [other, own],
+    };
+    let mut pair = PairOfRails::new(sides);
+    let [reach, step] = SHIFTS;
+    let count = (reach / step) as i32;
+    let shifts = (-count..=count).map(|k| step * f64::from(k));
+    let poses = shifts.filter_map(|shift| {
+        let pose = pair.pose_without_roll(shift, 0.0).ok()?;
+        pair.not_cut_off(&pose).ok()?;
+        Some((shift, pose.radius_difference()))
+    });
+    let (shifts, differences): (Vec<f64>, Vec<f64>) = poses.unzip();
+    if shifts.len() < 2 {
+        return None;
+    }
+    let found = RadiusDifference::new(shifts, differences).conicity(AMPLITUDE);
+    found.ok().map(|found| found.conicity)
+}
+
+fn range(states: &[StateContact]) -> ContactRange {
+    let mut range = ContactRange::default();
+    for state in states {
+        if state.failure.is_some() {
+            range.unsolved_share += state.share;
+            continue;
+        }
+        let pressure = state
+            .patches
+            .iter()
+            .map(|patch| patch.pressure_max_mpa)
+            .fold(0.0, f64::max);
+        range.pressure_max_mpa = range.pressure_max_mpa.max(pressure);
+        range.y_over_q_max = range.y_over_q_max.max(state.y_over_q);
+        range.pressure_mean_mpa += state.share * pressure;
+        range.y_over_q_mean += state.share * state.y_over_q;
+        let t_gamma: f64 = state.patches.iter().map(|patch| patch.t_gamma_n).sum();
+        range.t_gamma_mean_n += state.share * t_gamma;
+    }
+    let solved = 1.0 - range.unsolved_share;
+    if solved > 0.0 {
+        range.pressure_mean_mpa /= solved;
+        range.y_over_q_mean /= solved;
+        range.t_gamma_mean_n /= solved;
+    }
+    range
+}
+
+impl Evolution {
+    /// The answer of an evolution that is over, from all its records.
+    #[must_use]
+    pub fn answer(&self, state: &EvolutionState, records: Vec<EvolutionRecord>) -> EvolutionAnswer {
+        EvolutionAnswer {
+            limits: self.limits_reached(&records),
+            traffic: state.traffic.clone().unwrap_or_default(),
+            steps: state.steps,
+            steps_rejected: state.rejected,
+            solves: state.solves,
+            damage_parameters: self.figures.clone(),
+            remarks: self.remarks(state, &records),
+            records,
+        }
+    }
+
+    fn remarks(&self, state: &EvolutionState, records: &[EvolutionRecord]) -> Vec<RemarkEntry> {
+        let largest = |of: fn(&ContactRange) -> f64| {
+            let all = records.iter().map(|record| of(&record.contact));
+            all.fold(0.0, f64::max)
+        };
+        let (largest_mpa, hardness_mpa) =
+            (largest(|c| c.pressure_max_mpa), self.figures.hardness_mpa);
+        let unsolved_share = largest(|c| c.unsolved_share);
+        let traffic = state
+            .traffic
+            .as_ref()
+            .map_or([0.0; 2], |traffic| traffic.error);
+        let (traffic_error, tolerance_asked) = (
+            traffic[0].max(traffic[1]),
+            self.plan.accuracy.states_tolerance,
+        );
+        let factor = self.plan.coefficient_factor;
+        let found = [
+            (self.plan.wear_model != DamageModel::ArchardWear)
+                .then_some(Remark::CoefficientScatterStated { factor }),
+            (largest_mpa > hardness_mpa).then_some(Remark::PressureAboveHardness {
+                largest_mpa,
+                hardness_mpa,
+            }),
+            (traffic_error > tolerance_asked).then_some(Remark::TrafficCoarse {
+                traffic_error,
+                tolerance_asked,
+            }),
+            (unsolved_share > 0.0).then_some(Remark::StatesUnsolved { unsolved_share }),
+        ];
+        found.into_iter().flatten().map(RemarkEntry::from).collect()
+    }
+
+    fn limits_reached(&self, records: &[EvolutionRecord]) -> Vec<LimitReached> {
+        type Of = fn(&WearLosses) -> Option<f64>;
+        let limits = &self.plan.limits;
+        let all: [(&str, Option<f64>, Of, bool); 5] = [
+            ("height_mm", limits.height_mm, |l| l.height_mm, true),
+            (
+                "gauge_face_mm",
+                limits.gauge_face_mm,
+                |l| l.gauge_face_mm,
+                true,
+            ),
+            (
+                "gauge_corner_mm",
+                limits.gauge_corner_mm,
+                |l| l.gauge_corner_mm,
+                true,
+            ),
+            ("tread_mm", limits.tread_mm, |l| l.tread_mm, false),
+            ("flange_mm", limits.flange_mm, |l| l.flange_mm, false),
+        ];
+        let asked = all
+            .into_iter()
+            .filter_map(|(name, limit, of, rail)| Some((name, limit?, of, rail)));
+        let reached = asked.map(|(loss, limit_mm, of, rail)| {
+            let at = |factor: &dyn Fn(&WearUncertainty) -> f64| {
+                let losses: Vec<[f64; 2]> = records
+                    .iter()
+                    .filter_map(|record| {
+                        let body = if rail { &record.rail } else { &record.wheel };
+                        let loss = of(&record.losses)?;
+                        Some([record.progress.share, loss * factor(&body.uncertainty)])
+                    })
+                    .collect();
+                crossing(&losses, limit_mm).map(|share| self.progress(share))
+            };
+            let open = |own: &WearUncertainty| own.steps.hypot(own.states).hypot(own.contact);
+            LimitReached {
+                loss: loss.to_owned(),
+                limit_mm,
+                reached: at(&|_| 1.0),
+                earliest: at(&|own| own.coefficients[1] * (1.0 + open(own))),
+                latest: at(&|own| own.coefficients[0] * (1.0 - open(own)).max(0.0)),
+            }
+        });
+        reached.collect()
+    }
+}
+
+/// Where a line through points first reaches a limit.
+fn crossing(points: &[[f64; 2]], limit: f64) -> Option<f64> {
+    let pair = points.windows(2).find(|pair| pair[1][1] >= limit)?;
+    let [[from, low], [to, high]] = [pair[0], pair[1]];
+    if low >= limit {
+        return Some(from);
+    }
+    Some(from + (to - from) * (limit - low) / (high - low))
+}

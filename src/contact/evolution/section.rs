@@ -1,0 +1,267 @@
+//! A section as points that move along their normals.
+//!
+//! Points are `[y, z]` in mm, y to the field side and z down, in order of increasing y as a [`Profile`] has them. A point stands for the part
+//! of the section up to the middles to its neighbours.
+
+use crate::contact::geometry::profile::{Body, Profile};
+
+/// Points along the curve of a profile, at most `spacing` mm apart.
+#[must_use]
+pub fn sampled(profile: &Profile, spacing: f64) -> Vec<[f64; 2]> {
+    let places = profile.parameters(spacing).into_iter();
+    places
+        .map(|s| {
+            let [y, z] = profile.at(s).at;
+            [y, -z]
+        })
+        .collect()
+}
+
+/// Length of the section from the first point to each.
+#[must_use]
+pub fn along(points: &[[f64; 2]]) -> Vec<f64> {
+    let mut sum = vec![0.0];
+    for pair in points.windows(2) {
+        let step = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
+        sum.push(sum[sum.len() - 1] + step[0].hypot(step[1]));
+    }
+    sum
+}
+
+/// Length that each point stands for.
+#[must_use]
+pub fn lengths(points: &[[f64; 2]]) -> Vec<f64> {
+    let along = along(points);
+    let last = along.len() - 1;
+    (0..=last)
+        .map(|k| 0.5 * (along[(k + 1).min(last)] - along[k.saturating_sub(1)]))
+        .collect()
+}
+
+/// Unit normals into the body.
+fn normals(body: Body, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let sign = match body {
+        Body::Rail => 1.0,
+        Body::Wheel => -1.0,
+    };
+    let last = points.len() - 1;
+    (0..=last)
+        .map(|k| {
+            let (before, after) = (points[k.saturating_sub(1)], points[(k + 1).min(last)]);
+            let [y, z] = [after[0] - before[0], after[1] - before[1]];
+            let length = sign * y.hypot(z);
+            [-z / length, y / length]
+        })
+        .collect()
+}
+
+/// Area between a section and a later one with as many points, positive where material is gone.
+#[must_use]
+pub fn area_between(body: Body, before: &[[f64; 2]], after: &[[f64; 2]]) -> f64 {
+    let sign = match body {
+        Body::Rail => 1.0,
+        Body::Wheel => -1.0,
+    };
+    let outline = before.iter().chain(after.iter().rev());
+    let next = outline.clone().skip(1).chain(before.first());
+    let twice: f64 = outline
+        .zip(next)
+        .map(|(a, b)| a[0] * b[1] - b[0] * a[1])
+        .sum();
+    sign * 0.5 * twice
+}
+
+/// A section that has lost an area, in mm² for each point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Moved {
+    /// The points.
+    pub points: Vec<[f64; 2]>,
+    /// How far each moved into the body, in mm.
+    pub depth: Vec<f64>,
+}
+
+/// Moves points along their normals by so much that the section loses the sum of `areas`.
+///
+/// A convex section is shorter below its surface, so that the depths are larger than areas over lengths, by half of the depth times the
+/// curvature; the factor is found from the outlines.
+#[must_use]
+pub fn moved(body: Body, points: &[[f64; 2]], areas: &[f64]) -> Moved {
+    let wanted: f64 = areas.iter().sum();
+    let (normals, lengths) = (normals(body, points), lengths(points));
+    let depths = areas
+        .iter()
+        .zip(&lengths)
+        .map(|(area, length)| area / length);
+    let mut depth: Vec<f64> = depths.collect();
+    let by = |depth: &[f64]| {
+        let parts = points.iter().zip(&normals).zip(depth);
+        let moved = parts.map(|((at, normal), depth)| [0, 1].map(|k| at[k] + depth * normal[k]));
+        moved.collect::<Vec<[f64; 2]>>()
+    };
+    let mut after = by(&depth);
+    // Two corrections leave an error of the third order in depth times curvature.
+    for _ in 0..2 {
+        let found = area_between(body, points, &after);
+        if wanted > 0.0 && found > 0.0 {
+            depth.iter_mut().for_each(|depth| *depth *= wanted / found);
+            after = by(&depth);
+        }
+    }
+    Moved {
+        points: after,
+        depth,
+    }
+}
+
+/// Spreads areas along the section by a kernel of this standard deviation in mm, `spacing` being the usual distance of the points; their sum is
+/// kept.
+#[must_use]
+pub fn smoothed(areas: &[f64], spacing: f64, deviation: f64) -> Vec<f64> {
+    // One pass of ¼, ½, ¼ has the variance spacing²/2; a pass with a smaller share makes up the rest.
+    let passes = 2.0 * (deviation / spacing).powi(2);
+    let mut areas = areas.to_vec();
+    for k in 0..passes.ceil() as usize {
+        let share = 0.25 * (passes - k as f64).min(1.0);
+        let flow = areas.windows(2).map(|pair| share * (pair[1] - pair[0]));
+        let flow: Vec<f64> = flow.collect();
+        for (k, flow) in flow.into_iter().enumerate() {
+            areas[k] += flow;
+            areas[k + 1] -= flow;
+        }
+    }
+    areas
+}
+
+/// Cuts a section down to another one, which is moved into the body until it lies nowhere outside, and by `depth` mm more.
+///
+/// Depths are compared in z where the present section is less steep than 70° and the other one has points; steeper parts follow where the
+/// other section lies inside.
+#[must_use]
+pub fn machined(body: Body, points: &[[f64; 2]], target: &[[f64; 2]], depth: f64) -> Vec<[f64; 2]> {
+    let sign = match body {
+        Body::Rail => 1.0,
+        Body::Wheel => -1.0,
+    };
+    let normals = normals(body, points);
+    let over = |k: usize| {
+        let steep = normals[k][1].abs() < 70_f64.to_radians().cos();
+        height_at(target, points[k][0]).filter(|_| !steep)
+    };
+    let targets: Vec<Option<f64>> = (0..points.len()).map(over).collect();
+    let outside = points.iter().zip(&targets);
+    let outside = outside.filter_map(|(at, z)| z.map(|z| sign * (at[1] - z)));
+    let by = outside.fold(f64::NEG_INFINITY, f64::max) + depth;
+    let cut = |(at, z): (&[f64; 2], &Option<f64>)| match z {
+        Some(z) if sign * z + by > sign * at[1] => [at[0], z + sign * by],
+        _ => *at,
+    };
+    points.iter().zip(&targets).map(cut).collect()
+}
+
+/// z of a section at y: the first place that has it.
+fn height_at(points: &[[f64; 2]], y: f64) -> Option<f64> {
+    let pair = points
+        .windows(2)
+        .find(|pair| pair[0][0] <= y && y <= pair[1][0])?;
+    let width = pair[1][0] - pair[0][0];
+    let t = if width > 0.0 {
+        (y - pair[0][0]) / width
+    } else {
+        0.0
+    };
+    Some(pair[0][1] + t * (pair[1][1] - pair[0][1]))
+}
+
+/// Distance in mm from a place to the section in a direction, of unit length; the nearest place ahead.
+#[must_use]
+pub fn distance(points: &[[f64; 2]], from: [f64; 2], direction: [f64; 2]) -> Option<f64> {
+    let seen = |at: &[f64; 2]| {
+        let [y, z] = [at[0] - from[0], at[1] - from[1]];
+        [
+            y * direction[0] + z * direction[1],
+            z * direction[0] - y * direction[1],
+        ]
+    };
+    let crossings = points.windows(2).filter_map(|pair| {
+        let ([near, left], [far, right]) = (seen(&pair[0]), seen(&pair[1]));
+        let crosses = (left <= 0.0) != (right <= 0.0);
+        crosses.then(|| near + (far - near) * left / (left - right))
+    });
+    crossings
+        .filter(|ahead| *ahead > 0.0)
+        .min_by(f64::total_cmp)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arc(radius: f64, count: usize) -> Vec<[f64; 2]> {
+        let angle = |k: usize| -1.2 + 2.4 * k as f64 / (count - 1) as f64;
+        let at = |k| [radius * angle(k).sin(), radius * (1.0 - angle(k).cos())];
+        (0..count).map(at).collect()
+    }
+
+    #[test]
+    fn a_cylinder_under_uniform_wear_stays_one_and_loses_the_area() {
+        for (body, sign) in [(Body::Rail, 1.0), (Body::Wheel, -1.0)] {
+            // A rail with its top at z = 0, a wheel with its lowest point there.
+            let points: Vec<[f64; 2]> =
+                arc(30.0, 400).iter().map(|[y, z]| [*y, sign * z]).collect();
+            let areas: Vec<f64> = lengths(&points).iter().map(|length| 0.5 * length).collect();
+            let after = moved(body, &points, &areas);
+            let radii = after.points.iter().map(|[y, z]| y.hypot(z - sign * 30.0));
+            let (least, most) = radii.fold((f64::INFINITY, 0.0_f64), |(least, most), radius| {
+                (least.min(radius), most.max(radius))
+            });
+            assert!(
+                most - least < 2e-3 && (most - 29.5).abs() < 0.01,
+                "{least} {most}"
+            );
+            let wanted: f64 = areas.iter().sum();
+            let lost = area_between(body, &points, &after.points);
+            assert!((lost / wanted - 1.0).abs() < 1e-5, "{lost} {wanted}");
+        }
+    }
+
+    #[test]
+    fn smoothing_keeps_the_area_and_has_the_variance_it_says() {
+        let mut areas = vec![0.0; 101];
+        areas[50] = 2.0;
+        let spread = smoothed(&areas, 0.25, 0.6);
+        let sum: f64 = spread.iter().sum();
+        let variance = |(k, area): (usize, &f64)| area * (0.25 * (k as f64 - 50.0)).powi(2);
+        let variance: f64 = spread.iter().enumerate().map(variance).sum();
+        assert!(
+            (sum - 2.0).abs() < 1e-12 && (variance / sum - 0.36).abs() < 1e-3,
+            "{variance}"
+        );
+    }
+
+    #[test]
+    fn grinding_never_adds_material_and_leaves_the_target_shape() {
+        let worn: Vec<[f64; 2]> = arc(30.0, 200).iter().map(|[y, z]| [*y, z + 0.2]).collect();
+        let target = arc(28.0, 200);
+        let ground = machined(Body::Rail, &worn, &target, 0.1);
+        assert!(
+            ground
+                .iter()
+                .zip(&worn)
+                .all(|(after, before)| after[1] >= before[1])
+        );
+        let middle = ground.iter().position(|at| at[0] > 0.0).expect("a middle");
+        assert!(
+            (ground[middle][1] - 0.3).abs() < 1e-3,
+            "{:?}",
+            ground[middle]
+        );
+    }
+
+    #[test]
+    fn distances_are_those_to_the_first_crossing() {
+        let points = arc(30.0, 400);
+        let down = distance(&points, [0.0, -10.0], [0.0, 1.0]).expect("below");
+        assert!((down - 10.0).abs() < 1e-3);
+        assert_eq!(distance(&points, [60.0, -10.0], [0.0, 1.0]), None);
+    }
+}

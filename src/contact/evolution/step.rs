@@ -1,0 +1,411 @@
+//! The steps of an evolution: each a pure function of the state before it.
+//!
+//! A step is the midpoint rule: the wear of the present sections moves them by half a step, the wear of the sections found there moves the present
+//! ones by the whole step. The wear changed by half a step is the difference to two steps of half the length without it: it accepts the step, chooses
+//! the next, and its sum with signs is the error of the steps that is answered.
+//!
+//! Waves shorter than a patch are worn down within a fraction of its depth: a wave of the length λ changes the pressure by π E* / λ per amplitude.
+//! Explicit steps stay stable where the wear of a step is smoothed over a length of about a tenth of what E* over the pressure makes of its
+//! depth; the defaults of `smoothing_mm` and `step_depth_mm` belong together.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use crate::contact::error::SolveError;
+use crate::contact::evolution::pass::{BodyWear, Evaluation, Pass, Sections, pass};
+use crate::contact::evolution::record::record;
+use crate::contact::evolution::section::{
+    area_between, distance, lengths, machined, moved, smoothed,
+};
+use crate::contact::evolution::task::{Evolution, SPACING, SolveContext};
+use crate::contact::evolution::traffic::condensed;
+use crate::contact::geometry::profile::Body;
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::solution::words::evolution::{
+    BodyState, CondensedTraffic, EvolutionRecord, EvolutionState, StateContact, TrafficState,
+    WornBody,
+};
+
+/// Two shares of the extent that differ by less are one.
+const SAME: f64 = 1e-9;
+/// Shortest step as a share of the extent.
+const SHORTEST: f64 = 1e-7;
+/// Attempts at one step.
+const ATTEMPTS: u32 = 8;
+/// Largest share of the traffic that may be without an answer.
+const UNSOLVED: f64 = 0.1;
+/// Stack of a thread that solves states.
+const STACK_BYTES: usize = 16 << 20;
+const BODIES: [Body; 2] = [Body::Rail, Body::Wheel];
+
+/// The monitor of a step, whose progress is that of the evolution.
+struct StepMonitor<'a> {
+    inner: &'a (dyn Monitor + Sync),
+    share: f64,
+}
+
+impl Monitor for StepMonitor<'_> {
+    fn tick(&self, _: f64) -> ControlFlow<Stop> {
+        self.inner.tick(self.share)
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.inner.elapsed()
+    }
+}
+
+impl Evolution {
+    /// An evolution before its first step.
+    #[must_use]
+    pub fn begin(&self) -> EvolutionState {
+        let [rail, wheel] = self.start().map(|start| BodyState {
+            worn: WornBody {
+                depth_mm: vec![0.0; start.len()],
+                damage: vec![0.0; start.len()],
+                points_mm: start.clone(),
+                ..WornBody::default()
+            },
+            step_change_mm: vec![0.0; start.len()],
+            start_mm: start,
+            ..BodyState::default()
+        });
+        EvolutionState {
+            next: 1.0 / f64::from(self.plan.records),
+            rail,
+            wheel,
+            ..EvolutionState::default()
+        }
+    }
+
+    /// Is everything done?
+    #[must_use]
+    pub fn is_over(&self, state: &EvolutionState) -> bool {
+        state.share >= 1.0 && state.recorded && self.due(state).is_none()
+    }
+
+    /// The event that is due.
+    fn due(&self, state: &EvolutionState) -> Option<usize> {
+        let next = state.events_done as usize;
+        (next < self.plan.events.len() && self.share_of_event(next) <= state.share + SAME)
+            .then_some(next)
+    }
+
+    /// One step: condenses the traffic, lets an event happen, or advances the sections. Returns the record of the state before, if one is due.
+    ///
+    /// # Errors
+    /// The monitor stopped the work; a tenth of the traffic or more has no answer; or there are too many steps.
+    pub fn step(
+        &self,
+        context: &SolveContext,
+        before: &EvolutionState,
+        monitor: &(dyn Monitor + Sync),
+    ) -> Result<(EvolutionState, Option<EvolutionRecord>), SolveError> {
+        let monitor = &StepMonitor {
+            inner: monitor,
+            share: before.share,
+        };
+        let mut state = before.clone();
+        let Some(traffic) = &before.traffic else {
+            let on = sections([&before.rail, &before.wheel], before.friction, 0.0);
+            let mut solves = 0;
+            let mut solve = |values: &[f64]| {
+                solves += 1;
+                pass(self, context, on, values, monitor)
+            };
+            state.traffic = Some(condensed(self, &mut solve)?);
+            state.solves = solves;
+            return Ok((state, None));
+        };
+        let now = self.evaluate(
+            context,
+            traffic,
+            [&before.rail, &before.wheel],
+            before,
+            monitor,
+        )?;
+        state.solves += traffic.states.len() as u32;
+        state.wheel_y = touched(&now.states, &before.wheel_y);
+        let found = (!before.recorded).then(|| record(self, before, &now));
+        state.recorded = true;
+        if self.due(&state).is_some() {
+            while let Some(event) = self.due(&state) {
+                self.happen(event, &mut state);
+            }
+            state.recorded = false;
+            return Ok((state, found));
+        }
+        if state.share < 1.0 {
+            self.advance(context, before, &now, &mut state, monitor)?;
+        }
+        Ok((state, found))
+    }
+
+    /// Advances the sections by a step from `before`.
+    fn advance(
+        &self,
+        context: &SolveContext,
+        before: &EvolutionState,
+        now: &Evaluation,
+        state: &mut EvolutionState,
+        monitor: &(dyn Monitor + Sync),
+    ) -> Result<(), SolveError> {
+        let accuracy = &self.plan.accuracy;
+        let traffic = before.traffic.clone().unwrap_or_default();
+        if before.steps >= accuracy.steps_max {
+            let reason = format!(
+                "after {} steps {:.1} % of the extent are done; raise accuracy.steps_max or accuracy.step_depth_mm, or shorten the extent",
+                before.steps,
+                100.0 * before.share
+            );
+            return Err(SolveError::NormalProblem { reason });
+        }
+        let bodies = [&before.rail, &before.wheel];
+        let deepest = [0, 1].map(|k| deepest(&bodies[k].worn.points_mm, &now.wear[k].area));
+        let allowed = accuracy.step_depth_mm / deepest[0].max(deepest[1]).max(f64::MIN_POSITIVE);
+        let stop = self.next_stop(before.share);
+        let mut length = before.next.min(allowed).max(SHORTEST);
+        for attempt in 1..=ATTEMPTS {
+            let left = stop - before.share;
+            // Not to end just before the stop.
+            let step = if length > 0.6 * left {
+                left.min(if length >= left { left } else { 0.5 * left })
+            } else {
+                length
+            };
+            let half = [0, 1].map(|k| moved_body(BODIES[k], bodies[k], &now.wear[k], 0.5 * step));
+            let middle = [&half[0], &half[1]];
+            let then = self.evaluate(context, &traffic, middle, state, monitor)?;
+            state.solves += traffic.states.len() as u32;
+            let wearing = self.plan.wearing.flags();
+            let changes = [0, 1].map(|k| match wearing[k] {
+                true => 0.5 * change(&now.wear[k].area, &then.wear[k].area),
+                false => 0.0,
+            });
+            let error = changes[0].max(changes[1]);
+            let better = (0.8 * accuracy.step_tolerance / error.max(1e-6)).clamp(0.4, 2.0);
+            if error > accuracy.step_tolerance && step > SHORTEST && attempt < ATTEMPTS {
+                state.rejected += 1;
+                length = step * better.min(0.7);
+                continue;
+            }
+            let [rail, wheel] = [0, 1].map(|k| {
+                let mut body = moved_body(BODIES[k], bodies[k], &then.wear[k], step);
+                let lengths = lengths(&body.worn.points_mm);
+                for (i, sum) in body.step_change_mm.iter_mut().enumerate() {
+                    *sum += 0.5 * step * (then.wear[k].area[i] - now.wear[k].area[i]) / lengths[i];
+                }
+                body
+            });
+            (state.rail, state.wheel) = (rail, wheel);
+            state.steps += 1;
+            state.wheel_y = touched(&then.states, &state.wheel_y);
+            state.next = if step < length {
+                length.max(step * better)
+            } else {
+                step * better
+            };
+            state.share = before.share + step;
+            if (stop - state.share).abs() < SAME {
+                state.share = stop;
+                state.recorded = false;
+            }
+            break;
+        }
+        Ok(())
+    }
+
+    /// The next share with a record or an event.
+    fn next_stop(&self, share: f64) -> f64 {
+        let records = f64::from(self.plan.records);
+        let record = ((share + SAME) * records).floor() + 1.0;
+        let events = (0..self.plan.events.len()).map(|k| self.share_of_event(k));
+        let events = events.filter(|at| *at > share + SAME);
+        events.fold((record / records).min(1.0), f64::min)
+    }
+
+    /// The wear of all states on sections, over the extent and smoothed.
+    fn evaluate(
+        &self,
+        context: &SolveContext,
+        traffic: &CondensedTraffic,
+        bodies: [&BodyState; 2],
+        of: &EvolutionState,
+        monitor: &(dyn Monitor + Sync),
+    ) -> Result<Evaluation, SolveError> {
+        let radius = match self.plan.wearing.flags()[1] || bodies[1].worn.machined_area_mm2 > 0.0 {
+            true => radius_change(traffic, bodies[1], &of.wheel_y),
+            false => 0.0,
+        };
+        let on = sections(bodies, of.friction, radius);
+        let mut wear = on.points.map(|points| BodyWear::none(points.len()));
+        let mut states = Vec::with_capacity(traffic.states.len());
+        let passes = self.passes(context, on, &traffic.states, monitor)?;
+        for (state, Pass { wear: own, contact }) in traffic.states.iter().zip(passes) {
+            (0..2).for_each(|k| wear[k].add(state.share, &own[k]));
+            states.push(StateContact {
+                share: state.share,
+                ..contact
+            });
+        }
+        let failed = states.iter().filter(|state| state.failure.is_some());
+        let unsolved: f64 = failed.clone().map(|state| state.share).sum();
+        if unsolved > UNSOLVED {
+            let first = failed
+                .clone()
+                .next()
+                .and_then(|state| state.failure.as_deref());
+            let reason = format!(
+                "{:.0} % of the traffic have no answer; the first of these states: {}",
+                100.0 * unsolved,
+                first.unwrap_or_default()
+            );
+            return Err(SolveError::NormalProblem { reason });
+        }
+        let wearing = self.plan.wearing.flags();
+        for k in 0..2 {
+            if !wearing[k] {
+                wear[k] = BodyWear::none(on.points[k].len());
+                continue;
+            }
+            let amount = self.amounts[k];
+            let mut all = BodyWear::none(on.points[k].len());
+            all.add(amount, &wear[k]);
+            all.area = smoothed(&all.area, SPACING, self.plan.accuracy.smoothing_mm);
+            wear[k] = all;
+        }
+        Ok(Evaluation { wear, states })
+    }
+
+    /// Solves states, each on its own, on the threads of the context.
+    fn passes(
+        &self,
+        context: &SolveContext,
+        on: Sections,
+        states: &[TrafficState],
+        monitor: &(dyn Monitor + Sync),
+    ) -> Result<Vec<Pass>, SolveError> {
+        let solve = |state: &TrafficState| pass(self, context, on, &state.values, monitor);
+        if context.threads <= 1 {
+            return states.iter().map(solve).collect();
+        }
+        let next = AtomicUsize::new(0);
+        let found: Vec<Mutex<Option<Result<Pass, SolveError>>>> =
+            states.iter().map(|_| Mutex::new(None)).collect();
+        let work = || {
+            while let Some(k) =
+                Some(next.fetch_add(1, Ordering::Relaxed)).filter(|k| *k < states.len())
+            {
+                let pass = solve(&states[k]);
+                *found[k].lock().unwrap_or_else(PoisonError::into_inner) = Some(pass);
+            }
+        };
+        thread::scope(|scope| {
+            for _ in 1..context.threads {
+                let builder = thread::Builder::new().stack_size(STACK_BYTES);
+                // Without another thread this one does all.
+                drop(builder.spawn_scoped(scope, work));
+            }
+            work();
+        });
+        let found = found.into_iter().map(|pass| {
+            let pass = pass.into_inner().unwrap_or_else(PoisonError::into_inner);
+            pass.unwrap_or(Err(SolveError::Cancelled))
+        });
+        found.collect()
+    }
+
+    fn happen(&self, event: usize, state: &mut EvolutionState) {
+        let planned = &self.plan.events[event];
+        let bodies = [&mut state.rail, &mut state.wheel];
+        for ((body, target), kind) in bodies.into_iter().zip(&self.machined[event]).zip(BODIES) {
+            let Some(target) = target else { continue };
+            let before = &body.worn.points_mm;
+            let after = machined(kind, before, target, planned.depth_mm);
+            body.worn.machined_area_mm2 += area_between(kind, before, &after);
+            // Cracks go with the material that they are in.
+            for (k, damage) in body.worn.damage.iter_mut().enumerate() {
+                if after[k] != before[k] {
+                    *damage = 0.0;
+                }
+            }
+            body.worn.points_mm = after;
+        }
+        state.friction = planned.friction_coefficient.or(state.friction);
+        state.events_done += 1;
+    }
+}
+
+fn sections(bodies: [&BodyState; 2], friction: Option<f64>, radius: f64) -> Sections<'_> {
+    Sections {
+        points: bodies.map(|body| body.worn.points_mm.as_slice()),
+        friction,
+        radius,
+    }
+}
+
+/// y on the wheel's section of the patch that carries most, of each state; where it was not solved, the one before.
+fn touched(states: &[StateContact], before: &[f64]) -> Vec<f64> {
+    let of_state = |(k, state): (usize, &StateContact)| {
+        let patches = state.patches.iter();
+        let most = patches.max_by(|a, b| a.normal_force_n.total_cmp(&b.normal_force_n));
+        most.map(|patch| patch.wheel_mm[0])
+            .or(before.get(k).copied())
+            .unwrap_or(0.0)
+    };
+    states.iter().enumerate().map(of_state).collect()
+}
+
+/// Change of the wheel's radius in mm where the states touch it, the mean over the traffic: the radius at which it rolls freely changes by
+/// as much.
+fn radius_change(traffic: &CondensedTraffic, wheel: &BodyState, touched: &[f64]) -> f64 {
+    let up = |points: &[[f64; 2]], y: f64| distance(points, [y, 1e3], [0.0, -1.0]);
+    let parts = traffic.states.iter().zip(touched).map(|(state, y)| {
+        let [before, after] = [&wheel.start_mm, &wheel.worn.points_mm].map(|points| up(points, *y));
+        after
+            .zip(before)
+            .map_or(0.0, |(after, before)| state.share * (before - after))
+    });
+    parts.sum()
+}
+
+/// Largest area over length.
+fn deepest(points: &[[f64; 2]], areas: &[f64]) -> f64 {
+    let depths = areas
+        .iter()
+        .zip(lengths(points))
+        .map(|(area, length)| area / length);
+    depths.fold(0.0, f64::max)
+}
+
+/// Difference of two distributions over the second.
+fn change(now: &[f64], then: &[f64]) -> f64 {
+    let all: f64 = then.iter().sum();
+    let off: f64 = now
+        .iter()
+        .zip(then)
+        .map(|(now, then)| (then - now).abs())
+        .sum();
+    if all > 0.0 { off / all } else { 0.0 }
+}
+
+/// A body after a share of the extent under this wear.
+fn moved_body(body: Body, before: &BodyState, wear: &BodyWear, share: f64) -> BodyState {
+    let areas: Vec<f64> = wear.area.iter().map(|area| share * area).collect();
+    let after = moved(body, &before.worn.points_mm, &areas);
+    let mut state = before.clone();
+    let worn = &mut state.worn;
+    worn.worn_area_mm2 += area_between(body, &before.worn.points_mm, &after.points);
+    worn.points_mm = after.points;
+    worn.depth_mm
+        .iter_mut()
+        .zip(&after.depth)
+        .for_each(|(sum, depth)| *sum += depth);
+    let damage = worn.damage.iter_mut().zip(&wear.damage);
+    damage.for_each(|(sum, damage)| *sum = (*sum + share * damage).max(0.0));
+    (0..3).for_each(|k| state.regimes_mm2[k] += share * wear.regimes[k]);
+    state.contact_mm2 += share * wear.open;
+    state
+}

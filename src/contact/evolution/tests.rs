@@ -1,0 +1,307 @@
+//! Laws of an evolution.
+
+use serde_json::{Value, json};
+
+use crate::contact::case::limits::Limits;
+use crate::contact::evolution::pass::{Sections, pass};
+use crate::contact::evolution::section::area_between;
+use crate::contact::evolution::task::{Evolution, SolveContext};
+use crate::contact::geometry::profile::Body;
+use crate::contact::monitor::Unmonitored;
+use crate::contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
+
+/// A wheel on a rail, by the shipped example.
+fn template() -> Value {
+    let text = include_str!("../../../api/examples/wheel-rail.case.json");
+    let mut case: Value = serde_json::from_str(text).expect("an example is JSON");
+    for name in ["name", "outputs"] {
+        case.as_object_mut().expect("an object").remove(name);
+    }
+    case
+}
+
+/// An evolution of the example over some shifts.
+fn request(shifts: &[f64], passes: &[f64], records: u32) -> Value {
+    json!({
+        "template": template(),
+        "traffic": { "columns": { "/contact/lateral_shift_mm": shifts }, "passes": passes },
+        "extent": { "axle_passes": 4e5, "wheel_distance_km": 2e4 },
+        "records": records,
+        "accuracy": { "states_max": 8 },
+    })
+}
+
+fn checked(request: &Value) -> Evolution {
+    Evolution::check(request, &Limits::default()).expect("no faults")
+}
+
+fn run(task: &Evolution) -> (EvolutionState, Vec<EvolutionRecord>) {
+    run_from(task, task.begin())
+}
+
+fn run_from(task: &Evolution, mut state: EvolutionState) -> (EvolutionState, Vec<EvolutionRecord>) {
+    let context = SolveContext::default();
+    let mut records = Vec::new();
+    while !task.is_over(&state) {
+        let (next, record) = task.step(&context, &state, &Unmonitored).expect("a step");
+        records.extend(record);
+        state = next;
+    }
+    (state, records)
+}
+
+/// A flat wheel on the round head of a rail under pure longitudinal creepage: symmetric about y = 0.
+fn symmetric(records: u32, axles: f64) -> Value {
+    let rail: Vec<[f64; 2]> = (0..=240)
+        .map(|k| 0.25 * f64::from(k) - 30.0)
+        .map(|y| [y, 300.0 - (300.0_f64.powi(2) - y * y).sqrt()])
+        .collect();
+    let wheel: Vec<[f64; 2]> = (0..=240)
+        .map(|k| [0.25 * f64::from(k) - 30.0, 0.0])
+        .collect();
+    let section = |points| json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
+    json!({
+        "template": {
+            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": {
+                "type": "profiles", "rail": section(rail), "wheel": section(wheel), "side": "left", "rolling_radius_mm": 460,
+                "rail_origin_mm": 750, "flange_back_distance_mm": 1360, "flange_back_position_mm": -70,
+            },
+            "load": { "vertical_force_n": 80e3 },
+            "motion": { "creepage_x": 0.002 },
+        },
+        "traffic": { "columns": { "/load/vertical_force_n": [80e3] } },
+        "wearing": "rail",
+        "extent": { "axle_passes": axles },
+        "records": records,
+        "accuracy": { "step_tolerance": 1.0, "step_depth_mm": 1.0 },
+    })
+}
+
+#[test]
+fn a_symmetric_problem_stays_symmetric_and_loses_the_volume_of_its_wear() {
+    let task = checked(&symmetric(2, 2e5));
+    let (state, _) = run(&task);
+    let depth = &state.rail.worn.depth_mm;
+    let most = depth.iter().copied().fold(0.0, f64::max);
+    let off = depth
+        .iter()
+        .zip(depth.iter().rev())
+        .map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f64::max) < 0.01 * most, "{most}");
+    let lost = area_between(Body::Rail, &state.rail.start_mm, &state.rail.worn.points_mm);
+    let worn: f64 = state.rail.regimes_mm2.iter().sum();
+    assert!((lost / worn - 1.0).abs() < 1e-3, "{lost} {worn}");
+    assert!((lost / state.rail.worn.worn_area_mm2 - 1.0).abs() < 1e-9);
+    assert_eq!(state.wheel.worn.points_mm, state.wheel.start_mm);
+}
+
+/// Halving the step at least halves the distance to the finest run.
+#[test]
+fn steps_converge() {
+    let depths: Vec<Vec<f64>> = [1, 2, 4, 16]
+        .map(|records| run(&checked(&symmetric(records, 4e4))).0.rail.worn.depth_mm)
+        .into();
+    let off = |k: usize| -> f64 {
+        let pairs = depths[k].iter().zip(&depths[3]);
+        pairs.map(|(depth, finest)| (depth - finest).abs()).sum()
+    };
+    assert!(
+        off(1) < 0.5 * off(0) && off(2) < 0.5 * off(1),
+        "{} {} {}",
+        off(0),
+        off(1),
+        off(2)
+    );
+}
+
+#[test]
+fn without_friction_or_creepage_nothing_wears() {
+    let mut without_friction = symmetric(1, 2e5);
+    without_friction["template"]["friction"]["coefficient"] = 0.0.into();
+    let mut without_creepage = symmetric(1, 2e5);
+    without_creepage["template"]["motion"]["creepage_x"] = 0.0.into();
+    for request in [without_friction, without_creepage] {
+        let task = checked(&request);
+        let (state, records) = run(&task);
+        assert_eq!(state.rail.worn.points_mm, state.rail.start_mm);
+        assert!(
+            records
+                .iter()
+                .all(|record| record.contact.unsolved_share == 0.0)
+        );
+    }
+}
+
+#[test]
+fn twice_the_passes_at_half_the_weight_are_the_same() {
+    let once = checked(&request(&[-2.0, 1.0], &[1.0, 3.0], 1));
+    let twice = checked(&request(&[-2.0, 1.0, -2.0, 1.0], &[0.5, 1.5, 0.5, 1.5], 1));
+    let [once, twice] = [&once, &twice].map(|task| {
+        let mut state = task.begin();
+        for _ in 0..3 {
+            state = task
+                .step(&SolveContext::default(), &state, &Unmonitored)
+                .expect("a step")
+                .0;
+        }
+        state
+    });
+    assert!(once.share > 0.0 && (once.share - twice.share).abs() < 1e-12);
+    for (a, b) in once
+        .rail
+        .worn
+        .points_mm
+        .iter()
+        .zip(&twice.rail.worn.points_mm)
+    {
+        assert!((a[1] - b[1]).abs() < 1e-9, "{a:?} {b:?}");
+    }
+}
+
+/// Left after any step and continued from its text by other threads, an evolution gives the same bits.
+#[test]
+fn an_evolution_is_continued_to_the_same_bits() {
+    let mut plan = request(&[-2.0, 1.0], &[1.0, 3.0], 2);
+    plan["extent"] = json!({ "axle_passes": 2e4, "wheel_distance_km": 1e3 });
+    plan["events"] = json!([{ "at": 5e3, "friction_coefficient": 0.15 }, { "at": 1e4, "grind": plan["template"]["contact"]["rail"], "depth_mm": 0.05 }]);
+    let task = checked(&plan);
+    let (whole, records) = run(&task);
+    assert_eq!(records.len(), 6, "start, end, two of each event");
+    let context = SolveContext {
+        threads: 2,
+        ..SolveContext::default()
+    };
+    let (mut state, mut again) = (task.begin(), Vec::new());
+    while !task.is_over(&state) {
+        let text = serde_json::to_string(&state).expect("text");
+        let read: EvolutionState = serde_json::from_str(&text).expect("a state");
+        let (next, record) = task.step(&context, &read, &Unmonitored).expect("a step");
+        again.extend(record);
+        state = next;
+    }
+    assert_eq!(
+        serde_json::to_string(&state).expect("text"),
+        serde_json::to_string(&whole).expect("text")
+    );
+    assert_eq!(again, records);
+    let ground = &records[records.len() - 1].rail;
+    assert!(
+        ground.machined_area_mm2 > 1.0,
+        "{}",
+        ground.machined_area_mm2
+    );
+}
+
+/// The wear of a pass across both sections is the friction power of the strips by the map's mild slope.
+#[test]
+fn wear_across_a_section_is_that_of_the_power_of_the_cells() {
+    let request = request(&[0.0], &[1.0], 1);
+    let task = checked(&request);
+    let [rail, wheel] = task.start();
+    let on = Sections {
+        points: [&rail, &wheel],
+        friction: None,
+        radius: 0.0,
+    };
+    let found = pass(&task, &SolveContext::default(), on, &[0.0], &Unmonitored).expect("solved");
+    let mut case = task
+        .case([&rail, &wheel], &[0.0], None, 0.0)
+        .expect("a case");
+    case["outputs"] = json!(["resultants", "tractions", "slip", "zones"]);
+    case.as_object_mut().expect("an object").remove("damage");
+    let case = crate::contact::check(&case, &Limits::default()).expect("no faults");
+    let (solution, fields) = crate::contact::solve(&case, &Unmonitored).expect("solved");
+    let centre = solution.patches[0].position.expect("a place");
+    // kg/m³ are µg/mm³.
+    let slope = task.figures.usfd.mild_slope * 1e-3 / task.figures.density_kg_per_m3;
+    let (cells, values) = (&fields.patches[0].meshes[0], &fields.patches[0].points[0]);
+    let of = |values: &Option<Vec<f64>>, k: usize| values.as_ref().expect("values")[k];
+    // Right of the load centre, in the coordinate to the left: the field side of a right rail.
+    let (mut all, mut right) = (0.0, 0.0);
+    for k in 0..cells.x_mm.len() {
+        let power = of(&values.traction_x_mpa, k) * of(&values.slip_x, k)
+            + of(&values.traction_y_mpa, k) * of(&values.slip_y, k);
+        let worn = slope * power * cells.dx_mm[k] * cells.dy_mm[k];
+        all += worn;
+        right += if cells.y_mm[k] < -1.0 { worn } else { 0.0 };
+    }
+    let sum: f64 = found.wear[0].area.iter().sum();
+    assert!((sum / all - 1.0).abs() < 0.02, "{sum} {all}");
+    let beyond = |points: &[[f64; 2]], centre: [f64; 2], area: &[f64]| -> f64 {
+        let pairs = points.iter().zip(area);
+        pairs
+            .filter(|(at, _)| at[0] > centre[0] + 1.0)
+            .map(|(_, area)| area)
+            .sum()
+    };
+    let on_rail = beyond(&rail, centre.rail_mm, &found.wear[0].area);
+    assert!(
+        (on_rail - right).abs() < 0.02 * all + 0.1 * right,
+        "{on_rail} {right} {all}"
+    );
+    let on_wheel = beyond(&wheel, centre.wheel_mm, &found.wear[1].area);
+    let turn = 2.0 * std::f64::consts::PI * centre.rolling_radius_mm;
+    assert!(
+        (on_wheel * turn - right).abs() < 0.02 * all + 0.1 * right,
+        "{} {right}",
+        on_wheel * turn
+    );
+}
+
+#[test]
+fn faults_name_the_place_the_value_and_what_is_allowed() {
+    let good = request(&[0.0, 1.0], &[1.0, 1.0], 2);
+    let fault = |pointer: &str, value: Value| {
+        let mut bad = good.clone();
+        *bad.pointer_mut(pointer).expect("a place") = value;
+        let error = Evolution::check(&bad, &Limits::default()).expect_err("a fault");
+        (error.0[0].pointer.clone(), error.0[0].detail.clone())
+    };
+    let cases = [
+        (
+            "/extent/axle_passes",
+            json!(-5),
+            "/extent/axle_passes",
+            "-5",
+        ),
+        (
+            "/traffic/passes",
+            json!([1.0]),
+            "/traffic/passes",
+            "1 values",
+        ),
+        (
+            "/traffic/columns/~1contact~1lateral_shift_mm/1",
+            json!(5e4),
+            "/traffic/columns/~1contact~1lateral_shift_mm/1",
+            "50000",
+        ),
+        (
+            "/template/contact/type",
+            json!("radii"),
+            "/template/contact/type",
+            "profiles",
+        ),
+        (
+            "/template/friction/coefficient",
+            json!(-1),
+            "/template/friction/coefficient",
+            "-1",
+        ),
+        (
+            "/accuracy/states_max",
+            json!(0.5),
+            "/accuracy/states_max",
+            "0.5",
+        ),
+    ];
+    for (place, value, pointer, detail) in cases {
+        let (found, told) = fault(place, value);
+        assert!(
+            found == pointer && told.contains(detail),
+            "{place}: {found}: {told}"
+        );
+    }
+}

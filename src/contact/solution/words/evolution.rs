@@ -1,0 +1,262 @@
+//! The answer of an evolution, and the state between two of its steps.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::words::damage::DamageFiguresUsed;
+
+/// The answer of an evolution.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct EvolutionAnswer {
+    /// The stored steps, from the unworn sections on; one before and one after each event.
+    pub records: Vec<EvolutionRecord>,
+    /// When the limits are reached, between the records linearly.
+    pub limits: Vec<LimitReached>,
+    /// The traffic as it was condensed.
+    pub traffic: CondensedTraffic,
+    /// Steps taken, and steps taken again because they were too long.
+    pub steps: u32,
+    /// See `steps`.
+    pub steps_rejected: u32,
+    /// Contacts solved.
+    pub solves: u32,
+    /// The figures that wear and damage were computed with.
+    pub damage_parameters: DamageFiguresUsed,
+    /// What the client should know before using the numbers.
+    pub remarks: Vec<RemarkEntry>,
+}
+
+/// How far an evolution has come.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = EvolutionProgress)]
+pub struct Progress {
+    /// Share of the extent.
+    pub share: f64,
+    /// Traffic over the rail in million gross tonnes; absent where only the wheel wears.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub mgt: Option<f64>,
+    /// Axles over the rail.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub axle_passes: Option<f64>,
+    /// Distance of the wheel in km; absent where only the rail wears.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub wheel_distance_km: Option<f64>,
+}
+
+/// The profiles and their contact at one time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct EvolutionRecord {
+    /// When.
+    pub progress: Progress,
+    /// Events that have happened.
+    pub events_done: u32,
+    /// The rail.
+    pub rail: WornBody,
+    /// The wheel.
+    pub wheel: WornBody,
+    /// Losses against the sections at the start.
+    pub losses: WearLosses,
+    /// Equivalent conicity (EN 15302) at 3 mm of a wheelset with this wheel on both sides of a track of this rail; absent where it has none.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub conicity: Option<f64>,
+    /// The contact over all states.
+    pub contact: ContactRange,
+    /// The contact of each state.
+    pub states: Vec<StateContact>,
+}
+
+/// A section and what has become of it. Arrays have one entry for each point.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct WornBody {
+    /// Points `[y, z]` in mm, y to the field side and z down, as `points_mm` of a cross-section.
+    pub points_mm: Vec<[f64; 2]>,
+    /// Depth worn away along the normal in mm, without maintenance.
+    pub depth_mm: Vec<f64>,
+    /// Damage by the Whole Life Rail Model: 1 is a visible crack; not below 0, where wear outweighs fatigue.
+    pub damage: Vec<f64>,
+    /// Area of the section that wear has removed, in mm²; times the length, the volume.
+    pub worn_area_mm2: f64,
+    /// Area that grinding or turning has removed, in mm².
+    pub machined_area_mm2: f64,
+    /// Uncertainty of the worn area.
+    pub uncertainty: WearUncertainty,
+}
+
+/// Three separate uncertainties of worn areas and depths, relative.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct WearUncertainty {
+    /// Of the steps: from halving each.
+    pub steps: f64,
+    /// Of the condensed traffic: from twice the states.
+    pub states: f64,
+    /// Of the contact: from the error estimates of its friction power.
+    pub contact: f64,
+    /// Of the wear coefficients: factors that bound 90 % of the samples of their scatter.
+    pub coefficients: [f64; 2],
+}
+
+/// Losses of the sections in mm; absent where a section has no such place.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct WearLosses {
+    /// W1: height of the rail at y = 0.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub height_mm: Option<f64>,
+    /// W2: gauge face of the rail, 14 mm below its top at the start.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub gauge_face_mm: Option<f64>,
+    /// W3: gauge corner of the rail, at 45°.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub gauge_corner_mm: Option<f64>,
+    /// Tread of the wheel at y = 0.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub tread_mm: Option<f64>,
+    /// Flange of the wheel, 10 mm below its tread at the start.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub flange_mm: Option<f64>,
+}
+
+/// The contact over all states.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct ContactRange {
+    /// Largest pressure in MPa.
+    pub pressure_max_mpa: f64,
+    /// Mean over the traffic of the largest pressure of each state.
+    pub pressure_mean_mpa: f64,
+    /// Largest Y/Q: lateral over vertical force of the wheel.
+    pub y_over_q_max: f64,
+    /// Mean over the traffic.
+    pub y_over_q_mean: f64,
+    /// Mean over the traffic of the friction power over the speed, in N.
+    pub t_gamma_mean_n: f64,
+    /// Share of the traffic without an answer; it wears nothing.
+    pub unsolved_share: f64,
+}
+
+/// The contact of one state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StateContact {
+    /// Share of the traffic.
+    pub share: f64,
+    /// Y/Q.
+    pub y_over_q: f64,
+    /// Its patches; none where it was not solved.
+    pub patches: Vec<StatePatch>,
+    /// Why it was not solved.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub failure: Option<String>,
+}
+
+/// A patch of a state.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StatePatch {
+    /// Load centre on the rail's section, `[y, z]` in mm.
+    pub rail_mm: [f64; 2],
+    /// The same on the wheel's section.
+    pub wheel_mm: [f64; 2],
+    /// Normal force in N.
+    pub normal_force_n: f64,
+    /// Largest pressure in MPa.
+    pub pressure_max_mpa: f64,
+    /// Friction power over the speed, in N.
+    pub t_gamma_n: f64,
+}
+
+/// A traffic condensed to a few states.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct CondensedTraffic {
+    /// Rows that were sent.
+    pub rows: u32,
+    /// Places in the case that the values belong to.
+    pub pointers: Vec<String>,
+    /// The states.
+    pub states: Vec<TrafficState>,
+    /// Change of the distributions of wear of rail and wheel with twice the states, relative to the worn area.
+    pub error: [f64; 2],
+}
+
+/// A state that stands for some rows of the traffic.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TrafficState {
+    /// Share of the traffic.
+    pub share: f64,
+    /// Rows that it stands for.
+    pub rows: u32,
+    /// Their means, in the order of `pointers`.
+    pub values: Vec<f64>,
+}
+
+/// When a limit is reached.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct LimitReached {
+    /// The loss, as `limits` names it.
+    pub loss: String,
+    /// The limit in mm.
+    pub limit_mm: f64,
+    /// When; absent where the extent ends before.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub reached: Option<Progress>,
+    /// The earliest time within the uncertainty of the loss.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub earliest: Option<Progress>,
+    /// The latest time within it; absent where the extent ends before.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub latest: Option<Progress>,
+}
+
+/// An evolution between two steps: all that the next one depends on. Through JSON it keeps every bit.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct EvolutionState {
+    /// Share of the extent that is done.
+    pub share: f64,
+    /// Share of the next step.
+    pub next: f64,
+    /// The present time has a record.
+    pub recorded: bool,
+    /// Events that have happened.
+    pub events_done: u32,
+    /// Coefficient of friction in place of that of the states.
+    pub friction: Option<f64>,
+    /// The states; nothing before the first step.
+    pub traffic: Option<CondensedTraffic>,
+    /// y on the wheel's section where each state touched last.
+    pub wheel_y: Vec<f64>,
+    /// The rail.
+    pub rail: BodyState,
+    /// The wheel.
+    pub wheel: BodyState,
+    /// Steps taken.
+    pub steps: u32,
+    /// Steps taken again.
+    pub rejected: u32,
+    /// Contacts solved.
+    pub solves: u32,
+}
+
+/// A body between two steps.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct BodyState {
+    /// Points at the start, as `points_mm`.
+    pub start_mm: Vec<[f64; 2]>,
+    /// What the next record has of it.
+    pub worn: WornBody,
+    /// Worn area by regimes: mild, severe, and seizure or catastrophic.
+    pub regimes_mm2: [f64; 3],
+    /// Depth at every point that a step would have removed less without its half step.
+    pub step_change_mm: Vec<f64>,
+    /// Area that the errors of the contact leave open.
+    pub contact_mm2: f64,
+}
