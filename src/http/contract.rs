@@ -32,6 +32,7 @@ use crate::http::{contract_forms, contract_shared};
         (name = "batches", description = "Many cases at once"),
         (name = "profiles", description = "Cross-sections that cases name"),
         (name = "runs", description = "Many rows over one case"),
+        (name = "evolutions", description = "Profiles that wear under a traffic"),
         (name = "results", description = "What came out, part by part"),
         (name = "cases", description = "What can be asked"),
         (name = "service", description = "State of the service, its problems and this document")

@@ -64,9 +64,9 @@ use crate::http::routes::service::{
     examples as service_examples, health, methods, problems, remarks,
 };
 use crate::http::routes::{
-    batch_list, batch_results, batches, cases, damage, evaluate, events, fields, job_list, jobs,
-    me, plots, point_fields, profiles, resultants, results, run_results, run_row, run_totals, runs,
-    subsurface, tenant_events, zones,
+    batch_list, batch_results, batches, cases, damage, evaluate, events, evolutions, fields,
+    job_list, jobs, me, plots, point_fields, profiles, resultants, results, run_results, run_row,
+    run_totals, runs, subsurface, tenant_events, zones,
 };
 use crate::http::server::drain_body;
 use crate::http::state::AppState;
@@ -173,11 +173,14 @@ fn resources() -> OpenApiRouter<AppState> {
     let work = OpenApiRouter::new()
         .routes(routes!(jobs::get, jobs::delete))
         .routes(routes!(batches::get, batches::delete))
+        .routes(routes!(evolutions::get, evolutions::delete))
         .route_layer(from_fn(query::refuse_all_but_wait));
     let changing = changing.merge(work).route_layer(from_fn(etag::revalidate));
     let changing = contract::conditional(changing);
     let case = OpenApiRouter::new()
         .routes(routes!(jobs::case))
+        .routes(routes!(evolutions::request))
+        .routes(routes!(evolutions::result))
         .route_layer(from_fn(query::refuse_parameters));
     let finished = OpenApiRouter::new()
         .routes(routes!(results::result))
@@ -189,11 +192,13 @@ fn resources() -> OpenApiRouter<AppState> {
     let lists = OpenApiRouter::new()
         .routes(routes!(jobs::submit, job_list::list))
         .routes(routes!(batches::submit, batch_list::list))
+        .routes(routes!(evolutions::submit, evolutions::list))
         .route_layer(from_fn(etag::revalidate));
     let lists = contract::conditional(lists);
     let plain = OpenApiRouter::new()
         .routes(routes!(jobs::cancel))
         .routes(routes!(batches::cancel))
+        .routes(routes!(evolutions::cancel))
         .routes(routes!(cases::check))
         .routes(routes!(problems::list))
         .routes(routes!(problems::explain))
@@ -217,6 +222,8 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(damage::damage))
         .routes(routes!(plots::svg))
         .routes(routes!(plots::png))
+        .routes(routes!(evolutions::table))
+        .routes(routes!(evolutions::section))
         .route_layer(from_fn(etag::immutable));
     let parts = contract::conditional(parts);
     let contract = OpenApiRouter::new()
@@ -227,6 +234,7 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(events::job))
         .routes(routes!(events::batch))
         .routes(routes!(events::run))
+        .routes(routes!(evolutions::events))
         .routes(routes!(tenant_events::follow))
         .route_layer(from_fn(query::refuse_parameters));
     v1.merge(parts)

@@ -13,6 +13,7 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::job::{Job, QueuePlace, State};
+use crate::jobs::model::kind::Kind;
 use crate::jobs::model::labels::Labels;
 use crate::jobs::options::Options;
 use crate::jobs::runtime_probe::{ProbedTime, probe};
@@ -38,6 +39,8 @@ pub struct Jobs {
     pub(crate) shared: Arc<Shared>,
     /// Whose jobs this handle makes and sees.
     pub(crate) tenant: Arc<str>,
+    /// [`Kind::Case`], or [`Kind::Evolution`]: the kind of the jobs that this handle reads and controls.
+    pub(crate) kind: Kind,
     /// What this handle sees carries these labels, and what it makes gets them.
     pub(crate) bound: Arc<Labels>,
 }
@@ -49,7 +52,17 @@ impl Jobs {
         Jobs {
             shared: self.shared.clone(),
             tenant,
+            kind: Kind::Case,
             bound: Arc::default(),
+        }
+    }
+
+    /// The same for the tenant's jobs of another kind.
+    #[must_use]
+    pub fn of_kind(&self, kind: Kind) -> Jobs {
+        Jobs {
+            kind,
+            ..self.clone()
         }
     }
 
@@ -108,7 +121,9 @@ impl Jobs {
     pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
         let job = self.shared.store.job(&self.tenant, id).await?;
         match job {
-            Some(job) if !self.sees(&job.labels) => Err(JobsError::NotFound),
+            Some(job) if !self.sees(&job.labels) || job.kind != self.kind => {
+                Err(JobsError::NotFound)
+            }
             Some(job) => self.unexpired(job),
             None => Err(self.missing(id, JobsError::NotFound).await),
         }
@@ -153,6 +168,7 @@ impl Jobs {
     ) -> Result<Page<Job>, JobsError> {
         // The store makes cursors for the filter that it is asked, so the labels of the key come first.
         let filter = &Filter {
+            kind: self.kind,
             labels: self.narrowed(&filter.labels),
             ..filter.clone()
         };

@@ -28,6 +28,7 @@ use crate::jobs::handle::Jobs;
 use crate::jobs::maintenance::{blob_collector, deadlines, nodes, reaper, recovery, retention};
 use crate::jobs::metrics::Metrics;
 use crate::jobs::model::key::ANONYMOUS;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::open_store::{note_closed, open_for_service};
 use crate::jobs::options::Options;
 use crate::jobs::recent_reads::RecentReads;
@@ -75,6 +76,7 @@ impl Jobs {
         let (ended, _) = broadcast::channel(1024);
         let jobs = Jobs {
             tenant: ANONYMOUS.into(),
+            kind: Kind::Case,
             bound: Arc::default(),
             shared: Arc::new(Shared {
                 node: Node {

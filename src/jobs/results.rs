@@ -220,7 +220,7 @@ impl Jobs {
         let Some((job, stored)) = found else {
             return Err(self.missing(id, JobsError::NotFound).await);
         };
-        if !self.sees(&job.labels) {
+        if !self.sees(&job.labels) || job.kind != self.kind {
             return Err(JobsError::NotFound);
         }
         let job = self.unexpired(job)?;

@@ -1,12 +1,14 @@
 //! Submission of single jobs: check, idempotency key, cached result, queue.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bytes::Bytes;
 use serde_json::Value;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::error::CaseError;
+use crate::contact::error::{CaseError, Fault};
+use crate::contact::evolution::task::Evolution;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
@@ -47,9 +49,79 @@ impl Jobs {
         idempotency_key: Option<String>,
         options: SubmitOptions,
     ) -> Result<(Job, bool), JobsError> {
+        let check = |jobs: &Jobs, case: &Value| {
+            let mut checked = jobs.check(case)?;
+            jobs.bind(&mut checked.label.labels).map_err(CaseError)?;
+            Ok(jobs.new_job(checked, Bytes::new()))
+        };
+        let case = self.with_profiles(case).await?;
+        let small = is_small(&case);
+        self.submit_work(case, small, check, idempotency_key, options)
+            .await
+    }
+
+    /// Checks an evolution and queues it, as [`Jobs::submit_with`] does with a case; its columns are named by JSON pointers into its template.
+    ///
+    /// # Errors
+    /// As [`Jobs::submit`].
+    pub async fn submit_evolution(
+        &self,
+        mut request: Value,
+        (name, labels): (Option<String>, BTreeMap<String, String>),
+        idempotency_key: Option<String>,
+        options: SubmitOptions,
+    ) -> Result<(Job, bool), JobsError> {
+        if let Some(template) = request.get_mut("template") {
+            *template = self
+                .with_profiles(template.take())
+                .await
+                .map_err(in_template)?;
+        }
+        let check = move |jobs: &Jobs, request: &Value| {
+            let task = Evolution::check(request, &jobs.shared.options.limits)?;
+            let id = jobs.shared.new_id();
+            let seconds = task.expected_seconds();
+            Ok(NewJob {
+                id,
+                tenant: jobs.tenant.clone(),
+                kind: Kind::Evolution,
+                created_at: created_at(id),
+                method: Kind::Evolution.name().to_owned(),
+                outputs: outputs_text(&[]),
+                cost_us: microseconds(seconds),
+                slice_us: microseconds(seconds / f64::from(task.plan.records)),
+                cache_key: None,
+                source: None,
+                body: Bytes::new(),
+                row: false,
+                idempotency: None,
+                traceparent: None,
+                options: SubmitOptions::default(),
+                name,
+                labels,
+            })
+        };
+        self.submit_work(request, false, check, idempotency_key, options)
+            .await
+    }
+
+    /// Checks work and queues it.
+    async fn submit_work(
+        &self,
+        request: Value,
+        small: bool,
+        check: impl FnOnce(&Jobs, &Value) -> Result<NewJob, JobsError> + Send + 'static,
+        idempotency_key: Option<String>,
+        options: SubmitOptions,
+    ) -> Result<(Job, bool), JobsError> {
         let span = self.submit_span();
         let traceparent = span.traceparent();
-        let submitted = self.store_case(case, idempotency_key, options, traceparent);
+        let submitted = self.store_work(
+            request,
+            small,
+            check,
+            (idempotency_key, options, traceparent),
+        );
         span.end(submitted.await, |(job, _)| {
             vec![
                 KeyValue::new("railhead.job.id", job.id.to_string()),
@@ -58,23 +130,25 @@ impl Jobs {
         })
     }
 
-    async fn store_case(
+    async fn store_work(
         &self,
-        case: Value,
-        idempotency_key: Option<String>,
-        options: SubmitOptions,
-        traceparent: Option<Arc<str>>,
+        request: Value,
+        small: bool,
+        check: impl FnOnce(&Jobs, &Value) -> Result<NewJob, JobsError> + Send + 'static,
+        (idempotency_key, options, traceparent): (Option<String>, SubmitOptions, Option<Arc<str>>),
     ) -> Result<(Job, bool), JobsError> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
-        let case = self.with_profiles(case).await?;
         let jobs = self.clone();
-        let small = is_small(&case);
         let read = move || {
-            let digest = || jobs.bound_digest(options.digest(&idempotency::digest(&case)));
+            let digest = || jobs.bound_digest(options.digest(&idempotency::digest(&request)));
             let idempotency = idempotency_key.map(|key| (key, digest()));
-            (jobs.check(&case), serde_json::to_vec(&case), idempotency)
+            (
+                check(&jobs, &request),
+                serde_json::to_vec(&request),
+                idempotency,
+            )
         };
         let (checked, body, idempotency) = if small {
             read()
@@ -98,17 +172,15 @@ impl Jobs {
                 answer => return answer,
             }
         }
-        let mut checked = checked?;
-        self.bind(&mut checked.label.labels).map_err(CaseError)?;
-        let body = Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?);
         let mut new = NewJob {
             idempotency,
             traceparent,
             options,
-            ..self.new_job(checked, body)
+            body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
+            ..checked?
         };
         let id = new.id;
-        if !options.bypass_cache {
+        if !options.bypass_cache && new.cache_key.is_some() {
             self.find_sources(std::iter::once(&mut new)).await?;
         }
         let stored = self.shared.store.enqueue(&new, self.queue_bounds()).await;
@@ -188,6 +260,20 @@ impl Jobs {
             Enqueued::Conflict => Err(JobsError::IdempotencyConflict),
             Enqueued::Refused(refusal) => Err(self.refused(refusal)),
         }
+    }
+}
+
+/// The same faults, of the template of an evolution.
+fn in_template(error: JobsError) -> JobsError {
+    match error {
+        JobsError::Case(CaseError(faults)) => {
+            let moved = faults.into_iter().map(|fault| Fault {
+                pointer: format!("/template{}", fault.pointer),
+                ..fault
+            });
+            CaseError(moved.collect()).into()
+        }
+        error => error,
     }
 }
 

@@ -135,6 +135,22 @@ async fn runs_and_profiles_of_another_tenant_are_answered_like_what_does_not_exi
     let seen = guarded.get(south, "/v1/runs").await;
     assert_eq!(seen.json["runs"], json!([]));
 
+    let evolution = post(north, "/v1/evolutions", &crate::evolutions::request(1)).await;
+    let evolution = evolution
+        .header("location")
+        .expect("an evolution")
+        .to_owned();
+    let id = evolution.rsplit('/').next().unwrap();
+    assert_foreign_is_unknown(
+        &guarded,
+        operations_on("evolutions", id),
+        operations_on("evolutions", NOBODY),
+    )
+    .await;
+    assert_eq!(guarded.get(north, &evolution).await.status, 200);
+    let seen = guarded.get(south, "/v1/evolutions").await;
+    assert_eq!(seen.json["evolutions"], json!([]));
+
     let mut wheel_on_rail = example("wheel-rail.case.json");
     let rail = wheel_on_rail["contact"]["rail"].clone();
     let kept = post(north, "/v1/profiles", &rail).await.json;
@@ -246,7 +262,7 @@ async fn figures_of_the_whole_service_are_for_the_operator() {
     assert!(!answer.text.contains("north"), "no tenant is named");
 }
 
-/// Every path of the contract with a parameter belongs to a job, a batch, a run or a profile, whose operations are all tried below, or
+/// Every path of the contract with a parameter belongs to a job, a batch, a run, an evolution or a profile, whose operations are all tried below, or
 /// concerns no tenant.
 #[test]
 fn whatever_has_an_id_belongs_to_something_of_a_tenant() {
@@ -259,6 +275,7 @@ fn whatever_has_an_id_belongs_to_something_of_a_tenant() {
                 "jobs/{id}",
                 "batches/{id}",
                 "runs/{id}",
+                "evolutions/{id}",
                 "profiles/{digest}",
             ];
             !tried

@@ -28,6 +28,7 @@ mod documents;
 mod errors;
 mod evaluate;
 mod events;
+mod evolutions;
 mod faults;
 mod forces;
 mod formats;

@@ -26,6 +26,8 @@ use crate::contact::solution::words::evolution::Progress;
 
 /// Distance of the points of the sections in mm: a twentieth of a narrow patch, and what measured sections have at the gauge corner.
 pub const SPACING: f64 = 0.25;
+/// Steps of an evolution of usual length.
+const STEPS_USUAL: f64 = 50.0;
 /// Target of the contacts' forces where the template has none: wear coefficients are known far less well.
 const TARGET: f64 = 0.02;
 /// Wheel load in N of a million gross tonnes on an axle with one wheel of that load on each rail.
@@ -66,6 +68,10 @@ pub struct Evolution {
     /// Million gross tonnes over the extent.
     mgt: f64,
     limits: Limits,
+    digest: String,
+    /// Of a state.
+    memory_bytes: u64,
+    state_seconds: f64,
 }
 
 impl Evolution {
@@ -95,12 +101,22 @@ impl Evolution {
             amounts: [0.0; 2],
             mgt: 0.0,
             limits: *limits,
+            digest: String::new(),
+            memory_bytes: 0,
+            state_seconds: 0.0,
         };
         evolution.place_rail();
         let first = evolution.check_rows(limits)?;
         if let Some(damage) = &first.run.after.damage {
             evolution.figures = damage.used();
         }
+        let cost = first.cost();
+        (evolution.memory_bytes, evolution.state_seconds) = (cost.own_bytes(), cost.seconds);
+        // That of the case contains the revision of the solver.
+        let mut digest = blake3::Hasher::new();
+        digest.update(first.label.digest.as_bytes());
+        digest.update(value.to_string().as_bytes());
+        evolution.digest = digest.finalize().to_hex().to_string();
         evolution.read_events()?;
         evolution.weigh()?;
         Ok(evolution)
@@ -226,6 +242,28 @@ impl Evolution {
         self.mgt = axles * mean.unwrap_or(0.0) / NEWTONS_PER_MGT;
         self.amounts = [axles, extent.wheel_distance_km.unwrap_or(0.0) * 1e6];
         Ok(())
+    }
+
+    /// Hexadecimal digest of the evolution and of the solver.
+    #[must_use]
+    pub fn digest(&self) -> String {
+        self.digest.clone()
+    }
+
+    /// Memory in bytes that one thread takes to solve a state.
+    #[must_use]
+    pub fn memory_bytes(&self) -> u64 {
+        self.memory_bytes
+    }
+
+    /// Rough solve time in s on one core: two solves of each state for each step that the records need.
+    #[must_use]
+    pub fn expected_seconds(&self) -> f64 {
+        let states = self
+            .shares
+            .len()
+            .min(self.plan.accuracy.states_max as usize);
+        2.0 * states as f64 * f64::from(self.plan.records).max(STEPS_USUAL) * self.state_seconds
     }
 
     /// Rail and wheel at the start.

@@ -9,6 +9,7 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::http::dto::result::JobResult;
 use crate::http::problem::body::ProblemBody;
 use crate::jobs::model::job::{Job, QueuePlace, State as JobState};
+use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::Priority;
 
 /// A job as the client sees it. Times are RFC 3339 in UTC with milliseconds.
@@ -103,8 +104,11 @@ impl JobAnswer {
 
 /// What can be done with a job in its present state.
 fn links(job: &Job) -> BTreeMap<String, String> {
-    let own = format!("/v1/jobs/{}", job.id);
-    let mut links = BTreeMap::from([("case".to_owned(), format!("{own}/case"))]);
+    let (own, asked) = match job.kind {
+        Kind::Evolution => (format!("/v1/evolutions/{}", job.id), "request"),
+        _ => (format!("/v1/jobs/{}", job.id), "case"),
+    };
+    let mut links = BTreeMap::from([(asked.to_owned(), format!("{own}/{asked}"))]);
     links.insert("events".to_owned(), format!("{own}/events"));
     if job.state == JobState::Succeeded {
         links.insert("result".to_owned(), format!("{own}/result"));

@@ -165,6 +165,7 @@ pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, Api
         created_after: query.created_after,
         created_before: query.created_before,
         updated_after: query.updated_after,
+        ..Filter::default()
     };
     let limit = query.limit.unwrap_or(LIST_LIMIT_DEFAULT);
     let page = jobs.list(&filter, query.cursor.as_deref(), limit).await?;

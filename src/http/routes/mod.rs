@@ -9,6 +9,7 @@ pub(super) mod damage;
 pub(super) mod evaluate;
 pub(super) mod event_stream;
 pub(super) mod events;
+pub(super) mod evolutions;
 pub(super) mod fields;
 pub(super) mod job_list;
 pub(super) mod jobs;

@@ -26,7 +26,7 @@ use crate::jobs::attempts::gate::Gate;
 use crate::jobs::attempts::lease::GroupLease;
 use crate::jobs::attempts::outcome::Outcome;
 use crate::jobs::attempts::running::RunningEntry;
-use crate::jobs::attempts::slices::SlicedCase;
+use crate::jobs::attempts::slices::SlicedWork;
 use crate::jobs::attempts::solver_thread::SolverThread;
 use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::Claim;
@@ -41,7 +41,7 @@ pub(crate) struct Member {
     /// Its case, until it is handed to a thread.
     pub(crate) case: Option<ClaimedCase>,
     /// What it goes on with, once it is known.
-    pub(crate) sliced: Option<Box<SlicedCase>>,
+    pub(crate) sliced: Option<Box<SlicedWork>>,
     pub(crate) _listed: RunningEntry,
 }
 

@@ -92,7 +92,8 @@ impl FairTurns {
                         kind,
                     })
                 };
-                let of_tenant = of_kind(Kind::Case) + of_kind(Kind::Rows);
+                let of_tenant =
+                    of_kind(Kind::Case) + of_kind(Kind::Rows) + of_kind(Kind::Evolution);
                 ([of_tenant, used(&queue)], queue)
             })
             .collect();

@@ -2,7 +2,7 @@
 
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::remark::entry::RemarkEntry;
-use crate::jobs::attempts::slices::SlicedCase;
+use crate::jobs::attempts::slices::SlicedWork;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::model::job::Failure;
 use crate::jobs::store::ending::SliceRecord;
@@ -19,7 +19,7 @@ pub(crate) enum Outcome {
     },
     /// The next slice of a sweep, in its stored form, if one was solved; there is more to be done.
     Slice {
-        sliced: Box<SlicedCase>,
+        sliced: Box<SlicedWork>,
         part: Option<(SliceRecord, EncodedResult)>,
     },
     /// The solver gave up or was stopped.
@@ -38,9 +38,9 @@ pub(crate) enum Work {
     /// Check the case, of which this is stored, and solve what comes next.
     New(StoredCase, Vec<SliceRecord>),
     /// Solve the next slice.
-    Next(Box<SlicedCase>),
+    Next(Box<SlicedWork>),
     /// All slices are solved: put the parts of the answer together.
-    Join(Box<SlicedCase>, Vec<EncodedResult>),
+    Join(Box<SlicedWork>, Vec<EncodedResult>),
 }
 
 /// What clients read of a failure of the service itself.

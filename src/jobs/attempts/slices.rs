@@ -5,7 +5,11 @@
 use std::ops::Range;
 use std::time::Duration;
 
+use crate::contact::error::SolveError;
+use crate::contact::evolution::task::{Evolution, SolveContext};
+use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
 use crate::jobs::store::ending::SliceRecord;
 
 /// A checked case with its slices, of which the first `done` are stored.
@@ -82,6 +86,149 @@ impl SlicedCase {
     /// Are these parts as many as there are slices?
     pub(crate) fn is_whole(&self, parts: usize) -> bool {
         parts == self.slices.len()
+    }
+}
+
+/// Steps of an evolution that are stored together, unless a record ends them before.
+const STEPS: u32 = 16;
+
+/// An evolution between two slices.
+#[derive(Debug)]
+pub(crate) struct SlicedEvolution {
+    pub(crate) task: Evolution,
+    /// Where it stands; nothing if that has to be read from the last slice.
+    pub(crate) state: Option<EvolutionState>,
+    /// Slices stored.
+    done: u32,
+    /// Tells this evolution and its solver.
+    digest: String,
+    /// Solver time up to the end of what is stored.
+    pub(crate) spent: Duration,
+}
+
+impl SlicedEvolution {
+    /// An evolution of which this is stored. What another solver stored is left aside.
+    pub(crate) fn new(task: Evolution, digest: String, stored: &[SliceRecord]) -> SlicedEvolution {
+        let fits = |note: &SliceRecord| note.digest == digest;
+        let done = if stored.iter().all(fits) {
+            stored.len()
+        } else {
+            0
+        };
+        let last = done.checked_sub(1).and_then(|last| stored.get(last));
+        SlicedEvolution {
+            state: last.is_none().then(|| task.begin()),
+            done: u32::try_from(done).unwrap_or(u32::MAX),
+            spent: last.map_or(Duration::ZERO, |note| note.spent),
+            task,
+            digest,
+        }
+    }
+
+    /// Takes steps up to the next record, and returns it, or so many that they are worth being stored.
+    ///
+    /// # Errors
+    /// Those of a step.
+    pub(crate) fn steps(
+        &mut self,
+        context: &SolveContext,
+        monitor: &(dyn Monitor + Sync),
+    ) -> Result<Option<EvolutionRecord>, SolveError> {
+        let mut state = self.state.take().unwrap_or_else(|| self.task.begin());
+        let mut found = None;
+        for _ in 0..STEPS {
+            let (next, record) = self.task.step(context, &state, monitor)?;
+            state = next;
+            found = record;
+            if found.is_some() || self.task.is_over(&state) {
+                break;
+            }
+        }
+        self.state = Some(state);
+        Ok(found)
+    }
+
+    /// What is to be noted of the slice that was solved last, when the job had taken so long.
+    pub(crate) fn note(&self, spent: Duration) -> SliceRecord {
+        SliceRecord {
+            number: self.done,
+            motions: self.state.as_ref().map_or(0, |state| state.steps),
+            digest: self.digest.clone(),
+            spent,
+        }
+    }
+
+    /// Is everything solved?
+    pub(crate) fn is_over(&self) -> bool {
+        self.state
+            .as_ref()
+            .is_some_and(|state| self.task.is_over(state))
+    }
+
+    /// Are these parts as many as there are slices?
+    pub(crate) fn is_whole(&self, parts: usize) -> bool {
+        parts == self.done as usize
+    }
+}
+
+/// Work that is solved slice by slice.
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "it is always boxed")]
+pub(crate) enum SlicedWork {
+    /// A case, cut by its motions.
+    Case(SlicedCase),
+    /// An evolution, cut by its steps.
+    Evolution(SlicedEvolution),
+}
+
+impl SlicedWork {
+    /// Nothing can be done before the stored parts are read: all is solved, or it is not known where to go on.
+    pub(crate) fn waits_for_parts(&self) -> bool {
+        match self {
+            SlicedWork::Case(case) => case.next().is_none(),
+            SlicedWork::Evolution(evolution) => evolution.state.is_none() || evolution.is_over(),
+        }
+    }
+
+    /// Part that is done once the slice that was solved last is stored, 0 to 1.
+    pub(crate) fn done_after_next(&self) -> f64 {
+        match self {
+            SlicedWork::Case(case) => case.done_after_next(),
+            SlicedWork::Evolution(evolution) => {
+                evolution.state.as_ref().map_or(0.0, |state| state.share)
+            }
+        }
+    }
+
+    /// Expected time in s that is left once this part is done.
+    pub(crate) fn seconds_left(&self, done: f64) -> f64 {
+        (1.0 - done)
+            * match self {
+                SlicedWork::Case(case) => case.checked.cost().seconds,
+                SlicedWork::Evolution(evolution) => evolution.task.expected_seconds(),
+            }
+    }
+
+    /// The slice that was solved last is stored.
+    pub(crate) fn advance(&mut self, spent: Duration) {
+        match self {
+            SlicedWork::Case(case) => case.advance(spent),
+            SlicedWork::Evolution(evolution) => {
+                evolution.done += 1;
+                evolution.spent = spent;
+            }
+        }
+    }
+
+    /// What is stored cannot be used.
+    pub(crate) fn begin_again(&mut self) {
+        match self {
+            SlicedWork::Case(case) => case.begin_again(),
+            SlicedWork::Evolution(evolution) => {
+                evolution.done = 0;
+                evolution.state = Some(evolution.task.begin());
+            }
+        }
     }
 }
 

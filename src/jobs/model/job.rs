@@ -8,6 +8,7 @@ use uuid::Uuid;
 
 use crate::contact::error::SolveError;
 use crate::contact::remark::entry::RemarkEntry;
+use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::Priority;
 
 /// What is known of one job. Times are epoch milliseconds (UTC).
@@ -17,6 +18,8 @@ pub struct Job {
     pub id: Uuid,
     /// Whose it is.
     pub tenant: String,
+    /// [`Kind::Case`], [`Kind::Evolution`], or [`Kind::Rows`] for a chunk of a run.
+    pub kind: Kind,
     /// Where it stands.
     pub state: State,
     /// Free text of the client.

@@ -3,14 +3,17 @@
 use std::sync::Arc;
 
 /// A kind of work.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub enum Kind {
     /// One case: a job.
+    #[default]
     Case,
     /// Many cases: a batch, each case of which is a job.
     Cases,
     /// Many rows over one case: a run, which is solved in chunks of rows.
     Rows,
+    /// Profiles that wear step by step: one job, whose slices are steps.
+    Evolution,
 }
 
 impl Kind {
@@ -21,6 +24,7 @@ impl Kind {
             Kind::Case => "case",
             Kind::Cases => "cases",
             Kind::Rows => "rows",
+            Kind::Evolution => "evolution",
         }
     }
 
@@ -31,13 +35,14 @@ impl Kind {
             Kind::Case => "job",
             Kind::Cases => "batch",
             Kind::Rows => "run",
+            Kind::Evolution => "evolution",
         }
     }
 
     /// The kind with this name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Kind> {
-        let mut all = [Kind::Case, Kind::Cases, Kind::Rows].into_iter();
+        let mut all = [Kind::Case, Kind::Cases, Kind::Rows, Kind::Evolution].into_iter();
         all.find(|kind| kind.name() == name)
     }
 
@@ -47,15 +52,16 @@ impl Kind {
         match self {
             Kind::Case | Kind::Cases => Kind::Case,
             Kind::Rows => Kind::Rows,
+            Kind::Evolution => Kind::Evolution,
         }
     }
 }
 
-/// A queue of jobs. The jobs of a tenant and the chunks of its runs wait in one each, so that neither holds up the other.
+/// A queue of jobs. The jobs of a tenant, the chunks of its runs and its evolutions wait in one each, so that none holds up the others.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Queue {
     /// The tenant.
     pub tenant: Arc<str>,
-    /// [`Kind::Case`] or [`Kind::Rows`].
+    /// [`Kind::Case`], [`Kind::Rows`] or [`Kind::Evolution`].
     pub kind: Kind,
 }

@@ -8,6 +8,8 @@ use crate::jobs::model::kind::Kind;
 /// Which jobs to list; everything left out does not restrict.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
+    /// [`Kind::Case`] or [`Kind::Evolution`].
+    pub kind: Kind,
     /// Only jobs in one of these states; any if there is none.
     pub states: Vec<State>,
     /// Only jobs of this batch.

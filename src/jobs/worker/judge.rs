@@ -5,7 +5,7 @@ use crate::contact::error::SolveError;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::attempts::outcome::{INTERNAL, Outcome};
-use crate::jobs::attempts::slices::SlicedCase;
+use crate::jobs::attempts::slices::SlicedWork;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::model::job::{Failure, FailureKind, too_late};
 use crate::jobs::store::ending::{Ending, SliceRecord};
@@ -15,7 +15,7 @@ pub(crate) enum Verdict {
     /// Store a solved slice, if there is one; the case is not solved whole. With a reason to stop it is released then, without
     /// one the next slice is solved.
     StoreSlice {
-        sliced: Box<SlicedCase>,
+        sliced: Box<SlicedWork>,
         part: Option<(SliceRecord, EncodedResult)>,
         stopped: Option<StopReason>,
     },
@@ -95,6 +95,7 @@ pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
 mod tests {
     use super::*;
     use crate::contact::error::CaseError;
+    use crate::jobs::attempts::slices::SlicedCase;
 
     fn checked() -> crate::contact::problem::checked_case::CheckedCase {
         let case = serde_json::json!({
@@ -139,7 +140,11 @@ mod tests {
             field_patches: 0,
         };
         let slice = || Outcome::Slice {
-            sliced: Box::new(SlicedCase::new(checked(), vec![0..1, 1..2], &[])),
+            sliced: Box::new(SlicedWork::Case(SlicedCase::new(
+                checked(),
+                vec![0..1, 1..2],
+                &[],
+            ))),
             part: None,
         };
         let broken = || Outcome::Broken(Failure::new(FailureKind::Panic, "boom"));

@@ -2,6 +2,7 @@
 
 pub mod begin;
 pub mod claim_loop;
+pub mod evolution;
 pub mod heartbeat;
 pub mod judge;
 pub mod pool;

@@ -4,7 +4,7 @@ use uuid::Uuid;
 
 use crate::jobs::attempts::attempt::Attempt;
 use crate::jobs::attempts::outcome::Work;
-use crate::jobs::attempts::slices::SlicedCase;
+use crate::jobs::attempts::slices::SlicedWork;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
 use crate::jobs::storage_fault::StoragePlace;
@@ -26,7 +26,7 @@ impl Worker {
         &self,
         attempt: &mut Attempt,
         place: usize,
-        mut sliced: Box<SlicedCase>,
+        mut sliced: Box<SlicedWork>,
         part: Option<(SliceRecord, EncodedResult)>,
     ) -> Result<SliceFate, JobsError> {
         let shared = &self.shared;
@@ -48,7 +48,7 @@ impl Worker {
                 }
             };
             let slice = NewSlice {
-                rest_us: u64::from(microseconds(sliced.checked.cost().seconds * (1.0 - done))),
+                rest_us: u64::from(microseconds(sliced.seconds_left(done))),
                 note,
                 result,
                 done,
@@ -76,9 +76,9 @@ impl Worker {
     pub(crate) async fn next_of(
         &self,
         id: Uuid,
-        mut sliced: Box<SlicedCase>,
+        mut sliced: Box<SlicedWork>,
     ) -> Result<Work, JobsError> {
-        if sliced.next().is_some() {
+        if !sliced.waits_for_parts() {
             return Ok(Work::Next(sliced));
         }
         match self.parts(id).await {

@@ -12,7 +12,7 @@ use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::{Fields, PatchFields};
 use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::attempts::outcome::{INTERNAL, Outcome, Work};
-use crate::jobs::attempts::slices::SlicedCase;
+use crate::jobs::attempts::slices::{SlicedCase, SlicedWork};
 use crate::jobs::codec::encode::encode;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
@@ -21,14 +21,20 @@ use crate::jobs::model::kind::Kind;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
-use crate::jobs::worker::rows;
+use crate::jobs::worker::{evolution, rows};
 
 /// Does the work; a panic becomes a failure and the thread stays usable.
 pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Work) -> Outcome {
     let done = catch_unwind(AssertUnwindSafe(|| match work {
         Work::New(stored, notes) => check_and_solve(shared, control, &stored, &notes),
-        Work::Next(sliced) => solve_next(shared, control, sliced),
-        Work::Join(sliced, parts) => join_parts(shared, control, sliced, &parts),
+        Work::Next(sliced) => match *sliced {
+            SlicedWork::Case(case) => solve_next(shared, control, case),
+            SlicedWork::Evolution(own) => evolution::advance(shared, control, own),
+        },
+        Work::Join(sliced, parts) => match *sliced {
+            SlicedWork::Case(case) => join_parts(shared, control, case, &parts),
+            SlicedWork::Evolution(own) => evolution::join(shared, control, own, &parts),
+        },
     }));
     done.unwrap_or_else(|payload| {
         // What a defect says of the program is for the log, not for clients.
@@ -49,8 +55,10 @@ fn check_and_solve(
     stored: &StoredCase,
     notes: &[SliceRecord],
 ) -> Outcome {
-    if stored.kind == Kind::Rows {
-        return rows::solve_chunk(shared, control, stored);
+    match stored.kind {
+        Kind::Rows => return rows::solve_chunk(shared, control, stored),
+        Kind::Evolution => return evolution::begin(shared, control, stored, notes),
+        Kind::Case | Kind::Cases => {}
     }
     let case = match stored.value() {
         Ok(case) => case,
@@ -64,15 +72,12 @@ fn check_and_solve(
     checked.run.time_limit = Some(checked.run.time_limit.map_or(limit, |time| time.min(limit)));
     control.set_memory_bytes(checked.cost().own_bytes());
     let slices = (shared.engine.slices)(&checked);
-    solve_next(
-        shared,
-        control,
-        Box::new(SlicedCase::new(checked, slices, notes)),
-    )
+    solve_next(shared, control, SlicedCase::new(checked, slices, notes))
 }
 
-fn solve_next(shared: &Shared, control: &AttemptControl, sliced: Box<SlicedCase>) -> Outcome {
+fn solve_next(shared: &Shared, control: &AttemptControl, sliced: SlicedCase) -> Outcome {
     let Some(slice) = sliced.next() else {
+        let sliced = Box::new(SlicedWork::Case(sliced));
         return Outcome::Slice { sliced, part: None };
     };
     control.begin(sliced.spent);
@@ -88,7 +93,7 @@ fn solve_next(shared: &Shared, control: &AttemptControl, sliced: Box<SlicedCase>
     match encoded(&solution, &fields) {
         Ok(part) => Outcome::Slice {
             part: Some((sliced.note(spent), part)),
-            sliced,
+            sliced: Box::new(SlicedWork::Case(sliced)),
         },
         Err(reason) => internal(&reason),
     }
@@ -97,7 +102,7 @@ fn solve_next(shared: &Shared, control: &AttemptControl, sliced: Box<SlicedCase>
 fn join_parts(
     shared: &Shared,
     control: &AttemptControl,
-    mut sliced: Box<SlicedCase>,
+    mut sliced: SlicedCase,
     parts: &[EncodedResult],
 ) -> Outcome {
     let joined = match sliced.is_whole(parts.len()) {
@@ -112,6 +117,7 @@ fn join_parts(
         Err(error) => {
             tracing::error!(%error, "the slices of a sweep cannot be used; it is solved again");
             sliced.begin_again();
+            let sliced = Box::new(SlicedWork::Case(sliced));
             Outcome::Slice { sliced, part: None }
         }
     }

@@ -53,6 +53,12 @@ const STEPS: &[Step] = &[
         // Earlier programs look for runs under a tenant that no longer has them.
         readable_from: 6,
     },
+    Step {
+        form: 7,
+        statements: include_str!("steps/7.sql"),
+        // Earlier programs cannot read the kind of an evolution.
+        readable_from: 7,
+    },
 ];
 
 /// The form that is read and written.

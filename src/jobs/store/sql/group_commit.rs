@@ -215,6 +215,7 @@ fn queued(new: &NewJob) -> Job {
     Job {
         id: new.id,
         tenant: new.tenant.to_string(),
+        kind: new.kind,
         state: State::Queued,
         name: new.name.clone(),
         labels: new.labels.clone(),

@@ -28,7 +28,7 @@ impl ClientJobs for SqlStore {
                 "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
                  ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
                  cancel_requested = 1, version = version + 1, updated_at = $1 \
-                 WHERE id = $2 AND tenant = $3 AND kind = 'case' AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
+                 WHERE id = $2 AND tenant = $3 AND kind <> 'rows' AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
                 job_columns!(),
                 ", slices"
             ))
@@ -51,7 +51,7 @@ impl ClientJobs for SqlStore {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
             let gone = query(
-                "DELETE FROM jobs WHERE id = $1 AND tenant = $2 AND kind = 'case' AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id",
+                "DELETE FROM jobs WHERE id = $1 AND tenant = $2 AND kind <> 'rows' AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id",
             )
             .bind(id.to_string())
             .bind(tenant)
@@ -92,7 +92,7 @@ impl ClientJobs for SqlStore {
                 job_columns!(),
                 ", blob_id, field_patches, outputs, blob_key, blob_bytes, solution, fields FROM jobs LEFT JOIN \
                  (SELECT id AS blob, key AS blob_key, bytes AS blob_bytes, solution, fields FROM blobs) AS stored ON blob = blob_id \
-                 WHERE id = $1 AND tenant = $2 AND kind = 'case'"
+                 WHERE id = $1 AND tenant = $2 AND kind <> 'rows'"
             ))
             .bind(id.to_string())
             .bind(tenant)

@@ -105,7 +105,7 @@ impl SqlStore {
             let mut query = if restricted {
                 count_query(tenant, filter, state)
             } else {
-                kept_count_query(tenant, state)
+                kept_count_query(tenant, filter, state)
             };
             let row = query.build().fetch_one(&self.readers).await?;
             let number = read_count(&row, "number")?;
@@ -194,11 +194,12 @@ fn count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuil
 }
 
 /// The counts that the database keeps itself.
-fn kept_count_query(tenant: &str, state: Option<State>) -> QueryBuilder {
+fn kept_count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuilder {
     let mut query = QueryBuilder::new(
-        "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts WHERE kind = 'case' AND tenant = ",
+        "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts WHERE tenant = ",
     );
     query.push_bind(tenant.to_owned());
+    query.push(" AND kind = ").push_bind(filter.kind.name());
     if let Some(state) = state {
         query.push(" AND state = ").push_bind(state.name());
     }
@@ -232,10 +233,11 @@ fn walk(
     // Within a batch one of its indices is walked, not that of the tenant: a bare expression keeps that out.
     let owner = match (label, filter.batch) {
         (Some(_), _) => "of_tenant = ",
-        (None, Some(_)) => concat!("kind = 'case' AND ", bare!("tenant"), " = "),
-        (None, None) => "kind = 'case' AND tenant = ",
+        (None, Some(_)) => concat!(bare!("tenant"), " = "),
+        (None, None) => "tenant = ",
     };
     and(query, owner, tenant.to_owned());
+    and(query, "kind = ", filter.kind.name().to_owned());
     if let Some((key, value)) = label {
         and(query, "key = ", key.clone());
         and(query, "value = ", value.clone());

@@ -15,7 +15,7 @@ use crate::jobs::store_error::StoreError;
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {
     () => {
-        "id, tenant, state, name, labels, batch_id, created_at, updated_at, started_at, ended_at, attempt, progress, remarks, failure, cached, version, rank, deadline"
+        "id, tenant, kind, state, name, labels, batch_id, created_at, updated_at, started_at, ended_at, attempt, progress, remarks, failure, cached, version, rank, deadline"
     };
 }
 pub(crate) use job_columns;
@@ -27,6 +27,7 @@ pub(crate) fn read_job(row: &DbRow) -> Result<Job, StoreError> {
     Ok(Job {
         id: read_id(row)?,
         tenant: row.try_get("tenant")?,
+        kind: read_kind(row)?,
         state: read_state(row)?,
         name: row.try_get("name")?,
         labels: from_json(row.try_get("labels")?)?,
@@ -149,5 +150,5 @@ pub(crate) fn fence(claim: &Claim) -> i64 {
 pub(crate) const GET: &str = concat!(
     "SELECT ",
     job_columns!(),
-    " FROM jobs WHERE id = $1 AND tenant = $2 AND kind = 'case'"
+    " FROM jobs WHERE id = $1 AND tenant = $2 AND kind <> 'rows'"
 );

@@ -22,6 +22,7 @@ const FIRST_FORM: i64 = 7;
 const STEPS: &[(i64, &str)] = &[
     (8, include_str!("steps/8.sql")),
     (9, include_str!("steps/9.sql")),
+    (10, include_str!("steps/10.sql")),
 ];
 
 /// The form that is read and written.

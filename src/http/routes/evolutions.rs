@@ -1,0 +1,618 @@
+//! `/v1/evolutions`: profiles that wear under a traffic, as work of their own.
+
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use crate::contact::error::{CaseError, Fault};
+use crate::contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord, WornBody};
+use crate::http::dto::evolution::EvolutionRequest;
+use crate::http::dto::job::JobAnswer;
+use crate::http::extract::accept::{choose, one_of};
+use crate::http::extract::caller::Caller;
+use crate::http::extract::ids::JobId;
+use crate::http::extract::json::JsonBody;
+use crate::http::extract::labels::{name, new_label};
+use crate::http::extract::query::{Parameters, Repeated, count, query, reader};
+use crate::http::extract::submit_options::SubmitQuery;
+use crate::http::extract::titles::place;
+use crate::http::limits::holding_body::hold_while_sent;
+use crate::http::limits::memory::Memory;
+use crate::http::limits::shares::Share;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+use crate::http::render::format::Format;
+use crate::http::render::row_tables::{RowWriter, WriteError};
+use crate::http::routes::batches::labels_of;
+use crate::http::routes::event_stream::EventRequest;
+use crate::http::routes::events::{JobEventSent, job as follow_job};
+use crate::http::routes::job_list::{ListProblems, ListTotal, ListedJob};
+use crate::http::routes::jobs::{
+    DeleteProblems, GetProblems, SubmitProblems, cancel as cancel_job, delete as delete_job,
+    get as get_job, idempotency_key, mark_replay,
+};
+use crate::http::routes::next_page::{answer, list_query};
+use crate::http::routes::results::ResultProblems;
+use crate::http::routes::wait::{Wait, WaitQuery};
+use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+use crate::jobs::model::kind::Kind;
+use crate::jobs::store::list::Filter;
+use crate::jobs::{Jobs, JobsError};
+
+/// Evolutions in one page of a list when nothing is said.
+const LIST_LIMIT_DEFAULT: u32 = 20;
+/// The forms of the tables.
+const TABLES: &[Format] = &[Format::Csv, Format::Ndjson, Format::Arrow, Format::Parquet];
+
+query! {
+    /// What the query of a submission says about the evolution itself.
+    EvolutionQuery(() => ()) {
+        /// Name of the evolution
+        #[param(min_length = 1, max_length = 200, example = "grinding at 10 MGT")]
+        name: String as String = name();
+        /// A label of the evolution, written `key:value`; may be repeated, for at most 32 labels with different keys
+        #[param(max_items = 32, example = json!(["line:A12"]))]
+        label: Vec<(String, String)> as Vec<String> = Repeated(new_label());
+    }
+}
+
+/// Submits an evolution: profiles that wear under a traffic, step by step.
+///
+/// An evolution is followed, waited for, cancelled and deleted like a job. Its steps are stored as they are taken, and one that is interrupted goes
+/// on from the last of them to the same answer.
+#[utoipa::path(
+    post,
+    path = "/v1/evolutions",
+    tag = "evolutions",
+    operation_id = "submit_evolution",
+    params(
+        EvolutionQuery,
+        SubmitQuery,
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10"),
+        ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same evolution and the same options answers the first one instead of making another"),
+        ("traceparent" = Option<String>, Header, description = "W3C trace context: if the service exports traces, the trace of the evolution continues the client's trace. An unreadable value is ignored", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
+    ),
+    request_body(content = EvolutionRequest, description = "Case, traffic and plan", content_type = "application/json"),
+    responses(
+        (status = 202, description = "The evolution is stored and will be solved", body = JobAnswer, headers(
+            ("Location" = String, description = "Path of the evolution"),
+            ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for"),
+            ("Idempotency-Replayed" = String, description = "`true` if this is the evolution of an earlier request with the same `Idempotency-Key`; absent otherwise")
+        )),
+        (status = 200, description = "The evolution ended within the wait", body = JobAnswer, headers(
+            ("Location" = String, description = "Path of the evolution"),
+            ("Preference-Applied" = String, description = "The wait that was applied"),
+            ("Idempotency-Replayed" = String, description = "`true` if this is the evolution of an earlier request with the same `Idempotency-Key`; absent otherwise")
+        )),
+        SubmitProblems
+    )
+)]
+pub(crate) async fn submit(
+    Caller(jobs): Caller,
+    uri: Uri,
+    wait: Wait,
+    headers: HeaderMap,
+    JsonBody { mut value, room }: JsonBody,
+) -> Result<Response, ApiError> {
+    let jobs = jobs.of_kind(Kind::Evolution);
+    let key = idempotency_key(&headers)?;
+    let ((own, submit), _) = <((EvolutionQuery, SubmitQuery), WaitQuery)>::read(&uri, &())?;
+    let mut labels = labels_of(own.label.unwrap_or_default())?;
+    jobs.bind(&mut labels)
+        .map_err(|faults| ApiError::bad_parameter("label", faults[0].detail.clone()))?;
+    name_columns(&mut value)?;
+    let options = submit.options(&headers);
+    let named = (own.name, labels);
+    let (mut job, replayed) = jobs.submit_evolution(value, named, key, options).await?;
+    drop(room);
+    let id = job.id;
+    let location = [(header::LOCATION, format!("/v1/evolutions/{id}"))];
+    // The evolution is stored: whatever ends the wait early, the client must learn its id.
+    let waited = wait.hold(&jobs, async |at_most| jobs.wait(id, at_most).await);
+    if let Ok(Some(Ok(later))) = waited.await {
+        job = later;
+    }
+    let status = match job.state.ended() && wait.at_most().is_some() {
+        true => StatusCode::OK,
+        false => StatusCode::ACCEPTED,
+    };
+    let mut response = (status, location, Json(JobAnswer::new(job))).into_response();
+    mark_replay(&mut response, replayed);
+    Ok(wait.tell_applied(response))
+}
+
+/// Names the columns of the traffic by JSON pointers, in the units of the case. What is no table is left to the check.
+fn name_columns(request: &mut Value) -> Result<(), ApiError> {
+    let columns = request.pointer_mut("/traffic/columns");
+    let Some(Value::Object(columns)) = columns else {
+        return Ok(());
+    };
+    let (mut named, mut faults) = (Map::new(), Vec::new());
+    for (title, mut values) in std::mem::take(columns) {
+        let fault = |detail: String| {
+            let title = title.replace('~', "~0").replace('/', "~1");
+            Fault::new(format!("/traffic/columns/{title}"), detail)
+        };
+        match place(&title, None) {
+            Ok(Some(found)) => {
+                for value in values.as_array_mut().into_iter().flatten() {
+                    if let Some(number) = value.as_f64().filter(|_| found.factor != 1.0) {
+                        *value = (found.factor * number).into();
+                    }
+                }
+                if named.insert(found.pointer.clone(), values).is_some() {
+                    faults.push(fault(format!("a second column for `{}`", found.pointer)));
+                }
+            }
+            Ok(None) => faults.push(fault(
+                "names nothing in the case; allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs".to_owned(),
+            )),
+            Err(detail) => faults.push(fault(detail)),
+        }
+    }
+    match faults.is_empty() {
+        true => {
+            *columns = named;
+            Ok(())
+        }
+        false => Err(JobsError::from(CaseError(faults)).into()),
+    }
+}
+
+/// A page of evolutions, newest first.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct EvolutionPage {
+    /// The evolutions of this page.
+    #[schema(value_type = Vec<ListedJob>)]
+    evolutions: Vec<JobAnswer>,
+    /// Give this as `cursor` for the next page; null on the last one.
+    next_cursor: Option<String>,
+    #[serde(flatten)]
+    count: ListTotal,
+}
+
+list_query! {
+    /// Filters and page of a list of evolutions.
+    EvolutionListQuery {
+        /// Evolutions in one page; 20 when left out
+        #[param(minimum = 1, maximum = 100)]
+        limit: u32 as u32 = count(1, 100);
+    }
+}
+
+/// Lists evolutions, newest first.
+#[utoipa::path(
+    get,
+    path = "/v1/evolutions",
+    tag = "evolutions",
+    operation_id = "list_evolutions",
+    params(EvolutionListQuery),
+    responses((status = 200, description = "A page of evolutions", body = EvolutionPage, headers(
+        ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
+    )), ListProblems)
+)]
+pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
+    let query = EvolutionListQuery::read(&uri, &())?;
+    let filter = Filter {
+        labels: query.label.unwrap_or_default(),
+        name: query.name,
+        created_after: query.created_after,
+        created_before: query.created_before,
+        ..Filter::default()
+    };
+    let limit = query.limit.unwrap_or(LIST_LIMIT_DEFAULT);
+    let jobs = jobs.of_kind(Kind::Evolution);
+    let page = jobs.list(&filter, query.cursor.as_deref(), limit).await?;
+    let cursor = page.next_cursor.clone();
+    let page = EvolutionPage {
+        evolutions: page.entries.into_iter().map(JobAnswer::new).collect(),
+        next_cursor: page.next_cursor,
+        count: page.total.into(),
+    };
+    Ok(answer(&uri, cursor.as_deref(), page))
+}
+
+/// Returns an evolution.
+#[utoipa::path(
+    get,
+    path = "/v1/evolutions/{id}",
+    tag = "evolutions",
+    operation_id = "get_evolution",
+    params(
+        ("id" = String, Path, description = "Id of the evolution", format = "uuid"),
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
+    ),
+    responses((status = 200, description = "The evolution", body = JobAnswer, headers(
+        ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
+    )), GetProblems)
+)]
+pub(crate) async fn get(Caller(jobs): Caller, id: JobId, wait: Wait) -> Result<Response, ApiError> {
+    get_job(Caller(jobs.of_kind(Kind::Evolution)), id, wait).await
+}
+
+/// An evolution as it was submitted, with the columns of its traffic named by JSON pointers.
+#[utoipa::path(
+    get,
+    path = "/v1/evolutions/{id}/request",
+    tag = "evolutions",
+    operation_id = "get_evolution_request",
+    params(("id" = String, Path, description = "Id of the evolution", format = "uuid")),
+    responses((status = 200, description = "Case, traffic and plan", body = EvolutionRequest), GetProblems)
+)]
+pub(crate) async fn request(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
+    let text = jobs.of_kind(Kind::Evolution).case(id).await?;
+    Ok(([(header::CONTENT_TYPE, Format::Json.media_type())], text).into_response())
+}
+
+/// Stops a queued or running evolution. One that has already ended stays as it is.
+#[utoipa::path(
+    post,
+    path = "/v1/evolutions/{id}/cancel",
+    tag = "evolutions",
+    operation_id = "cancel_evolution",
+    params(("id" = String, Path, description = "Id of the evolution", format = "uuid")),
+    responses(
+        (status = 200, description = "The evolution has ended", body = JobAnswer),
+        (status = 202, description = "The running evolution will stop shortly", body = JobAnswer),
+        GetProblems
+    )
+)]
+pub(crate) async fn cancel(Caller(jobs): Caller, id: JobId) -> Result<Response, ApiError> {
+    cancel_job(Caller(jobs.of_kind(Kind::Evolution)), id).await
+}
+
+/// Removes an ended evolution with its answer.
+#[utoipa::path(
+    delete,
+    path = "/v1/evolutions/{id}",
+    tag = "evolutions",
+    operation_id = "delete_evolution",
+    params(("id" = String, Path, description = "Id of the evolution", format = "uuid")),
+    responses((status = 204, description = "The evolution is gone"), DeleteProblems)
+)]
+pub(crate) async fn delete(Caller(jobs): Caller, id: JobId) -> Result<StatusCode, ApiError> {
+    delete_job(Caller(jobs.of_kind(Kind::Evolution)), id).await
+}
+
+/// Follows an evolution, as the events of a job.
+#[utoipa::path(
+    get,
+    path = "/v1/evolutions/{id}/events",
+    tag = "evolutions",
+    operation_id = "follow_evolution",
+    params(
+        ("id" = String, Path, description = "Id of the evolution", format = "uuid"),
+        ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen")
+    ),
+    responses(
+        (status = 200, description = "One event per change", content((JobEventSent = "text/event-stream"))),
+        (status = 204, description = "The evolution has ended and the client has seen it"),
+        GetProblems
+    )
+)]
+pub(crate) async fn events(mut request: EventRequest, id: JobId) -> Result<Response, ApiError> {
+    request.jobs = request.jobs.of_kind(Kind::Evolution);
+    follow_job(request, id).await
+}
+
+/// The answer of a succeeded evolution.
+#[utoipa::path(
+    get,
+    path = "/v1/evolutions/{id}/result",
+    tag = "evolutions",
+    operation_id = "get_evolution_result",
+    params(("id" = String, Path, description = "Id of the evolution", format = "uuid")),
+    responses((status = 200, description = "The answer", body = EvolutionAnswer), ResultProblems)
+)]
+pub(crate) async fn result(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    State(memory): State<Memory>,
+) -> Result<Response, ApiError> {
+    let jobs = jobs.of_kind(Kind::Evolution);
+    let share = memory.ready_answer(jobs.tenant(), jobs.answer_bytes(id).await?)?;
+    let text = jobs.answer(id).await?.solution;
+    let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
+    Ok(hold_while_sent((head, text).into_response(), share))
+}
+
+query! {
+    /// Parameters of the tables of an evolution.
+    EvolutionTableQuery(() => ()) {
+        /// `records`, a row for each stored step (when left out), or `points`, a row for each point of both sections in each of them
+        #[param(pattern = "^(records|points)$", example = "records")]
+        of: TableOf as String = reader("`records` or `points`", |text| match text {
+            "records" => Some(TableOf::Records),
+            "points" => Some(TableOf::Points),
+            _ => None,
+        });
+        /// `csv`, `ndjson`, `arrow` or `parquet`; overrides `Accept`
+        #[param(pattern = "^(csv|ndjson|arrow|parquet)$", example = "parquet")]
+        format: Format as String = one_of(TABLES);
+    }
+}
+
+/// What the rows of a table are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TableOf {
+    /// Stored steps.
+    Records,
+    /// Points of the sections.
+    Points,
+}
+
+/// The answer of a succeeded evolution as a table.
+#[utoipa::path(
+    get,
+    path = "/v1/evolutions/{id}/table",
+    tag = "evolutions",
+    operation_id = "get_evolution_table",
+    params(("id" = String, Path, description = "Id of the evolution", format = "uuid"), EvolutionTableQuery),
+    responses((status = 200, description = "The table", content(
+        (String = "text/csv"),
+        (String = "application/x-ndjson"),
+        (Vec<u8> = "application/vnd.apache.arrow.stream"),
+        (Vec<u8> = "application/vnd.apache.parquet")
+    )), ResultProblems)
+)]
+pub(crate) async fn table(
+    Caller(jobs): Caller,
+    JobId(id): JobId,
+    uri: Uri,
+    State(memory): State<Memory>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let query = EvolutionTableQuery::read(&uri, &())?;
+    let format = choose(&headers, query.format, TABLES)?;
+    let found = read(jobs, &memory, id, move |evolution| {
+        let table = match query.of {
+            Some(TableOf::Points) => points_table(evolution),
+            _ => records_table(evolution),
+        };
+        let columns = table.columns.iter();
+        let columns: Vec<(String, TableKind)> = columns
+            .map(|(name, column)| {
+                let kind = match column {
+                    TableColumn::Integers(_) => TableKind::Integers,
+                    TableColumn::Numbers(_) => TableKind::Numbers,
+                    TableColumn::Texts(_) => TableKind::Texts,
+                };
+                (name.clone(), kind)
+            })
+            .collect();
+        let write = || {
+            let mut writer = RowWriter::new(format, &columns)?;
+            let mut text = writer.head()?;
+            text.extend(writer.write(table)?);
+            text.extend(writer.finish()?);
+            Ok::<_, WriteError>(text)
+        };
+        write().map_err(|error| ApiError::internal(&error))
+    });
+    let (text, share) = found.await?;
+    let head = [
+        (header::CONTENT_TYPE, format.media_type()),
+        (header::VARY, "Accept"),
+    ];
+    let mut response = (head, text).into_response();
+    let name = format!("evolution-{id}");
+    response.headers_mut().extend(format.disposition(&name));
+    Ok(hold_while_sent(response, share))
+}
+
+query! {
+    /// Parameters of a section of an evolution.
+    SectionQuery(() => ()) {
+        /// Number of the record, from 0; the last when left out
+        #[param(minimum = 0, example = 3)]
+        record: u32 as u32 = count(0, 100_000);
+        /// `columns` (when left out), `miniprof` or `simpack`
+        #[param(pattern = "^(columns|miniprof|simpack)$", example = "miniprof")]
+        format: SectionForm as String = reader("`columns`, `miniprof` or `simpack`", |text| match text {
+            "columns" => Some(SectionForm::Columns),
+            "miniprof" => Some(SectionForm::Miniprof),
+            "simpack" => Some(SectionForm::Simpack),
+            _ => None,
+        });
+    }
+}
+
+/// The forms of a file with a section.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SectionForm {
+    /// Columns of y and z.
+    Columns,
+    /// As MiniProf writes it.
+    Miniprof,
+    /// As Simpack reads it.
+    Simpack,
+}
+
+/// A section of a succeeded evolution as a file for other programs.
+#[utoipa::path(
+    get,
+    path = "/v1/evolutions/{id}/sections/{body}",
+    tag = "evolutions",
+    operation_id = "get_evolution_section",
+    params(
+        ("id" = String, Path, description = "Id of the evolution", format = "uuid"),
+        ("body" = String, Path, description = "`rail` or `wheel`", pattern = "^(rail|wheel)$"),
+        SectionQuery
+    ),
+    responses((status = 200, description = "The file", content((String = "text/plain"))), ResultProblems)
+)]
+pub(crate) async fn section(
+    Caller(jobs): Caller,
+    Path((id, body)): Path<(String, String)>,
+    uri: Uri,
+    State(memory): State<Memory>,
+) -> Result<Response, ApiError> {
+    let query = SectionQuery::read(&uri, &())?;
+    let unknown = |detail: String| ApiError::new(ProblemKind::JobNotFound, detail);
+    let id = Uuid::try_parse(&id)
+        .map_err(|_| unknown(format!("`{id}` is no id of an evolution; ids are UUIDs")))?;
+    let wheel = match body.as_str() {
+        "rail" => false,
+        "wheel" => true,
+        _ => {
+            return Err(unknown(format!(
+                "`{body}` is no body; allowed: rail, wheel"
+            )));
+        }
+    };
+    let form = query.format.unwrap_or(SectionForm::Columns);
+    let found = read(jobs, &memory, id, move |evolution| {
+        let last = evolution.records.len().saturating_sub(1);
+        let number = query.record.map_or(last, |number| number as usize);
+        let record = evolution.records.get(number).ok_or_else(|| {
+            ApiError::bad_parameter("record", format!("{number} given; 0 to {last} are there"))
+        })?;
+        let worn = if wheel { &record.wheel } else { &record.rail };
+        Ok(file(worn, wheel, form).into_bytes())
+    });
+    let (text, share) = found.await?;
+    let extension = match (form, wheel) {
+        (SectionForm::Columns, _) => "txt",
+        (SectionForm::Miniprof, false) => "ban",
+        (SectionForm::Miniprof, true) => "whl",
+        (SectionForm::Simpack, false) => "prr",
+        (SectionForm::Simpack, true) => "prw",
+    };
+    let name = format!("attachment; filename=\"{body}-{id}.{extension}\"");
+    let head = [
+        (header::CONTENT_TYPE, "text/plain; charset=utf-8".to_owned()),
+        (header::CONTENT_DISPOSITION, name),
+    ];
+    Ok(hold_while_sent((head, text).into_response(), share))
+}
+
+/// Makes something of the answer of an evolution, off the threads that answer requests.
+async fn read(
+    jobs: Jobs,
+    memory: &Memory,
+    id: Uuid,
+    make: impl FnOnce(&EvolutionAnswer) -> Result<Vec<u8>, ApiError> + Send + 'static,
+) -> Result<(Vec<u8>, Option<Share>), ApiError> {
+    let jobs = jobs.of_kind(Kind::Evolution);
+    // Once as text, and about as much as numbers.
+    let share = memory.ready_answer(jobs.tenant(), 2 * jobs.answer_bytes(id).await?)?;
+    let text = jobs.answer(id).await?.solution;
+    let made = tokio::task::spawn_blocking(move || {
+        let read = serde_json::from_slice(&text);
+        make(&read.map_err(|error| ApiError::internal(&error))?)
+    });
+    let made = made.await.map_err(|error| ApiError::internal(&error))??;
+    Ok((made, share))
+}
+
+fn records_table(evolution: &EvolutionAnswer) -> RowTable {
+    type Of = fn(&EvolutionRecord) -> Option<f64>;
+    let columns: [(&str, Of); 26] = [
+        ("share", |r| Some(r.progress.share)),
+        ("mgt", |r| r.progress.mgt),
+        ("axle_passes", |r| r.progress.axle_passes),
+        ("wheel_distance_km", |r| r.progress.wheel_distance_km),
+        ("height_mm", |r| r.losses.height_mm),
+        ("gauge_face_mm", |r| r.losses.gauge_face_mm),
+        ("gauge_corner_mm", |r| r.losses.gauge_corner_mm),
+        ("tread_mm", |r| r.losses.tread_mm),
+        ("flange_mm", |r| r.losses.flange_mm),
+        ("rail_worn_area_mm2", |r| Some(r.rail.worn_area_mm2)),
+        ("rail_machined_area_mm2", |r| Some(r.rail.machined_area_mm2)),
+        ("rail_damage_max", |r| largest(&r.rail.damage)),
+        ("rail_depth_max_mm", |r| largest(&r.rail.depth_mm)),
+        ("rail_coefficients_low", |r| {
+            Some(r.rail.uncertainty.coefficients[0])
+        }),
+        ("rail_coefficients_high", |r| {
+            Some(r.rail.uncertainty.coefficients[1])
+        }),
+        ("wheel_worn_area_mm2", |r| Some(r.wheel.worn_area_mm2)),
+        ("wheel_machined_area_mm2", |r| {
+            Some(r.wheel.machined_area_mm2)
+        }),
+        ("wheel_damage_max", |r| largest(&r.wheel.damage)),
+        ("wheel_depth_max_mm", |r| largest(&r.wheel.depth_mm)),
+        ("conicity", |r| r.conicity),
+        ("pressure_max_mpa", |r| Some(r.contact.pressure_max_mpa)),
+        ("pressure_mean_mpa", |r| Some(r.contact.pressure_mean_mpa)),
+        ("y_over_q_max", |r| Some(r.contact.y_over_q_max)),
+        ("y_over_q_mean", |r| Some(r.contact.y_over_q_mean)),
+        ("t_gamma_mean_n", |r| Some(r.contact.t_gamma_mean_n)),
+        ("unsolved_share", |r| Some(r.contact.unsolved_share)),
+    ];
+    let records = &evolution.records;
+    let numbers = (0..records.len()).map(|k| k as i64).collect();
+    let first = [("record".to_owned(), TableColumn::Integers(numbers))];
+    let rest = columns.into_iter().map(|(name, of)| {
+        let values = records.iter().map(|record| of(record).unwrap_or(f64::NAN));
+        (name.to_owned(), TableColumn::Numbers(values.collect()))
+    });
+    RowTable {
+        columns: first.into_iter().chain(rest).collect(),
+    }
+}
+
+fn largest(values: &[f64]) -> Option<f64> {
+    values.iter().copied().max_by(f64::total_cmp)
+}
+
+fn points_table(evolution: &EvolutionAnswer) -> RowTable {
+    let (mut record, mut point) = (Vec::new(), Vec::new());
+    let mut body = Vec::new();
+    let mut values: [Vec<f64>; 5] = Default::default();
+    for (number, one) in evolution.records.iter().enumerate() {
+        for (name, worn) in [("rail", &one.rail), ("wheel", &one.wheel)] {
+            for (k, [y, z]) in worn.points_mm.iter().enumerate() {
+                record.push(number as i64);
+                point.push(k as i64);
+                body.push(Some(name.to_owned()));
+                let row = [one.progress.share, *y, *z, worn.depth_mm[k], worn.damage[k]];
+                values
+                    .iter_mut()
+                    .zip(row)
+                    .for_each(|(column, value)| column.push(value));
+            }
+        }
+    }
+    let names = ["share", "y_mm", "z_mm", "depth_mm", "damage"];
+    let numbers = names.into_iter().zip(values);
+    let numbers = numbers.map(|(name, values)| (name.to_owned(), TableColumn::Numbers(values)));
+    let first = [
+        ("record".to_owned(), TableColumn::Integers(record)),
+        ("body".to_owned(), TableColumn::Texts(body)),
+        ("point".to_owned(), TableColumn::Integers(point)),
+    ];
+    RowTable {
+        columns: first.into_iter().chain(numbers).collect(),
+    }
+}
+
+/// The text of a file with a section, in mm.
+fn file(worn: &WornBody, wheel: bool, form: SectionForm) -> String {
+    let points = worn.points_mm.iter();
+    // MiniProf's X points to the track centre.
+    let row = |[y, z]: &[f64; 2]| match form {
+        SectionForm::Miniprof => format!("{:.6}\t{z:.6}\n", 0.0 - y),
+        _ => format!("{y:.6} {z:.6}\n"),
+    };
+    let rows: String = points.map(row).collect();
+    match form {
+        SectionForm::Columns => rows,
+        SectionForm::Miniprof => format!(
+            "ProgramName=railhead\nXYPoints={}\nColumnDef=X,Y\n\n{rows}",
+            worn.points_mm.len()
+        ),
+        SectionForm::Simpack => format!(
+            "header.begin\n  version = 1\n  type = {}\nheader.end\nspline.begin\n  type = 0\n  units.len.f = 1000\n  point.begin\n{rows}  point.end\nspline.end\n",
+            u8::from(wheel)
+        ),
+    }
+}

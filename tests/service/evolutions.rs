@@ -1,0 +1,264 @@
+//! Evolutions: submitted, followed, interrupted and answered like other work.
+
+use std::time::{Duration, Instant};
+
+use railhead::jobs::codec::parquet::TableReader;
+use reqwest::{Method, RequestBuilder};
+use serde_json::{Value, json};
+
+use crate::errors::assert_problem;
+use crate::server::{Server, Setup, example};
+use crate::support::{Service, pause};
+
+/// Ends of a guard: something hangs.
+const WITHIN: Duration = Duration::from_secs(240);
+
+/// The shipped wheel and rail under two states, over a short extent.
+pub fn request(records: u32) -> Value {
+    let mut template = example("wheel-rail.case.json");
+    for name in ["name", "outputs"] {
+        template.as_object_mut().unwrap().remove(name);
+    }
+    template["solver"] = json!({ "target_error": 0.05 });
+    json!({
+        "template": template,
+        "traffic": { "columns": { "lateral_shift [cm]": [-0.1, 0.2], "wheel_load [kN]": [70, 80] }, "passes": [1, 3] },
+        "extent": { "axle_passes": 4e3, "wheel_distance_km": 200 },
+        "records": records,
+        "accuracy": { "step_tolerance": 1.0 },
+        "limits": { "height_mm": 1e-6 },
+    })
+}
+
+async fn ended(server: &Server, path: &str) -> Value {
+    let begun = Instant::now();
+    loop {
+        let answer = server.get(path).await;
+        assert_eq!(answer.status, 200, "{}", answer.text);
+        if answer.json["ended_at"].is_string() {
+            return answer.json;
+        }
+        assert!(begun.elapsed() < WITHIN, "{}", answer.text);
+        pause().await;
+    }
+}
+
+#[tokio::test]
+async fn an_evolution_is_answered_as_json_tables_and_sections() {
+    let server = Setup::new().start().await;
+    let answer = server
+        .post("/v1/evolutions?name=short&label=line:A", &request(2))
+        .await;
+    assert_eq!(answer.status, 202, "{}", answer.text);
+    let path = answer.header("location").unwrap().to_owned();
+    let done = ended(&server, &path).await;
+    assert_eq!(
+        (&done["state"], &done["name"]),
+        (&json!("succeeded"), &json!("short")),
+        "{done}"
+    );
+    // It is in its own list alone, and no job.
+    let id = done["id"].as_str().unwrap();
+    let list = server.get("/v1/evolutions?label=line:A").await.json;
+    assert_eq!(
+        (&list["evolutions"][0]["id"], &list["total"]),
+        (&json!(id), &json!(1))
+    );
+    let jobs = server.get("/v1/jobs").await.json;
+    assert_eq!(jobs["jobs"], json!([]));
+    assert_problem(
+        &server.get(&format!("/v1/jobs/{id}/result")).await,
+        404,
+        "job-not-found",
+        "job",
+    );
+
+    let result = server.get(&format!("{path}/result")).await.json;
+    let records = result["records"].as_array().unwrap();
+    assert_eq!(records.len(), 3);
+    let last = &records[2];
+    let pointers = json!(["/contact/lateral_shift_mm", "/load/vertical_force_n"]);
+    assert_eq!(result["traffic"]["pointers"], pointers);
+    let mut states: Vec<f64> = result["traffic"]["states"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|state| state["values"][1].as_f64().unwrap())
+        .collect();
+    states.sort_by(f64::total_cmp);
+    assert_eq!(states, [70e3, 80e3], "in the units of the case");
+    assert!(last["rail"]["worn_area_mm2"].as_f64().unwrap() > 0.0);
+    assert!(last["wheel"]["worn_area_mm2"].as_f64().unwrap() > 0.0);
+    assert!(
+        result["limits"][0]["reached"]["share"].as_f64().unwrap() < 1.0,
+        "{}",
+        result["limits"]
+    );
+
+    let csv = server.get(&format!("{path}/table?format=csv")).await;
+    let lines: Vec<&str> = csv.text.lines().collect();
+    assert!(
+        lines[0].starts_with("record,share,mgt,axle_passes") && lines.len() == 4,
+        "{}",
+        csv.text
+    );
+    let parquet = server
+        .get(&format!("{path}/table?of=points&format=parquet"))
+        .await;
+    let points = records.iter().map(|record| {
+        record["rail"]["points_mm"].as_array().unwrap().len()
+            + record["wheel"]["points_mm"].as_array().unwrap().len()
+    });
+    let table = TableReader::new(bytes::Bytes::from(parquet.bytes)).unwrap();
+    assert_eq!(table.group_size(0).0 as usize, points.sum::<usize>());
+
+    // The section files are cross-sections of cases.
+    for (body, format, form) in [
+        ("rail", "miniprof", "miniprof"),
+        ("wheel", "simpack", "simpack"),
+        ("wheel", "miniprof", "miniprof"),
+        ("rail", "columns", "columns"),
+    ] {
+        let file = server
+            .get(&format!("{path}/sections/{body}?format={format}"))
+            .await;
+        assert_eq!(file.status, 200, "{}", file.text);
+        let mut case = example("wheel-rail.case.json");
+        case["contact"][body] = json!({ "format": form, "text": file.text });
+        let checked = server.post("/v1/cases/check", &case).await;
+        assert_eq!(checked.status, 200, "{body} {format}: {}", checked.text);
+        let mut own = example("wheel-rail.case.json");
+        own["contact"][body] = json!({ "points_mm": last[body]["points_mm"] });
+        let own = server.post("/v1/cases/check", &own).await;
+        let touch = "/understood/placement/first_touch/track_mm/1";
+        let [found, known] =
+            [&checked, &own].map(|answer| answer.json.pointer(touch).unwrap().as_f64().unwrap());
+        assert!(
+            (found - known).abs() < 0.1,
+            "{body} {format}: {found} {known}"
+        );
+    }
+    let deleted = server.delete(&path).await;
+    assert_eq!(deleted.status, 204);
+    assert_problem(&server.get(&path).await, 404, "job-not-found", "id");
+}
+
+#[tokio::test]
+async fn a_key_gives_the_same_evolution_and_a_cancelled_one_has_no_answer() {
+    let server = Setup::new().start().await;
+    let send = async |request: &Value| {
+        let keyed = |sent: RequestBuilder| sent.header("Idempotency-Key", "k").json(request);
+        server.send(Method::POST, "/v1/evolutions", keyed).await
+    };
+    let mut long = request(100);
+    long["accuracy"]["step_depth_mm"] = json!(1e-5);
+    let (first, again) = (send(&long).await, send(&long).await);
+    assert_eq!(first.json["id"], again.json["id"]);
+    assert_eq!(again.header("idempotency-replayed"), Some("true"));
+    assert_problem(&send(&request(1)).await, 422, "idempotency-conflict", "key");
+    let path = first.header("location").unwrap().to_owned();
+    let cancelled = server.post(&format!("{path}/cancel"), &json!({})).await;
+    assert!([200, 202].contains(&cancelled.status), "{}", cancelled.text);
+    assert_eq!(ended(&server, &path).await["state"], "cancelled");
+    assert_problem(
+        &server.get(&format!("{path}/result")).await,
+        409,
+        "job-cancelled",
+        "cancel",
+    );
+}
+
+#[tokio::test]
+async fn faults_are_named_with_their_place_and_what_is_allowed() {
+    let server = Server::idle().await;
+    for (place, value, pointer, words) in [
+        (
+            "/extent",
+            json!({ "mgt": 1 }),
+            "/extent/wheel_distance_km",
+            "distance",
+        ),
+        ("/traffic/passes", json!([1, -3]), "/traffic/passes/1", "-3"),
+        (
+            "/traffic/columns",
+            json!({ "lateral_shft": [1, 2] }),
+            "/traffic/columns/lateral_shft",
+            "column",
+        ),
+        ("/wear_model", json!("rust"), "/wear_model", "archard_wear"),
+    ] {
+        let mut bad = request(2);
+        *bad.pointer_mut(place).unwrap_or(&mut json!(null)) = value.clone();
+        if place == "/wear_model" {
+            bad["wear_model"] = value;
+        }
+        let answer = server.post("/v1/evolutions", &bad).await;
+        assert_problem(&answer, 422, "faulty-case", "fault");
+        let fault = &answer.json["errors"][0];
+        assert_eq!(fault["pointer"], pointer, "{}", answer.text);
+        assert!(
+            fault["detail"].as_str().unwrap().contains(words),
+            "{}",
+            answer.text
+        );
+    }
+}
+
+/// A process that is killed again and again gives the bytes of one that is not.
+#[tokio::test]
+async fn an_evolution_gives_the_same_bytes_although_the_process_is_killed() {
+    let whole = tempfile::tempdir().unwrap();
+    let torn = tempfile::tempdir().unwrap();
+    let body = request(4);
+    let submit = async |service: &Service| {
+        let sent = service
+            .request(Method::POST, "/v1/evolutions")
+            .json(&body)
+            .send()
+            .await
+            .unwrap();
+        let job: Value = sent.json().await.unwrap();
+        format!(
+            "/v1/evolutions/{}",
+            job["id"].as_str().unwrap_or_else(|| panic!("{job}"))
+        )
+    };
+    let result = async |service: &Service, path: &str| {
+        let begun = Instant::now();
+        while service.get(path).await["state"] != "succeeded" {
+            assert!(begun.elapsed() < WITHIN, "{}", service.get(path).await);
+            pause().await;
+        }
+        let sent = service
+            .request(Method::GET, &format!("{path}/result"))
+            .send()
+            .await
+            .unwrap();
+        sent.text().await.unwrap()
+    };
+    let service = Service::start(whole.path(), &["--workers", "1"]);
+    let path = submit(&service).await;
+    let expected = result(&service, &path).await;
+    service.kill();
+
+    let mut service = Service::start(torn.path(), &["--workers", "2"]);
+    let path = submit(&service).await;
+    let (mut kills, mut seen) = (0, 0.0);
+    while kills < 3 {
+        let job = service.get(&path).await;
+        if job["state"] == "succeeded" {
+            break;
+        }
+        let progress = job["progress"].as_f64().unwrap();
+        if progress > seen + 0.1 {
+            seen = progress;
+            kills += 1;
+            service.kill();
+            service = Service::start(torn.path(), &["--workers", "2"]);
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    assert!(kills > 0, "it was met while running");
+    assert_eq!(result(&service, &path).await, expected);
+    service.kill();
+}
