@@ -23,6 +23,10 @@ export async function makeViews(service) {
   const base = await service.solved(withFields('wheel-rail'));
   const bent = await service.solved({ ...withFields('wheel-rail'), contact: { ...example('wheel-rail').contact, reference_surface: 'curve', lateral_shift_mm: -6 } });
   const wheelset = await service.solved(withFields('wheelset'));
+  const evolution = await service.ask('/v1/evolutions', { json: {
+    template: { ...example('wheel-rail'), outputs: undefined }, traffic: { columns: { '/load/vertical_force_n': [75_000, 90_000], '/contact/lateral_shift_mm': [0, -3] }, passes: [3, 1] },
+    wearing: 'rail', extent: { mgt: 2 }, records: 4, limits: { height_mm: 0.01 }, name: 'two million tonnes',
+  } });
   return [
     ['compose', '#/compose', '.verdict .good'],
     ['result-flange', `#/jobs/${flange.id}`, 'svg .comb'],
@@ -33,6 +37,8 @@ export async function makeViews(service) {
     ['compare-worn', `#/compare/${base.id}/${worn.id}`, '[aria-labelledby="h-overlay"] .chart'],
     ['result-bent', `#/jobs/${bent.id}`, 'svg .comb'],
     ['wheelset', `#/jobs/${wheelset.id}`, '.shifting .comb'],
+    ['forecasts', '#/forecast', '.forecasts a'],
+    ['forecast', `#/forecast/${evolution.id}`, 'svg.worn .touch'],
     ['line', `#/line/${batch.id}`, 'line-strips canvas'],
     ['run', `#/line/${run.id}?kind=run`, 'line-strips canvas'],
   ];

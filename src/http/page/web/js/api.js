@@ -123,6 +123,21 @@ export const caseOf = (id) => json(`/v1/jobs/${id}/case`);
 /** @type {(id: string, patch: number, point: number) => Promise<Schemas['Stresses']>} */
 export const stresses = (id, patch, point) => json(`/v1/jobs/${id}/subsurface?patch=${patch}&point=${point}`);
 
+/** @param {{ limit?: number }} filter @returns {Promise<{ evolutions: Job[] }>} */
+export const evolutions = (filter) => json(`/v1/evolutions?${search(filter)}`);
+
+/** @type {(id: string) => Promise<Job>} */
+export const evolution = (id) => json(`/v1/evolutions/${id}`);
+
+/** @type {(id: string) => Promise<JsonObject>} */
+export const evolutionRequest = (id) => json(`/v1/evolutions/${id}/request`);
+
+/** @type {(id: string) => Promise<Schemas['EvolutionAnswer']>} */
+export const evolutionResult = (id) => json(`/v1/evolutions/${id}/result`);
+
+/** @param {JsonObject} asked @returns {Promise<Job>} */
+export const submitEvolution = (asked) => json('/v1/evolutions', { method: 'POST', body: JSON.stringify(asked) });
+
 /** @typedef {{ state?: readonly string[], batch?: string, label?: string, name?: string, fields?: string, cursor?: string, limit?: number }} Filter */
 /** @typedef {Omit<Schemas['JobPage'], 'jobs'> & { jobs: Job[] }} JobPage With all members of the jobs that are asked for. */
 
@@ -163,11 +178,11 @@ export const runTotals = (id, wanted) => json(`/v1/runs/${id}/totals?${search(wa
 /** @type {(id: string, row: number) => Promise<Schemas['RunRowAlone']>} */
 export const runRow = (id, row) => json(`/v1/runs/${id}/rows/${row}`);
 
-/** @param {'jobs' | 'batches'} kind @param {string} id */
+/** @param {'jobs' | 'batches' | 'evolutions'} kind @param {string} id */
 export const cancel = (kind, id) => request(`/v1/${kind}/${id}/cancel`, { method: 'POST' });
 
 /**
- * @param {'jobs' | 'batches'} kind
+ * @param {'jobs' | 'batches' | 'evolutions'} kind
  * @param {string} id
  * @param {boolean} [keepalive] The request goes on when the page is left; a browser allows few of them at once.
  */

@@ -3,7 +3,7 @@
 import { Refused, remove } from './api.js';
 
 /** @typedef {import('./state.js').App} App */
-/** @typedef {'jobs' | 'batches'} Kind */
+/** @typedef {'jobs' | 'batches' | 'evolutions'} Kind */
 
 const UNDO_MS = 6000;
 /** Requests under way. */

@@ -2,12 +2,12 @@
 
 /**
  * @typedef {object} Route
- * @property {'compose' | 'jobs' | 'result' | 'compare' | 'line' | 'licences'} view
+ * @property {'compose' | 'jobs' | 'result' | 'compare' | 'line' | 'forecast' | 'licences'} view
  * @property {string[]} ids Jobs, or the batch, that the view is about.
  * @property {Record<string, string>} query What the view shows of them.
  */
 
-const VIEWS = /** @type {const} */ (['compose', 'jobs', 'compare', 'line', 'licences']);
+const VIEWS = /** @type {const} */ (['compose', 'jobs', 'compare', 'line', 'forecast', 'licences']);
 
 /**
  * @param {string} hash

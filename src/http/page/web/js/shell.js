@@ -5,6 +5,7 @@ import { apiKey, useKey } from './api.js';
 import { compareView } from './compareview.js';
 import { compose } from './compose.js';
 import { isDark } from './field/palette.js';
+import { forecastView } from './forecastview.js';
 import { jobsView } from './jobsview.js';
 import { licencesView } from './licences.js';
 import { lineView } from './lineview.js';
@@ -19,9 +20,9 @@ import { formatRoute } from './routes.js';
 const KEY_ICON = html`<svg viewBox="0 0 20 20" width="17" height="17" fill="none" stroke="currentColor" stroke-width="1.7" aria-hidden="true"><circle cx="6" cy="10" r="3.4"/><path d="M9.4 10H18v3.4M14.4 10v2.6"/></svg>`;
 
 /** @type {Record<View, (app: App) => unknown>} */
-const VIEWS = { compose, jobs: jobsView, result, compare: compareView, line: lineView, licences: licencesView };
+const VIEWS = { compose, jobs: jobsView, result, compare: compareView, line: lineView, forecast: forecastView, licences: licencesView };
 /** @type {Record<View, string>} */
-const TITLES = { compose: 'Contact', jobs: 'Jobs', result: 'Result', compare: 'Compare', line: 'Track', licences: 'Licences' };
+const TITLES = { compose: 'Contact', jobs: 'Jobs', result: 'Result', compare: 'Compare', line: 'Track', forecast: 'Forecast', licences: 'Licences' };
 
 /** @param {App} app @param {HTMLElement} root */
 export function renderShell(app, root) {
@@ -46,7 +47,7 @@ function topBar(app) {
   const tabs = [
     ['compose', formatRoute('compose')], ['jobs', formatRoute('jobs')],
     ...(looked ? [/** @type {[View, string]} */ (['result', formatRoute('result', [looked.job.id])])] : []),
-    ['compare', formatRoute('compare', ids)], ['line', formatRoute('line')],
+    ['compare', formatRoute('compare', ids)], ['line', formatRoute('line')], ['forecast', formatRoute('forecast')],
   ];
   const state = health ? (health.ready ? 'ready' : 'away') : '…';
   return html`<header class="top">

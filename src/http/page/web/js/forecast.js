@@ -1,0 +1,240 @@
+// Profiles that wear under a traffic: the form, what was computed, and the step that is looked at.
+
+import { evolution as evolutionOf, evolutionRequest, evolutionResult, evolutions as evolutionsOf, submitEvolution } from './api.js';
+import { at, isObject } from './document.js';
+import { LOSSES } from './forecastdata.js';
+import { formatRoute } from './routes.js';
+import { standardSection } from './starts.js';
+import { COLUMNS, ROWS_MAX, trafficOf } from './traffic.js';
+import { parse } from './written.js';
+
+/** @typedef {import('./state.js').App} App */
+/** @typedef {import('./api.js').Job} Job */
+/** @typedef {import('./api.js').Schemas} Schemas */
+/** @typedef {Schemas['EvolutionAnswer']} Answer */
+/** @typedef {Schemas['EvolutionRecord']} WornRecord */
+/** @typedef {import('./document.js').JsonObject} JsonObject */
+/** @typedef {import('./document.js').JsonValue} JsonValue */
+/** @typedef {import('./files.js').Body} Body */
+/** @typedef {import('./traffic.js').ColumnKey} ColumnKey */
+
+export const EVENTS = /** @type {const} */ ([['grind', 'grind the rail to a new 60E1'], ['friction', 'friction changes to μ ='], ['reprofile', 'turn the wheel to a new S1002']]);
+
+/** @typedef {{ kind: 'grind' | 'friction' | 'reprofile', at: string, value: string }} Maintenance */
+
+/**
+ * @typedef {object} Form
+ * Everything as it is written.
+ * @property {string} name
+ * @property {Record<ColumnKey, string>[]} rows
+ * @property {import('./traffic.js').Table & { name: string } | null} table A table from a file, in place of the rows.
+ * @property {'rail' | 'wheel' | 'both'} wearing
+ * @property {'usfd_wear' | 'archard_wear'} law
+ * @property {string} mgt
+ * @property {string} km
+ * @property {string} records
+ * @property {Record<string, string>} limits
+ * @property {Maintenance[]} events
+ */
+
+/** A mixed traffic to begin with: straight track, curves to both sides, and a share with much shift. @returns {Form} */
+const firstForm = () => ({
+  name: '',
+  rows: [
+    { passes: '60', load: '75', shift: '0', yaw: '0', friction: '0,35' },
+    { passes: '25', load: '90', shift: '-2', yaw: '1', friction: '0,35' },
+    { passes: '15', load: '85', shift: '-5', yaw: '3', friction: '0,35' },
+  ],
+  table: null, wearing: 'both', law: 'usfd_wear', mgt: '20', km: '50000', records: '10', limits: {}, events: [],
+});
+
+/**
+ * @typedef {object} Side
+ * An evolution that is looked at.
+ * @property {Job} job
+ * @property {Answer | null} answer
+ */
+
+/**
+ * @typedef {object} Forecast
+ * @property {Form} form
+ * @property {boolean} sending
+ * @property {string} refusal
+ * @property {readonly { pointer?: string, detail: string }[]} faults
+ * @property {readonly Job[] | null} listed
+ * @property {Set<string>} ticked
+ * @property {string[]} ids Those that are looked at; none for the list.
+ * @property {Side[]} sides
+ * @property {number} step The record of the first of them.
+ * @property {Body} body
+ * @property {number} factor By which wear is drawn larger.
+ * @property {string} curve
+ * @property {number} playing The timer of the film; 0 while it stands.
+ */
+
+/** @type {Forecast} */
+const forecast = {
+  form: firstForm(), sending: false, refusal: '', faults: [], listed: null, ticked: new Set(), ids: [], sides: [], step: 0, body: 'rail', factor: 1, curve: 'losses', playing: 0,
+};
+
+const POLL_MS = 1000;
+const FRAME_MS = 250;
+
+export const forecastSeen = () => forecast;
+
+/** @param {App} app @param {Partial<Forecast>} change */
+export function chooseForecast(app, change) {
+  Object.assign(forecast, change);
+  app.redraw();
+}
+
+/** @param {App} app @param {Partial<Form>} change */
+export const writeForm = (app, change) => chooseForecast(app, { form: { ...forecast.form, ...change } });
+
+/** Opens the list, one evolution, or two side by side. @param {App} app @param {string[]} ids */
+export async function openForecast(app, ids) {
+  stopFilm();
+  const wanted = ids.slice(0, 2);
+  const same = wanted.join() === forecast.ids.join() && forecast.sides.length === wanted.length;
+  Object.assign(forecast, { ids: wanted, ...(same ? {} : { sides: [], step: Infinity }) });
+  try {
+    if (!wanted.length) await watchList(app);
+    else if (!same || forecast.sides.some(({ answer }) => !answer)) await watchSides(app, wanted);
+  } catch (error) {
+    app.refused(error);
+  }
+}
+
+/** Leaves the view: nothing is asked for any longer. */
+export function leaveForecast() {
+  stopFilm();
+  forecast.ids = ['-'];
+}
+
+/** @param {{ state: string }} job */
+const isOpen = ({ state }) => state === 'queued' || state === 'running';
+const pause = () => new Promise((resolve) => setTimeout(resolve, POLL_MS));
+
+/** @param {App} app */
+async function watchList(app) {
+  const { ids } = forecast;
+  for (let open = true; open && forecast.ids === ids; open && await pause()) {
+    const { evolutions } = await evolutionsOf({ limit: 50 });
+    if (forecast.ids !== ids) return;
+    open = evolutions.some(isOpen);
+    chooseForecast(app, { listed: evolutions });
+  }
+}
+
+/** @param {App} app @param {string[]} ids */
+async function watchSides(app, ids) {
+  while (forecast.ids === ids) {
+    const jobs = await Promise.all(ids.map(evolutionOf));
+    const sides = await Promise.all(jobs.map(async (job, at) => ({ job, answer: forecast.sides[at]?.answer ?? (job.state === 'succeeded' ? await evolutionResult(job.id) : null) })));
+    if (forecast.ids !== ids) return;
+    const records = sides[0].answer?.records.length ?? 0;
+    const body = sides[0].answer && !(Math.max(...sides[0].answer.records.map(({ rail }) => rail.worn_area_mm2)) > 0) ? 'wheel' : forecast.body;
+    chooseForecast(app, { sides, body, step: records ? Math.min(forecast.step, records - 1) : forecast.step });
+    if (!jobs.some(isOpen)) return;
+    await pause();
+  }
+}
+
+/** The record of a side at the step that is looked at: that of the same share of the extent. @param {Side} side @returns {WornRecord | null} */
+export function recordOf({ answer }) {
+  const wanted = forecast.sides[0]?.answer?.records[forecast.step]?.progress.share;
+  if (!answer || wanted === undefined) return null;
+  return answer.records.reduce((best, record) => (Math.abs(record.progress.share - wanted) <= Math.abs(best.progress.share - wanted) ? record : best));
+}
+
+/** Plays the steps as a film, or stops it. @param {App} app */
+export function playFilm(app) {
+  if (forecast.playing) {
+    stopFilm();
+    return app.redraw();
+  }
+  const last = (forecast.sides[0]?.answer?.records.length ?? 1) - 1;
+  if (forecast.step >= last) forecast.step = -1;
+  forecast.playing = window.setInterval(() => {
+    forecast.step += 1;
+    if (forecast.step >= last) stopFilm();
+    app.redraw();
+  }, FRAME_MS);
+  app.redraw();
+}
+
+function stopFilm() {
+  clearInterval(forecast.playing);
+  forecast.playing = 0;
+}
+
+/** The case that lends its sections, or why it cannot. @param {App} app @returns {JsonObject | string} */
+export function templateOf(app) {
+  const { document } = app.store.get().compose;
+  if (!document || at(document, '/contact/type') !== 'profiles') return 'Choose a wheel on a rail (Profiles) in the view Contact first: its files, inclination, speed and friction are taken from there.';
+  const { outputs, subsurface, thermal, name, labels, damage, ...template } = document;
+  return isObject(damage) && damage.parameters ? { ...template, damage: { parameters: damage.parameters } } : template;
+}
+
+/** What is submitted. @param {App} app @param {JsonObject} template @returns {JsonObject} */
+export function requestOf(app, template) {
+  const { form } = forecast;
+  const { examples } = app.store.get().compose;
+  const number = (/** @type {string} */ text) => parse(text) ?? null;
+  const limits = Object.fromEntries(LOSSES.flatMap(({ key, body }) => {
+    const limit = parse(form.limits[key] ?? '');
+    return limit === undefined || (form.wearing !== 'both' && form.wearing !== body) ? [] : [[key, limit]];
+  }));
+  /** @type {(event: Maintenance) => JsonObject} */
+  const eventOf = ({ kind, at: when, value }) => {
+    if (kind === 'friction') return { at: number(when), friction_coefficient: number(value) };
+    const section = standardSection(examples, kind === 'grind' ? 'rail' : 'wheel') ?? null;
+    return { at: number(when), [kind]: section, ...(parse(value) === undefined ? {} : { depth_mm: number(value) }) };
+  };
+  const events = form.events.map(eventOf);
+  return {
+    template, traffic: trafficOf(form), wearing: form.wearing, wear_model: form.law, records: number(form.records),
+    extent: { ...(form.wearing === 'wheel' ? {} : { mgt: number(form.mgt) }), ...(form.wearing === 'rail' ? {} : { wheel_distance_km: number(form.km) }) },
+    ...(Object.keys(limits).length ? { limits } : {}), ...(events.length ? { events } : {}), name: form.name || `wear of ${app.store.get().compose.document?.name ?? 'a pair'}`,
+  };
+}
+
+/** Submits what the form says, and shows it. @param {App} app */
+export async function startForecast(app) {
+  const template = templateOf(app);
+  if (typeof template === 'string') return app.say(template);
+  chooseForecast(app, { sending: true, refusal: '', faults: [] });
+  try {
+    const { id } = await submitEvolution(requestOf(app, template));
+    app.go(formatRoute('forecast', [id]));
+  } catch (error) {
+    const faults = error instanceof Error && 'faults' in error ? /** @type {Forecast['faults']} */ (error.faults) : [];
+    forecast.refusal = error instanceof Error ? error.message : String(error);
+    forecast.faults = faults;
+  } finally {
+    chooseForecast(app, { sending: false });
+  }
+}
+
+/** The form as an evolution was asked for, to change something of it. @param {App} app @param {string} id */
+export async function repeatForecast(app, id) {
+  const asked = await evolutionRequest(id);
+  const text = (/** @type {unknown} */ value, factor = 1) => (typeof value === 'number' ? String(Number((value / factor).toPrecision(12))) : '');
+  const columns = /** @type {Record<string, number[]>} */ (at(asked, '/traffic/columns') ?? {});
+  const passes = /** @type {number[] | undefined} */ (at(asked, '/traffic/passes'));
+  const rows = Math.max(...Object.values(columns).map((column) => column.length));
+  const known = Object.keys(columns).every((pointer) => COLUMNS.some((column) => column.pointer === pointer));
+  const few = known && rows <= ROWS_MAX;
+  const made = Array.from({ length: few ? rows : 0 }, (_, row) => /** @type {Record<ColumnKey, string>} */ (Object.fromEntries(COLUMNS.map(({ key, pointer, factor }) =>
+    [key, text(pointer ? columns[pointer]?.[row] : passes?.[row], factor)]))));
+  const events = /** @type {JsonObject[]} */ (asked.events ?? []).map((event) => /** @type {Maintenance} */ ({
+    kind: 'grind' in event ? 'grind' : 'reprofile' in event ? 'reprofile' : 'friction', at: text(event.at), value: text('friction_coefficient' in event ? event.friction_coefficient : event.depth_mm),
+  }));
+  writeForm(app, {
+    ...firstForm(), ...(few ? { rows: made } : { table: { name: 'the traffic of before', rows, columns, passes: passes ?? null } }),
+    name: `${asked.name ?? ''}, changed`, wearing: /** @type {Form['wearing']} */ (asked.wearing ?? 'both'), law: /** @type {Form['law']} */ (asked.wear_model ?? 'usfd_wear'),
+    mgt: text(at(asked, '/extent/mgt')) || '20', km: text(at(asked, '/extent/wheel_distance_km')) || '50000', records: text(asked.records) || '10',
+    limits: Object.fromEntries(LOSSES.map(({ key }) => [key, text(at(asked, `/limits/${key}`))])), events,
+  });
+  app.go(formatRoute('forecast'));
+}

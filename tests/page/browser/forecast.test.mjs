@@ -1,0 +1,88 @@
+// Forecast: own sections under a traffic, the step that is looked at, two plans side by side, files that load elsewhere.
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { dropFiles, OUTPUT, parsed, setUp, until } from './harness.mjs';
+
+const { service, onPage } = setUp();
+
+/** @param {string} name */
+const file = (name) => readFileSync(new URL(`../data/${name}`, import.meta.url), 'utf8');
+const WAIT = { timeout: 240_000 };
+
+/** Fills the form with a small traffic. @param {import('playwright-core').Page} page @param {string} name */
+async function fill(page, name) {
+  await page.getByLabel('Name').fill(name);
+  await page.getByLabel('What wears').selectOption('the rail');
+  await page.getByLabel('Traffic over the rail').fill('4');
+  await page.getByLabel('Steps to keep').fill('4');
+  await page.getByLabel('rail height, W1').fill('0,05');
+}
+
+test('a planner forecasts the wear of own sections, and compares it with grinding', () => onPage('#/forecast', async (page) => {
+  await dropFiles(page, 'main', { 'own.ban': file('words-behind.ban'), 'own.whl': file('worn-wheel.whl') });
+  await page.getByText('own.ban, own.whl').waitFor();
+  await page.getByRole('button', { name: 'Remove row 3' }).click();
+  await fill(page, 'leave it');
+  await page.getByRole('button', { name: 'Compute' }).click();
+  await page.locator('svg.worn').waitFor(WAIT);
+  const { evolutions: [job] } = await service.ask('/v1/evolutions?limit=10');
+  const answer = await service.ask(`/v1/evolutions/${job.id}/result`);
+  const last = answer.records.at(-1);
+
+  // The last step is shown first; the slider goes back to the start, where nothing is worn.
+  const area = page.locator('[aria-labelledby="h-step"] tr').filter({ hasText: 'worn area of the rail' }).locator('td').first();
+  assert.ok(Math.abs(parsed(await area.innerText()) - last.rail.worn_area_mm2) <= 6e-3 * last.rail.worn_area_mm2 + 1e-6, `${await area.innerText()} is ${last.rail.worn_area_mm2}`);
+  await page.locator('.film input').evaluate((input) => {
+    /** @type {HTMLInputElement} */ (input).value = '0';
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+  });
+  await until(async () => parsed(await area.innerText()) === 0);
+  await page.getByRole('button', { name: 'Play as a film' }).click();
+  await until(async () => parsed(await area.innerText()) > 0.9 * last.rail.worn_area_mm2);
+  await page.getByRole('radio', { name: 'Pressure' }).check();
+  await page.locator('creep-curve canvas').waitFor();
+  await page.getByRole('radio', { name: 'Losses' }).check();
+  await page.screenshot({ path: join(OUTPUT, 'forecast.png'), fullPage: true });
+
+  // Files: a table, a picture, and a section that the page reads again.
+  const saved = async (/** @type {string} */ name) => {
+    const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('button', { name, exact: true }).click()]);
+    return readFileSync(await download.path());
+  };
+  assert.match((await saved('CSV')).toString(), /^share,/);
+  assert.equal((await saved('Parquet')).subarray(0, 4).toString(), 'PAR1');
+  assert.match((await saved('SVG')).toString(), /^<svg[^]*stroke="rgb/);
+  const ground = (await saved('MiniProf')).toString();
+  assert.match((await saved('Simpack')).toString(), /point\.begin/);
+
+  await page.getByRole('button', { name: 'Change and repeat' }).click();
+  await page.getByLabel('Name').waitFor();
+  await fill(page, 'grind at 2 MGT');
+  await page.getByRole('button', { name: 'Add grinding, lubrication or turning' }).click();
+  await page.getByRole('button', { name: 'Compute' }).click();
+  await page.locator('svg.worn').waitFor(WAIT);
+  await page.goto(`${service.base}/#/forecast`);
+  for (const name of ['leave it', 'grind at 2 MGT']) await page.getByLabel(`Choose ${name}`).check();
+  await page.getByRole('link', { name: 'Compare 2' }).click();
+  await page.getByRole('heading', { name: 'Two forecasts' }).waitFor();
+  const off = page.locator('[aria-labelledby="h-step"] tr').filter({ hasText: 'ground or turned off the rail' }).locator('td');
+  await until(async () => (await off.count()) === 2);
+  assert.ok(parsed(await off.nth(0).innerText()) !== parsed(await off.nth(1).innerText()));
+  await page.screenshot({ path: join(OUTPUT, 'forecasts.png'), fullPage: true });
+
+  await page.goto(`${service.base}/#/compose`);
+  await dropFiles(page, 'main', { 'ground.ban': ground, 'own.whl': file('worn-wheel.whl') });
+  await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'own on ground');
+  await page.locator('.verdict .checked').waitFor();
+}));
+
+test('a faulty traffic is refused with its place, and a table from a file is taken', () => onPage('#/forecast', async (page) => {
+  await page.getByRole('button', { name: 'Compute', exact: true }).waitFor();
+  await page.getByLabel('friction μ, row 1').fill('-1');
+  await page.getByRole('button', { name: 'Compute' }).click();
+  await page.locator('.faults code').filter({ hasText: /traffic.*friction/ }).first().waitFor();
+  await page.locator('#traffic').setInputFiles({ name: 'year.csv', mimeType: 'text/csv', buffer: Buffer.from('axle load [t];shift [mm];passes\n20;0;3\n22,5;-1;1\n') });
+  await page.getByText('year.csv: 2 rows of wheel load Q, shift to the left and passes').waitFor();
+}));
