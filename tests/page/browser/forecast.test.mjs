@@ -51,7 +51,7 @@ test('a planner forecasts the wear of own sections, and compares it with grindin
     const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('button', { name, exact: true }).click()]);
     return readFileSync(await download.path());
   };
-  assert.match((await saved('CSV')).toString(), /^share,/);
+  assert.match((await saved('CSV')).toString(), /^record,/);
   assert.equal((await saved('Parquet')).subarray(0, 4).toString(), 'PAR1');
   assert.match((await saved('SVG')).toString(), /^<svg[^]*stroke="rgb/);
   const ground = (await saved('MiniProf')).toString();

@@ -135,8 +135,8 @@ export const evolutionRequest = (id) => json(`/v1/evolutions/${id}/request`);
 /** @type {(id: string) => Promise<Schemas['EvolutionAnswer']>} */
 export const evolutionResult = (id) => json(`/v1/evolutions/${id}/result`);
 
-/** @param {JsonObject} asked @returns {Promise<Job>} */
-export const submitEvolution = (asked) => json('/v1/evolutions', { method: 'POST', body: JSON.stringify(asked) });
+/** @param {JsonObject} asked @param {string} name @returns {Promise<Job>} */
+export const submitEvolution = (asked, name) => json(`/v1/evolutions?${search({ name })}`, { method: 'POST', body: JSON.stringify(asked) });
 
 /** @typedef {{ state?: readonly string[], batch?: string, label?: string, name?: string, fields?: string, cursor?: string, limit?: number }} Filter */
 /** @typedef {Omit<Schemas['JobPage'], 'jobs'> & { jobs: Job[] }} JobPage With all members of the jobs that are asked for. */

@@ -195,7 +195,7 @@ export function requestOf(app, template) {
   return {
     template, traffic: trafficOf(form), wearing: form.wearing, wear_model: form.law, records: number(form.records),
     extent: { ...(form.wearing === 'wheel' ? {} : { mgt: number(form.mgt) }), ...(form.wearing === 'rail' ? {} : { wheel_distance_km: number(form.km) }) },
-    ...(Object.keys(limits).length ? { limits } : {}), ...(events.length ? { events } : {}), name: form.name || `wear of ${app.store.get().compose.document?.name ?? 'a pair'}`,
+    ...(Object.keys(limits).length ? { limits } : {}), ...(events.length ? { events } : {}),
   };
 }
 
@@ -205,7 +205,8 @@ export async function startForecast(app) {
   if (typeof template === 'string') return app.say(template);
   chooseForecast(app, { sending: true, refusal: '', faults: [] });
   try {
-    const { id } = await submitEvolution(requestOf(app, template));
+    const name = forecast.form.name || `wear of ${app.store.get().compose.document?.name ?? 'a pair'}`;
+    const { id } = await submitEvolution(requestOf(app, template), name);
     app.go(formatRoute('forecast', [id]));
   } catch (error) {
     const faults = error instanceof Error && 'faults' in error ? /** @type {Forecast['faults']} */ (error.faults) : [];
@@ -216,9 +217,9 @@ export async function startForecast(app) {
   }
 }
 
-/** The form as an evolution was asked for, to change something of it. @param {App} app @param {string} id */
-export async function repeatForecast(app, id) {
-  const asked = await evolutionRequest(id);
+/** The form as an evolution was asked for, to change something of it. @param {App} app @param {Job} job */
+export async function repeatForecast(app, job) {
+  const asked = await evolutionRequest(job.id);
   const text = (/** @type {unknown} */ value, factor = 1) => (typeof value === 'number' ? String(Number((value / factor).toPrecision(12))) : '');
   const columns = /** @type {Record<string, number[]>} */ (at(asked, '/traffic/columns') ?? {});
   const passes = /** @type {number[] | undefined} */ (at(asked, '/traffic/passes'));
@@ -232,7 +233,7 @@ export async function repeatForecast(app, id) {
   }));
   writeForm(app, {
     ...firstForm(), ...(few ? { rows: made } : { table: { name: 'the traffic of before', rows, columns, passes: passes ?? null } }),
-    name: `${asked.name ?? ''}, changed`, wearing: /** @type {Form['wearing']} */ (asked.wearing ?? 'both'), law: /** @type {Form['law']} */ (asked.wear_model ?? 'usfd_wear'),
+    name: `${job.name ?? ''}, changed`, wearing: /** @type {Form['wearing']} */ (asked.wearing ?? 'both'), law: /** @type {Form['law']} */ (asked.wear_model ?? 'usfd_wear'),
     mgt: text(at(asked, '/extent/mgt')) || '20', km: text(at(asked, '/extent/wheel_distance_km')) || '50000', records: text(asked.records) || '10',
     limits: Object.fromEntries(LOSSES.map(({ key }) => [key, text(at(asked, `/limits/${key}`))])), events,
   });

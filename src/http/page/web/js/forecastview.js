@@ -123,7 +123,7 @@ function listPanel(app, { listed, ticked }) {
       <td><input type="checkbox" aria-label=${`Choose ${job.name || job.id}`} .checked=${ticked.has(job.id)} @change=${tick(job.id)}></td>
       <th scope="row"><a href=${formatRoute('forecast', [job.id])}>${job.name || job.id}</a></th>
       <td class=${`state ${job.state}`}>${job.state}${job.state === 'running' ? ` ${Math.round(100 * job.progress)} %` : ''}</td><td><time>${job.created_at.slice(0, 16).replace('T', ' ')}</time></td>
-      <td><button class="small" @click=${() => repeatForecast(app, job.id).catch(app.refused)}>Change and repeat</button>
+      <td><button class="small" @click=${() => repeatForecast(app, job).catch(app.refused)}>Change and repeat</button>
         <button class="small ghost" @click=${act(job)}>${job.state === 'queued' || job.state === 'running' ? 'Cancel' : 'Delete'}</button></td></tr>`)}</tbody></table></div></section>`;
 }
 
@@ -133,7 +133,7 @@ function waitingPanel(app, job) {
   return html`<section class="panel wait"><h1>${job.name || 'Forecast'}</h1>
     <p role="status" class=${job.state === 'failed' ? 'fault big' : ''}>${job.state === 'queued' ? 'Waiting in the queue …' : job.state === 'running' ? 'Computing step by step …' : job.state === 'failed' ? (job.error?.detail ?? 'Failed') : job.state}</p>
     ${open ? html`<progress max="1" .value=${job.progress} aria-label="Progress"></progress><button @click=${() => cancel('evolutions', job.id).catch(app.refused)}>Cancel</button>`
-      : html`<button @click=${() => repeatForecast(app, job.id).catch(app.refused)}>Change and repeat</button>`}
+      : html`<button @click=${() => repeatForecast(app, job).catch(app.refused)}>Change and repeat</button>`}
     <a class="button" href="#/forecast">To the forecasts</a></section>`;
 }
 
@@ -263,9 +263,9 @@ function downloadsOf(app, { body, step }, { job }, record) {
   const section = (/** @type {string} */ format, /** @type {string} */ end) => get(`sections/${body}?record=${step}&format=${format}`, `${at}.${end}`);
   return html`<div class="downloads" role="group" aria-label="Download">
     <button class="small" @click=${get('table?of=records&format=csv', `${name}.csv`)}>CSV</button>
-    <button class="small" @click=${get('table?of=sections&format=parquet', `${name}-sections.parquet`)}>Parquet</button>
+    <button class="small" @click=${get('table?of=points&format=parquet', `${name}-points.parquet`)}>Parquet</button>
     <button class="small" @click=${picture}>SVG</button>
     <button class="small" @click=${section('miniprof', body === 'rail' ? 'ban' : 'whl')}>MiniProf</button>
     <button class="small" @click=${section('simpack', body === 'rail' ? 'prr' : 'prw')}>Simpack</button>
-    <button class="small primary" @click=${() => repeatForecast(app, job.id).catch(app.refused)}>Change and repeat</button></div>`;
+    <button class="small primary" @click=${() => repeatForecast(app, job).catch(app.refused)}>Change and repeat</button></div>`;
 }
