@@ -2,9 +2,10 @@
 
 import { evolution as evolutionOf, evolutionRequest, evolutionResult, evolutions as evolutionsOf, submitEvolution } from './api.js';
 import { at, isObject } from './document.js';
+import { editDocument } from './editing.js';
 import { LOSSES } from './forecastdata.js';
 import { formatRoute } from './routes.js';
-import { standardSection } from './starts.js';
+import { inOrder, standardSection, withEverything } from './starts.js';
 import { COLUMNS, ROWS_MAX, trafficOf } from './traffic.js';
 import { parse } from './written.js';
 
@@ -237,5 +238,8 @@ export async function repeatForecast(app, job) {
     mgt: text(at(asked, '/extent/mgt')) || '20', km: text(at(asked, '/extent/wheel_distance_km')) || '50000', records: text(asked.records) || '10',
     limits: Object.fromEntries(LOSSES.map(({ key }) => [key, text(at(asked, `/limits/${key}`))])), events,
   });
+  const template = asked.template;
+  if (isObject(template)) editDocument(app, inOrder(withEverything(template)));
+  app.compose({ example: '', files: {} });
   app.go(formatRoute('forecast'));
 }
