@@ -3,7 +3,7 @@
 import { evolution as evolutionOf, evolutionRequest, evolutionResult, evolutions as evolutionsOf, submitEvolution } from './api.js';
 import { at, isObject } from './document.js';
 import { editDocument } from './editing.js';
-import { LOSSES } from './forecastdata.js';
+import { LOSSES, wears } from './forecastdata.js';
 import { formatRoute } from './routes.js';
 import { inOrder, standardSection, withEverything } from './starts.js';
 import { COLUMNS, ROWS_MAX, trafficOf } from './traffic.js';
@@ -78,6 +78,9 @@ const forecast = {
   form: firstForm(), sending: false, refusal: '', faults: [], listed: null, ticked: new Set(), ids: [], sides: [], step: 0, body: 'rail', factor: 1, curve: 'losses', playing: 0,
 };
 
+/** By how much wear is drawn larger, and the depth that it has then at most, in mm. */
+export const FACTORS = [1, 5, 20, 100];
+const DRAWN_MM = 3;
 const POLL_MS = 1000;
 const FRAME_MS = 250;
 
@@ -97,7 +100,7 @@ export async function openForecast(app, ids) {
   stopFilm();
   const wanted = ids.slice(0, 2);
   const same = wanted.join() === forecast.ids.join() && forecast.sides.length === wanted.length;
-  Object.assign(forecast, { ids: wanted, ...(same ? {} : { sides: [], step: Infinity }) });
+  Object.assign(forecast, { ids: wanted, listed: null, ...(same ? {} : { sides: [], step: Infinity }) });
   try {
     if (!wanted.length) await watchList(app);
     else if (!same || forecast.sides.some(({ answer }) => !answer)) await watchSides(app, wanted);
@@ -134,8 +137,13 @@ async function watchSides(app, ids) {
     const sides = await Promise.all(jobs.map(async (job, at) => ({ job, answer: forecast.sides[at]?.answer ?? (job.state === 'succeeded' ? await evolutionResult(job.id) : null) })));
     if (forecast.ids !== ids) return;
     const records = sides[0].answer?.records.length ?? 0;
-    const body = sides[0].answer && !(Math.max(...sides[0].answer.records.map(({ rail }) => rail.worn_area_mm2)) > 0) ? 'wheel' : forecast.body;
-    chooseForecast(app, { sides, body, step: records ? Math.min(forecast.step, records - 1) : forecast.step });
+    const first = sides[0].answer;
+    if (first && forecast.step >= records) {
+      const body = wears(first, forecast.body) ? forecast.body : forecast.body === 'rail' ? 'wheel' : 'rail';
+      const depth = Math.max(...first.records.flatMap((record) => record[body].depth_mm));
+      Object.assign(forecast, { step: records - 1, body, factor: FACTORS.findLast((factor) => factor * depth <= DRAWN_MM) ?? 1 });
+    }
+    chooseForecast(app, { sides });
     if (!jobs.some(isOpen)) return;
     await pause();
   }

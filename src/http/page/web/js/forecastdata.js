@@ -30,6 +30,12 @@ export function distanceUnit({ records: [first] }) {
   return mgt !== undefined ? 'MGT' : axle_passes !== undefined ? 'axles' : wheel_distance_km !== undefined ? 'km' : '% of the extent';
 }
 
+/** Worn area below which a body has no wear, in mm²: what is left of rounding. */
+const NO_WEAR_MM2 = 1e-6;
+
+/** Does a body wear? @param {Answer} answer @param {Body} body */
+export const wears = ({ records }, body) => records.some((record) => record[body].worn_area_mm2 > NO_WEAR_MM2);
+
 /** Unit normals of a section into the body. @param {readonly Point[]} line @param {Body} body @returns {Point[]} */
 export function normalsInto(line, body) {
   const normals = line.map((_, at) => {
@@ -72,7 +78,8 @@ export const numericalOf = (record, body) => {
 /** @typedef {Omit<Line, 'colour'> & { look: number, limit?: boolean }} ForecastLine `look` is the place of its colour. */
 
 /** Lines of one evolution over its records. @param {Answer} answer @param {string} kind @returns {(ForecastLine & { body?: Body })[]} */
-function linesOf({ records, limits }, kind) {
+function linesOf(answer, kind) {
+  const { records, limits } = answer;
   /** @type {(label: string, unit: string, look: number, of: (record: WornRecord) => number | null | undefined, error?: (record: WornRecord) => number) => ForecastLine} */
   const line = (label, unit, look, of, error) => ({ label, unit, look, y: records.map((record) => of(record) ?? NaN), error: records.map((record) => error?.(record) || null) });
   switch (kind) {
@@ -88,7 +95,7 @@ function linesOf({ records, limits }, kind) {
         const area = (/** @type {WornRecord} */ record) => record[body].worn_area_mm2;
         const bound = (/** @type {0 | 1} */ end) => ({ ...line(`${body}, ${end ? 'highest' : 'lowest'} coefficients`, 'mm²', 2, (record) => area(record) * record[body].uncertainty.coefficients[end]), body });
         const worn = line(body, 'mm²', 0, area, (record) => area(record) * numericalOf(record, body));
-        return worn.y.some((value) => value > 0) ? [{ ...worn, body }, bound(0), bound(1)] : [];
+        return wears(answer, body) ? [{ ...worn, body }, bound(0), bound(1)] : [];
       });
     case 'pressure':
       return [line('largest', 'MPa', 0, ({ contact }) => contact.pressure_max_mpa), line('mean of the traffic', 'MPa', 1, ({ contact }) => contact.pressure_mean_mpa)];

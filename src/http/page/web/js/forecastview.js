@@ -7,8 +7,8 @@ import { drawChart } from './drawing/axes.js';
 import { drawWorn } from './drawing/worn.js';
 import { fileName } from './downloads.js';
 import { decoded } from './files.js';
-import { chooseForecast, EVENTS, forecastSeen, openForecast, playFilm, recordOf, repeatForecast, startForecast, templateOf, writeForm } from './forecast.js';
-import { CURVES, distanceOf, distanceUnit, forecastCurve, LOSSES, numericalOf, sectionOf } from './forecastdata.js';
+import { chooseForecast, EVENTS, FACTORS, forecastSeen, openForecast, playFilm, recordOf, repeatForecast, startForecast, templateOf, writeForm } from './forecast.js';
+import { CURVES, distanceOf, distanceUnit, forecastCurve, LOSSES, numericalOf, sectionOf, wears } from './forecastdata.js';
 import { count, fixed, number } from './format.js';
 import { remarkList } from './remarks.js';
 import { formatRoute } from './routes.js';
@@ -21,8 +21,6 @@ import { COLUMNS, parseTraffic, ROWS_MAX } from './traffic.js';
 /** @typedef {import('./forecast.js').Answer} Answer */
 /** @typedef {import('./forecast.js').WornRecord} WornRecord */
 /** @typedef {import('./api.js').Job} Job */
-
-const FACTORS = [1, 5, 20];
 
 /** @param {App} app */
 export function forecastView(app) {
@@ -163,7 +161,7 @@ function resultView(app, forecast) {
       ${compared ? html`<a class="button small" href="#/forecast">To the forecasts</a>` : downloadsOf(app, forecast, sides[0], record)}</header>
     ${compared ? nothing : remarkList(first.remarks)}
     <section class="panel" aria-labelledby="h-worn"><header class="bar"><h2 id="h-worn">Section</h2>
-        <div class="segs" role="group" aria-label="Body">${/** @type {const} */ (['rail', 'wheel']).map((name) => html`<label class="seg"><input type="radio" name="worn" .checked=${body === name} @change=${() => chooseForecast(app, { body: name })}><span>${name}</span></label>`)}</div>
+        <div class="segs" role="group" aria-label="Body">${BODIES.map((name) => html`<label class="seg"><input type="radio" name="worn" .checked=${body === name} @change=${() => chooseForecast(app, { body: name })}><span>${name}</span></label>`)}</div>
         <label class="inline">wear drawn <select class="slim" @change=${(/** @type {Event} */ event) => chooseForecast(app, { factor: Number(/** @type {HTMLSelectElement} */ (event.target).value) })}>${FACTORS.map((times) => html`<option value=${times} ?selected=${times === factor}>${times === 1 ? 'to scale' : `${times} times larger`}</option>`)}</select></label></header>
       <div class="pad">${drawWorn({
         name: `Section of the ${body} at the start and after ${number(distanceOf(record.progress), 3)} ${unit}`, start: shapes[0].shape.start,
@@ -180,7 +178,7 @@ function resultView(app, forecast) {
         ${curve ? html`<creep-curve .shown=${{ curve, chosen: curve.x.lastIndexOf(distanceOf(record.progress)), pick }}></creep-curve>` : html`<p class="pad quiet">Nothing to draw.</p>`}
         <p class="pad hint">Error bars: steps, condensed traffic and contact together, without the wear coefficients.</p></section>
       ${limitsPanel(answers, sides)}</div>
-      ${numbersPanel(shapes.map((shape) => shape.record), compared)}
+      ${numbersPanel(shapes.map((shape) => shape.record), BODIES.filter((name) => answers.some((answer) => wears(answer, name))), compared)}
     </div></div>`;
 }
 
@@ -227,12 +225,14 @@ function limitsPanel(answers, sides) {
       : html`<p class="pad quiet">No limits were given.</p>`}</section>`;
 }
 
-/** Numbers of the step. @param {readonly WornRecord[]} records @param {boolean} compared */
-function numbersPanel(records, compared) {
+const BODIES = /** @type {const} */ (['rail', 'wheel']);
+
+/** Numbers of the step. @param {readonly WornRecord[]} records @param {readonly ('rail' | 'wheel')[]} bodies Those that wear. @param {boolean} compared */
+function numbersPanel(records, bodies, compared) {
   /** @type {[string, (record: WornRecord) => unknown][]} */
   const rows = [
-    ...LOSSES.map(({ key, label }) => /** @type {[string, (record: WornRecord) => unknown]} */ ([`${label} / mm`, ({ losses }) => fixed(losses[key] ?? NaN, 3)])),
-    ...(/** @type {const} */ (['rail', 'wheel'])).flatMap((body) => /** @type {[string, (record: WornRecord) => unknown][]} */ ([
+    ...LOSSES.filter(({ body }) => bodies.includes(body)).map(({ key, label }) => /** @type {[string, (record: WornRecord) => unknown]} */ ([`${label} / mm`, ({ losses }) => fixed(losses[key] ?? NaN, 3)])),
+    ...bodies.flatMap((body) => /** @type {[string, (record: WornRecord) => unknown][]} */ ([
       [`worn area of the ${body} / mm²`, (record) => {
         const { worn_area_mm2: area, uncertainty: { coefficients } } = record[body];
         return html`${number(area, 3)} ± ${number(100 * numericalOf(record, body), 2)} %<small> coefficients: ${number(area * coefficients[0], 2)} … ${number(area * coefficients[1], 2)}</small>`;
