@@ -155,7 +155,12 @@ async fn a_key_gives_the_same_evolution_and_a_cancelled_one_has_no_answer() {
     let (first, again) = (send(&long).await, send(&long).await);
     assert_eq!(first.json["id"], again.json["id"]);
     assert_eq!(again.header("idempotency-replayed"), Some("true"));
-    assert_problem(&send(&request(1)).await, 422, "idempotency-conflict", "key");
+    assert_problem(
+        &send(&request(1)).await,
+        422,
+        "idempotency-conflict",
+        "Idempotency-Key",
+    );
     let path = first.header("location").unwrap().to_owned();
     let cancelled = server.post(&format!("{path}/cancel"), &json!({})).await;
     assert!([200, 202].contains(&cancelled.status), "{}", cancelled.text);
