@@ -2,12 +2,14 @@
 //!
 //! `cargo bench --bench wheels` prints times in LU (the report's unit), best of several; `-- rows 1000` the means of so many rows that differ in
 //! shift, yaw and load, solved one after the other as a run solves them, at a target of 0.02 and without fields.
+//! `-- curve 20` prints what contact on the reference curve takes over contact on planes, for so many random placements of each class.
 
 extern crate railhead_contact as railhead;
 
 mod machine;
 
 use std::hint::black_box;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use railhead::contact::case::known_pair::KnownPair;
@@ -35,10 +37,19 @@ fn main() {
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
-    let place = arguments.iter().position(|argument| argument == "rows");
-    match place.map(|k| arguments.get(k + 1).and_then(|count| count.parse().ok())) {
-        None => cases(),
-        Some(count) => rows(count.unwrap_or(1000)),
+    let form = |name: &str, usual: usize| {
+        let place = arguments.iter().position(|argument| argument == name)?;
+        let count = arguments
+            .get(place + 1)
+            .and_then(|count| count.parse().ok());
+        Some(count.unwrap_or(usual))
+    };
+    if let Some(count) = form("rows", 1000) {
+        rows(count);
+    } else if let Some(count) = form("curve", 20) {
+        curve(count);
+    } else {
+        cases();
     }
 }
 
@@ -133,15 +144,20 @@ fn rows(count: usize) {
     );
 }
 
-/// The case of a row, on the tread and at the gauge corner: the same on every machine.
-fn row(pair: &Value, number: usize) -> Value {
-    let mut state = (number as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    let mut between = move |low: f64, high: f64| {
+/// Numbers between two ends, the same on every machine.
+fn random(seed: usize) -> impl FnMut(f64, f64) -> f64 {
+    let mut state = (seed as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    move |low: f64, high: f64| {
         state ^= state << 13;
         state ^= state >> 7;
         state ^= state << 17;
         low + (high - low) * ((state >> 11) as f64 / (1_u64 << 53) as f64)
-    };
+    }
+}
+
+/// The case of a row, on the tread and at the gauge corner.
+fn row(pair: &Value, number: usize) -> Value {
+    let mut between = random(number);
     let mut case = pair.clone();
     case["contact"]["lateral_shift_mm"] = json!(between(-5.0, 4.0));
     case["contact"]["yaw_rad"] = json!(between(-0.01, 0.01));
@@ -149,4 +165,139 @@ fn row(pair: &Value, number: usize) -> Value {
     case["solver"] = json!({ "method": "boundary_element", "target_error": 0.02 });
     case["outputs"] = json!(["resultants"]);
     case
+}
+
+/// A class of placements of a pair.
+struct Class {
+    name: &'static str,
+    pair: Value,
+    /// Lateral shifts in mm.
+    shifts: [f64; 2],
+    /// Yaw in rad.
+    yaw: [f64; 2],
+    /// Vertical forces in N.
+    force: [f64; 2],
+    /// Solved once one after the other with a common store of operators, at a target error of 0.02; otherwise alone, at 0.005.
+    rows: bool,
+}
+
+/// Contact on the reference curve against contact on planes: ratios of processor time of single solves and of rows of one pair.
+fn curve(count: usize) {
+    println!(
+        "| class | cases | patches | plane, ms | curve, ms | ratio: median | 90 % | largest | without an answer |\n|---|---|---|---|---|---|---|---|---|"
+    );
+    for (seed, class) in classes().into_iter().enumerate() {
+        let (mut times, mut ratios) = ([Vec::new(), Vec::new()], Vec::new());
+        let (mut patches, mut failed) = (Vec::new(), 0);
+        let (operators, known) = ([Arc::default(), Arc::default()], KnownPair::default());
+        for k in 0..count {
+            let mut between = random(1000 * seed + k);
+            let mut case = class.pair.clone();
+            case["contact"]["lateral_shift_mm"] = json!(between(class.shifts[0], class.shifts[1]));
+            case["contact"]["yaw_rad"] = json!(between(class.yaw[0], class.yaw[1]));
+            case["load"] = json!({ "vertical_force_n": between(class.force[0], class.force[1]) });
+            case["solver"] = json!({ "method": "boundary_element", "target_error": if class.rows { 0.02 } else { 0.005 } });
+            case["outputs"] = json!(["resultants"]);
+            let problems = ["plane", "curve"].map(|surface| {
+                case["contact"]["reference_surface"] = json!(surface);
+                check_with(&known, &case, &Limits::default()).expect("a valid case")
+            });
+            let mut best = [f64::INFINITY; 2];
+            let mut answers = [None, None];
+            for _ in 0..if class.rows { 1 } else { 3 } {
+                for (surface, problem) in problems.iter().enumerate() {
+                    let alone = Arc::default();
+                    let operators = if class.rows {
+                        &operators[surface]
+                    } else {
+                        &alone
+                    };
+                    let (seconds, answer) =
+                        seconds_of(|| solve_with(operators, problem, &Unmonitored));
+                    best[surface] = best[surface].min(seconds);
+                    answers[surface] = answer.ok();
+                }
+            }
+            if let [Some(_), Some((solution, _))] = answers {
+                patches.push(solution.patches.len() as f64);
+                ratios.push(best[1] / best[0]);
+                times
+                    .iter_mut()
+                    .zip(best)
+                    .for_each(|(times, best)| times.push(1e3 * best));
+            } else {
+                failed += 1;
+            }
+        }
+        let [plane, curve] = times.map(median);
+        println!(
+            "| {} | {count} | {} | {plane:.1} | {curve:.1} | {:.2} | {:.2} | {:.2} | {failed} |",
+            class.name,
+            median(patches),
+            median(ratios.clone()),
+            quantile(ratios.clone(), 0.9),
+            quantile(ratios, 1.0),
+        );
+    }
+}
+
+fn classes() -> Vec<Class> {
+    let new = example("wheel-rail.case.json");
+    let of_new = |name, shifts, rows| Class {
+        name,
+        pair: new.clone(),
+        shifts,
+        yaw: [-0.01, 0.01],
+        force: [40e3, 110e3],
+        rows,
+    };
+    let mut classes = vec![
+        of_new("tread", [-2.0, 4.0], false),
+        of_new("gauge corner", [-5.9, -3.5], false),
+        of_new("gauge corner and flange", [-6.5, -6.2], false),
+        of_new("tread, rows", [-2.0, 4.0], true),
+        of_new("gauge corner, rows", [-5.9, -3.5], true),
+    ];
+    if let Some(pair) = worn_pair() {
+        for (name, shifts) in [
+            ("worn, tread", [-13.8, -12.5]),
+            ("worn, tread and flange", [-15.2, -14.5]),
+        ] {
+            classes.push(Class {
+                name,
+                pair: pair.clone(),
+                shifts,
+                yaw: [-0.01, 0.01],
+                force: [100e3, 140e3],
+                rows: false,
+            });
+        }
+    }
+    classes
+}
+
+/// A worn pair, if the reference files are beside the checkout or in the folder `RAILHEAD_REFERENCE`.
+fn worn_pair() -> Option<Value> {
+    let folder = std::env::var_os("RAILHEAD_REFERENCE").map(PathBuf::from);
+    let folder = folder.unwrap_or_else(|| {
+        PathBuf::from(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../shared/reference"
+        ))
+    });
+    let file = |name: &str| {
+        let text = std::fs::read_to_string(folder.join("extended/profiles").join(name)).ok()?;
+        Some(json!({ "format": "simpack", "text": text }))
+    };
+    Some(json!({
+        "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": {
+            "type": "profiles", "rail": file("site_b_hr.prr")?, "wheel": file("worn_high_mileage.prw")?,
+            "side": "right", "rolling_radius_mm": 444, "gauge_mm": 1435.1, "gauge_height_mm": 15.875,
+            "flange_back_distance_mm": 1347.4, "flange_back_position_mm": 0, "roll_rad": -0.0013,
+            "accept_rough_profiles": true,
+        },
+        "motion": { "wheelset": { "speed_mm_per_s": 15000, "free_rolling_radius_mm": 444 } },
+    }))
 }

@@ -47,12 +47,15 @@ use crate::contact::time_limit::TimeLimit;
 use crate::contact::unlike_motions::tell_region;
 use crate::contact::wheel_balance::next_share;
 
-/// Allowed error of the resultants in the rounds before the last ones, relative to μN.
-const TARGET_OF_ROUNDS: f64 = 0.02;
+/// Allowed error of the resultants relative to μN on the coarse grid: that of the coarsest meshes, whatever the few cells of a small patch leave open.
+const TARGET_ROUGH: f64 = 0.2;
 /// Rounds at most; 3 to 6 suffice.
 const ROUNDS_MAX: u32 = 16;
-/// Change of the forces relative to μN over the target that ends the rounds.
+/// Change of the forces relative to μN over the target that ends the rounds, and of the vertical force relative to it.
 const CHANGE: f64 = 0.05;
+const BALANCE: f64 = 1e-4;
+/// Change of the forces relative to μN that ends the rounds on the coarse grid.
+const CHANGE_ROUGH: f64 = 0.02;
 /// When the rounds are used up, a change of the forces relative to μN up to this is answered with a remark.
 const CHANGE_POOR: f64 = 5e-3;
 /// A surface that turns by less than this over the contact, in rad, has no remark.
@@ -129,9 +132,18 @@ struct Found {
     /// Vertical force of the tractions in N.
     lift: f64,
     parts: Vec<Part>,
-    /// Force on the rail in track axes in N.
-    force: [f64; 3],
+    /// The contact on the coarse grid, and rough tractions on it.
+    rough: Option<(CurveContact, Rough)>,
     remarks: Vec<RemarkEntry>,
+}
+
+/// Tractions on a coarse grid.
+struct Rough {
+    parts: Vec<Part>,
+    /// Forces on the rail in track axes relative to the friction limit, for the load that they leave to the pressures.
+    force: [f64; 3],
+    /// Friction limit in N.
+    limit: f64,
 }
 
 /// Patches that are solved together.
@@ -220,18 +232,11 @@ impl<'a> CurveSolve<'a> {
         let MotionPart { before: index, all } = self.case.problem.part;
         let workspace = &mut Workspace::default();
         let began = self.watch.elapsed();
-        let contact = self.task().rest(workspace, self.watch)?;
-        let at_rest = self.wheel(&contact, 0.0)?;
-        if index == 0 {
-            before(&at_rest)?;
-        }
-        let run = &self.case.run;
-        let mut found = self.rounds(contact, run, true, workspace)?;
-        // An answer has one list of patches, which is that without tractions if there are several motions.
-        let patches: usize = found.parts.iter().map(|part| part.patches.len()).sum();
-        if all > 1 && patches != at_rest.patches.len() {
-            let contact = self.task().rest(workspace, self.watch)?;
-            found = self.rounds(contact, run, false, workspace)?;
+        let mut unasked = |_: &WheelContact| Ok(());
+        let before = if index == 0 { before } else { &mut unasked };
+        let mut found = self.rounds(true, before, workspace)?;
+        if all > 1 && patches(&found.parts) != self.patches_at_rest(workspace)? {
+            found = self.rounds(false, &mut |_| Ok(()), workspace)?;
             found
                 .remarks
                 .push(Remark::NormalForcesAloneBalance {}.into());
@@ -254,84 +259,139 @@ impl<'a> CurveSolve<'a> {
         Ok((wheel, solution, fields))
     }
 
-    /// Pressures and tractions in turn, from a rest without friction; only once, on the pressures of that rest, unless they are `coupled`.
+    /// How many patches there are without tractions: those of an answer to several motions, which has one list of patches.
+    fn patches_at_rest(&self, workspace: &mut Workspace) -> Result<usize, SolveError> {
+        let task = self.task();
+        let coarse = task.coarse(workspace, self.watch)?;
+        let contact = task.fine(&coarse, &Friction::default(), workspace, self.watch)?;
+        Ok(self.wheel(&contact, 0.0)?.patches.len())
+    }
+
+    /// Pressures and tractions in turn: on a coarse grid until friction is known about, then on the fine one. `before` is asked of the wheel at rest
+    /// on the fine grid. Unless they are `coupled`, tractions are solved once, on pressures without friction.
     fn rounds(
         &self,
-        mut contact: CurveContact,
-        run: &Run,
         coupled: bool,
+        before: &mut dyn FnMut(&WheelContact) -> Result<(), SolveError>,
         workspace: &mut Workspace,
     ) -> Result<Found, SolveError> {
-        let last_run = with_tractions(run, &run.outputs);
-        let rough = with_tractions(&run.for_resultants(TARGET_OF_ROUNDS), &[]);
-        let shares = matches!(self.contact.loading, WheelLoad::Vertical(_));
+        let run = &self.case.run;
         let coupled = coupled
-            && (shares || self.influence == Influence::AngleCorrected)
+            && (matches!(self.contact.loading, WheelLoad::Vertical(_))
+                || self.influence == Influence::AngleCorrected)
             && !self.case.problem.friction.is_frictionless();
-        let tolerance = CHANGE * run.resolution.target_or_usual();
-        let mut exact = !coupled;
-        let mut counted = 0.0;
-        let mut earlier: Option<(f64, f64)> = None;
-        let mut before: Option<[f64; 3]> = None;
-        let mut change = f64::INFINITY;
-        for round in 0..ROUNDS_MAX {
-            let exactly = exact || round + 1 == ROUNDS_MAX;
-            let parts = self.tractions(
-                &contact,
-                if exactly { &last_run } else { &rough },
-                workspace,
-            )?;
-            let forces = self.forces(&contact, &parts);
-            let force = sum(forces.iter().flatten().map(PatchForces::in_track));
-            let lift: f64 = forces.iter().flatten().map(|patch| patch.sheared[2]).sum();
-            let limit = self.limit(&parts);
-            if let Some(before) = before {
-                let moved = [0, 1, 2].map(|k| (force[k] - before[k]).abs());
-                change = moved.into_iter().fold(0.0, f64::max) / limit.max(f64::MIN_POSITIVE);
+        let task = self.task();
+        let mut coarse = task.coarse(workspace, self.watch)?;
+        let mut friction = Friction::default();
+        let mut rough = None;
+        let mut earlier = None;
+        for _ in 0..if coupled { ROUNDS_MAX } else { 0 } {
+            let found = self.rough(&coarse, friction.lift, workspace)?;
+            let next = self.friction(&coarse, &found.parts, workspace);
+            let limit = found.limit;
+            let [by_lift, by_gap] = coarse.change_by(&friction, &next);
+            rough = Some(found);
+            friction = accelerated(&friction, next, &mut earlier);
+            if by_lift.max(by_gap * coarse.normal_force() / limit) <= CHANGE_ROUGH {
+                break;
             }
-            let settled = change <= tolerance;
-            if !coupled || exactly && settled || round + 1 == ROUNDS_MAX {
-                let mut remarks = Vec::new();
-                if coupled && !settled {
-                    if change > CHANGE_POOR {
-                        return Err(SolveError::NormalProblem {
-                            reason: format!(
-                                "pressures and tractions on the curve of the rail do not come to agree in {ROUNDS_MAX} rounds: forces still change by \
-                                 {:.1} % of the friction limit; give reference_surface \"plane\"",
-                                100.0 * change
-                            ),
-                        });
-                    }
-                    let remark = Remark::IterationInexact {
-                        iteration: "pressures and tractions on the curve of the rail",
-                        reason: "the rounds were used up",
-                        residual: change,
-                        tolerance,
-                    };
-                    remarks.push(remark.into());
+            coarse = task.again(coarse, &friction, workspace, self.watch)?;
+        }
+        let mut contact = task.fine(&coarse, &friction, workspace, self.watch)?;
+        friction.opened = friction
+            .opened
+            .map(|opened| contact.interpolated(&coarse, &opened));
+        before(&self.wheel(&contact, friction.lift)?)?;
+        let exact = with_tractions(run, &run.outputs);
+        let target = run.resolution.target_or_usual();
+        let mut earlier = None;
+        for round in 1..=ROUNDS_MAX {
+            let parts = self.tractions(&contact, &exact, workspace)?;
+            let forces = self.forces(&contact, &parts);
+            let (mut next, mut change) = (Friction::default(), 0.0);
+            if coupled {
+                next = self.friction(&contact, &parts, workspace);
+                let [by_lift, by_gap] = contact.change_by(&friction, &next);
+                let by_gap = by_gap * contact.normal_force() / self.limit(&parts);
+                change = (by_lift / BALANCE).max(by_gap / (CHANGE * target));
+            }
+            if change <= 1.0 || round == ROUNDS_MAX {
+                let residual = change * CHANGE * target;
+                if residual > CHANGE_POOR {
+                    return Err(SolveError::NormalProblem {
+                        reason: format!(
+                            "pressures and tractions on the curve of the rail do not come to agree in {ROUNDS_MAX} rounds: forces still change by \
+                             {:.1} % of the friction limit; give reference_surface \"plane\"",
+                            100.0 * residual
+                        ),
+                    });
                 }
+                let remark = Remark::IterationInexact {
+                    iteration: "pressures and tractions on the curve of the rail",
+                    reason: "the rounds were used up",
+                    residual,
+                    tolerance: CHANGE * target,
+                };
                 return Ok(Found {
                     contact,
-                    lift,
+                    lift: forces.iter().flatten().map(|patch| patch.sheared[2]).sum(),
                     parts,
-                    force,
-                    remarks,
+                    rough: rough.map(|rough| (coarse, rough)),
+                    remarks: (change > 1.0).then(|| remark.into()).into_iter().collect(),
                 });
             }
-            exact |= settled;
-            before = Some(force);
-            let next = next_share((counted, lift), earlier.replace((counted, lift)));
-            counted = next;
-            let traction = self.on_grid(&contact, &parts);
-            let friction = Friction {
-                lift: if shares { next } else { 0.0 },
-                opened: contact.operator.opened_by_traction(&traction, workspace),
-            };
-            contact = self
-                .task()
-                .again(contact, &friction, workspace, self.watch)?;
+            friction = accelerated(&friction, next, &mut earlier);
+            contact = task.again(contact, &friction, workspace, self.watch)?;
         }
         unreachable!("the last round ends them")
+    }
+
+    /// Solves tractions on a coarse mesh, on pressures that count on a vertical force in N of the tractions.
+    fn rough(
+        &self,
+        contact: &CurveContact,
+        lift: f64,
+        workspace: &mut Workspace,
+    ) -> Result<Rough, SolveError> {
+        let run = with_tractions(&self.case.run.for_resultants(TARGET_ROUGH), &[]);
+        let parts = self.tractions(contact, &run, workspace)?;
+        let forces = self.forces(contact, &parts);
+        let limit = self.limit(&parts);
+        // Where they carry another part of the load, all forces grow with what is left to the pressures.
+        let grown = match self.contact.loading {
+            WheelLoad::Vertical(load) => {
+                let found: f64 = forces.iter().flatten().map(|patch| patch.sheared[2]).sum();
+                load / (load + lift - found)
+            }
+            WheelLoad::Normal(_) | WheelLoad::Lowering(_) => 1.0,
+        };
+        let force = sum(forces.iter().flatten().map(PatchForces::in_track));
+        Ok(Rough {
+            force: force.map(|part| grown * part / limit.max(f64::MIN_POSITIVE)),
+            limit,
+            parts,
+        })
+    }
+
+    /// What the tractions of all parts do to the contact.
+    fn friction(
+        &self,
+        contact: &CurveContact,
+        parts: &[Part],
+        workspace: &mut Workspace,
+    ) -> Friction {
+        let lift = match self.contact.loading {
+            WheelLoad::Vertical(_) => {
+                let forces = self.forces(contact, parts);
+                forces.iter().flatten().map(|patch| patch.sheared[2]).sum()
+            }
+            WheelLoad::Normal(_) | WheelLoad::Lowering(_) => 0.0,
+        };
+        let traction = self.on_grid(contact, parts);
+        Friction {
+            lift,
+            opened: contact.operator.opened_by_traction(&traction, workspace),
+        }
     }
 
     /// The tractions of all parts of a contact.
@@ -483,15 +543,17 @@ impl<'a> CurveSolve<'a> {
             };
             (0..extents.len()).min_by(|a, b| far(a).total_cmp(&far(b)))
         };
-        let deepest = least_gap(&contact.over).unwrap_or(0.0);
+        let deepest = least(&contact.gap);
         let mut slip = [Vec::new(), Vec::new()];
         for (j, place) in grid.places.iter().enumerate() {
             let rigid = &rigid[patch_of(place.s).unwrap_or(0)];
-            let row = &contact.over[j * grid.x.len()..(j + 1) * grid.x.len()];
-            let gap = 0.5 * (deepest + least_gap(row).unwrap_or(deepest));
+            let row = &contact.gap[j * grid.x.len()..(j + 1) * grid.x.len()];
+            let gap = 0.5 * (deepest + least(row).min(0.0));
+            // It is linear in x.
+            let [at, by_x] = [0.0, 1.0].map(|x| rigid.slip(place.point(x, gap), place));
             for (i, x) in grid.x.iter().enumerate() {
                 let k = j * grid.x.len() + i;
-                let own = rigid.slip(place.point(*x, gap), place);
+                let own = [0, 1].map(|axis| at[axis] + x * (by_x[axis] - at[axis]));
                 let [dx, ds] = [x - origin[0], place.s - origin[1]];
                 let plane = [
                     motion.creepage_x - motion.spin_per_mm * ds,
@@ -504,9 +566,12 @@ impl<'a> CurveSolve<'a> {
             }
         }
         SurfaceSlip {
-            first: [grid.x[0] - origin[0], grid.places[0].s - origin[1]],
-            step: grid.step,
-            samples: grid.cells(),
+            x: (grid.x[0] - origin[0], grid.step[0], grid.x.len()),
+            y: grid
+                .places
+                .iter()
+                .map(|place| place.s - origin[1])
+                .collect(),
             slip,
         }
     }
@@ -575,6 +640,7 @@ impl<'a> CurveSolve<'a> {
             grid.x[0] - 0.5 * grid.step[0],
             grid.places[0].s - 0.5 * grid.step[1],
         ];
+        let cells = [nx, grid.numbers[ny - 1] + 1];
         for part in parts {
             for k in 0..part.solution.patches.len() {
                 each_cell(part, k, |place, size, _, [x, y, _]| {
@@ -583,9 +649,12 @@ impl<'a> CurveSolve<'a> {
                         let ends = [-0.5, 0.5].map(|half| {
                             (place[axis] + half * size[axis] - low[axis]) / grid.step[axis]
                         });
-                        covered(ends, [nx, ny][axis])
+                        covered(ends, cells[axis])
                     });
-                    for (j, height) in &across {
+                    for (number, height) in &across {
+                        let Some(j) = grid.strip(*number as i64) else {
+                            continue;
+                        };
                         for (i, width) in &along {
                             let share = width * height;
                             traction[0][j * nx + i] += share * x;
@@ -604,26 +673,28 @@ impl<'a> CurveSolve<'a> {
         patches.filter_map(|patch| patch.friction_limit_n).sum()
     }
 
-    /// What the factors for the turn change in the forces on the rail, as error and remark; none where the surface hardly turns.
+    /// What the factors for the turn change in the forces on the rail, by rough tractions on the coarse grid; none where the surface hardly turns.
     fn change_by_turn(
         &self,
         found: &Found,
         workspace: &mut Workspace,
     ) -> Result<Option<Remark>, SolveError> {
         let turn = turn(&found.contact);
-        let limit = self.limit(&found.parts);
-        if self.influence != Influence::AngleCorrected || turn < TURN_REMARKED || limit <= 0.0 {
+        let Some((coarse, rough)) = &found.rough else {
+            return Ok(None);
+        };
+        if self.influence != Influence::AngleCorrected || turn < TURN_REMARKED || rough.limit <= 0.0
+        {
             return Ok(None);
         }
         let unfolded = CurveSolve {
             influence: Influence::Unfolded,
-            fineness: GridFineness::for_answer(TARGET_OF_ROUNDS),
             ..*self
         };
-        let run = self.case.run.for_resultants(TARGET_OF_ROUNDS);
-        let rest = unfolded.task().rest(workspace, self.watch)?;
-        let other = unfolded.rounds(rest, &run, true, workspace)?;
-        let [change_x, change_y] = [0, 1].map(|k| (found.force[k] - other.force[k]) / limit);
+        let task = unfolded.task();
+        let contact = task.on_grid_of(coarse, found.lift, workspace, self.watch)?;
+        let other = unfolded.rough(&contact, found.lift, workspace)?;
+        let [change_x, change_y] = [0, 1].map(|k| rough.force[k] - other.force[k]);
         Ok(Some(Remark::TurnCorrected {
             turn_rad: turn,
             change_x,
@@ -842,6 +913,15 @@ fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] - b[0], a[1] - b[1]]
 }
 
+/// The friction to count on next: what was found, with a secant step for the vertical force.
+fn accelerated(counted: &Friction, found: Friction, earlier: &mut Option<(f64, f64)>) -> Friction {
+    let pair = (counted.lift, found.lift);
+    Friction {
+        lift: next_share(pair, earlier.replace(pair)),
+        ..found
+    }
+}
+
 /// A run with tractions and pressures among its outputs.
 fn with_tractions(run: &Run, outputs: &[Output]) -> Run {
     let needed = [Output::Resultants, Output::Tractions, Output::Pressure];
@@ -918,10 +998,14 @@ fn covered([from, to]: [f64; 2], cells: usize) -> Vec<(usize, f64)> {
         .collect()
 }
 
-/// The least gap of some cells in mm.
-fn least_gap(over: &[Option<WheelOver>]) -> Option<f64> {
-    let gaps = over.iter().flatten().map(|over| over.gap);
-    gaps.reduce(f64::min)
+/// How many patches some parts have.
+fn patches(parts: &[Part]) -> usize {
+    parts.iter().map(|part| part.patches.len()).sum()
+}
+
+/// The least of some gaps in mm.
+fn least(gaps: &[f64]) -> f64 {
+    gaps.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
 /// The turn of the surface from the first to the last strip in contact, in rad.

@@ -4,6 +4,7 @@ pub mod conicity;
 pub mod contact_locus;
 pub mod corner;
 pub mod crossing;
+pub mod curve_place;
 pub mod envelope;
 mod estimated_force;
 pub mod formats;

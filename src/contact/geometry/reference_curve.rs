@@ -4,6 +4,10 @@
 //! s, which grows to the left. The gap is measured from the rail along that normal to the wheel, a surface of revolution about its axle; both are
 //! undeformed. Contact solved on this curve needs no plane of contact: x and s are the coordinates of the surface, unfolded.
 
+use std::cell::Cell;
+use std::ops::Range;
+
+pub use crate::contact::geometry::curve_place::CurvePlace;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::numerics::quadrature::{GaussPoints, integral};
@@ -12,10 +16,23 @@ use crate::contact::numerics::quadrature::{GaussPoints, integral};
 const LENGTH_STEP: f64 = 0.25;
 /// Spacing of the wheel's circles among which the one over a place is looked for, in mm.
 const WHEEL_STEP: f64 = 0.1;
+/// Intervals between neighbouring circles, or places of the rail, that are looked at together.
+const BLOCK: usize = 16;
+/// Where the wheel's polygon comes nearer to the rail than this, in mm, the distance is computed exactly.
+const LOOKED_AT: f64 = 0.02;
+/// A polygon of either body lies within this distance, in mm, of what it stands for where the bodies may overlap.
+const DEEPEST: f64 = 2.0;
 /// A wheel farther from the rail than this along the normal, in mm, does not touch it.
 const FAR: f64 = 8.0;
 /// Largest cosine between the outward normals of two bodies that face each other.
 const FACING: f64 = -0.1;
+/// Intervals between the points along x at which the gap is computed, for a wheel without yaw, and at most; and the distance in mm across the
+/// wheel's profile for which there is one more.
+const INTERVALS: usize = 4;
+const INTERVALS_MAX: usize = 15;
+const NODE_DISTANCE: f64 = 0.1;
+/// Sections in which the least gap between two places is looked for.
+const SECTIONS: usize = 16;
 /// Newton's method for the wheel's surface: steps at most, the last step in mm, and the longest one allowed in mm.
 const STEPS_MAX: usize = 25;
 const STEP_LAST: f64 = 1e-10;
@@ -25,24 +42,68 @@ const STEP_LONGEST: f64 = 1.0;
 #[derive(Debug, Clone)]
 pub struct ReferenceCurve<'g> {
     geometry: &'g WheelRail,
-    /// Parameters of the rail's curve with the length of the curve up to each.
-    lengths: Vec<[f64; 2]>,
-    /// Lowest points `[s, x, y, z]` of the wheel's circles, s the parameter of its profile, z from the height of its centre; none where the yaw
-    /// hides a circle.
-    circles: Vec<Option<[f64; 4]>>,
+    /// The rail's curve, from its first point to its last.
+    rail: &'g [CurvePlace],
+    /// Lowest points of the wheel's circles.
+    circles: Vec<LowestPoint>,
+    /// Circles around [`BLOCK`] intervals between neighbouring lowest points each.
+    blocks: Vec<Circle>,
+    /// The place asked for last: cells of a strip ask for the same one after the other.
+    last: Cell<CurvePlace>,
 }
 
-/// A place on the reference curve.
+/// The lowest point of a circle of the wheel, with z from the height of the wheel's centre; not a number where the yaw hides it.
+#[derive(Debug, Clone, Copy)]
+struct LowestPoint {
+    /// Parameter of the wheel's profile.
+    wheel: f64,
+    x: f64,
+    at: [f64; 2],
+}
+
+/// A circle in the cross-section, in mm.
+#[derive(Debug, Clone, Copy)]
+struct Circle {
+    centre: [f64; 2],
+    radius: f64,
+}
+
+impl Circle {
+    /// A circle around points; those that are not numbers are left out.
+    fn around(points: impl Iterator<Item = [f64; 2]> + Clone) -> Circle {
+        let nothing = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+        let [low, high] = points.clone().fold(nothing, |[low, high], at| {
+            [
+                [0, 1].map(|k| low[k].min(at[k])),
+                [0, 1].map(|k| high[k].max(at[k])),
+            ]
+        });
+        let centre = [0, 1].map(|k| 0.5 * (low[k] + high[k]));
+        let far = points.map(|at| (at[0] - centre[0]).hypot(at[1] - centre[1]));
+        Circle {
+            centre,
+            radius: far.fold(0.0, f64::max),
+        }
+    }
+
+    /// Whether another circle, raised by a height, comes within a distance.
+    fn is_near(&self, other: &Circle, height: f64, distance: f64) -> bool {
+        let across = self.centre[0] - other.centre[0];
+        let up = self.centre[1] - other.centre[1] - height;
+        let reach = self.radius + other.radius + distance;
+        across * across + up * up <= reach * reach
+    }
+}
+
+/// A place where the wheel is nearest to the rail on the line along x: x in mm, and the wheel there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CurvePlace {
-    /// Arc length in mm.
-    pub s: f64,
-    /// `[y, z]` in track axes, in mm.
-    pub at: [f64; 2],
-    /// Angle α of the tangent in rad.
-    pub angle: f64,
-    /// Parameter of the rail's curve.
-    pub rail: f64,
+pub struct Nearest {
+    /// The place.
+    pub place: CurvePlace,
+    /// x in mm.
+    pub x: f64,
+    /// The wheel.
+    pub wheel: WheelOver,
 }
 
 /// The wheel's surface over a place of the curve.
@@ -58,63 +119,41 @@ pub struct WheelOver {
     pub angle: f64,
 }
 
-impl CurvePlace {
-    /// Unit tangent `[y, z]`.
-    #[must_use]
-    pub fn tangent(&self) -> [f64; 2] {
-        let (sin, cos) = self.angle.sin_cos();
-        [cos, sin]
-    }
-
-    /// Unit normal `[y, z]` out of the rail.
-    #[must_use]
-    pub fn normal(&self) -> [f64; 2] {
-        let (sin, cos) = self.angle.sin_cos();
-        [-sin, cos]
-    }
-
-    /// The point `[x, y, z]` in track axes at a distance along the normal, in mm.
-    #[must_use]
-    pub fn point(&self, x: f64, gap: f64) -> [f64; 3] {
-        let normal = self.normal();
-        [
-            x,
-            self.at[0] + gap * normal[0],
-            self.at[1] + gap * normal[1],
-        ]
-    }
-}
-
 impl<'g> ReferenceCurve<'g> {
     /// The curve of a rail, with the wheel in its pose.
     #[must_use]
     pub fn new(geometry: &'g WheelRail) -> ReferenceCurve<'g> {
-        let parameters = geometry.parameters(LENGTH_STEP)[0].clone();
-        let mut lengths = vec![[parameters[0], 0.0]];
-        for pair in parameters.windows(2) {
-            let [.., before] = lengths[lengths.len() - 1];
-            lengths.push([pair[1], before + length(geometry, pair[0], pair[1])]);
-        }
-        let wheel = geometry.parameters(WHEEL_STEP)[1].clone();
-        let circles = wheel.into_iter().map(|s| {
-            let [x, y, z] = geometry.lowest(s)?;
-            Some([s, x, y, z])
+        let [_, wheel] = geometry.parameters(WHEEL_STEP);
+        let circles: Vec<LowestPoint> = wheel
+            .into_iter()
+            .map(|wheel| {
+                let [x, y, z] = geometry.lowest(wheel).unwrap_or([f64::NAN; 3]);
+                LowestPoint {
+                    wheel,
+                    x,
+                    at: [y, z],
+                }
+            })
+            .collect();
+        let blocks = blocks(circles.len()).map(|block| {
+            let points = circles[block].iter().map(|circle| circle.at);
+            Circle::around(points.filter(|at| !at[0].is_nan()))
         });
+        let rail = geometry.rail_places.get_or_make(|| rail_places(geometry));
         ReferenceCurve {
+            blocks: blocks.collect(),
+            last: Cell::new(rail[0]),
+            rail,
             geometry,
-            lengths,
-            circles: circles.collect(),
+            circles,
         }
     }
 
     /// Least and largest arc length in mm. On a right rail, whose points run to the right, arc lengths are negative.
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
-        let whole = self.lengths[self.lengths.len() - 1][1];
-        match self.sign() > 0.0 {
-            true => [0.0, whole],
-            false => [-whole, 0.0],
-        }
+        let last = self.rail[self.rail.len() - 1].s;
+        [last.min(0.0), last.max(0.0)]
     }
 
     fn sign(&self) -> f64 {
@@ -124,61 +163,178 @@ impl<'g> ReferenceCurve<'g> {
     /// The place at an arc length; beyond the ends the tangent there.
     #[must_use]
     pub fn at(&self, s: f64) -> CurvePlace {
-        let along = self.sign() * s;
-        let last = self.lengths.len() - 1;
-        let k = self.lengths.partition_point(|known| known[1] <= along);
-        let [from, before] = self.lengths[k.clamp(1, last) - 1];
-        let [to, after] = self.lengths[k.clamp(1, last)];
-        let mut rail = from + (to - from) * (along - before) / (after - before);
-        // The table is so fine that each step squares an error of some thousandths of its spacing.
-        for _ in 0..2 {
-            let [y, z] = self.geometry.rail_at(rail).slope;
-            rail -= (before + length(self.geometry, from, rail) - along) / y.hypot(z);
-        }
-        let point = self.geometry.rail_at(rail);
-        let [y, z] = point.tangent().map(|part| self.sign() * part);
-        CurvePlace {
-            s,
-            at: point.at,
-            angle: z.atan2(y),
-            rail,
-        }
+        let sign = self.sign();
+        let next = self
+            .rail
+            .partition_point(|known| sign * known.s <= sign * s);
+        let next = next.clamp(1, self.rail.len() - 1);
+        let [from, to] = [self.rail[next - 1], self.rail[next]];
+        let mut rail = from.rail + (to.rail - from.rail) * (s - from.s) / (to.s - from.s);
+        // The table is so fine that a step squares an error of some thousandths of its spacing.
+        let [y, z] = self.geometry.rail_at(rail).slope;
+        let missed = length(self.geometry, from.rail, rail) - sign * (s - from.s);
+        rail -= missed / y.hypot(z);
+        let found = place(self.geometry, rail, s);
+        self.last.set(found);
+        found
     }
 
     /// Where the wheel is nearest to the rail on the line along x through a place, with the wheel's centre at a height in mm: x, and the wheel there as
     /// a start for [`over`](Self::over). None where the wheel does not face the rail within 8 mm.
     #[must_use]
     pub fn nearest(&self, place: &CurvePlace, centre: f64) -> Option<(f64, WheelOver)> {
+        let (x, start) = self.about(place, centre, FAR)?;
+        Some((x, self.over(place, x, centre, &start)?))
+    }
+
+    /// About where the wheel is nearest to the rail on the line along x through a place, if that is within a distance in mm: x, and the wheel's polygon
+    /// there.
+    fn about(&self, place: &CurvePlace, centre: f64, far: f64) -> Option<(f64, WheelOver)> {
         let (tangent, normal) = (place.tangent(), place.normal());
-        let seen = |[s, x, y, z]: [f64; 4]| {
-            let from = [y - place.at[0], z + centre - place.at[1]];
-            let [across, gap] = [tangent, normal].map(|axis| axis[0] * from[0] + axis[1] * from[1]);
-            [self.sign() * across, gap, x, s]
+        let here = Circle {
+            centre: place.at,
+            radius: 0.0,
         };
-        let mut found: Option<[f64; 4]> = None;
-        let mut before: Option<[f64; 4]> = None;
-        for circle in &self.circles {
-            let here = circle.map(seen);
-            if let (Some(from), Some(to)) = (before, here)
-                && from[0] <= 0.0
-                && to[0] > 0.0
-            {
-                let t = from[0] / (from[0] - to[0]);
-                let at = [0, 1, 2, 3].map(|k| from[k] + t * (to[k] - from[k]));
-                if at[1].abs() < found.map_or(FAR, |found| found[1].abs()) {
-                    found = Some(at);
-                }
+        let seen = |circle: &LowestPoint| {
+            let from = [
+                circle.at[0] - place.at[0],
+                circle.at[1] + centre - place.at[1],
+            ];
+            let [across, gap] = [tangent, normal].map(|axis| axis[0] * from[0] + axis[1] * from[1]);
+            [self.sign() * across, gap, circle.x, circle.wheel]
+        };
+        let mut found = [0.0, far, 0.0, 0.0];
+        let mut any = false;
+        for (block, circle) in blocks(self.circles.len()).zip(&self.blocks) {
+            if !here.is_near(circle, centre, far) {
+                continue;
             }
-            before = here;
+            let mut before = [f64::NAN; 4];
+            for circle in &self.circles[block] {
+                let to = seen(circle);
+                if before[0] <= 0.0 && to[0] > 0.0 {
+                    let t = before[0] / (before[0] - to[0]);
+                    let at = [0, 1, 2, 3].map(|k| before[k] + t * (to[k] - before[k]));
+                    if at[1].abs() < found[1].abs() {
+                        (found, any) = (at, true);
+                    }
+                }
+                before = to;
+            }
         }
-        let [_, gap, x, wheel] = found?;
+        let [_, gap, x, wheel] = found;
         let start = WheelOver {
             gap,
             wheel,
             lift: place.angle.cos(),
             angle: place.angle,
         };
-        Some((x, self.over(place, x, centre, &start)?))
+        any.then_some((x, start))
+    }
+
+    /// The stretches of the rail in which the bodies overlap with the wheel's centre at a height in mm: overlapped places at most `step` mm apart,
+    /// with increasing arc length. Where none is overlapped, the place between them at which the bodies overlap most, if they do.
+    #[must_use]
+    pub fn overlaps(&self, centre: f64, step: f64) -> Vec<Vec<Nearest>> {
+        let mut stretches: Vec<Vec<Nearest>> = Vec::new();
+        let mut least: Option<Nearest> = None;
+        let mut open = false;
+        for (k, is_close) in self.close_intervals(centre).into_iter().enumerate() {
+            if !is_close {
+                open = false;
+                continue;
+            }
+            let [from, to] = [self.ordered(k).s, self.ordered(k + 1).s];
+            let parts = ((to - from) / step).ceil().max(1.0);
+            for part in 0..parts as usize {
+                let here =
+                    self.nearest_at(from + (part as f64 + 0.5) / parts * (to - from), centre);
+                let Some(here) = here else {
+                    open = false;
+                    continue;
+                };
+                if least.is_none_or(|least| here.wheel.gap < least.wheel.gap) {
+                    least = Some(here);
+                }
+                if here.wheel.gap >= 0.0 {
+                    open = false;
+                } else if open && let Some(last) = stretches.last_mut() {
+                    last.push(here);
+                } else {
+                    stretches.push(vec![here]);
+                    open = true;
+                }
+            }
+        }
+        if let Some(least) = least.filter(|_| stretches.is_empty()) {
+            let deepest = self.deepest_near(least, centre, step);
+            stretches.extend((deepest.wheel.gap < 0.0).then(|| vec![deepest]));
+        }
+        stretches
+    }
+
+    /// A place of the table, counted with increasing arc length.
+    fn ordered(&self, k: usize) -> &CurvePlace {
+        match self.sign() > 0.0 {
+            true => &self.rail[k],
+            false => &self.rail[self.rail.len() - 1 - k],
+        }
+    }
+
+    fn nearest_at(&self, s: f64, centre: f64) -> Option<Nearest> {
+        let place = self.at(s);
+        let (x, start) = self.about(&place, centre, DEEPEST)?;
+        let wheel = self.over(&place, x, centre, &start)?;
+        Some(Nearest { place, x, wheel })
+    }
+
+    /// Whether the wheel may overlap the rail between a place of the table and the next one, with increasing arc length.
+    fn close_intervals(&self, centre: f64) -> Vec<bool> {
+        let last = self.rail.len() - 1;
+        let mut close = vec![false; last];
+        for block in blocks(self.rail.len()) {
+            let places = block.clone().map(|k| self.ordered(k).at);
+            let around = Circle::around(places);
+            if !self
+                .blocks
+                .iter()
+                .any(|wheel| around.is_near(wheel, centre, DEEPEST))
+            {
+                continue;
+            }
+            for k in block {
+                let about = self.about(self.ordered(k), centre, DEEPEST);
+                if about.is_some_and(|(_, wheel)| wheel.gap < LOOKED_AT) {
+                    close[k.saturating_sub(1)] = true;
+                    close[k.min(last - 1)] = true;
+                }
+            }
+        }
+        close
+    }
+
+    /// The place with the least gap within a distance of one, by golden sections.
+    fn deepest_near(&self, start: Nearest, centre: f64, distance: f64) -> Nearest {
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let (mut low, mut high) = (start.place.s - distance, start.place.s + distance);
+        let mut best = start;
+        for _ in 0..SECTIONS {
+            let part = golden * (high - low);
+            let [left, right] = [high - part, low + part].map(|s| self.nearest_at(s, centre));
+            let gap =
+                |found: &Option<Nearest>| found.map_or(f64::INFINITY, |found| found.wheel.gap);
+            let left_is_less = gap(&left) < gap(&right);
+            (low, high) = if left_is_less {
+                (low, low + part)
+            } else {
+                (high - part, high)
+            };
+            let found = if left_is_less { left } else { right };
+            best = found
+                .filter(|found| found.wheel.gap < best.wheel.gap)
+                .unwrap_or(best);
+        }
+        best
     }
 
     /// The wheel over a place, at x and with its centre at a height in mm, by Newton's method from a start nearby. None where the search leaves the
@@ -242,11 +398,92 @@ impl<'g> ReferenceCurve<'g> {
         None
     }
 
+    /// Points along x at which the gap of a strip is computed, so that a polynomial through them has it between two ends in mm: more where the yaw
+    /// moves the contact across the wheel's profile.
+    #[must_use]
+    pub fn nodes(&self, [first, last]: [f64; 2]) -> Vec<f64> {
+        let across = self.geometry.axle()[0].abs() * (last - first);
+        let intervals = (INTERVALS + (across / NODE_DISTANCE) as usize).min(INTERVALS_MAX);
+        let (middle, half) = (0.5 * (first + last), 0.5 * (last - first));
+        let angle = |k: usize| std::f64::consts::PI * k as f64 / intervals as f64;
+        (0..=intervals)
+            .map(|k| middle - half * angle(k).cos())
+            .collect()
+    }
+
+    /// The wheel over the points of a line along x with its centre at a height in mm, from that over a place beside it if that is known. None
+    /// where one of the points is not below the wheel.
+    #[must_use]
+    pub fn over_line(
+        &self,
+        place: &CurvePlace,
+        x: &[f64],
+        centre: f64,
+        beside: Option<&[WheelOver]>,
+    ) -> Option<Vec<WheelOver>> {
+        let from_beside = beside.and_then(|beside| {
+            let points = x.iter().zip(beside);
+            let over = points.map(|(x, start)| self.over(place, *x, centre, start));
+            over.collect::<Option<Vec<WheelOver>>>()
+        });
+        if from_beside.is_some() {
+            return from_beside;
+        }
+        let (nearest, start) = self.nearest(place, centre)?;
+        let middle = x.partition_point(|x| *x < nearest);
+        let mut line = vec![start; x.len()];
+        let mut from = start;
+        for k in (0..middle).rev() {
+            from = self.over(place, x[k], centre, &from)?;
+            line[k] = from;
+        }
+        from = start;
+        for k in middle..x.len() {
+            from = self.over(place, x[k], centre, &from)?;
+            line[k] = from;
+        }
+        Some(line)
+    }
+
     /// Half of the length in mm on which the bodies overlap along x, where the wheel is nearest to a place at x.
     #[must_use]
     pub fn half_length(&self, wheel: &WheelOver) -> f64 {
         let radius = self.geometry.meridian(wheel.wheel).radius;
         (2.0 * radius * (-wheel.gap).max(0.0) / wheel.lift.abs().max(0.1)).sqrt()
+    }
+}
+
+/// Ranges of points over [`BLOCK`] intervals each; neighbours share a point.
+fn blocks(points: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..points.saturating_sub(1))
+        .step_by(BLOCK)
+        .map(move |first| first..(first + BLOCK + 1).min(points))
+}
+
+/// Places along a rail's curve, from its first point to its last.
+fn rail_places(geometry: &WheelRail) -> Vec<CurvePlace> {
+    let [parameters, _] = geometry.parameters(LENGTH_STEP);
+    let sign = geometry.placement.side.sign();
+    let mut s = 0.0;
+    let mut places = vec![place(geometry, parameters[0], s)];
+    for pair in parameters.windows(2) {
+        s += sign * length(geometry, pair[0], pair[1]);
+        places.push(place(geometry, pair[1], s));
+    }
+    places
+}
+
+/// The place at a parameter of the rail's curve, with its arc length.
+fn place(geometry: &WheelRail, rail: f64, s: f64) -> CurvePlace {
+    let point = geometry.rail_at(rail);
+    let [y, z] = point
+        .tangent()
+        .map(|part| geometry.placement.side.sign() * part);
+    CurvePlace {
+        s,
+        at: point.at,
+        angle: z.atan2(y),
+        rail,
     }
 }
 

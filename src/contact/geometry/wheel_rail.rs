@@ -9,6 +9,7 @@
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::contact::geometry::curve_place::CurvePlace;
 use crate::contact::geometry::locus_lines::{LocusLines, RailEdge};
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile::Profile;
@@ -135,6 +136,8 @@ pub struct WheelRail {
     axes: AxleAxes,
     /// The rail's upper edge.
     pub(crate) rail_edge: Arc<Once<RailEdge>>,
+    /// Places along the rail's curve, the same for every place of the wheelset.
+    pub(crate) rail_places: Arc<Once<Vec<CurvePlace>>>,
     /// Circles of the wheel, which are the same for every place of the wheelset.
     pub(crate) circles: Arc<Once<Vec<WheelCircle>>>,
     /// The same pair with other smoothings, somewhere over the rail, which are the same for every place of the wheelset too.
@@ -273,6 +276,7 @@ impl WheelRail {
             wheel,
             axes,
             rail_edge: Arc::default(),
+            rail_places: Arc::default(),
             circles: Arc::default(),
             readings: Arc::default(),
             locus: Once::default(),

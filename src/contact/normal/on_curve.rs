@@ -1,12 +1,12 @@
 //! The normal problem of a wheel on the reference curve: one grid over the arc length of the rail, and one unknown height of the wheel.
 //!
 //! Where the bodies overlap at an expected height, a coarse grid finds the contact; a finer one, as fine as the narrowest patch that counts needs,
-//! has the answer. Its strips lie at multiples of their width from the origin of the arc length, whatever the height is. The height is sought by
-//! secant steps in the force to the power 2/3, which grows nearly linearly.
+//! has the answer. Its strips lie at multiples of their width from the origin of the arc length, whatever the height is, and leave out what lies
+//! between the patches.
 
-use crate::contact::geometry::reference_curve::{CurvePlace, ReferenceCurve, WheelOver};
+use crate::contact::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCurve, WheelOver};
 use crate::contact::half_space::bent_surface::{
-    BentOperator, BentStrips, BentWorkspace, Influence,
+    BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
 };
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::monitor::Monitor;
@@ -23,6 +23,7 @@ use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::wheel_height::task::WheelLoad;
 use crate::contact::numerics::flood_fill::groups;
+use crate::contact::once::Once;
 
 /// Spacing of the strips that are looked at for overlaps, in mm.
 const LOOK: f64 = 0.1;
@@ -36,28 +37,29 @@ const FINE_ENOUGH: f64 = 0.9;
 const APART: f64 = 0.3;
 /// The gap of a cell that is no part of the contact, in mm.
 const NO_CONTACT: f64 = 1e3;
+/// Strips whose deformed surfaces come nearer than this part of the deepest overlap are part of the next grid.
+const NEAR: f64 = 0.03;
 /// Cells around the contact that stay free.
 const FREE: usize = 2;
-/// Heights that are tried on one grid at most, and grids.
+/// Normal problems that are solved on one grid at most, and grids.
 const HEIGHTS_MAX: usize = 40;
 const GRIDS_MAX: usize = 12;
-/// Tolerance of the force on the grid that finds the contact.
-const FORCE_FIRST: f64 = 0.03;
+/// Tolerance of the contact conditions on the grid that finds the contact, relative to the deepest overlap.
+const FIRST_TOLERANCE: f64 = 5e-3;
+/// A light patch has at least this part of the cells across that the smallest patch has on planes.
+const OF_LIGHT: f64 = 0.5;
 /// Tolerance of the force.
 const FORCE: f64 = 2e-5;
 /// A force that is missed by more than this is no answer.
 const FORCE_POOR: f64 = 5e-3;
-/// Violation of the contact conditions relative to the deepest overlap.
-const VIOLATION: f64 = 2e-5;
 /// Least lowering of the wheel in mm that is tried.
 const LOWERING_LEAST: f64 = 1e-4;
-/// Largest step of the lowering over the lowering.
-const STEP_LARGEST: f64 = 0.6;
-/// A bracket of the lowering narrower than this part of it is closed.
-const BRACKET_MIN: f64 = 1e-9;
+/// The gap is computed again where the height has changed by more than this part of the deepest overlap; up to there it is linear in the height.
+const LINEAR: f64 = 0.05;
+/// Steeper strips count in the search for the height as if their angle had this cosine.
+const COSINE_LEAST: f64 = 0.1;
 /// Runs of contact on a half-space that lie nearer than this, in mm, act on each other.
 const APART_ON_HALF_SPACE: f64 = 4.0;
-
 /// What presses a wheel on a rail.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CurveTask<'a> {
@@ -72,15 +74,30 @@ pub(crate) struct CurveTask<'a> {
     pub(crate) fineness: GridFineness,
 }
 
-/// Equal cells over the unfolded surface; cell (i, j) is stored at `j * x.len() + i`.
+/// Equal cells over parts of the unfolded surface; cell (i, j) is stored at `j * x.len() + i`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CurveGrid {
     /// Centres of the cells along x in mm.
     pub(crate) x: Vec<f64>,
-    /// The strips, by increasing arc length.
+    /// The strips, by increasing arc length; without those between parts of the contact.
     pub(crate) places: Vec<CurvePlace>,
+    /// The places of the strips in widths of a strip from that of the first one.
+    pub(crate) numbers: Vec<usize>,
     /// Size of a cell along x and s in mm.
     pub(crate) step: [f64; 2],
+}
+
+/// The undeformed wheel over the cells of a grid.
+#[derive(Debug, Clone)]
+struct WheelOverGrid {
+    /// Height of the wheel's centre in mm.
+    centre: f64,
+    /// Distance from the rail along its normal in mm.
+    gap: Vec<f64>,
+    /// Its change with the height of the wheel's centre.
+    lift: Vec<f64>,
+    /// Mean angles of rail and wheel of each strip, where the wheel is nearest; both bodies bend, and each deforms as its own surface does.
+    angle: Vec<f64>,
 }
 
 /// A wheel at rest on the curve.
@@ -90,8 +107,8 @@ pub(crate) struct CurveContact {
     pub(crate) operator: BentOperator,
     /// Height of the wheel's centre in mm.
     pub(crate) centre: f64,
-    /// The undeformed wheel over each cell near the contact.
-    pub(crate) over: Vec<Option<WheelOver>>,
+    /// Distance in mm of the undeformed wheel from the rail along its normal at each cell; more than 8 where none was found.
+    pub(crate) gap: Vec<f64>,
     /// Pressures in MPa.
     pub(crate) pressure: Vec<f64>,
     /// The runs of contact that act on each other, by strips: first and last.
@@ -101,8 +118,11 @@ pub(crate) struct CurveContact {
     pub(crate) heights: u32,
     /// By which part the force is missed.
     pub(crate) missed: f64,
-    /// Force that is prescribed over the lowering to the power 3/2.
-    slope: f64,
+    over: WheelOverGrid,
+    /// Strips whose deformed surfaces nearly touch.
+    near: Vec<bool>,
+    /// The pressures of the patches with their first strips.
+    patches: Once<Vec<(usize, GridPressure)>>,
 }
 
 /// What friction does to a contact.
@@ -117,44 +137,71 @@ pub(crate) struct Friction {
 /// Buffers that successive solves reuse.
 pub(crate) type Workspace = BentWorkspace;
 
-impl PressureInfluence for BentOperator {
-    const CHANGES_MAX: usize = 12;
+/// Pressures of strips times weights: a uniform approach of these lowers the wheel.
+struct WeightedStrips<'a> {
+    operator: &'a BentOperator,
+    factors: StripFactors,
+    weights: &'a [f64],
+}
+
+impl PressureInfluence for WeightedStrips<'_> {
+    const CHANGES_MAX: usize = 6;
     type Workspace = BentWorkspace;
 
     fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut BentWorkspace) {
-        self.opened_by_pressure(pressure, displacement, workspace);
+        self.operator
+            .opened_by_pressure(&self.factors, pressure, displacement, workspace);
     }
 
     fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
-        self.add_opened(changes, displacement);
+        self.operator
+            .add_opened(&self.factors, changes, displacement);
     }
 
     fn own(&self) -> f64 {
-        BentOperator::own(self)
+        self.operator.own() / self.weights[0].powi(2)
     }
 
     fn weights(&self, cells: usize) -> CellWeights {
-        let ones = vec![1.0; cells.next_multiple_of(LANES)];
-        CellWeights {
-            area: ones.clone(),
-            yielding: ones,
+        let mut weights = CellWeights {
+            area: vec![1.0; cells.next_multiple_of(LANES)],
+            yielding: vec![1.0; cells.next_multiple_of(LANES)],
+        };
+        let rows = weights.yielding[..cells].chunks_exact_mut(cells / self.weights.len());
+        for (row, weight) in rows.zip(self.weights) {
+            row.fill((weight / self.weights[0]).powi(2));
         }
+        weights
     }
 }
 
 impl CurveGrid {
-    /// The cells over windows in mm, with centres at `(k + ½)` times their size.
-    fn new(curve: &ReferenceCurve, window: [[f64; 2]; 2], step: [f64; 2]) -> CurveGrid {
-        let centres = |k: usize| -> Vec<f64> {
-            let [low, high] = window[k].map(|end| end / step[k]);
+    /// The cells over a window along x and windows along s in mm, with centres at `(k + ½)` times their size.
+    fn new(curve: &ReferenceCurve, x: [f64; 2], s: &[[f64; 2]], step: [f64; 2]) -> CurveGrid {
+        let cells = |window: [f64; 2], step: f64| {
+            let [low, high] = window.map(|end| end / step);
             let (first, last) = (low.floor() as i64, high.ceil() as i64);
-            (first..last.max(first + 1))
-                .map(|cell| (cell as f64 + 0.5) * step[k])
-                .collect()
+            first..last.max(first + 1)
         };
+        let centre = |cell: i64, step: f64| (cell as f64 + 0.5) * step;
+        let mut numbers: Vec<i64> = s
+            .iter()
+            .flat_map(|window| cells(*window, step[1]))
+            .collect();
+        numbers.sort_unstable();
+        numbers.dedup();
         CurveGrid {
-            x: centres(0),
-            places: centres(1).into_iter().map(|s| curve.at(s)).collect(),
+            x: cells(x, step[0])
+                .map(|cell| centre(cell, step[0]))
+                .collect(),
+            places: numbers
+                .iter()
+                .map(|cell| curve.at(centre(*cell, step[1])))
+                .collect(),
+            numbers: numbers
+                .iter()
+                .map(|cell| (cell - numbers[0]) as usize)
+                .collect(),
             step,
         }
     }
@@ -167,44 +214,88 @@ impl CurveGrid {
         self.step[0] * self.step[1]
     }
 
-    /// The wheel over the cells at a height of its centre; none far from the contact.
-    fn over(&self, curve: &ReferenceCurve, centre: f64) -> Vec<Option<WheelOver>> {
-        let mut over = Vec::with_capacity(self.x.len() * self.places.len());
-        for place in &self.places {
-            let nearest = curve.nearest(place, centre);
-            let Some((x, nearest)) = nearest.filter(|(_, wheel)| wheel.gap < APART) else {
-                over.extend(self.x.iter().map(|_| None));
+    /// The wheel over the cells at a height of its centre. Along x the gap is that of a polynomial through some points.
+    fn over(&self, curve: &ReferenceCurve, centre: f64) -> WheelOverGrid {
+        let [nx, ny] = self.cells();
+        let [first, last] = [self.x[0], self.x[nx - 1]];
+        let nodes = curve.nodes([first, last]);
+        let weights: Vec<Vec<f64>> = self.x.iter().map(|x| lagrange(&nodes, *x)).collect();
+        let mut over = WheelOverGrid {
+            centre,
+            gap: Vec::with_capacity(nx * ny),
+            lift: Vec::with_capacity(nx * ny),
+            angle: Vec::with_capacity(ny),
+        };
+        let mut before: Option<Vec<WheelOver>> = None;
+        for (j, place) in self.places.iter().enumerate() {
+            let adjoins = j > 0 && self.numbers[j] == self.numbers[j - 1] + 1;
+            let start = before.take().filter(|_| adjoins);
+            before = curve.over_line(place, &nodes, centre, start.as_deref());
+            let Some(line) = &before else {
+                self.one_by_one(curve, place, &mut over);
                 continue;
             };
-            let mut row = vec![None; self.x.len()];
-            let from = self.x.partition_point(|centre| *centre < x);
-            let (behind, ahead) = row.split_at_mut(from);
-            let (behind, ahead) = (behind.iter_mut().rev(), ahead.iter_mut());
-            let behind = behind.zip(self.x[..from].iter().rev());
-            let mut start = Some(nearest);
-            for (wheel, x) in behind {
-                start = start.and_then(|start| curve.over(place, *x, centre, &start));
-                *wheel = start;
+            let values = |of: fn(&WheelOver) -> f64| {
+                let known: Vec<f64> = line.iter().map(of).collect();
+                let at = move |weights: &Vec<f64>| -> f64 {
+                    weights.iter().zip(&known).map(|(w, v)| w * v).sum()
+                };
+                weights.iter().map(at)
+            };
+            let row = over.gap.len();
+            over.gap.extend(values(|wheel| wheel.gap));
+            over.lift.extend(values(|wheel| wheel.lift));
+            let gaps = &over.gap[row..];
+            let nearest = (0..nx).min_by(|a, b| gaps[*a].total_cmp(&gaps[*b]));
+            let nearest = nearest.unwrap_or(0);
+            let of_wheel = values(|wheel| wheel.angle).nth(nearest);
+            if gaps[nearest] < APART {
+                over.angle
+                    .push(0.5 * (place.angle + of_wheel.unwrap_or(place.angle)));
+            } else {
+                over.angle.push(place.angle);
+                over.gap[row..].fill(NO_CONTACT);
             }
-            start = Some(nearest);
-            for (wheel, x) in ahead.zip(&self.x[from..]) {
-                start = start.and_then(|start| curve.over(place, *x, centre, &start));
-                *wheel = start;
-            }
-            over.extend(row);
         }
         over
     }
 
-    /// Mean angles of the strips: of the rail and of the wheel where it is nearest, at a height of its centre; both bodies bend, and each deforms as its
-    /// own surface does.
-    fn mean_angles(&self, curve: &ReferenceCurve, centre: f64) -> Vec<f64> {
-        let of = |place: &CurvePlace| {
-            let nearest = curve.nearest(place, centre);
-            let nearest = nearest.filter(|(_, wheel)| wheel.gap < APART);
-            nearest.map_or(place.angle, |(_, wheel)| 0.5 * (place.angle + wheel.angle))
+    /// The wheel over a strip above whose ends along x it may end.
+    fn one_by_one(&self, curve: &ReferenceCurve, place: &CurvePlace, over: &mut WheelOverGrid) {
+        let centre = over.centre;
+        let row = over.gap.len();
+        over.gap.resize(row + self.x.len(), NO_CONTACT);
+        over.lift.resize(row + self.x.len(), place.angle.cos());
+        let nearest = curve.nearest(place, centre);
+        let Some((x, nearest)) = nearest.filter(|(_, wheel)| wheel.gap < APART) else {
+            over.angle.push(place.angle);
+            return;
         };
-        self.places.iter().map(of).collect()
+        over.angle.push(0.5 * (place.angle + nearest.angle));
+        let from = self.x.partition_point(|centre| *centre < x);
+        let mut go = |cells: &mut dyn Iterator<Item = usize>| {
+            let mut start = Some(nearest);
+            for i in cells {
+                start = start.and_then(|start| curve.over(place, self.x[i], centre, &start));
+                if let Some(wheel) = start {
+                    (over.gap[row + i], over.lift[row + i]) = (wheel.gap, wheel.lift);
+                }
+            }
+        };
+        go(&mut (0..from).rev());
+        go(&mut (from..self.x.len()));
+    }
+
+    /// Ends of the parts of the grid whose strips adjoin each other, by strips: first and last.
+    fn parts(&self) -> Vec<[usize; 2]> {
+        let mut parts: Vec<[usize; 2]> = Vec::new();
+        for (j, number) in self.numbers.iter().enumerate() {
+            match parts.last_mut() {
+                Some([_, last]) if self.numbers[*last] + 1 == *number => *last = j,
+                _ => parts.push([j, j]),
+            }
+        }
+        parts
     }
 
     /// First and last strip of each run of strips in contact.
@@ -227,7 +318,9 @@ impl CurveGrid {
         let mut joined: Vec<[usize; 2]> = Vec::new();
         for run in runs {
             match joined.last_mut() {
-                Some([_, last]) if (run[0] - *last) as f64 * self.step[1] < APART_ON_HALF_SPACE => {
+                Some([_, last])
+                    if self.places[run[0]].s - self.places[*last].s < APART_ON_HALF_SPACE =>
+                {
                     *last = run[1];
                 }
                 _ => joined.push(run),
@@ -238,123 +331,208 @@ impl CurveGrid {
 
     /// The number of the run that each strip belongs to; those between two belong to the nearer one.
     fn run_of_strips(&self, runs: &[[usize; 2]]) -> Vec<usize> {
-        let far =
-            |j: usize, [first, last]: [usize; 2]| first.saturating_sub(j) + j.saturating_sub(last);
+        let number = |j: usize| self.numbers[j];
+        let far = |j: usize, [first, last]: [usize; 2]| {
+            let [first, last] = [first, last].map(number);
+            first.saturating_sub(number(j)) + number(j).saturating_sub(last)
+        };
         let nearest = |j: usize| (0..runs.len()).min_by_key(|k| far(j, runs[*k]));
         (0..self.places.len())
             .map(|j| nearest(j).unwrap_or(0))
             .collect()
     }
 
-    /// Sides of the grid that are not free of contact: along x and s, the lower and the upper one.
-    fn reached(&self, pressure: &[f64]) -> [[bool; 2]; 2] {
-        let [nx, ny] = self.cells();
-        let mut reached = [[false; 2]; 2];
-        for k in (0..pressure.len()).filter(|k| pressure[*k] > 0.0) {
-            for (axis, (cell, cells)) in [(k % nx, nx), (k / nx, ny)].into_iter().enumerate() {
-                reached[axis][0] |= cell < FREE;
-                reached[axis][1] |= cell + FREE >= cells;
-            }
-        }
-        reached
-    }
-
-    /// The window of the grid in mm.
-    fn window(&self) -> [[f64; 2]; 2] {
-        let ends = |first: f64, last: f64, step: f64| [first - 0.5 * step, last + 0.5 * step];
-        let [nx, ny] = self.cells();
-        [
-            ends(self.x[0], self.x[nx - 1], self.step[0]),
-            ends(self.places[0].s, self.places[ny - 1].s, self.step[1]),
-        ]
-    }
-
-    fn enlarged(&self, curve: &ReferenceCurve, reached: [[bool; 2]; 2]) -> CurveGrid {
-        let mut window = self.window();
-        for (axis, window) in window.iter_mut().enumerate() {
-            let growth = 0.15 * (window[1] - window[0]) + 2.0 * self.step[axis];
+    /// A larger grid where the contact reaches the border of this one or of a part of it.
+    fn enlarged(&self, curve: &ReferenceCurve, pressure: &[f64]) -> Option<CurveGrid> {
+        let nx = self.x.len();
+        let is_loaded = |j: usize| pressure[j * nx..(j + 1) * nx].iter().any(|p| *p > 0.0);
+        let half = 0.25 * self.step[1];
+        let mut any = false;
+        let mut window = |[low, high]: [f64; 2], reached: [bool; 2], step: f64| {
+            any |= reached[0] || reached[1];
+            let growth = 0.15 * (high - low) + 2.0 * step;
             // Cells are whole, so that half of one is no new one.
-            let [low, high] = reached[axis].map(|reached| if reached { growth } else { 0.0 });
-            *window = [
-                window[0] - low + 0.25 * self.step[axis],
-                window[1] + high - 0.25 * self.step[axis],
-            ];
-        }
-        CurveGrid::new(curve, window, self.step)
+            let [below, above] = reached.map(|reached| if reached { growth } else { 0.0 });
+            [low - below - half, high + above + half]
+        };
+        let windows: Vec<[f64; 2]> = self
+            .parts()
+            .into_iter()
+            .map(|[first, last]| {
+                let end = (first + FREE).min(last + 1);
+                let low = (first..end).any(is_loaded);
+                let high = ((last + 1).saturating_sub(FREE).max(first)..=last).any(is_loaded);
+                let ends = [first, last].map(|j| self.places[j].s);
+                window(ends, [low, high], self.step[1])
+            })
+            .collect();
+        let in_columns = |columns: std::ops::Range<usize>| {
+            let mut rows = pressure.chunks_exact(nx);
+            rows.any(|row| row[columns.clone()].iter().any(|p| *p > 0.0))
+        };
+        let reached = [
+            in_columns(0..FREE.min(nx)),
+            in_columns(nx.saturating_sub(FREE)..nx),
+        ];
+        let along = window([self.x[0], self.x[nx - 1]], reached, self.step[0]);
+        any.then(|| CurveGrid::new(curve, along, &windows, self.step))
     }
 
     /// Pressures of another grid at the cells, bilinearly.
     fn interpolated(&self, other: &CurveGrid, pressure: &[f64]) -> Vec<f64> {
         let width = other.x.len();
-        let value = |i: i64, j: i64| {
-            let inside =
-                (0..width as i64).contains(&i) && (0..other.places.len() as i64).contains(&j);
-            match inside {
-                true => pressure[j as usize * width + i as usize],
-                false => 0.0,
-            }
+        let value = |i: i64, j: Option<usize>| match j {
+            Some(j) if (0..width as i64).contains(&i) => pressure[j * width + i as usize],
+            _ => 0.0,
         };
         let place = |at: f64, first: f64, step: f64| {
             let at = (at - first) / step;
             (at.floor() as i64, at - at.floor())
         };
+        let columns: Vec<(i64, f64)> = self
+            .x
+            .iter()
+            .map(|x| place(*x, other.x[0], other.step[0]))
+            .collect();
         let mut out = Vec::with_capacity(self.x.len() * self.places.len());
         for strip in &self.places {
             let (j, v) = place(strip.s, other.places[0].s, other.step[1]);
-            for x in &self.x {
-                let (i, u) = place(*x, other.x[0], other.step[0]);
-                let row = |j: i64| (1.0 - u) * value(i, j) + u * value(i + 1, j);
-                out.push((1.0 - v) * row(j) + v * row(j + 1));
+            let [low, high] = [j, j + 1].map(|j| other.strip(j));
+            for &(i, u) in &columns {
+                let row = |j| (1.0 - u) * value(i, j) + u * value(i + 1, j);
+                out.push((1.0 - v) * row(low) + v * row(high));
             }
         }
         out
     }
+
+    /// The strip at a place in widths of a strip from that of the first one.
+    pub(crate) fn strip(&self, number: i64) -> Option<usize> {
+        let number = usize::try_from(number).ok()?;
+        self.numbers.binary_search(&number).ok()
+    }
+
+    /// The strips with the same arc lengths as the first and the last ones of runs on another grid.
+    fn runs_of(&self, other: &CurveGrid, runs: &[[usize; 2]]) -> Vec<[usize; 2]> {
+        let last = self.places.len() - 1;
+        let same = |j: usize| {
+            let s = other.places[j].s;
+            self.places.partition_point(|place| place.s < s).min(last)
+        };
+        runs.iter().map(|run| run.map(same)).collect()
+    }
+}
+
+/// Weights of values at some nodes for that of a polynomial through them.
+fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
+    let weight = |k: usize| {
+        let others = (0..nodes.len()).filter(|m| *m != k);
+        others
+            .map(|m| (at - nodes[m]) / (nodes[k] - nodes[m]))
+            .product()
+    };
+    (0..nodes.len()).map(weight).collect()
 }
 
 impl CurveTask<'_> {
-    /// Brings the wheel to rest without friction.
+    /// Finds the contact on a coarse grid, without friction.
     ///
     /// # Errors
-    /// Why it does not come to rest; or the monitor stopped the work.
-    pub(crate) fn rest(
+    /// Why the wheel does not come to rest; or the monitor stopped the work.
+    pub(crate) fn coarse(
         &self,
         workspace: &mut Workspace,
         monitor: &dyn Monitor,
     ) -> Result<CurveContact, NormalError> {
-        let coarse = self.first(workspace, monitor)?;
-        let step = self.wanted(&coarse);
-        let mut window = coarse.grid.window();
-        for (axis, window) in window.iter_mut().enumerate() {
-            let [first, last] = extent(&coarse, axis);
-            let margin = coarse.grid.step[axis] + (FREE as f64 + 0.5) * step[axis];
-            *window = [first - margin, last + margin];
+        let mut lowering = match self.loading {
+            WheelLoad::Lowering(lowering) => lowering,
+            _ => self.expected.max(LOWERING_LEAST),
+        };
+        let mut last = None;
+        for _ in 0..GRIDS_MAX {
+            let grid = self.over_overlaps(lowering)?;
+            let centre = self.touch - lowering;
+            let over = grid.over(self.curve, centre);
+            let runs = match self.influence {
+                Influence::AngleCorrected | Influence::Unfolded => vec![[0, grid.places.len() - 1]],
+                // Overlaps are wider than contacts, so that runs of strips that touch may only be found with what acts alone.
+                Influence::HalfSpace => {
+                    let deep: Vec<f64> = over.gap.iter().map(|gap| (-gap).max(0.0)).collect();
+                    grid.joined(grid.runs(&deep))
+                }
+            };
+            let start = Start {
+                runs,
+                pressure: vec![0.0; grid.x.len() * grid.places.len()],
+                operator: None,
+                over: None,
+                grid,
+                centre,
+                heights: 0,
+                iterations: 0,
+            };
+            let none = Friction::default();
+            let found = self.settled(start, &none, FIRST_TOLERANCE, workspace, monitor)?;
+            let next = self.touch - found.centre;
+            let close = (next / lowering - 1.0).abs() < 0.1;
+            lowering = next.max(LOWERING_LEAST);
+            let found = last.insert(found);
+            if self.influence == Influence::HalfSpace {
+                found.runs = found.grid.joined(found.grid.runs(&found.pressure));
+            }
+            if close {
+                break;
+            }
         }
-        let grid = CurveGrid::new(self.curve, window, step);
-        let start = grid.interpolated(&coarse.grid, &coarse.pressure);
-        let runs = coarse.runs.iter().map(|run| {
-            // The same arc lengths on the new grid.
-            run.map(|j| {
-                let s = coarse.grid.places[j].s;
-                grid.places.partition_point(|place| place.s < s)
-            })
-        });
-        let runs: Vec<[usize; 2]> = runs.collect();
-        let contact = Start {
+        last.ok_or_else(|| NormalError::NoAnswer("no grid of the contact was found".to_owned()))
+    }
+
+    /// Brings the wheel to rest on a grid as fine as the answer needs.
+    ///
+    /// # Errors
+    /// As [`coarse`](Self::coarse).
+    pub(crate) fn fine(
+        &self,
+        coarse: &CurveContact,
+        friction: &Friction,
+        workspace: &mut Workspace,
+        monitor: &dyn Monitor,
+    ) -> Result<CurveContact, NormalError> {
+        let step = self.wanted(coarse);
+        let [first, last] = extent(coarse, 0);
+        let margin = coarse.grid.step[0] + (FREE as f64 + 0.5) * step[0];
+        let beside = 0.5 * coarse.grid.step[1] + (FREE as f64 + 0.5) * step[1];
+        let near = coarse.grid.places.iter().zip(&coarse.near);
+        let windows: Vec<[f64; 2]> = near
+            .filter(|(_, near)| **near)
+            .map(|(place, _)| [place.s - beside, place.s + beside])
+            .collect();
+        let grid = CurveGrid::new(self.curve, [first - margin, last + margin], &windows, step);
+        let friction = Friction {
+            opened: friction
+                .opened
+                .as_ref()
+                .map(|opened| grid.interpolated(&coarse.grid, opened)),
+            ..*friction
+        };
+        let start = Start {
+            pressure: grid.interpolated(&coarse.grid, &coarse.pressure),
+            runs: grid.runs_of(&coarse.grid, &coarse.runs),
+            operator: None,
+            over: None,
             grid,
-            runs,
-            pressure: start,
             centre: coarse.centre,
-            slope: coarse.slope,
             heights: coarse.heights,
             iterations: coarse.work.iterations,
         };
-        self.settled(contact, &Friction::default(), FORCE, workspace, monitor)
+        let tolerance = self.fineness.tolerance;
+        self.settled(start, &friction, tolerance, workspace, monitor)
     }
 
-    /// Brings the wheel to rest with friction, from a rest with other friction.
+    /// Brings the wheel to rest with friction on the grid of a rest with other friction.
     ///
     /// # Errors
-    /// As [`rest`](Self::rest).
+    /// As [`coarse`](Self::coarse).
     pub(crate) fn again(
         &self,
         before: CurveContact,
@@ -367,141 +545,107 @@ impl CurveTask<'_> {
             runs: before.runs,
             pressure: before.pressure,
             centre: before.centre,
-            slope: before.slope,
+            operator: Some(before.operator),
+            over: Some(before.over),
             heights: before.heights,
             iterations: before.work.iterations,
         };
-        self.settled(start, friction, FORCE, workspace, monitor)
+        let tolerance = self.fineness.tolerance;
+        self.settled(start, friction, tolerance, workspace, monitor)
     }
 
-    /// The contact on coarse grids.
-    fn first(
+    /// Brings the wheel to rest on the grid of a rest with another influence, with the vertical force in N of tractions.
+    ///
+    /// # Errors
+    /// As [`coarse`](Self::coarse).
+    pub(crate) fn on_grid_of(
         &self,
+        other: &CurveContact,
+        lift: f64,
         workspace: &mut Workspace,
         monitor: &dyn Monitor,
     ) -> Result<CurveContact, NormalError> {
-        let mut lowering = match self.loading {
-            WheelLoad::Lowering(lowering) => lowering,
-            _ => self.expected.max(LOWERING_LEAST),
+        let start = Start {
+            grid: other.grid.clone(),
+            runs: other.runs.clone(),
+            pressure: other.pressure.clone(),
+            centre: other.centre,
+            operator: None,
+            over: Some(other.over.clone()),
+            heights: 0,
+            iterations: 0,
         };
-        let mut last = None;
-        for _ in 0..GRIDS_MAX {
-            let grid = self.over_overlaps(lowering)?;
-            let pressure = vec![0.0; grid.x.len() * grid.places.len()];
-            let runs = vec![[0, grid.places.len() - 1]];
-            let start = Start {
-                runs: match self.influence {
-                    Influence::AngleCorrected | Influence::Unfolded => runs,
-                    // Overlaps are wider than contacts, so that runs of strips that touch may only be found with what acts alone.
-                    Influence::HalfSpace => {
-                        let over = grid.over(self.curve, self.touch - lowering);
-                        let deep: Vec<f64> = over
-                            .iter()
-                            .map(|over| over.map_or(0.0, |over| (-over.gap).max(0.0)))
-                            .collect();
-                        grid.joined(grid.runs(&deep))
-                    }
-                },
-                grid,
-                pressure,
-                centre: self.touch - lowering,
-                slope: 0.0,
-                heights: 0,
-                iterations: 0,
-            };
-            let found =
-                self.settled(start, &Friction::default(), FORCE_FIRST, workspace, monitor)?;
-            let next = self.touch - found.centre;
-            let close = (next / lowering - 1.0).abs() < 0.1;
-            lowering = next;
-            let found = last.insert(found);
-            found.runs = match self.influence {
-                Influence::AngleCorrected | Influence::Unfolded => found.runs.clone(),
-                Influence::HalfSpace => found.grid.joined(found.grid.runs(&found.pressure)),
-            };
-            if close {
-                break;
-            }
-        }
-        last.ok_or_else(|| NormalError::NoAnswer("no grid of the contact was found".to_owned()))
+        let friction = Friction { lift, opened: None };
+        self.settled(start, &friction, FIRST_TOLERANCE, workspace, monitor)
     }
 
     /// A coarse grid over all places where the bodies overlap at a lowering in mm.
     fn over_overlaps(&self, lowering: f64) -> Result<CurveGrid, NormalError> {
         // So that a little more than the lowering still fits.
         let centre = self.touch - 1.1 * lowering;
+        let overlaps = self.curve.overlaps(centre, LOOK);
+        let mut along = [f64::INFINITY, f64::NEG_INFINITY];
+        let (mut widest, mut longest): (f64, f64) = (2.0 * LOOK, 0.0);
+        let mut windows = Vec::with_capacity(overlaps.len());
         let [first, last] = self.curve.range();
-        let nothing = [f64::INFINITY, f64::NEG_INFINITY];
-        let (mut along, mut across) = (nothing, nothing);
-        let (mut widest, mut longest): (f64, f64) = (0.0, 0.0);
-        let mut width = 0.0;
-        let strips = ((last - first) / LOOK) as usize;
-        for k in 0..strips {
-            let place = self.curve.at(first + (k as f64 + 0.5) * LOOK);
-            let nearest = self.curve.nearest(&place, centre);
-            let Some((x, wheel)) = nearest.filter(|(_, wheel)| wheel.gap < 0.0) else {
-                width = 0.0;
-                continue;
-            };
-            if k == 0 || k + 1 == strips {
+        for overlap in &overlaps {
+            let window = [
+                overlap[0].place.s - LOOK,
+                overlap[overlap.len() - 1].place.s + LOOK,
+            ];
+            if window[0] < first || window[1] > last {
                 return Err(NormalError::NoAnswer(
                     "the contact reaches the end of the rail's points; send the points beyond"
                         .to_owned(),
                 ));
             }
-            width += LOOK;
-            widest = widest.max(width);
-            let half = self.curve.half_length(&wheel);
-            longest = longest.max(2.0 * half);
-            along = [along[0].min(x - half), along[1].max(x + half)];
-            across = [across[0].min(place.s - LOOK), across[1].max(place.s + LOOK)];
+            widest = widest.max(window[1] - window[0] - LOOK);
+            windows.push(window);
+            for Nearest { x, wheel, .. } in overlap {
+                let half = self.curve.half_length(wheel);
+                longest = longest.max(2.0 * half);
+                along = [along[0].min(x - half), along[1].max(x + half)];
+            }
         }
-        if widest == 0.0 {
+        if overlaps.is_empty() {
             return Err(NormalError::NoAnswer(no_touch(lowering, 0.0)));
         }
-        let step = [longest / FIRST, widest.max(2.0 * LOOK) / FIRST];
-        let window = [along, across];
-        let window = [0, 1].map(|k| {
-            let margin = FREE as f64 * step[k];
-            [window[k][0] - margin, window[k][1] + margin]
-        });
-        let step = [0, 1].map(|k| step[k].max((window[k][1] - window[k][0]) / CELLS_MAX as f64));
-        Ok(CurveGrid::new(self.curve, window, step))
+        let step = [longest, widest].map(|length| length / FIRST);
+        let total: f64 = windows.iter().map(|[low, high]| high - low).sum();
+        let lengths = [along[1] - along[0], total];
+        let step = [0, 1].map(|k| step[k].max(lengths[k] / CELLS_MAX as f64));
+        let [margin, beside] = step.map(|step| FREE as f64 * step);
+        for [low, high] in &mut windows {
+            (*low, *high) = (*low - beside, *high + beside);
+        }
+        let along = [along[0] - margin, along[1] + margin];
+        Ok(CurveGrid::new(self.curve, along, &windows, step))
     }
 
     /// The size of cells that resolves a contact.
     fn wanted(&self, found: &CurveContact) -> [f64; 2] {
         let CurveContact { grid, pressure, .. } = found;
-        let mut step = [0, 1].map(|axis| {
-            let [first, last] = extent(found, axis);
-            (last - first) / self.fineness.contact
-        });
-        // Patches far apart do not make each other's strips wider.
+        let length = |[first, last]: [f64; 2]| last - first;
+        let mut step = [0, 1].map(|axis| length(extent(found, axis)) / self.fineness.contact);
         let total: f64 = pressure.iter().sum();
-        let mut heaviest = (0.0, step);
         for patch in groups(grid.cells(), |k| pressure[k] > 0.0) {
-            let load: f64 = patch.iter().map(|k| pressure[*k]).sum();
-            if load < self.fineness.share_min * total {
+            let share = patch.iter().map(|k| pressure[*k]).sum::<f64>() / total;
+            if share < self.fineness.share_min {
                 continue;
             }
-            let size = [0, 1].map(|axis| {
-                let [first, last] = extent_of(grid, &patch, axis);
-                last - first
-            });
+            // The error of a patch falls with the power 3/2 of its cells, and counts as much as its load.
+            let cells = self.fineness.contact * share.powf(2.0 / 3.0);
+            let cells = cells.max(OF_LIGHT * self.fineness.patch);
             for axis in [0, 1] {
-                step[axis] = step[axis].min(size[axis] / self.fineness.patch);
-            }
-            if load > heaviest.0 {
-                heaviest = (load, size.map(|size| size / self.fineness.contact));
+                step[axis] = step[axis].min(length(extent_of(grid, &patch, axis)) / cells);
             }
         }
-        let window = grid.window();
+        let lengths = [0, 1].map(|axis| grid.cells()[axis] as f64 * grid.step[axis]);
         [0, 1].map(|axis| {
-            let length = window[axis][1] - window[axis][0];
-            let wanted = step[axis].min(heaviest.1[axis]);
+            let wanted = step[axis];
             match grid.step[axis] * FINE_ENOUGH < wanted {
                 true => grid.step[axis],
-                false => wanted.max(length / CELLS_MAX as f64),
+                false => wanted.max(lengths[axis] / CELLS_MAX as f64),
             }
         })
     }
@@ -518,24 +662,18 @@ impl CurveTask<'_> {
         let mut friction = friction.clone();
         for _ in 0..GRIDS_MAX {
             let found = self.on_grid(start, &friction, tolerance, workspace, monitor)?;
-            let reached = found.grid.reached(&found.pressure);
-            if reached == [[false; 2]; 2] {
+            let Some(grid) = found.grid.enlarged(self.curve, &found.pressure) else {
                 return Ok(found);
-            }
-            let grid = found.grid.enlarged(self.curve, reached);
-            let shift = |s: f64| grid.places.partition_point(|place| place.s < s);
+            };
             let opened = friction.opened.take();
             friction.opened = opened.map(|opened| grid.interpolated(&found.grid, &opened));
             start = Start {
-                runs: found
-                    .runs
-                    .iter()
-                    .map(|run| run.map(|j| shift(found.grid.places[j].s)))
-                    .collect(),
+                runs: grid.runs_of(&found.grid, &found.runs),
                 pressure: grid.interpolated(&found.grid, &found.pressure),
+                operator: None,
+                over: None,
                 grid,
                 centre: found.centre,
-                slope: found.slope,
                 heights: found.heights,
                 iterations: found.work.iterations,
             };
@@ -545,7 +683,43 @@ impl CurveTask<'_> {
         ))
     }
 
+    /// The force in N that the pressures carry as [`carried`] counts it; none where the height is given.
+    fn wanted_force(&self, friction: &Friction) -> Result<Option<f64>, NormalError> {
+        let wanted = match self.loading {
+            WheelLoad::Vertical(force) => force + friction.lift,
+            WheelLoad::Normal(force) => force,
+            WheelLoad::Lowering(_) => return Ok(None),
+        };
+        if wanted <= 0.0 {
+            return Err(NormalError::NoAnswer(
+                "friction carries the whole load; give a normal_force_n or an approach_mm"
+                    .to_owned(),
+            ));
+        }
+        Ok(Some(wanted))
+    }
+
+    fn operator(
+        &self,
+        grid: &CurveGrid,
+        over: &WheelOverGrid,
+        runs: &[[usize; 2]],
+        workspace: &mut Workspace,
+    ) -> BentOperator {
+        let strips = BentStrips {
+            number: grid.numbers.clone(),
+            angle: over.angle.clone(),
+            run: grid.run_of_strips(runs),
+            corrected: self.influence == Influence::AngleCorrected,
+        };
+        BentOperator::new(grid.x.len(), grid.step, self.elasticity, strips, workspace)
+    }
+
     /// The wheel at rest on one grid.
+    ///
+    /// Pressures are multiplied with a weight of their strip, the cosine of its angle. Then their sum is the vertical force, and lowering the wheel is
+    /// a uniform approach: conjugate gradients find the pressures and the height together. What the gap depends on the height otherwise is
+    /// added in the next solve.
     fn on_grid(
         &self,
         start: Start,
@@ -559,143 +733,151 @@ impl CurveTask<'_> {
             runs,
             mut pressure,
             mut centre,
-            slope,
+            operator,
+            over,
             mut heights,
             mut iterations,
         } = start;
-        let strips = BentStrips {
-            angle: grid.mean_angles(self.curve, centre),
-            run: grid.run_of_strips(&runs),
-            corrected: self.influence == Influence::AngleCorrected,
+        let nx = grid.x.len();
+        let mut over = over.unwrap_or_else(|| grid.over(self.curve, centre));
+        let operator = operator.unwrap_or_else(|| self.operator(&grid, &over, &runs, workspace));
+        let wanted = self.wanted_force(friction)?;
+        let weight = |place: &CurvePlace| match wanted {
+            Some(_) => place.angle.cos().max(COSINE_LEAST),
+            None => 1.0,
         };
-        let operator = BentOperator::new(grid.cells(), grid.step, self.elasticity, strips);
-        let wanted = match self.loading {
-            WheelLoad::Vertical(force) => Some(force + friction.lift),
-            WheelLoad::Normal(force) => Some(force),
-            WheelLoad::Lowering(_) => None,
+        let weights: Vec<f64> = grid.places.iter().map(weight).collect();
+        let influence = WeightedStrips {
+            factors: operator.weighted_pressure_factors(&weights),
+            operator: &operator,
+            weights: &weights,
         };
-        if wanted.is_some_and(|wanted| wanted <= 0.0) {
-            return Err(NormalError::NoAnswer(
-                "friction carries the whole load; give a normal_force_n or an approach_mm"
-                    .to_owned(),
-            ));
-        }
-        let mut search = HeightSearch {
-            bounds: [0.0, f64::INFINITY],
-            before: None,
-            slope,
-        };
+        let mut sum = wanted.map(|wanted| match self.loading {
+            WheelLoad::Normal(_) => wanted * mean_weight(nx, &pressure, &over.gap, &weights),
+            _ => wanted,
+        });
         for height in 0..HEIGHTS_MAX {
-            let over = grid.over(self.curve, centre);
-            let gap = gap(&over, friction.opened.as_deref());
-            let deepest = gap.iter().copied().fold(f64::INFINITY, f64::min);
-            let mut residual = 0.0;
-            if deepest < 0.0 {
-                let start = match pressure.iter().any(|p| *p > 0.0) {
-                    true => pressure,
-                    false => first_pressure(&gap, grid.area(), self.elasticity),
-                };
-                let task = PressureTask {
-                    gap: &gap,
-                    cell: grid.area(),
-                    loading: NormalLoad::Approach(0.0),
-                    tolerance: VIOLATION.max(0.2 * tolerance),
-                };
-                let found = solve_pressure(&task, &operator, start, workspace, monitor)?;
-                iterations += found.iterations;
-                residual = found.residual;
-                pressure = found.pressure;
-            } else {
-                pressure.fill(0.0);
-            }
             heights += 1;
+            let gap = over.at(centre);
+            let mut weighted: Vec<f64> = match &friction.opened {
+                Some(opened) => gap.iter().zip(opened).map(|(a, b)| a + b).collect(),
+                None => gap,
+            };
+            each_row(&mut weighted, &weights, |gap, weight| gap / weight);
+            let least = weighted.iter().copied().fold(f64::INFINITY, f64::min);
+            if least >= 0.0 && wanted.is_none() {
+                return Err(NormalError::NoAnswer(no_touch(self.touch - centre, 0.0)));
+            }
+            each_row(&mut pressure, &weights, |pressure, weight| {
+                pressure * weight
+            });
+            if pressure.iter().all(|p| *p == 0.0) {
+                let depth = (-least).max(self.expected);
+                pressure = first_pressure(&weighted, depth, grid.area(), self.elasticity);
+            }
+            let task = PressureTask {
+                gap: &weighted,
+                cell: grid.area(),
+                loading: sum.map_or(NormalLoad::Approach(0.0), NormalLoad::Force),
+                tolerance,
+            };
+            let found = solve_pressure(&task, &influence, pressure, workspace, monitor)?;
+            iterations += found.iterations;
+            pressure = found.pressure;
+            each_row(&mut pressure, &weights, |pressure, weight| {
+                pressure / weight
+            });
+            centre -= found.approach;
+            let depth = found.approach - least;
             let carried = carried(self.loading, &grid, &pressure);
-            let lowering = self.touch - centre;
             let missed = wanted.map_or(0.0, |wanted| carried / wanted - 1.0);
-            if missed.abs() <= tolerance || search.is_closed() || height + 1 == HEIGHTS_MAX {
-                if missed.abs() > tolerance.max(FORCE_POOR) {
-                    return Err(NormalError::NoAnswer(format!(
-                        "no height of the wheel was found on the curve of the rail at which it carries its load, which is missed by {:.1} %",
-                        100.0 * missed.abs()
-                    )));
+            let off = over.lift_off(&pressure, &weights) * found.approach.abs();
+            let is_linear = (over.centre - centre).abs() <= LINEAR * depth;
+            let ends = height + 1 == HEIGHTS_MAX;
+            if ends || is_linear && off <= tolerance * depth && missed.abs() <= FORCE {
+                if missed.abs() > FORCE_POOR {
+                    return Err(load_missed(missed));
                 }
-                let work = NormalWork {
-                    cells: grid.cells(),
-                    grids: 1,
-                    iterations,
-                    residual,
-                    pressure_change: 0.0,
-                };
+                let near = found.distance.chunks_exact(nx);
                 return Ok(CurveContact {
+                    patches: Once::default(),
+                    near: near
+                        .map(|row| row.iter().any(|distance| *distance < NEAR * depth))
+                        .collect(),
+                    gap: over.at(centre),
+                    work: NormalWork {
+                        cells: grid.cells(),
+                        grids: 1,
+                        iterations,
+                        residual: found.residual,
+                        pressure_change: 0.0,
+                    },
                     grid,
                     operator,
                     centre,
-                    over,
                     pressure,
                     runs,
-                    work,
                     heights,
                     missed: missed.abs(),
-                    slope: search.slope,
+                    over,
                 });
             }
-            let wanted = wanted.unwrap_or(carried);
-            centre = self.touch - search.next([lowering, carried], wanted);
+            sum = sum.map(|sum| sum / (1.0 + missed));
+            if !is_linear {
+                over = grid.over(self.curve, centre);
+            }
         }
         unreachable!("the last height ends the search")
     }
 }
 
-/// The search for the lowering of a wheel that carries a force: secant steps in the force to the power 2/3, kept between what carries too little and
-/// too much.
-struct HeightSearch {
-    bounds: [f64; 2],
-    /// The last lowering in mm, and the power of its force.
-    before: Option<[f64; 2]>,
-    /// Power of the force per mm; 0 where it is not known.
-    slope: f64,
+/// Why there is no answer where the force is missed by a part of it.
+fn load_missed(part: f64) -> NormalError {
+    NormalError::NoAnswer(format!(
+        "no height of the wheel was found on the curve of the rail at which it carries its load, which is missed by {:.1} %",
+        100.0 * part.abs()
+    ))
 }
 
-impl HeightSearch {
-    fn is_closed(&self) -> bool {
-        self.bounds[1] - self.bounds[0] < BRACKET_MIN * self.bounds[1]
+/// Changes the values of cells with a weight of their strip.
+fn each_row(values: &mut [f64], weights: &[f64], of: fn(f64, f64) -> f64) {
+    let nx = values.len() / weights.len();
+    for (row, weight) in values.chunks_exact_mut(nx).zip(weights) {
+        row.iter_mut()
+            .for_each(|value| *value = of(*value, *weight));
+    }
+}
+
+impl WheelOverGrid {
+    /// The largest difference of the change of the gap with the height over the weight of the strip from 1, among cells in contact.
+    fn lift_off(&self, pressure: &[f64], weights: &[f64]) -> f64 {
+        let nx = pressure.len() / weights.len();
+        let rows = pressure.chunks_exact(nx).zip(self.lift.chunks_exact(nx));
+        let off = rows.zip(weights).flat_map(|((pressure, lift), weight)| {
+            let in_contact = pressure.iter().zip(lift).filter(|(p, _)| **p > 0.0);
+            in_contact.map(move |(_, lift)| (lift / weight - 1.0).abs())
+        });
+        off.fold(0.0, f64::max)
     }
 
-    /// The lowering to try after one in mm with its force in N.
-    fn next(&mut self, [lowering, carried]: [f64; 2], wanted: f64) -> f64 {
-        let [low, high] = &mut self.bounds;
-        if carried < wanted {
-            *low = low.max(lowering);
-        } else {
-            *high = high.min(lowering);
-        }
-        let power = |force: f64| force.max(0.0).powf(2.0 / 3.0);
-        let here = power(carried);
-        let secant = self
-            .before
-            .filter(|[at, _]| *at != lowering)
-            .map(|[at, was]| (here - was) / (lowering - at));
-        let least = lowering.max(LOWERING_LEAST);
-        match secant.filter(|slope| *slope > 0.0) {
-            Some(slope) => self.slope = slope,
-            None if self.slope <= 0.0 => self.slope = here / least,
-            None => {}
-        }
-        self.before = Some([lowering, here]);
-        let step = match self.slope > 0.0 {
-            true => (power(wanted) - here) / self.slope,
-            false => least,
-        };
-        let next = lowering + step.clamp(-STEP_LARGEST * least, STEP_LARGEST * least);
-        let [low, high] = self.bounds;
-        if next > low && next < high {
-            next
-        } else if high.is_finite() {
-            0.5 * (low + high)
-        } else {
-            (1.0 + STEP_LARGEST) * least
-        }
+    /// The gap of the cells at another height of the wheel's centre.
+    fn at(&self, centre: f64) -> Vec<f64> {
+        let raised = centre - self.centre;
+        let cells = self.gap.iter().zip(&self.lift);
+        cells.map(|(gap, lift)| gap + raised * lift).collect()
     }
+}
+
+/// The weight of the strips in contact, or, where none is, of the one with the least gap.
+fn mean_weight(nx: usize, pressure: &[f64], gap: &[f64], weights: &[f64]) -> f64 {
+    let loads = || pressure.chunks_exact(nx).map(|row| row.iter().sum::<f64>());
+    let total: f64 = loads().sum();
+    if total > 0.0 {
+        let weighted = loads().zip(weights).map(|(load, weight)| load * weight);
+        return weighted.sum::<f64>() / total;
+    }
+    let deepest = (0..gap.len()).min_by(|a, b| gap[*a].total_cmp(&gap[*b]));
+    weights[deepest.unwrap_or(0) / nx]
 }
 
 /// Where a grid is solved from.
@@ -704,30 +886,20 @@ struct Start {
     runs: Vec<[usize; 2]>,
     pressure: Vec<f64>,
     centre: f64,
-    slope: f64,
+    /// What was found on the same grid before.
+    operator: Option<BentOperator>,
+    over: Option<WheelOverGrid>,
     heights: u32,
     iterations: u32,
 }
 
-/// The gap of the cells: the wheel over the rail, and what tractions open.
-fn gap(over: &[Option<WheelOver>], opened: Option<&[f64]>) -> Vec<f64> {
-    let mut gap: Vec<f64> = over
-        .iter()
-        .map(|over| over.map_or(NO_CONTACT, |over| over.gap))
-        .collect();
-    for (gap, opened) in gap.iter_mut().zip(opened.into_iter().flatten()) {
-        *gap += opened;
-    }
-    gap
-}
-
-/// A pressure to start from: Hertz's law over the part that overlaps by more than half of the deepest overlap.
-fn first_pressure(gap: &[f64], cell: f64, elasticity: &Elasticity) -> Vec<f64> {
-    let deepest = gap.iter().copied().fold(f64::INFINITY, f64::min);
-    let part = |gap: &f64| (2.0 * gap / deepest - 1.0).max(0.0);
+/// A pressure to start from: Hertz's law over the part that overlaps by more than half of the deepest overlap, which is given.
+fn first_pressure(gap: &[f64], depth: f64, cell: f64, elasticity: &Elasticity) -> Vec<f64> {
+    let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
+    let part = |gap: &f64| (1.0 - 2.0 * (gap - least) / depth).max(0.0);
     let inside = gap.iter().filter(|gap| part(gap) > 0.0).count();
     let radius = (inside as f64 * cell / std::f64::consts::PI).sqrt();
-    let largest = -elasticity.contact_modulus() * deepest / (std::f64::consts::PI * radius);
+    let largest = elasticity.contact_modulus() * depth / (std::f64::consts::PI * radius);
     gap.iter().map(|gap| largest * part(gap).sqrt()).collect()
 }
 
@@ -773,34 +945,51 @@ impl CurveContact {
         &self,
         [first, last]: [usize; 2],
     ) -> Result<Vec<GridPressure>, NormalError> {
-        let nx = self.grid.x.len();
-        let inside = |k: usize| self.pressure[k] > 0.0 && (first..=last).contains(&(k / nx));
-        let s: Vec<f64> = self.grid.places.iter().map(|place| place.s).collect();
-        let depth = self.over.iter().flatten().map(|over| -over.gap);
-        let depth = depth.fold(0.0, f64::max);
-        let field = |patch: Vec<usize>| {
-            let mut pressure = vec![0.0; self.pressure.len()];
-            for k in patch {
-                pressure[k] = self.pressure[k];
-            }
-            GridPressure::of_solution(
-                &self.grid.x,
-                &s,
-                &squares(nx, &pressure),
-                &pressure,
-                depth,
-                Edges::Found,
-            )
-        };
-        let patches = groups(self.grid.cells(), inside).into_iter();
-        // A patch of a cell or two has no edges.
-        let found: Vec<GridPressure> = patches.filter_map(|patch| field(patch).ok()).collect();
+        let all = self.patches.get_or_make(|| self.all_patches());
+        let inside = all
+            .iter()
+            .filter(|(strip, _)| (first..=last).contains(strip));
+        let found: Vec<GridPressure> = inside.map(|(_, patch)| patch.clone()).collect();
         match found.is_empty() {
             true => Err(NormalError::NoAnswer(
                 "the contact is smaller than a cell of the grid".to_owned(),
             )),
             false => Ok(found),
         }
+    }
+
+    fn all_patches(&self) -> Vec<(usize, GridPressure)> {
+        let [nx, ny] = self.grid.cells();
+        let depth = self.gap.iter().fold(0.0, |depth: f64, gap| depth.max(-gap));
+        let field = |patch: Vec<usize>| {
+            let strip = patch[0] / nx;
+            let range = |of: fn(usize, usize) -> usize, cells: usize| {
+                let numbers = patch.iter().map(|k| of(*k, nx));
+                let (low, high) = numbers.fold((cells, 0), |(l, h), k| (l.min(k), h.max(k)));
+                low.saturating_sub(FREE)..(high + FREE + 1).min(cells)
+            };
+            let (columns, rows) = (range(|k, nx| k % nx, nx), range(|k, nx| k / nx, ny));
+            let mut pressure = vec![0.0; columns.len() * rows.len()];
+            for k in patch {
+                let (i, j) = (k % nx - columns.start, k / nx - rows.start);
+                pressure[j * columns.len() + i] = self.pressure[k];
+            }
+            let places = &self.grid.places[rows];
+            let s: Vec<f64> = places.iter().map(|place| place.s).collect();
+            let found = GridPressure::of_solution(
+                &self.grid.x[columns.clone()],
+                &s,
+                &squares(columns.len(), &pressure),
+                &pressure,
+                depth,
+                Edges::Found,
+            );
+            // A patch of a cell or two has no edges.
+            Some((strip, found.ok()?))
+        };
+        let inside = |k: usize| self.pressure[k] > 0.0;
+        let patches = groups(self.grid.cells(), inside).into_iter();
+        patches.filter_map(field).collect()
     }
 
     /// The strips of the parts of the contact that are solved together.
@@ -821,6 +1010,47 @@ impl CurveContact {
                 parts
             }
         }
+    }
+
+    /// Sum of the pressures in N.
+    pub(crate) fn normal_force(&self) -> f64 {
+        self.grid.area() * self.pressure.iter().sum::<f64>()
+    }
+
+    /// Values at the cells of another grid, at those of this one.
+    pub(crate) fn interpolated(&self, other: &CurveContact, values: &[f64]) -> Vec<f64> {
+        self.grid.interpolated(&other.grid, values)
+    }
+
+    /// About what changes with the friction: the vertical force that the pressures carry, relative to it; and, by the gap that tractions open, the
+    /// lateral force relative to all normal forces.
+    pub(crate) fn change_by(&self, from: &Friction, to: &Friction) -> [f64; 2] {
+        let (mut load, mut vertical) = (0.0, 0.0);
+        let (mut depth, mut opened) = (0.0, 0.0);
+        let mut angles = [0.0; 2];
+        let rows = self.pressure.chunks_exact(self.grid.x.len()).enumerate();
+        for ((j, row), place) in rows.zip(&self.grid.places) {
+            for (k, p) in (j * row.len()..).zip(row).filter(|(_, p)| **p > 0.0) {
+                let [before, after] = [from, to].map(|friction| {
+                    let opened = friction.opened.as_ref();
+                    opened.map_or(0.0, |opened| opened[k])
+                });
+                depth -= p * self.gap[k];
+                opened += p * (after - before).abs();
+            }
+            let sum: f64 = row.iter().sum();
+            load += sum;
+            vertical += sum * place.angle.cos();
+            angles[0] += sum * place.angle;
+            angles[1] += sum * place.angle * place.angle;
+        }
+        let [mean, square] = angles.map(|sum| sum / load);
+        let turn = (square - mean * mean).max(0.0).sqrt();
+        let force = vertical * self.grid.area();
+        [
+            (to.lift - from.lift).abs() / force.abs().max(f64::MIN_POSITIVE),
+            turn * opened / depth.max(f64::MIN_POSITIVE),
+        ]
     }
 
     /// The field of a part.

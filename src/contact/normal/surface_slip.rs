@@ -3,27 +3,38 @@
 /// Slip at the points of a surface beyond that of the motion, divided by the rolling speed, interpolated between samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceSlip {
-    /// First sample along x and y in mm.
-    pub first: [f64; 2],
-    /// Distance of the samples along x and y in mm.
-    pub step: [f64; 2],
-    /// Number of samples along x and y, at least 1 each.
-    pub samples: [usize; 2],
-    /// Slip of the upper body relative to the lower one along x and y; sample (i, j) at `j * samples[0] + i`.
+    /// Samples along x: the first one and their distance in mm, and how many, at least 1.
+    pub x: (f64, f64, usize),
+    /// Samples along y in mm, ascending, at least 1.
+    pub y: Vec<f64>,
+    /// Slip of the upper body relative to the lower one along x and y; sample (i, j) at `j * x.2 + i`.
     pub slip: [Vec<f64>; 2],
 }
 
 impl SurfaceSlip {
     /// Slip at a place `[x, y]` in mm; beyond the samples that of the nearest place among them.
     #[must_use]
-    pub fn at(&self, place: [f64; 2]) -> [f64; 2] {
-        let [x, y] = [0, 1].map(|k| {
-            let last = (self.samples[k] - 1) as f64;
-            let at = ((place[k] - self.first[k]) / self.step[k]).clamp(0.0, last);
-            let from = at.floor().min((last - 1.0).max(0.0));
-            (from as usize, at - from, usize::from(last > 0.0))
-        });
-        let value = |values: &[f64], i: usize, j: usize| values[j * self.samples[0] + i];
+    pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (first, step, samples) = self.x;
+        let last = (samples - 1) as f64;
+        let at = ((x - first) / step).clamp(0.0, last);
+        let from = at.floor().min((last - 1.0).max(0.0));
+        let x = (from as usize, at - from, usize::from(last > 0.0));
+        let last = self.y.len() - 1;
+        let from = self
+            .y
+            .partition_point(|sample| *sample <= y)
+            .clamp(1, last.max(1))
+            - 1;
+        let to = (from + 1).min(last);
+        let length = self.y[to] - self.y[from];
+        let part = if length > 0.0 {
+            ((y - self.y[from]) / length).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let y = (from, part, to - from);
+        let value = |values: &[f64], i: usize, j: usize| values[j * self.x.2 + i];
         [0, 1].map(|k| {
             let row = |j: usize| {
                 let [low, high] = [x.0, x.0 + x.2].map(|i| value(&self.slip[k], i, j));
@@ -58,9 +69,8 @@ mod tests {
             }
         }
         let surface = SurfaceSlip {
-            first: [1.0, -2.0],
-            step: [0.5, 0.25],
-            samples: [3, 4],
+            x: (1.0, 0.5, 3),
+            y: vec![-2.0, -1.75, -1.5, -1.25],
             slip,
         };
         for (x, y) in [(1.0, -2.0), (1.3, -1.6), (2.0, -1.25)] {
