@@ -242,7 +242,8 @@ fn curve(count: usize) {
 }
 
 fn classes() -> Vec<Class> {
-    let new = example("wheel-rail.case.json");
+    let mut new = example("wheel-rail.case.json");
+    new["contact"]["accept_rough_profiles"] = json!(true);
     let of_new = |name, shifts, rows| Class {
         name,
         pair: new.clone(),
