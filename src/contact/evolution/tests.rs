@@ -161,6 +161,49 @@ fn twice_the_passes_at_half_the_weight_are_the_same() {
 }
 
 /// Left after any step and continued from its text by other threads, an evolution gives the same bits.
+/// Creepages of both signs whose mean is none, and a load that differs far more: the error of a few states is told and shrinks with their number.
+#[test]
+fn the_error_of_a_condensed_traffic_covers_what_all_rows_wear() {
+    let rows = 48;
+    let loads: Vec<f64> = (0..rows)
+        .map(|k| 60e3 + 1e3 * f64::from(k % 8) * 4.0)
+        .collect();
+    let creepages: Vec<f64> = (0..rows)
+        .map(|k| 1e-3 * (f64::from(k * 7 % 48) / 23.5 - 1.0))
+        .collect();
+    let mut asked = symmetric(1, 2e4);
+    asked["traffic"] = json!({ "columns": {
+        "/load/vertical_force_n": loads, "/motion/creepage_x": creepages
+    } });
+    let wear = |states: u32, tolerance: f64| {
+        let mut asked = asked.clone();
+        asked["accuracy"]["states_max"] = json!(states);
+        asked["accuracy"]["states_tolerance"] = json!(tolerance);
+        let task = checked(&asked);
+        let (state, _) = run(&task);
+        let traffic = state.traffic.expect("a condensed traffic");
+        (
+            state.rail.worn.worn_area_mm2,
+            traffic.error[0],
+            traffic.states.len(),
+        )
+    };
+    let (all, _, count) = wear(48, 1e-12);
+    assert_eq!(count, 48);
+    let mut last = f64::INFINITY;
+    for states in [4, 8, 24] {
+        let (worn, told, _) = wear(states, 1e-12);
+        let error = (worn / all - 1.0).abs();
+        assert!(
+            error <= 1.2 * told,
+            "{states} states: {error} off, {told} told"
+        );
+        assert!(error <= last, "{states} states: {error} off, {last} before");
+        last = error;
+    }
+    assert!(last < 0.05, "{last}");
+}
+
 #[test]
 fn an_evolution_is_continued_to_the_same_bits() {
     let mut plan = request(&[-2.0, 1.0], &[1.0, 3.0], 2);

@@ -92,7 +92,7 @@ pub struct WornBody {
 pub struct WearUncertainty {
     /// Of the steps: from halving each.
     pub steps: f64,
-    /// Of the condensed traffic: from twice the states.
+    /// Of the condensed traffic: from its groups halved along each column.
     pub states: f64,
     /// Of the contact: from the error estimates of its friction power.
     pub contact: f64,
