@@ -77,7 +77,7 @@ pub struct EvolutionExtent {
 /// Tolerances of an evolution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct EvolutionAccuracy {
-    /// Most representative states; 24 when left out.
+    /// Most representative states; 100 when left out.
     #[schema(required = false, minimum = 1, maximum = 200)]
     pub states_max: u32,
     /// Error of the condensed traffic relative to the worn area, measured with twice the states; 0.03 when left out.
@@ -100,7 +100,7 @@ pub struct EvolutionAccuracy {
 impl Default for EvolutionAccuracy {
     fn default() -> EvolutionAccuracy {
         EvolutionAccuracy {
-            states_max: 24,
+            states_max: 100,
             states_tolerance: 0.03,
             step_tolerance: 0.1,
             step_depth_mm: 0.03,
