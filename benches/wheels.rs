@@ -2,14 +2,14 @@
 //!
 //! `cargo bench --bench wheels` prints times in LU (the report's unit), best of several; `-- rows 1000` the means of so many rows that differ in
 //! shift, yaw and load, solved one after the other as a run solves them, at a target of 0.02 and without fields.
-//! `-- curve 20` prints what contact on the reference curve takes over contact on planes, for so many random placements of each class.
+//! `-- curve 20` prints the ratio of the time on the reference curve to that on planes, for 20 random placements of each class.
 
 extern crate railhead_contact as railhead;
 
 mod machine;
+mod worn_pair;
 
 use std::hint::black_box;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use railhead::contact::case::known_pair::KnownPair;
@@ -24,6 +24,7 @@ use railhead::contact::{check, check_with, solve, solve_with};
 use serde_json::{Value, json};
 
 use machine::{lu_seconds, median, quantile, seconds_of};
+use worn_pair::worn_pair;
 
 /// Lateral shifts of the wheelset in mm, from the tread to the gauge corner.
 const SHIFTS: [f64; 7] = [3.0, 1.0, 0.0, -1.0, -2.0, -4.0, -5.5];
@@ -259,7 +260,7 @@ fn classes() -> Vec<Class> {
         of_new("tread, rows", [-2.0, 4.0], true),
         of_new("gauge corner, rows", [-5.9, -3.5], true),
     ];
-    if let Some(pair) = worn_pair() {
+    if let Some(pair) = worn_case() {
         for (name, shifts) in [
             ("worn, tread", [-13.8, -12.5]),
             ("worn, tread and flange", [-15.2, -14.5]),
@@ -277,24 +278,14 @@ fn classes() -> Vec<Class> {
     classes
 }
 
-/// A worn pair, if the reference files are beside the checkout or in the folder `RAILHEAD_REFERENCE`.
-fn worn_pair() -> Option<Value> {
-    let folder = std::env::var_os("RAILHEAD_REFERENCE").map(PathBuf::from);
-    let folder = folder.unwrap_or_else(|| {
-        PathBuf::from(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../shared/reference"
-        ))
-    });
-    let file = |name: &str| {
-        let text = std::fs::read_to_string(folder.join("extended/profiles").join(name)).ok()?;
-        Some(json!({ "format": "simpack", "text": text }))
-    };
+/// The worn pair of the reference files, for the right-hand rail; `None` without the files.
+fn worn_case() -> Option<Value> {
+    let [rail, wheel] = worn_pair()?;
     Some(json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
         "friction": { "coefficient": 0.3 },
         "contact": {
-            "type": "profiles", "rail": file("site_b_hr.prr")?, "wheel": file("worn_high_mileage.prw")?,
+            "type": "profiles", "rail": rail, "wheel": wheel,
             "side": "right", "rolling_radius_mm": 444, "gauge_mm": 1435.1, "gauge_height_mm": 15.875,
             "flange_back_distance_mm": 1347.4, "flange_back_position_mm": 0, "roll_rad": -0.0013,
             "accept_rough_profiles": true,

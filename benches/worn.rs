@@ -5,8 +5,9 @@
 
 extern crate railhead_contact as railhead;
 
+mod worn_pair;
+
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use railhead::contact::case::limits::Limits;
@@ -15,8 +16,10 @@ use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
+use worn_pair::worn_pair;
+
 fn main() -> ExitCode {
-    let Some(pair) = pair() else {
+    let Some(pair) = worn_pair() else {
         println!("no reference files: RAILHEAD_REFERENCE names the folder that they are in");
         return ExitCode::FAILURE;
     };
@@ -64,22 +67,6 @@ fn solved(case: &Value) -> Result<Solution, String> {
     let checked = check(case, &Limits::default()).map_err(|error| error.to_string())?;
     let answer = solve(&checked, &Unmonitored).map_err(|error| error.to_string())?;
     Ok(answer.0)
-}
-
-/// Rail and wheel, if the files are there.
-fn pair() -> Option<[Value; 2]> {
-    let folder = std::env::var_os("RAILHEAD_REFERENCE").map(PathBuf::from);
-    let folder = folder.unwrap_or_else(|| {
-        PathBuf::from(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../shared/reference"
-        ))
-    });
-    let file = |name: &str| {
-        let text = std::fs::read_to_string(folder.join("extended/profiles").join(name)).ok()?;
-        Some(json!({ "format": "simpack", "text": text }))
-    };
-    Some([file("site_b_hr.prr")?, file("worn_high_mileage.prw")?])
 }
 
 fn placed([rail, wheel]: &[Value; 2], shift: f64, force: f64, yaw: f64) -> Value {

@@ -151,7 +151,7 @@ struct Part {
     /// x and s in mm of the origin of its coordinates.
     origin: [f64; 2],
     patches: Vec<GridPressure>,
-    /// What the normal problem says of them, about the same origin.
+    /// Result of the normal problem about the same origin.
     loads: Vec<Patch>,
     /// Their load centres `[x, s]` in mm.
     centres: Vec<[f64; 2]>,
@@ -373,7 +373,7 @@ impl<'a> CurveSolve<'a> {
         })
     }
 
-    /// What the tractions of all parts do to the contact.
+    /// Effect of the tractions of all parts on the contact.
     fn friction(
         &self,
         contact: &CurveContact,
@@ -673,7 +673,7 @@ impl<'a> CurveSolve<'a> {
         patches.filter_map(|patch| patch.friction_limit_n).sum()
     }
 
-    /// What the factors for the turn change in the forces on the rail, by rough tractions on the coarse grid; none where the surface hardly turns.
+    /// Change of the forces on the rail by the correction for the turn, from rough tractions on the coarse grid; `None` where the surface hardly turns.
     fn change_by_turn(
         &self,
         found: &Found,

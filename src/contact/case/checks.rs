@@ -148,7 +148,7 @@ impl CheckedParts {
 /// The surface on which the contact of profiles is solved.
 ///
 /// # Errors
-/// What of the case is not solved on the surface that it asks for.
+/// Parts of the case that the requested reference surface does not support.
 fn surface(
     given: &PartialCase,
     elasticity: Option<Elasticity>,

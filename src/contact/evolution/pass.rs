@@ -16,7 +16,7 @@ use crate::contact::post::units::NANOMETRES;
 use crate::contact::solution::words::answer::{PatchSolution, Position};
 use crate::contact::solution::words::evolution::{StateContact, StatePatch};
 
-/// What states do to one body: of the rail for one pass, of the wheel for 1 mm rolled.
+/// Wear of one body: of the rail in one pass, of the wheel over 1 mm rolled.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct BodyWear {
     /// Area in mm² that is lost at each point.
@@ -69,7 +69,7 @@ pub(crate) struct Pass {
     pub(crate) contact: StateContact,
 }
 
-/// What all states do over the extent.
+/// Wear of all states over the extent.
 pub(crate) struct Evaluation {
     /// Rail and wheel.
     pub(crate) wear: [BodyWear; 2],

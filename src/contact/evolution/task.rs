@@ -1,4 +1,4 @@
-//! What is asked of an evolution, checked.
+//! A checked evolution.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ const TARGET: f64 = 0.02;
 /// Wheel load in N of a million gross tonnes on an axle with one wheel of that load on each rail.
 const NEWTONS_PER_MGT: f64 = 1e9 * 9.80665 / 2.0;
 
-/// What solves of an evolution share.
+/// State shared by the solves of an evolution.
 #[derive(Debug, Default)]
 pub struct SolveContext {
     /// Threads that solve the states of a step, the calling one included; 0 counts as 1.
@@ -369,7 +369,7 @@ fn template(draft: &EvolutionDraft) -> Result<Value, CaseError> {
     if template.get("solver").is_none() {
         template["solver"] = json!({ "target_error": TARGET });
     }
-    // How far the points given can be trusted is told with the first contact; the points from then on are ours.
+    // The quality of the given points is judged at the first contact only; later points are computed.
     template["contact"]["accept_rough_profiles"] = true.into();
     Ok(template)
 }

@@ -161,7 +161,7 @@ fn twice_the_passes_at_half_the_weight_are_the_same() {
 }
 
 /// Left after any step and continued from its text by other threads, an evolution gives the same bits.
-/// Creepages of both signs whose mean is none, and a load that differs far more: the error of a few states is told and shrinks with their number.
+/// Creepages of both signs with mean 0 beside widely spread loads: the reported error covers the true one, which falls with the number of states.
 #[test]
 fn the_error_of_a_condensed_traffic_covers_what_all_rows_wear() {
     let rows = 48;

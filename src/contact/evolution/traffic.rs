@@ -26,7 +26,7 @@ struct Group {
     pass: Pass,
 }
 
-/// What parting a group changes.
+/// Effect of dividing a group.
 #[derive(Debug, Clone)]
 struct Parted {
     /// The wear of both bodies, summed over the columns.

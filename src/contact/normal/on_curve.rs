@@ -886,7 +886,7 @@ struct Start {
     runs: Vec<[usize; 2]>,
     pressure: Vec<f64>,
     centre: f64,
-    /// What was found on the same grid before.
+    /// Solution found earlier on the same grid.
     operator: Option<BentOperator>,
     over: Option<WheelOverGrid>,
     heights: u32,

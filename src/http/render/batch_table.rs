@@ -169,7 +169,7 @@ fn default_names() -> impl Iterator<Item = &'static str> {
     FIRST.into_iter().chain(Forces::COLUMNS).chain(LAST)
 }
 
-/// What a column of texts says of the job itself.
+/// Value of a text column that describes the job.
 fn of_job(item: &BatchItem, name: &str) -> Option<String> {
     let job = &item.job;
     match name {

@@ -49,7 +49,7 @@ pub(crate) fn json_body(answer: RowsAnswer) -> Body {
     }))
 }
 
-/// The same columns as a table.
+/// The columns as a table.
 ///
 /// # Errors
 /// It cannot be begun.

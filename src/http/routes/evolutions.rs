@@ -429,7 +429,7 @@ query! {
 pub(crate) enum SectionForm {
     /// Columns of y and z.
     Columns,
-    /// As MiniProf writes it.
+    /// MiniProf.
     Miniprof,
     /// As Simpack reads it.
     Simpack,

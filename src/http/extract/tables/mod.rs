@@ -87,7 +87,7 @@ pub enum TableSource {
     Memory(Bytes),
 }
 
-/// What tables are read from.
+/// A source of tables.
 trait Seekable: BufRead + Seek + Send {}
 
 impl<T: BufRead + Seek + Send> Seekable for T {}
@@ -104,7 +104,7 @@ impl TableSource {
 /// The title of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Title {
-    /// As it was sent.
+    /// The title as sent.
     pub name: String,
     /// Its unit in a line of units.
     pub unit: Option<String>,
@@ -176,7 +176,7 @@ impl TableRows {
     /// The columns, as a run names them.
     ///
     /// # Errors
-    /// As [`NamedColumns::columns`].
+    /// See [`NamedColumns::columns`].
     pub fn named(&self, named: &NamedColumns) -> Result<Vec<RunColumn>, ApiError> {
         let titles = self.titles.iter();
         named.columns(

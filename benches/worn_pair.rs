@@ -1,0 +1,21 @@
+//! The worn sections of the reference files: `shared/reference` beside the checkout, or the folder that `RAILHEAD_REFERENCE` names.
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+/// Sections of a worn rail and a worn wheel, as a case takes them; `None` without the files.
+pub(crate) fn worn_pair() -> Option<[Value; 2]> {
+    let folder = std::env::var_os("RAILHEAD_REFERENCE").map(PathBuf::from);
+    let folder = folder.unwrap_or_else(|| {
+        PathBuf::from(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../shared/reference"
+        ))
+    });
+    let file = |name: &str| {
+        let text = std::fs::read_to_string(folder.join("extended/profiles").join(name)).ok()?;
+        Some(json!({ "format": "simpack", "text": text }))
+    };
+    Some([file("site_b_hr.prr")?, file("worn_high_mileage.prw")?])
+}
