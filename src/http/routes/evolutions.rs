@@ -411,7 +411,7 @@ query! {
     /// Parameters of a section of an evolution.
     SectionQuery(() => ()) {
         /// Number of the record, from 0; the last when left out
-        #[param(minimum = 0, example = 3)]
+        #[param(minimum = 0, maximum = 100000, example = 3)]
         record: u32 as u32 = count(0, 100_000);
         /// `columns` (when left out), `miniprof` or `simpack`
         #[param(pattern = "^(columns|miniprof|simpack)$", example = "miniprof")]
