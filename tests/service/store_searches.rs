@@ -2,7 +2,7 @@
 
 use railhead::jobs::State;
 use railhead::jobs::model::kind::Kind;
-use railhead::jobs::store::list::{BatchFilter, Change, Filter, Total};
+use railhead::jobs::store::list::{BatchFilter, Change, Filter, Membership, Total};
 use railhead::jobs::store::retention::Usage;
 use railhead::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds};
 use uuid::Uuid;
@@ -13,6 +13,7 @@ conformance!(
     several_states_labels_and_words_of_the_name_are_found_page_by_page,
     a_search_that_finds_little_ends_its_page_and_goes_on_from_there,
     changes_are_told_in_their_order_once_and_to_their_tenant_alone,
+    jobs_submitted_alone_are_listed_without_those_of_batches,
     batches_are_listed_with_their_counts_and_found_by_name_and_label,
 );
 
@@ -141,11 +142,46 @@ async fn a_search_that_finds_little_ends_its_page_and_goes_on_from_there(kind: S
         assert_eq!(second.next_cursor, None);
     }
     let all = Filter {
-        batch: Some(batch.id),
+        member: Some(Membership::Batch(batch.id)),
         ..Filter::default()
     };
     let page = table.store.list("anonymous", &all, None, 1).await.unwrap();
     assert_eq!(page.total, Total::AtLeast(1_000));
+}
+
+async fn jobs_submitted_alone_are_listed_without_those_of_batches(kind: StoreKind) {
+    let table = Table::new(kind).await;
+    let ids = twelve(&table).await;
+    four_batches(&table).await;
+    let found = async |filter: &Filter| {
+        let (mut found, mut after, mut total) = (Vec::new(), None, None);
+        loop {
+            let list = table.store.list("anonymous", filter, after, 2);
+            let page = list.await.unwrap();
+            for job in &page.entries {
+                assert_eq!(job.batch_id, None);
+                found.push(ids.iter().position(|id| *id == job.id).unwrap());
+            }
+            total = total.or(Some(page.total));
+            match page.next_cursor {
+                Some(cursor) => after = filter.read_cursor(&cursor),
+                None => return (found, total.unwrap()),
+            }
+        }
+    };
+    let mut alone = Filter {
+        member: Some(Membership::Alone),
+        ..Filter::default()
+    };
+    let (jobs, total) = found(&alone).await;
+    assert_eq!((jobs, total), ((0..12).rev().collect(), Total::Exactly(12)));
+    alone.name = Some("case 1".to_owned());
+    assert_eq!(found(&alone).await.0, [11, 10, 1]);
+    alone.name = None;
+    alone.states = vec![State::Queued];
+    assert_eq!(found(&alone).await.1, Total::Exactly(6));
+    alone.labels = vec![("third".to_owned(), "yes".to_owned())];
+    assert_eq!(found(&alone).await.0, [9, 6]);
 }
 
 async fn changes_are_told_in_their_order_once_and_to_their_tenant_alone(kind: StoreKind) {

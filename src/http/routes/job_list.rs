@@ -11,12 +11,12 @@ use uuid::Uuid;
 use crate::http::dto::job::JobAnswer;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::labels::time;
-use crate::http::extract::query::{Parameters, Reader, Repeated, count, id, reader};
+use crate::http::extract::query::{Parameters, Reader, Repeated, count, reader};
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::routes::next_page::{answer, list_query};
 use crate::jobs::model::job::State as JobState;
-use crate::jobs::{Filter, PAGE_MAX, Total};
+use crate::jobs::{Filter, Membership, PAGE_MAX, Total};
 
 /// Jobs in one page of a list when nothing is said.
 const LIST_LIMIT_DEFAULT: u32 = 50;
@@ -112,9 +112,9 @@ list_query! {
     ListQuery {
         /// Only jobs in this state; may be repeated for jobs in one of several
         state: Vec<JobState> as Vec<JobState> = Repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
-        /// Only jobs of this batch
-        #[param(format = "uuid")]
-        batch: Uuid as String = id("batch");
+        /// Only jobs of this batch; `none` for jobs that were submitted alone
+        #[param(pattern = "^(none|[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12})$", example = "none")]
+        batch: Membership as String = member();
         /// Only jobs that changed at or after this time (RFC 3339), progress aside
         #[param(format = "date-time")]
         updated_after: i64 as String = time();
@@ -125,6 +125,14 @@ list_query! {
         #[param(minimum = 1, maximum = 1000)]
         limit: u32 as u32 = count(1, PAGE_MAX);
     }
+}
+
+/// The id of a batch, or `none`.
+fn member() -> Reader<Membership> {
+    reader("the id of a batch, or `none`", |text| match text {
+        "none" => Some(Membership::Alone),
+        id => Uuid::try_parse(id).ok().map(Membership::Batch),
+    })
 }
 
 /// Names of members with commas between.
@@ -159,7 +167,7 @@ pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, Api
     states.dedup();
     let filter = Filter {
         states,
-        batch: query.batch,
+        member: query.batch,
         labels: query.label.unwrap_or_default(),
         name: query.name,
         created_after: query.created_after,

@@ -5,6 +5,15 @@ use uuid::Uuid;
 use crate::jobs::model::job::State;
 use crate::jobs::model::kind::Kind;
 
+/// Where the jobs of a list belong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Membership {
+    /// To this batch.
+    Batch(Uuid),
+    /// To no batch: each was submitted alone.
+    Alone,
+}
+
 /// Which jobs to list; everything left out does not restrict.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
@@ -12,8 +21,8 @@ pub struct Filter {
     pub kind: Kind,
     /// Only jobs in one of these states; any if there is none.
     pub states: Vec<State>,
-    /// Only jobs of this batch.
-    pub batch: Option<Uuid>,
+    /// Only jobs of one batch, or of none.
+    pub member: Option<Membership>,
     /// Only jobs that carry each of these labels with its value.
     pub labels: Vec<(String, String)>,
     /// Only jobs whose name contains this text; ASCII letters match in either case.
@@ -90,7 +99,23 @@ impl Filter {
 
     /// Whether jobs themselves have to be read, because no index knows all that is asked for.
     pub(crate) fn reads_jobs(&self) -> bool {
-        self.labels.len() > 1 || self.name.is_some() || self.updated_after.is_some()
+        self.labels.len() > 1
+            || self.name.is_some()
+            || self.updated_after.is_some()
+            || (self.alone() && !self.labels.is_empty())
+    }
+
+    /// Whether only jobs of no batch are listed.
+    pub(crate) fn alone(&self) -> bool {
+        self.member == Some(Membership::Alone)
+    }
+
+    /// The batch whose jobs are listed.
+    pub(crate) fn batch(&self) -> Option<Uuid> {
+        match self.member {
+            Some(Membership::Batch(id)) => Some(id),
+            Some(Membership::Alone) | None => None,
+        }
     }
 
     /// Smallest id a job of the filter can have: UUIDv7 begins with 48 bits of milliseconds.
@@ -109,7 +134,10 @@ impl Filter {
             self.created_after.map(|time| time.to_string()),
             self.created_before.map(|time| time.to_string()),
             self.updated_after.map(|time| time.to_string()),
-            self.batch.map(|batch| batch.to_string()),
+            self.member.map(|member| match member {
+                Membership::Batch(id) => id.to_string(),
+                Membership::Alone => "none".to_owned(),
+            }),
             self.name.clone(),
             Some(self.states.len().to_string()),
         ];

@@ -7,7 +7,7 @@ use railhead::jobs::State;
 use railhead::jobs::model::kind::{Kind, Queue};
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason};
-use railhead::jobs::store::list::{BatchFilter, Filter};
+use railhead::jobs::store::list::{BatchFilter, Filter, Membership};
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
 use railhead::jobs::store::retention::{Moment, RetentionRule};
@@ -144,11 +144,14 @@ async fn read_lists(store: &Arc<dyn Store>, id: Uuid) {
         vec![State::Failed],
     ] {
         for after in [None, Some(id)] {
-            let filter = Filter {
-                states: states.clone(),
-                ..Filter::default()
-            };
-            store.list(TENANT, &filter, after, 50).await.unwrap();
+            for member in [None, Some(Membership::Alone)] {
+                let filter = Filter {
+                    states: states.clone(),
+                    member,
+                    ..Filter::default()
+                };
+                store.list(TENANT, &filter, after, 50).await.unwrap();
+            }
         }
     }
     let labelled = Filter {

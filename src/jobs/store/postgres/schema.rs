@@ -59,6 +59,12 @@ const STEPS: &[Step] = &[
         // Earlier programs cannot read the kind of an evolution.
         readable_from: 7,
     },
+    Step {
+        form: 8,
+        statements: include_str!("steps/8.sql"),
+        // An index.
+        readable_from: 7,
+    },
 ];
 
 /// The form that is read and written.

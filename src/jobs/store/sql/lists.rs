@@ -97,7 +97,7 @@ impl JobLists for SqlStore {
 
 impl SqlStore {
     async fn count(&self, tenant: &str, filter: &Filter) -> Result<Total, StoreError> {
-        let restricted = filter.batch.is_some()
+        let restricted = filter.member.is_some()
             || !filter.labels.is_empty()
             || filter.created_after.or(filter.created_before).is_some();
         let (mut total, mut all) = (0, true);
@@ -126,6 +126,8 @@ const CHANGES: &str = "SELECT id, batch_id, kind, updated_at FROM jobs WHERE ten
 fn walked(filter: &Filter) -> Vec<Option<State>> {
     let all = State::ALL.iter().all(|state| filter.states.contains(state));
     match filter.states.is_empty() || all {
+        // The index of jobs that were submitted alone is sorted by state first.
+        true if filter.alone() => State::ALL.map(Some).to_vec(),
         true => vec![None],
         false => filter.states.iter().copied().map(Some).collect(),
     }
@@ -150,6 +152,9 @@ pub(crate) fn page_query(
     walk(&mut query, job_columns!(), tenant, filter, state, after);
     query.push(" LIMIT ").push_bind(EXAMINED_MAX);
     query.push(") AS examined WHERE TRUE");
+    if filter.alone() {
+        query.push(" AND batch_id IS NULL");
+    }
     if let Some(time) = filter.updated_after {
         query.push(" AND updated_at >= ").push_bind(time);
     }
@@ -231,7 +236,7 @@ fn walk(
         joint = " AND ";
     };
     // Within a batch one of its indices is walked, not that of the tenant: a bare expression keeps that out.
-    let owner = match (label, filter.batch) {
+    let owner = match (label, filter.batch()) {
         (Some(_), _) => "of_tenant = ",
         (None, Some(_)) => concat!(bare!("tenant"), " = "),
         (None, None) => "tenant = ",
@@ -242,7 +247,7 @@ fn walk(
         and(query, "key = ", key.clone());
         and(query, "value = ", value.clone());
     }
-    if let Some(batch) = filter.batch {
+    if let Some(batch) = filter.batch() {
         // Nothing of a batch of another tenant is walked.
         let column = match label {
             Some(_) => concat!(bare!("batch_id"), " = (SELECT id FROM batches WHERE id = "),
@@ -255,15 +260,18 @@ fn walk(
             .push(")");
     }
     if let Some(state) = state {
-        let column = match (label, filter.batch) {
-            (Some(_), _) => "label_state = ",
-            (None, _) => "state = ",
+        let column = match label {
+            Some(_) => "label_state = ",
+            None => "state = ",
         };
         and(query, column, state.name().to_owned());
     }
     // Of several bounds only the closest is passed on, so that the index is entered at one place.
     let before = [after, filter.id_before()].into_iter().flatten().min();
-    if let (Some(_), Some(batch)) = (label, filter.batch) {
+    if label.is_none() && filter.alone() {
+        query.push(" AND batch_id IS NULL");
+    }
+    if let (Some(_), Some(batch)) = (label, filter.batch()) {
         within_batch(query, batch, filter.id_from(), before);
     } else {
         if let Some(first) = filter.id_from() {

@@ -4,7 +4,7 @@ use uuid::Uuid;
 
 use crate::jobs::model::job::State;
 use crate::jobs::model::kind::Kind;
-use crate::jobs::store::list::{BatchFilter, Filter};
+use crate::jobs::store::list::{BatchFilter, Filter, Membership};
 use crate::jobs::store::sqlite::connection::{Row, query};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::engine::{CLAIM_BEGUN, CLAIM_NEW};
@@ -190,7 +190,7 @@ async fn the_list_of_a_batch_walks_its_index_and_nothing_of_the_batch_of_another
         .unwrap();
     for (state, after) in [(None, None), (Some(State::Queued), Some(Uuid::now_v7()))] {
         let filter = Filter {
-            batch: Some(Uuid::now_v7()),
+            member: Some(Membership::Batch(Uuid::now_v7())),
             ..Filter::default()
         };
         let query = lists::page_query("t", &filter, state, after, 50);
@@ -217,7 +217,7 @@ async fn a_label_within_a_batch_is_walked_no_further_than_the_batch_goes() {
         .unwrap();
     for (state, after) in [(None, Some(Uuid::now_v7())), (Some(State::Failed), None)] {
         let filter = Filter {
-            batch: Some(Uuid::now_v7()),
+            member: Some(Membership::Batch(Uuid::now_v7())),
             labels: vec![("line".to_owned(), "A12".to_owned())],
             ..Filter::default()
         };
@@ -269,6 +269,30 @@ async fn every_form_of_the_list_walks_an_index_without_sorting() {
                     assert!(steps[0].contains(seek), "{steps:?}");
                 }
             }
+        }
+    }
+}
+
+#[tokio::test]
+async fn the_list_of_jobs_submitted_alone_walks_its_index() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = SqliteStore::open(&folder.path().join("jobs.db"))
+        .await
+        .unwrap();
+    for after in [None, Some(Uuid::now_v7())] {
+        for updated_after in [None, Some(5)] {
+            let filter = Filter {
+                member: Some(Membership::Alone),
+                updated_after,
+                ..Filter::default()
+            };
+            let query = lists::page_query("t", &filter, Some(State::Failed), after, 50);
+            let steps = plan(&store, query.sql()).await;
+            let seeks =
+                |step: &String| step.contains("jobs_alone (tenant=? AND kind=? AND state=?");
+            assert!(steps.iter().any(seeks), "{steps:?}");
+            let sorts = |step: &String| step.contains("TEMP B-TREE");
+            assert!(!steps.iter().any(sorts), "{steps:?}");
         }
     }
 }

@@ -23,6 +23,7 @@ const STEPS: &[(i64, &str)] = &[
     (8, include_str!("steps/8.sql")),
     (9, include_str!("steps/9.sql")),
     (10, include_str!("steps/10.sql")),
+    (11, include_str!("steps/11.sql")),
 ];
 
 /// The form that is read and written.
