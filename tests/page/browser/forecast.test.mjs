@@ -42,9 +42,19 @@ test('a planner forecasts the wear of own sections, and compares it with grindin
   await until(async () => (await shown()) === 0);
   await page.getByRole('button', { name: 'Play as a film' }).click();
   await until(async () => (await shown()) > 0.9 * last.rail.worn_area_mm2);
+  const curve = page.locator('[aria-labelledby="h-over"] svg.chart');
   await page.getByRole('radio', { name: 'Pressure' }).check();
-  await page.locator('creep-curve canvas').waitFor();
+  await until(async () => (await curve.getAttribute('aria-label')) === 'Pressure over the traffic');
   await page.getByRole('radio', { name: 'Losses' }).check();
+  assert.ok((await curve.locator('.band').count()) >= 1, 'losses have the band of the coefficients');
+  assert.equal(await curve.locator('.line.limit').count(), 2, 'the limit and its legend');
+  // A click at the left end of the curve goes to the start, and a film of contacts has a needle for each.
+  const { width = 0, height = 0 } = (await curve.boundingBox()) ?? {};
+  await curve.click({ position: { x: 0.14 * width, y: 0.4 * height } });
+  await until(async () => (await shown()) === 0);
+  assert.equal(await page.locator('svg.worn .touch path').count(), answer.records[0].states.flatMap((/** @type {{ patches: unknown[] }} */ { patches }) => patches).length);
+  await page.locator('.film input').press('End');
+  await until(async () => (await shown()) > 0.9 * last.rail.worn_area_mm2);
   await page.screenshot({ path: join(OUTPUT, 'forecast.png'), fullPage: true });
 
   // Files: a table, a picture, and a section that the page reads again.
@@ -54,20 +64,25 @@ test('a planner forecasts the wear of own sections, and compares it with grindin
   };
   assert.match((await saved('CSV')).toString(), /^record,/);
   assert.equal((await saved('Parquet')).subarray(0, 4).toString(), 'PAR1');
-  assert.match((await saved('SVG')).toString(), /^<svg[^]*stroke="rgb/);
+  for (const name of ['Save as SVG: leave it rail 4.00 MGT', 'Save as SVG: leave it depth rail', 'Save as SVG: leave it Losses over the traffic']) assert.match((await saved(name)).toString(), /^<svg[^]*stroke="rgb/);
   const ground = (await saved('MiniProf')).toString();
   assert.match((await saved('Simpack')).toString(), /point\.begin/);
 
-  await page.getByRole('button', { name: 'Change and repeat' }).click();
-  await page.getByLabel('Name').waitFor();
-  await fill(page, 'grind at 2 MGT');
+  // A second plan that grinds to a section of the planner's own; both stand side by side as soon as it is computed.
+  await page.getByRole('button', { name: 'Compare with another plan' }).click();
+  await page.getByText('compared with leave it').waitFor();
+  await page.getByText('own.ban, own.whl').waitFor();
   await page.getByRole('button', { name: 'Add grinding, lubrication or turning' }).click();
-  await page.getByRole('button', { name: 'Compute' }).click();
-  await page.locator('svg.worn').waitFor(WAIT);
-  await page.goto(`${service.base}/#/forecast`);
-  for (const name of ['leave it', 'grind at 2 MGT']) await page.getByLabel(`Choose ${name}`).check();
-  await page.getByRole('link', { name: 'Compare 2' }).click();
-  await page.getByRole('heading', { name: 'Two forecasts' }).waitFor();
+  await page.getByLabel('Section of maintenance 1').setInputFiles({ name: 'target.ban', mimeType: 'text/plain', buffer: Buffer.from(file('words-behind.ban')) });
+  await page.getByText('target.ban').waitFor();
+  await page.getByLabel('Depth beyond that, in mm').fill('0.02');
+  await page.getByRole('button', { name: 'Compute and compare' }).click();
+  await page.getByRole('heading', { name: 'Two forecasts' }).waitFor(WAIT);
+  const { evolutions: [second] } = await service.ask('/v1/evolutions?limit=10');
+  assert.equal(second.name, 'grind at 2 MGT');
+  const { events: [event] } = await service.ask(`/v1/evolutions/${second.id}/request`);
+  assert.deepEqual([event.at, event.depth_mm, event.grind.text, event.grind.format], [2, 0.02, file('words-behind.ban'), 'miniprof']);
+  assert.match(await page.locator('.decision').innerText(), /(goes on longer|Neither reaches a limit|at the same time)[^]*grinds 0 \(A\) and [\d.]+ \(B\) mm² off the rail/);
   const off = page.locator('[aria-labelledby="h-step"] tr').filter({ hasText: 'ground or turned off the rail' }).locator('td');
   await until(async () => (await off.count()) === 2);
   assert.ok(parsed(await off.nth(0).innerText()) !== parsed(await off.nth(1).innerText()));
@@ -85,5 +100,13 @@ test('a faulty traffic is refused with its place, and a table from a file is tak
   await page.getByRole('button', { name: 'Compute' }).click();
   await page.locator('.faults code').filter({ hasText: /traffic.*friction/ }).first().waitFor();
   await page.locator('#traffic').setInputFiles({ name: 'year.csv', mimeType: 'text/csv', buffer: Buffer.from('axle load [t];shift [mm];passes\n20;0;3\n22,5;-1;1\n') });
-  await page.getByText('year.csv: 2 rows of wheel load Q, shift to the left and passes').waitFor();
+  await page.getByText('year.csv: 2 rows').waitFor();
+  // Dropped with the sections, each file goes to its place; what is read of the table is in sight.
+  await dropFiles(page, 'main', { 'own.whl': file('worn-wheel.whl'), 'line.csv': 'train;axle load [t];speed [km/h];radius [m];passes\nore;30;60;-400;3\ncoach;12;140;;9\n', 'own.ban': file('words-behind.ban') });
+  await page.getByText('own.ban, own.whl').waitFor();
+  await page.getByText('line.csv: 2 rows').waitFor();
+  const read = await page.getByRole('region', { name: 'Columns of the table' }).innerText();
+  assert.match(read, /wheel load Q\s+58\.8 … 147 kN/);
+  assert.match(read, /curve radius\s+−400 … 0 m/);
+  await page.getByText('Not used: train.').waitFor();
 }));

@@ -14,3 +14,8 @@ function applyTheme() {
 
 applyTheme();
 dark.addEventListener('change', applyTheme);
+// Paper is light.
+addEventListener('beforeprint', () => {
+  document.documentElement.dataset.theme = 'light';
+});
+addEventListener('afterprint', applyTheme);

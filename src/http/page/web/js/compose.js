@@ -80,7 +80,7 @@ function examplePicker(app) {
 let placedBefore = null;
 
 /** What the case is about: what the service understood of it, or the numbers that it brings. @param {Compose} state @param {JsonObject} document */
-function drawing({ understood, lone }, document) {
+export function drawing({ understood, lone }, document) {
   const type = at(document, '/contact/type');
   if (lone && hasSections(type)) return drawSection(lone.body, lone.line);
   const known = understood && understood.type === type ? understood.of : null;
@@ -107,7 +107,7 @@ function drawing({ understood, lone }, document) {
 const BODIES = /** @type {const} */ (['rail', 'wheel']);
 
 /** @param {App} app @param {Compose} state */
-function verdict(app, state) {
+export function verdict(app, state) {
   const { unreadable, faults, refusal, checked, document } = state;
   if (unreadable) return html`<p class="fault big">${unreadable}</p>`;
   if (refusal) return html`<p class="fault big">${refusal}</p>`;

@@ -138,7 +138,7 @@ function sectionZones(app) {
 }
 
 /** The smoothing that the noise of the files asks for, on one click. @param {App} app @param {readonly Body[]} there */
-function adviceOf(app, there) {
+export function adviceOf(app, there) {
   const { document, checked } = app.store.get().compose;
   const advised = there.flatMap((body) => {
     const length = checked?.quality?.[body]?.smoothing_suggested_mm ?? 0;

@@ -1,12 +1,14 @@
 // Profiles that wear under a traffic: the form, what was computed, and the step that is looked at.
 
 import { evolution as evolutionOf, evolutionRequest, evolutionResult, evolutions as evolutionsOf, submitEvolution } from './api.js';
-import { at, isObject } from './document.js';
+import { takeProfiles } from './contactform.js';
+import { at, isObject, numberAt } from './document.js';
 import { editDocument } from './editing.js';
+import { decoded, profileKind } from './files.js';
 import { LOSSES, wears } from './forecastdata.js';
 import { formatRoute } from './routes.js';
 import { inOrder, standardSection, withEverything } from './starts.js';
-import { COLUMNS, ROWS_MAX, trafficOf } from './traffic.js';
+import { isTraffic, parseTraffic, rowsOf, tableOf, trafficOf } from './traffic.js';
 import { parse } from './written.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -17,20 +19,29 @@ import { parse } from './written.js';
 /** @typedef {import('./document.js').JsonObject} JsonObject */
 /** @typedef {import('./document.js').JsonValue} JsonValue */
 /** @typedef {import('./files.js').Body} Body */
-/** @typedef {import('./traffic.js').ColumnKey} ColumnKey */
+/** @typedef {import('./traffic.js').Row} Row */
 
-export const EVENTS = /** @type {const} */ ([['grind', 'grind the rail to a new 60E1'], ['friction', 'friction changes to μ ='], ['reprofile', 'turn the wheel to a new S1002']]);
+export const EVENTS = /** @type {const} */ ([['grind', 'grind the rail'], ['friction', 'friction changes, as by a lubricator'], ['reprofile', 'turn the wheel']]);
+/** The sections that are ground and turned to, where no file says another one. */
+export const TARGETS = { grind: 'a new 60E1', reprofile: 'a new S1002' };
 
-/** @typedef {{ kind: 'grind' | 'friction' | 'reprofile', at: string, value: string }} Maintenance */
+/**
+ * @typedef {object} Maintenance
+ * @property {'grind' | 'friction' | 'reprofile'} kind
+ * @property {string} at
+ * @property {string} value The depth beyond the target, or the coefficient of friction.
+ * @property {{ name: string, section: JsonObject } | null} target The section that a file has.
+ */
 
 /**
  * @typedef {object} Form
  * Everything as it is written.
  * @property {string} name
- * @property {Record<ColumnKey, string>[]} rows
+ * @property {Row[]} rows
  * @property {import('./traffic.js').Table & { name: string } | null} table A table from a file, in place of the rows.
  * @property {'rail' | 'wheel' | 'both'} wearing
  * @property {'usfd_wear' | 'archard_wear'} law
+ * @property {string} states The most representative states; those of the service if empty.
  * @property {string} mgt
  * @property {string} km
  * @property {string} records
@@ -38,15 +49,15 @@ export const EVENTS = /** @type {const} */ ([['grind', 'grind the rail to a new 
  * @property {Maintenance[]} events
  */
 
-/** A mixed traffic to begin with: straight track, curves to both sides, and a share with much shift. @returns {Form} */
+/** A mixed traffic to begin with: straight track, curves, and a share with much shift. @returns {Form} */
 const firstForm = () => ({
   name: '',
   rows: [
-    { passes: '60', load: '75', shift: '0', yaw: '0', friction: '0,35' },
-    { passes: '25', load: '90', shift: '-2', yaw: '1', friction: '0,35' },
-    { passes: '15', load: '85', shift: '-5', yaw: '3', friction: '0,35' },
+    { passes: '60', load: '75', speed: '', radius: '', shift: '0', yaw: '0', friction: '0.35' },
+    { passes: '25', load: '90', speed: '', radius: '', shift: '-2', yaw: '1', friction: '0.35' },
+    { passes: '15', load: '85', speed: '', radius: '', shift: '-5', yaw: '3', friction: '0.35' },
   ],
-  table: null, wearing: 'both', law: 'usfd_wear', mgt: '20', km: '50000', records: '10', limits: {}, events: [],
+  table: null, wearing: 'both', law: 'usfd_wear', states: '', mgt: '20', km: '50000', records: '10', limits: {}, events: [],
 });
 
 /**
@@ -62,6 +73,7 @@ const firstForm = () => ({
  * @property {boolean} sending
  * @property {string} refusal
  * @property {readonly { pointer?: string, detail: string }[]} faults
+ * @property {Job | null} against The one that the next is compared with.
  * @property {readonly Job[] | null} listed
  * @property {Set<string>} ticked
  * @property {string[]} ids Those that are looked at; none for the list.
@@ -75,7 +87,7 @@ const firstForm = () => ({
 
 /** @type {Forecast} */
 const forecast = {
-  form: firstForm(), sending: false, refusal: '', faults: [], listed: null, ticked: new Set(), ids: [], sides: [], step: 0, body: 'rail', factor: 1, curve: 'losses', playing: 0,
+  form: firstForm(), sending: false, refusal: '', faults: [], against: null, listed: null, ticked: new Set(), ids: [], sides: [], step: 0, body: 'rail', factor: 1, curve: 'losses', playing: 0,
 };
 
 /** By how much wear is drawn larger, and the depth that it has then at most, in mm. */
@@ -185,6 +197,9 @@ export function templateOf(app) {
   return isObject(damage) && damage.parameters ? { ...template, damage: { parameters: damage.parameters } } : template;
 }
 
+/** The speed of a case in mm/s. @param {JsonObject} template */
+const speedOf = (template) => numberAt(template, '/motion/wheelset/speed_mm_per_s');
+
 /** What is submitted. @param {App} app @param {JsonObject} template @returns {JsonObject} */
 export function requestOf(app, template) {
   const { form } = forecast;
@@ -195,59 +210,101 @@ export function requestOf(app, template) {
     return limit === undefined || (form.wearing !== 'both' && form.wearing !== body) ? [] : [[key, limit]];
   }));
   /** @type {(event: Maintenance) => JsonObject} */
-  const eventOf = ({ kind, at: when, value }) => {
+  const eventOf = ({ kind, at: when, value, target }) => {
     if (kind === 'friction') return { at: number(when), friction_coefficient: number(value) };
-    const section = standardSection(examples, kind === 'grind' ? 'rail' : 'wheel') ?? null;
+    const section = target?.section ?? standardSection(examples, kind === 'grind' ? 'rail' : 'wheel') ?? null;
     return { at: number(when), [kind]: section, ...(parse(value) === undefined ? {} : { depth_mm: number(value) }) };
   };
   const events = form.events.map(eventOf);
   return {
-    template, traffic: trafficOf(form), wearing: form.wearing, wear_model: form.law, records: number(form.records),
+    template, traffic: trafficOf(form, speedOf(template)), wearing: form.wearing, wear_model: form.law, records: number(form.records),
     extent: { ...(form.wearing === 'wheel' ? {} : { mgt: number(form.mgt) }), ...(form.wearing === 'rail' ? {} : { wheel_distance_km: number(form.km) }) },
-    ...(Object.keys(limits).length ? { limits } : {}), ...(events.length ? { events } : {}),
+    ...(Object.keys(limits).length ? { limits } : {}), ...(events.length ? { events } : {}), ...(form.states ? { accuracy: { states_max: number(form.states) } } : {}),
   };
 }
 
-/** Submits what the form says, and shows it. @param {App} app */
+/** What a forecast is called that was given no name: its maintenance. @param {Form} form */
+export function nameOf({ events, wearing }) {
+  const unit = wearing === 'wheel' ? 'km' : 'MGT';
+  const what = { grind: 'grind', reprofile: 'turn', friction: 'μ' };
+  return events.map(({ kind, at: when, value }) => `${what[kind]}${kind === 'friction' ? ` ${value}` : ''} at ${when} ${unit}`).join(', ') || 'no maintenance';
+}
+
+/** Submits what the form says, and shows it: beside another one, if it is compared with that. @param {App} app */
 export async function startForecast(app) {
   const template = templateOf(app);
   if (typeof template === 'string') return app.say(template);
   chooseForecast(app, { sending: true, refusal: '', faults: [] });
   try {
-    const name = forecast.form.name || `wear of ${app.store.get().compose.document?.name ?? 'a pair'}`;
-    const { id } = await submitEvolution(requestOf(app, template), name);
-    app.go(formatRoute('forecast', [id]));
+    const { form, against } = forecast;
+    const { id } = await submitEvolution(requestOf(app, template), form.name || nameOf(form));
+    const { document, files } = app.store.get().compose;
+    if (document) sent.set(id, { form, document, files });
+    forecast.against = null;
+    app.go(formatRoute('forecast', [...(against ? [against.id] : []), id]));
   } catch (error) {
-    const faults = error instanceof Error && 'faults' in error ? /** @type {Forecast['faults']} */ (error.faults) : [];
     forecast.refusal = error instanceof Error ? error.message : String(error);
-    forecast.faults = faults;
+    forecast.faults = error instanceof Error && 'faults' in error ? /** @type {Forecast['faults']} */ (error.faults) : [];
   } finally {
     chooseForecast(app, { sending: false });
   }
 }
 
-/** The form as an evolution was asked for, to change something of it. @param {App} app @param {Job} job */
+/** What this tab has sent. @type {Map<string, { form: Form, document: JsonObject, files: import('./state.js').Compose['files'] }>} */
+const sent = new Map();
+
+/** The form as an evolution was asked for, to change something of it and to compare both. @param {App} app @param {Job} job */
 export async function repeatForecast(app, job) {
   const asked = await evolutionRequest(job.id);
-  const text = (/** @type {unknown} */ value, factor = 1) => (typeof value === 'number' ? String(Number((value / factor).toPrecision(12))) : '');
-  const columns = /** @type {Record<string, number[]>} */ (at(asked, '/traffic/columns') ?? {});
-  const passes = /** @type {number[] | undefined} */ (at(asked, '/traffic/passes'));
-  const rows = Math.max(...Object.values(columns).map((column) => column.length));
-  const known = Object.keys(columns).every((pointer) => COLUMNS.some((column) => column.pointer === pointer));
-  const few = known && rows <= ROWS_MAX;
-  const made = Array.from({ length: few ? rows : 0 }, (_, row) => /** @type {Record<ColumnKey, string>} */ (Object.fromEntries(COLUMNS.map(({ key, pointer, factor }) =>
-    [key, text(pointer ? columns[pointer]?.[row] : passes?.[row], factor)]))));
-  const events = /** @type {JsonObject[]} */ (asked.events ?? []).map((event) => /** @type {Maintenance} */ ({
-    kind: 'grind' in event ? 'grind' : 'reprofile' in event ? 'reprofile' : 'friction', at: text(event.at), value: text('friction_coefficient' in event ? event.friction_coefficient : event.depth_mm),
-  }));
-  writeForm(app, {
-    ...firstForm(), ...(few ? { rows: made } : { table: { name: 'the traffic of before', rows, columns, passes: passes ?? null } }),
-    name: `${job.name ?? ''}, changed`, wearing: /** @type {Form['wearing']} */ (asked.wearing ?? 'both'), law: /** @type {Form['law']} */ (asked.wear_model ?? 'usfd_wear'),
-    mgt: text(at(asked, '/extent/mgt')) || '20', km: text(at(asked, '/extent/wheel_distance_km')) || '50000', records: text(asked.records) || '10',
-    limits: Object.fromEntries(LOSSES.map(({ key }) => [key, text(at(asked, `/limits/${key}`))])), events,
-  });
-  const template = asked.template;
-  if (isObject(template)) editDocument(app, inOrder(withEverything(template)));
-  app.compose({ example: '', files: {} });
+  const template = isObject(asked.template) ? asked.template : {};
+  const text = (/** @type {unknown} */ value) => (typeof value === 'number' ? String(value) : '');
+  const table = tableOf(/** @type {Record<string, number[]>} */ (at(asked, '/traffic/columns') ?? {}), /** @type {number[] | undefined} */ (at(asked, '/traffic/passes')), speedOf(template));
+  const rows = rowsOf(table);
+  const { examples } = app.store.get().compose;
+  /** @type {(event: JsonObject) => Maintenance} */
+  const eventOf = (event) => {
+    const kind = 'grind' in event ? 'grind' : 'reprofile' in event ? 'reprofile' : 'friction';
+    const section = kind === 'friction' ? undefined : event[kind];
+    const own = isObject(section) && JSON.stringify(section) !== JSON.stringify(standardSection(examples, kind === 'grind' ? 'rail' : 'wheel'));
+    return { kind, at: text(event.at), value: text(kind === 'friction' ? event.friction_coefficient : event.depth_mm), target: own ? { name: 'the section of before', section } : null };
+  };
+  const first = firstForm();
+  /** @type {Form} */
+  const form = {
+    ...first, ...(rows ? { rows } : { table: { name: 'the traffic of before', ...table } }),
+    wearing: /** @type {Form['wearing']} */ (asked.wearing ?? 'both'), law: /** @type {Form['law']} */ (asked.wear_model ?? 'usfd_wear'),
+    states: text(at(asked, '/accuracy/states_max')), mgt: text(at(asked, '/extent/mgt')) || first.mgt, km: text(at(asked, '/extent/wheel_distance_km')) || first.km, records: text(asked.records) || first.records,
+    limits: Object.fromEntries(LOSSES.map(({ key }) => [key, text(at(asked, `/limits/${key}`))])), events: /** @type {JsonObject[]} */ (asked.events ?? []).map(eventOf),
+  };
+  // What this tab has sent has the names of its files.
+  const known = sent.get(job.id);
+  chooseForecast(app, { form: known ? { ...known.form, name: '' } : form, against: job.state === 'succeeded' ? job : null, refusal: '', faults: [] });
+  app.compose({ example: '', files: known?.files ?? {} });
+  editDocument(app, known?.document ?? inOrder(withEverything(template)));
   app.go(formatRoute('forecast'));
+}
+
+/** Takes files that were dropped or chosen: a table of the traffic, cross-sections. @param {App} app @param {readonly File[]} files */
+export async function takeForecastFiles(app, files) {
+  const read = await Promise.all(files.map(async (file) => ({ file, text: decoded(await file.arrayBuffer()) })));
+  const tables = read.filter(({ file, text }) => profileKind({ name: file.name, text }).format === 'columns' && isTraffic(text));
+  if (forecast.ids.length) app.go(formatRoute('forecast'));
+  if (tables.length) takeTable(app, tables[0].file.name, tables[0].text);
+  const sections = read.filter((each) => !tables.includes(each)).map(({ file }) => file);
+  if (sections.length) await takeProfiles(app, sections);
+}
+
+/** Takes the text of a table of the traffic. @param {App} app @param {string} name @param {string} text */
+export function takeTable(app, name, text) {
+  const parsed = parseTraffic(text);
+  if (typeof parsed === 'string') app.say(`${name}: ${parsed}.`);
+  else writeForm(app, { table: { name, ...parsed } });
+}
+
+/** Takes the file of a section that is ground or turned to. @param {App} app @param {number} place That of the event. @param {File} file */
+export async function takeTarget(app, place, file) {
+  const text = decoded(await file.arrayBuffer());
+  const { format } = profileKind({ name: file.name, text });
+  const { events } = forecast.form;
+  writeForm(app, { events: events.map((event, other) => (other === place ? { ...event, target: { name: file.name, section: { format, text, smoothing_mm: 'auto' } } } : event)) });
 }

@@ -3,8 +3,7 @@
 /** @typedef {import('./forecast.js').Answer} Answer */
 /** @typedef {import('./forecast.js').WornRecord} WornRecord */
 /** @typedef {import('./forecast.js').Body} Body */
-/** @typedef {import('./curvedata.js').Curve} Curve */
-/** @typedef {import('./curvedata.js').Line} Line */
+/** @typedef {import('./drawing/axes.js').ChartLine} ChartLine */
 /** @typedef {import('./drawing/axes.js').Point} Point y to the field side and z up, in mm. */
 
 /** Losses with a limit, the body that they belong to. */
@@ -19,7 +18,6 @@ export const LOSSES = /** @type {const} */ ([
 export const CURVES = /** @type {const} */ ([
   ['losses', 'Losses'], ['area', 'Worn area'], ['pressure', 'Pressure'], ['yq', 'Y/Q'], ['conicity', 'Conicity'], ['damage', 'RCF damage'],
 ]);
-const COLOURS = ['--c1', '--c2', '--c3'];
 
 /** How far an evolution has come, in the unit that its events have. @param {WornRecord['progress']} progress */
 export const distanceOf = ({ mgt, axle_passes, wheel_distance_km, share }) => mgt ?? axle_passes ?? wheel_distance_km ?? 100 * share;
@@ -66,7 +64,7 @@ export function sectionOf(answer, record, body, factor) {
     return /** @type {Point} */ ([y + more * normals[at][0], z + more * normals[at][1]]);
   });
   const [low, high] = worn.uncertainty.coefficients;
-  return { start, now, low: edge(low), high: edge(high) };
+  return { start, now, normals, low: edge(low), high: edge(high) };
 }
 
 /** The numerical part of the uncertainty, relative: of the steps, the states and the contact. @param {WornRecord} record @param {Body} body */
@@ -75,40 +73,58 @@ export const numericalOf = (record, body) => {
   return Math.hypot(steps, states, contact);
 };
 
-/** @typedef {Omit<Line, 'colour'> & { look: number, limit?: boolean }} ForecastLine `look` is the place of its colour. */
+const BODIES = /** @type {const} */ (['rail', 'wheel']);
+const LOOKS = ['one', 'two', 'three', 'four'];
+/** Less than this is rounding of no loss, in mm. */
+const NO_LOSS_MM = 1e-4;
 
-/** Lines of one evolution over its records. @param {Answer} answer @param {string} kind @returns {(ForecastLine & { body?: Body })[]} */
-function linesOf(answer, kind) {
+/** Lines of one evolution over its records, those of one body. @param {Answer} answer @param {string} kind @param {Body} body @returns {(ChartLine & { limited?: boolean })[]} */
+function linesOf(answer, kind, body) {
   const { records, limits } = answer;
-  /** @type {(label: string, unit: string, look: number, of: (record: WornRecord) => number | null | undefined, error?: (record: WornRecord) => number) => ForecastLine} */
-  const line = (label, unit, look, of, error) => ({ label, unit, look, y: records.map((record) => of(record) ?? NaN), error: records.map((record) => error?.(record) || null) });
+  const places = records.map(({ progress }) => distanceOf(progress));
+  /** @type {(label: string, look: number, of: (record: WornRecord) => number | null | undefined) => ChartLine} */
+  const line = (label, look, of) => ({ label, look: LOOKS[look], points: records.map((record, at) => [places[at], of(record) ?? NaN]) });
+  const limit = (/** @type {string} */ label, /** @type {number} */ value) => ({ label, look: 'limit', points: /** @type {Point[]} */ ([[places[0], value], [places[places.length - 1], value]]) });
+  /** With error bars of the numerical part, and the band of the coefficients; what was ground or turned off has neither. @type {(of: (record: WornRecord) => number) => Pick<ChartLine, 'errors' | 'band'>} */
+  const uncertain = (of) => {
+    let machined = 0;
+    const parts = records.map((record, at) => {
+      const before = records[at - 1];
+      if (before && record.events_done > before.events_done) machined += of(record) - of(before);
+      return { record, machined, worn: of(record) - machined };
+    });
+    const edge = (/** @type {0 | 1} */ end) => parts.map((part, at) => /** @type {Point} */ ([places[at], part.machined + part.worn * part.record[body].uncertainty.coefficients[end]]));
+    return { errors: parts.map(({ record, worn }) => worn * numericalOf(record, body) || null), band: [edge(0), edge(1)] };
+  };
   switch (kind) {
     case 'losses':
-      return LOSSES.flatMap(({ key, label, body }, at) => {
-        const loss = line(label, 'mm', at % 3, ({ losses }) => losses[key], (record) => (record.losses[key] ?? 0) * numericalOf(record, body));
-        const limit = limits.find((known) => known.loss === key);
-        if (!limit && !loss.y.some((value) => value > 0)) return [];
-        return [{ ...loss, body }, ...(limit ? [{ ...line(`limit of ${label}`, 'mm', 0, () => limit.limit_mm), limit: true, body }] : [])];
-      });
-    case 'area':
-      return BODIES.flatMap((body) => {
-        const area = (/** @type {WornRecord} */ record) => record[body].worn_area_mm2;
-        const bound = (/** @type {0 | 1} */ end) => ({ ...line(`${body}, ${end ? 'highest' : 'lowest'} coefficients`, 'mm²', 2, (record) => area(record) * record[body].uncertainty.coefficients[end]), body });
-        const worn = line(body, 'mm²', 0, area, (record) => area(record) * numericalOf(record, body));
-        return wears(answer, body) ? [{ ...worn, body }, bound(0), bound(1)] : [];
-      });
+      return [{ ...line('largest depth', 0, (record) => deepest(record, body)), ...uncertain((record) => deepest(record, body)) }, ...LOSSES.filter((loss) => loss.body === body).flatMap(({ key, label }, at) => {
+        const of = (/** @type {WornRecord} */ record) => record.losses[key] ?? 0;
+        const known = limits.find(({ loss }) => loss === key);
+        if (!known && !records.some((record) => of(record) > NO_LOSS_MM)) return [];
+        return [{ ...line(label, at + 1, of), ...uncertain(of), limited: Boolean(known) }, ...(known ? [limit(`limit of ${label}`, known.limit_mm)] : [])];
+      })];
+    case 'area': {
+      const of = (/** @type {WornRecord} */ record) => record[body].worn_area_mm2;
+      return [{ ...line(`worn area of the ${body}`, 0, of), ...uncertain(of) }];
+    }
     case 'pressure':
-      return [line('largest', 'MPa', 0, ({ contact }) => contact.pressure_max_mpa), line('mean of the traffic', 'MPa', 1, ({ contact }) => contact.pressure_mean_mpa)];
+      return [line('largest', 0, ({ contact }) => contact.pressure_max_mpa), line('mean of the traffic', 1, ({ contact }) => contact.pressure_mean_mpa)];
     case 'yq':
-      return [line('largest Y/Q', '', 0, ({ contact }) => contact.y_over_q_max), line('mean of the traffic', '', 1, ({ contact }) => contact.y_over_q_mean)];
+      return [line('largest Y/Q', 0, ({ contact }) => contact.y_over_q_max), line('mean of the traffic', 1, ({ contact }) => contact.y_over_q_mean)];
     case 'conicity':
-      return [line('equivalent conicity at 3 mm', '', 0, ({ conicity }) => conicity)];
+      return [line('equivalent conicity at 3 mm', 0, ({ conicity }) => conicity)];
     default:
-      return [...BODIES.map((body) => ({ ...line(`${body}, largest`, '', 0, (record) => Math.max(0, ...record[body].damage)), body })), { ...line('visible crack', '', 0, () => 1), limit: true }];
+      return [line(`${body}, largest`, 0, (record) => worstDamage(record, body)), limit('visible crack', 1)];
   }
 }
 
-const BODIES = /** @type {const} */ (['rail', 'wheel']);
+/** The largest worn depth, in mm. @param {WornRecord} record @param {Body} body */
+export const deepest = (record, body) => Math.max(0, ...record[body].depth_mm);
+
+/** @param {WornRecord} record @param {Body} body */
+export const worstDamage = (record, body) => Math.max(0, ...record[body].damage);
+
 const Y_LABELS = { losses: 'loss / mm', area: 'worn area / mm²', pressure: 'largest pressure / MPa', yq: 'Y/Q', conicity: 'equivalent conicity', damage: 'RCF damage, net of wear' };
 
 /**
@@ -116,30 +132,71 @@ const Y_LABELS = { losses: 'loss / mm', area: 'worn area / mm²', pressure: 'lar
  * @param {readonly Answer[]} answers
  * @param {string} kind
  * @param {Body} body
- * @returns {Curve | null}
  */
-export function forecastCurve(answers, kind, body) {
-  const [first] = answers;
-  const places = answers.map(({ records }) => records.map(({ progress }) => distanceOf(progress)));
-  const x = [...new Set(places.flat())].sort((one, two) => one - two);
-  if (x.length < 2) return null;
+export function forecastChart(answers, kind, body) {
   const compared = answers.length > 1;
-  const lines = answers.flatMap((answer, side) => linesOf(answer, kind)
-    // Of two, bounds and what the first has as well would only be in the way.
-    .filter((line) => (!line.body || line.body === body) && !(compared && /coefficients/.test(line.label)) && !(side && line.limit))
-    .map(({ look, limit, label, unit, y, error }) => ({
-      label: compared && !limit ? `${'AB'[side]}: ${label}` : label, unit, colour: limit ? '--bad' : COLOURS[look], dash: limit ? [5, 3] : side ? [7, 4] : /coefficients/.test(label) ? [2, 3] : undefined,
-      y: x.map((place) => between(places[side], y, place)), error: x.map((place) => error[places[side].indexOf(place)] ?? null),
-    })));
-  if (!lines.some(({ y }) => y.some(Number.isFinite))) return null;
-  return { xLabel: `traffic / ${distanceUnit(first)}`, yLabel: Y_LABELS[/** @type {keyof typeof Y_LABELS} */ (kind)] ?? '', x, order: [...x.keys()], lines, bound: NaN };
+  const lines = answers.flatMap((answer, side) => linesOf(answer, kind, body)
+    // The limits of the first hold for both.
+    .filter(({ look }) => !(side && look === 'limit'))
+    // Of two, the bands of what has a limit tell most, and more would cover each other.
+    .map((line) => (compared && line.look !== 'limit' ? { ...line, band: line.limited ? line.band : undefined, label: `${'AB'[side]}: ${line.label}`, look: `${line.look} ${side ? 'dashed' : 'solid'}` } : line)));
+  const y = Y_LABELS[/** @type {keyof typeof Y_LABELS} */ (kind)] ?? '';
+  return { name: `${CURVES.find(([key]) => key === kind)?.[1]} over the traffic`, x: `traffic / ${distanceUnit(answers[0])}`, y, lines };
 }
 
-/** The value at a place between those of increasing places; the later one where two are the same. @param {readonly number[]} xs @param {readonly number[]} ys @param {number} x */
-function between(xs, ys, x) {
-  const at = xs.lastIndexOf(x);
-  if (at >= 0) return ys[at];
-  const after = xs.findIndex((place) => place > x);
-  if (after < 1) return NaN;
-  return ys[after - 1] + ((x - xs[after - 1]) / (xs[after] - xs[after - 1])) * (ys[after] - ys[after - 1]);
+/**
+ * @typedef {object} Life When a limit is reached; null for not within the extent.
+ * @property {number | null} mean
+ * @property {number | null} earliest
+ * @property {number | null} latest
+ */
+/** @typedef {{ key: string, label: string, limit: string, lives: Life[] }} Reached */
+
+/** When limits are reached, and a visible crack. @param {readonly Answer[]} answers @returns {Reached[]} */
+export function reachedOf(answers) {
+  const losses = LOSSES.flatMap(({ key, label }) => {
+    const [limit] = answers.flatMap(({ limits }) => limits.filter(({ loss }) => loss === key));
+    if (!limit) return [];
+    const lives = answers.map(({ limits }) => {
+      const own = limits.find(({ loss }) => loss === key);
+      const [mean, earliest, latest] = [own?.reached, own?.earliest, own?.latest].map((progress) => (progress ? distanceOf(progress) : null));
+      return { mean, earliest, latest };
+    });
+    return [{ key, label, limit: `${limit.limit_mm} mm`, lives }];
+  });
+  const cracks = BODIES.map((body) => ({ key: body, label: `RCF of the ${body}`, limit: 'visible crack', lives: answers.map((answer) => crackOf(answer, body)) }));
+  return [...losses, ...cracks.filter(({ lives }) => lives.some(({ mean }) => mean !== null))];
+}
+
+/** When the damage of a body reaches a visible crack. @param {Answer} answer @param {Body} body @returns {Life} */
+function crackOf({ records }, body) {
+  const worst = records.map((record) => worstDamage(record, body));
+  const after = worst.findIndex((damage) => damage >= 1);
+  if (after < 0) return { mean: null, earliest: null, latest: null };
+  const [from, to] = [records[Math.max(0, after - 1)], records[after]].map(({ progress }) => distanceOf(progress));
+  const mean = after ? from + ((to - from) * (1 - worst[after - 1])) / (worst[after] - worst[after - 1]) : from;
+  return { mean, earliest: mean, latest: mean };
+}
+
+/** The first limit of each evolution. @param {readonly Reached[]} reached @param {number} side @param {keyof Life} when */
+function firstOf(reached, side, when) {
+  const ended = reached.flatMap((each) => {
+    const place = each.lives[side][when];
+    return place === null ? [] : [{ place, label: each.label }];
+  });
+  return ended.reduce((best, each) => (each.place < best.place ? each : best), { place: Infinity, label: '' });
+}
+
+/**
+ * Which of two plans goes on longer until its first limit, and whether the lowest and the highest wear coefficients, which hold for both, say the same.
+ * @param {readonly Reached[]} reached
+ * @returns {{ better: 0 | 1 | null, sure: boolean, ends: { place: number, label: string }[] }} `better` is null where neither reaches a limit, or both at once.
+ */
+export function decisionOf(reached) {
+  const ahead = (/** @type {keyof Life} */ when) => {
+    const [one, two] = [firstOf(reached, 0, when).place, firstOf(reached, 1, when).place];
+    return one === two ? 0 : Math.sign(two - one);
+  };
+  const sign = ahead('mean');
+  return { better: sign > 0 ? 1 : sign < 0 ? 0 : null, sure: [ahead('earliest'), ahead('latest')].every((other) => other === 0 || other === sign), ends: [firstOf(reached, 0, 'mean'), firstOf(reached, 1, 'mean')] };
 }

@@ -1,19 +1,21 @@
 // Forecast: what a traffic does to a rail and a wheel, step by step: the form, the sections with their band, curves, limits, two plans side by side.
 
 import { html, nothing } from '../vendor/lit-html.js';
-import { cancel, download, save } from './api.js';
+import { cancel, download } from './api.js';
+import { drawing, verdict } from './compose.js';
+import { adviceOf } from './contactform.js';
 import { removeLater, isThere } from './deleting.js';
 import { drawChart } from './drawing/axes.js';
 import { drawWorn } from './drawing/worn.js';
+import { numberAt } from './document.js';
 import { fileName } from './downloads.js';
-import { decoded } from './files.js';
-import { chooseForecast, EVENTS, FACTORS, forecastSeen, openForecast, playFilm, recordOf, repeatForecast, startForecast, templateOf, writeForm } from './forecast.js';
-import { CURVES, distanceOf, distanceUnit, forecastCurve, LOSSES, numericalOf, sectionOf, wears } from './forecastdata.js';
-import { count, fixed, number } from './format.js';
+import { chooseForecast, EVENTS, FACTORS, forecastSeen, nameOf, openForecast, playFilm, recordOf, repeatForecast, startForecast, takeForecastFiles, takeTarget, TARGETS, templateOf, writeForm } from './forecast.js';
+import { CURVES, decisionOf, deepest, distanceOf, distanceUnit, forecastChart, LOSSES, numericalOf, reachedOf, sectionOf, wears, worstDamage } from './forecastdata.js';
+import { count, fixed, number, seconds } from './format.js';
 import { remarkList } from './remarks.js';
 import { formatRoute } from './routes.js';
-import { saveDrawing } from './savedrawing.js';
-import { COLUMNS, parseTraffic, ROWS_MAX } from './traffic.js';
+import { savable } from './savedrawing.js';
+import { COLUMNS, ROWS_MAX } from './traffic.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./forecast.js').Forecast} Forecast */
@@ -34,59 +36,75 @@ export function forecastView(app) {
 
 /** @param {App} app @param {Forecast} forecast */
 function formPanel(app, forecast) {
-  const { form, sending, refusal, faults } = forecast;
+  const { form, sending, refusal, faults, against } = forecast;
   const template = templateOf(app);
-  const { document, files } = app.store.get().compose;
-  const write = (/** @type {keyof typeof form} */ member) => (/** @type {Event} */ event) => writeForm(app, { [member]: /** @type {HTMLInputElement} */ (event.target).value });
-  const entry = (/** @type {'mgt' | 'km' | 'records' | 'name'} */ member, /** @type {string} */ label, /** @type {string} */ unit) => html`<div class="field"><label for=${`f-${member}`}>${label}</label>
-    <span class="input"><input id=${`f-${member}`} autocomplete="off" .value=${form[member]} @input=${write(member)}>${unit ? html`<span class="unit">${unit}</span>` : nothing}</span></div>`;
+  const state = app.store.get().compose;
+  const { document, files } = state;
+  const write = (/** @type {keyof typeof form} */ member) => (/** @type {Event} */ event) => writeForm(app, { [member]: valueOf(event) });
+  const entry = (/** @type {'mgt' | 'km' | 'records' | 'name'} */ member, /** @type {string} */ label, /** @type {string} */ unit, empty = '') => html`<div class="field"><label for=${`f-${member}`}>${label}</label>
+    <span class="input"><input id=${`f-${member}`} autocomplete="off" placeholder=${empty} .value=${form[member]} @input=${write(member)}>${unit ? html`<span class="unit">${unit}</span>` : nothing}</span></div>`;
+  const select = (/** @type {'wearing' | 'law' | 'states'} */ member, /** @type {string} */ label, /** @type {string[][]} */ options) => html`<div class="field"><label for=${`f-${member}`}>${label}</label>
+    <select id=${`f-${member}`} @change=${write(member)}>${options.map(([value, name]) => html`<option value=${value} ?selected=${form[member] === value}>${name}</option>`)}</select></div>`;
   const names = [files.rail?.name, files.wheel?.name].filter(Boolean).join(', ');
-  return html`<section class="panel" aria-labelledby="h-forecast"><header class="bar"><h1 id="h-forecast">Forecast: wear and fatigue under a traffic</h1>
-      <button class="primary" ?disabled=${sending || typeof template === 'string'} @click=${() => startForecast(app)}>${sending ? 'Sending …' : 'Compute'}</button></header>
+  return html`<section class="panel" aria-labelledby="h-forecast"><header class="bar"><h1 id="h-forecast">${against ? 'Another plan' : 'Forecast: wear and fatigue under a traffic'}</h1>
+      ${against ? html`<span class="hint">compared with <b>${against.name}</b></span><button class="small ghost" @click=${() => chooseForecast(app, { against: null })}>Do not compare</button>` : nothing}
+      <button class="primary" ?disabled=${sending || typeof template === 'string'} @click=${() => startForecast(app)}>${sending ? 'Sending …' : against ? 'Compute and compare' : 'Compute'}</button></header>
+    ${refusal ? html`<div class="pad" role="alert"><p class="fault big">${refusal}</p><ul class="faults">${faults.map(({ pointer, detail }) => html`<li><code>${pointer}</code> ${detail}</li>`)}</ul></div>` : nothing}
     <div class="two pad">
-      <div>
-        <fieldset><legend>Rail and wheel</legend>${typeof template === 'string' ? html`<p class="fault">${template}</p>`
-          : html`<p>${String(document?.name ?? 'The pair of the view Contact')}${names ? html` <span class="quiet">(${names})</span>` : nothing}</p>
-            <p class="hint">Sections, inclination, gauge, speed, friction and steel are those of the view <a href="#/compose">Contact</a>. Other files can be dropped here.</p>`}</fieldset>
-        <fieldset><legend>Traffic</legend>${form.table ? tableOf(app, form.table) : rowsOf(app, form)}
-          <label class="drop">${form.table ? 'Another table' : 'Or a table of the traffic'}<span class="quiet">CSV with titles such as Q [kN], shift [mm], yaw [mrad], friction, passes; up to 200 000 rows</span>
-            <input type="file" class="visually-hidden" id="traffic" @change=${(/** @type {Event} */ event) => takeTable(app, /** @type {HTMLInputElement} */ (event.target))}></label></fieldset>
-      </div>
+      <fieldset><legend>Rail and wheel</legend>${typeof template === 'string' ? html`<p class="fault">${template}</p>`
+        : html`<p>${String(document?.name ?? 'The pair of the view Contact')}${names ? html` <span class="quiet">(${names})</span>` : nothing}</p>
+          ${document ? html`<div class="figure pair-drawing">${drawing(state, document)}</div>` : nothing}
+          <div class="verdict" role="status">${verdict(app, state)}${adviceOf(app, BODIES)}</div>
+          <p class="hint">Drop other files of a rail and a wheel, or a table of the traffic, anywhere here. Inclination, gauge, speed and steel are those of the view <a href="#/compose">Contact</a>.</p>`}</fieldset>
       <div>
         <fieldset><legend>How far</legend><div class="pair">${form.wearing === 'wheel' ? nothing : entry('mgt', 'Traffic over the rail', 'MGT')}${form.wearing === 'rail' ? nothing : entry('km', 'Distance of the wheel', 'km')}</div>
-          <div class="pair"><div class="field"><label for="f-wearing">What wears</label><select id="f-wearing" @change=${write('wearing')}>${[['both', 'rail and wheel'], ['rail', 'the rail'], ['wheel', 'the wheel']].map(([value, label]) => html`<option value=${value} ?selected=${form.wearing === value}>${label}</option>`)}</select></div>
-            <div class="field"><label for="f-law">Law of wear</label><select id="f-law" @change=${write('law')}>${[['usfd_wear', 'Tγ/A (Sheffield)'], ['archard_wear', 'Archard']].map(([value, label]) => html`<option value=${value} ?selected=${form.law === value}>${label}</option>`)}</select></div></div>
-          <div class="pair">${entry('records', 'Steps to keep', '')}${entry('name', 'Name', '')}</div></fieldset>
+          <div class="pair">${select('wearing', 'What wears', [['both', 'rail and wheel'], ['rail', 'the rail'], ['wheel', 'the wheel']])}${select('law', 'Law of wear', [['usfd_wear', 'Tγ/A (Sheffield)'], ['archard_wear', 'Archard']])}</div>
+          <div class="pair">${select('states', 'Condensed traffic', [['24', 'quick look: 24 states'], ['', '100 states'], ['200', 'fine: 200 states']])}${entry('records', 'Steps to keep', '')}</div>
+          ${entry('name', 'Name', '', nameOf(form))}</fieldset>
         <fieldset><legend>Limits</legend><div class="triple">${LOSSES.filter(({ body }) => form.wearing === 'both' || form.wearing === body).map(({ key, label }) => html`<div class="field"><label for=${`f-${key}`}>${label}</label>
-          <span class="input"><input id=${`f-${key}`} autocomplete="off" placeholder="none" .value=${form.limits[key] ?? ''} @input=${(/** @type {Event} */ event) => writeForm(app, { limits: { ...form.limits, [key]: /** @type {HTMLInputElement} */ (event.target).value } })}><span class="unit">mm</span></span></div>`)}</div></fieldset>
+          <span class="input"><input id=${`f-${key}`} inputmode="decimal" autocomplete="off" placeholder="none" .value=${form.limits[key] ?? ''} @input=${(/** @type {Event} */ event) => writeForm(app, { limits: { ...form.limits, [key]: valueOf(event) } })}><span class="unit">mm</span></span></div>`)}</div></fieldset>
         <fieldset><legend>Maintenance</legend>${eventsOf(app, form)}</fieldset>
       </div>
     </div>
-    ${refusal ? html`<div class="pad"><p class="fault big">${refusal}</p><ul class="faults">${faults.map(({ pointer, detail }) => html`<li><code>${pointer}</code> ${detail}</li>`)}</ul></div>` : nothing}</section>`;
+    <fieldset class="pad"><legend>Traffic</legend>${form.table ? tableOf(app, form.table) : rowsOf(app, form, document)}
+      <label class="drop">${form.table ? 'Another table' : 'Or a table of the traffic'}<span class="quiet">CSV with titles such as passes; axle load [t]; speed [km/h]; radius [m]; shift [mm]; angle of attack [mrad]; friction. Up to 200 000 rows</span>
+        <input type="file" class="visually-hidden" id="traffic" @change=${chosen((file) => takeForecastFiles(app, [file]).catch(app.refused))}></label></fieldset></section>`;
 }
 
-/** Rows of the traffic, written by hand. @param {App} app @param {Forecast['form']} form */
-function rowsOf(app, { rows }) {
-  const set = (/** @type {number} */ row, /** @type {import('./traffic.js').ColumnKey} */ key) => (/** @type {Event} */ event) =>
-    writeForm(app, { rows: rows.map((old, at) => (at === row ? { ...old, [key]: /** @type {HTMLInputElement} */ (event.target).value } : old)) });
-  return html`<div class="scroll" tabindex="0" role="region" aria-label="Traffic"><table class="traffic"><thead><tr>${COLUMNS.map(({ label, unit }) => html`<th scope="col">${label}${unit ? ` / ${unit}` : ''}</th>`)}<th></th></tr></thead>
-    <tbody>${rows.map((row, at) => html`<tr>${COLUMNS.map(({ key, label }) => html`<td><input inputmode="decimal" aria-label=${`${label}, row ${at + 1}`} .value=${row[key]} @input=${set(at, key)}></td>`)}
-      <td><button class="icon" aria-label=${`Remove row ${at + 1}`} ?disabled=${rows.length < 2} @click=${() => writeForm(app, { rows: rows.filter((_, other) => other !== at) })}>×</button></td></tr>`)}</tbody></table></div>
-    <p><button class="small" ?disabled=${rows.length >= ROWS_MAX} @click=${() => writeForm(app, { rows: [...rows, { ...rows[rows.length - 1] }] })}>Add a row</button> <span class="hint">Passes are shares or numbers: only their ratios count.</span></p>`;
-}
+/** @param {Event} event */
+const valueOf = ({ target }) => /** @type {HTMLInputElement} */ (target).value;
 
-/** @param {App} app @param {NonNullable<Forecast['form']['table']>} table */
-const tableOf = (app, table) => html`<p>${table.name}: ${count(table.rows)} rows of ${Object.keys(table.columns).map((pointer) => COLUMNS.find((column) => column.pointer === pointer)?.label ?? pointer).join(', ')}${table.passes ? ' and passes' : ''}
-  <button class="small" @click=${() => writeForm(app, { table: null })}>Write rows instead</button></p>`;
-
-/** @param {App} app @param {HTMLInputElement} input */
-async function takeTable(app, input) {
-  const file = input.files?.[0];
+/** Takes a file that was chosen. @param {(file: File) => unknown} take */
+const chosen = (take) => (/** @type {Event} */ { target }) => {
+  const input = /** @type {HTMLInputElement} */ (target);
+  const [file] = input.files ?? [];
+  if (file) take(file);
   input.value = '';
-  if (!file) return;
-  const parsed = parseTraffic(decoded(await file.arrayBuffer()));
-  if (typeof parsed === 'string') app.say(`${file.name}: ${parsed}.`);
-  else writeForm(app, { table: { name: file.name, ...parsed } });
+};
+
+/** What a row without a value has. @type {Partial<Record<import('./traffic.js').ColumnKey, string>>} */
+const EMPTY = { passes: '1', radius: 'straight', shift: '0', yaw: '0' };
+
+/** Rows of the traffic, written by hand. @param {App} app @param {Forecast['form']} form @param {import('./document.js').JsonObject | null} document */
+function rowsOf(app, { rows }, document) {
+  const set = (/** @type {number} */ row, /** @type {import('./traffic.js').ColumnKey} */ key) => (/** @type {Event} */ event) =>
+    writeForm(app, { rows: rows.map((old, at) => (at === row ? { ...old, [key]: valueOf(event) } : old)) });
+  const empty = { ...EMPTY, speed: number(3.6e-3 * numberAt(document ?? undefined, '/motion/wheelset/speed_mm_per_s'), 3) };
+  return html`<div class="scroll" tabindex="0" role="region" aria-label="Traffic"><table class="traffic"><thead><tr>${COLUMNS.map(({ label, unit }) => html`<th scope="col">${label}${unit ? ` / ${unit}` : ''}</th>`)}<td></td></tr></thead>
+    <tbody>${rows.map((row, at) => html`<tr>${COLUMNS.map(({ key, label }) => html`<td><input inputmode="decimal" placeholder=${empty[/** @type {keyof typeof empty} */ (key)] ?? ''} aria-label=${`${label}, row ${at + 1}`} .value=${row[key]} @input=${set(at, key)}></td>`)}
+      <td><button class="icon" aria-label=${`Remove row ${at + 1}`} ?disabled=${rows.length < 2} @click=${() => writeForm(app, { rows: rows.filter((_, other) => other !== at) })}>×</button></td></tr>`)}</tbody></table></div>
+    <p><button class="small" ?disabled=${rows.length >= ROWS_MAX} @click=${() => writeForm(app, { rows: [...rows, { ...rows[rows.length - 1] }] })}>Add a row</button> <span class="hint">Passes are shares or numbers: only their ratios count. On the right rail a shift to the right, below 0, brings the flange to the gauge. Radii are positive to the left.</span></p>`;
+}
+
+/** What was read of a table. @param {App} app @param {NonNullable<Forecast['form']['table']>} table */
+function tableOf(app, { name, rows, values, others, unused }) {
+  const range = (/** @type {readonly number[]} */ list) => list.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]).map((value) => number(value, 3)).join(' … ');
+  const lacking = COLUMNS.filter(({ key }) => !values[key] && key !== 'passes').map(({ label }) => label);
+  return html`<p><b>${name}</b>: ${count(rows)} rows <button class="small" @click=${() => writeForm(app, { table: null })}>Write rows instead</button></p>
+    <div class="scroll columns" tabindex="0" role="region" aria-label="Columns of the table"><table><tbody>${COLUMNS.flatMap(({ key, label, unit }) => (values[key] ? [html`<tr><th scope="row">${label}</th><td>${range(values[key])} ${unit}</td></tr>`] : []))}
+      ${Object.entries(others).map(([pointer, list]) => html`<tr><th scope="row"><code>${pointer}</code></th><td>${range(list)}</td></tr>`)}</tbody></table></div>
+    ${lacking.length ? html`<p class="hint">As in the view Contact: ${lacking.join(', ')}.</p>` : nothing}
+    ${unused.length ? html`<p class="hint warn">Not used: ${unused.join(', ')}.</p>` : nothing}`;
 }
 
 /** @param {App} app @param {Forecast['form']} form */
@@ -94,14 +112,15 @@ function eventsOf(app, form) {
   const { events, wearing } = form;
   const unit = wearing === 'wheel' ? 'km' : 'MGT';
   const set = (/** @type {number} */ place, /** @type {object} */ change) => writeForm(app, { events: events.map((event, at) => (at === place ? { ...event, ...change } : event)) });
-  const value = (/** @type {Event} */ event) => /** @type {HTMLInputElement} */ (event.target).value;
-  return html`${events.map((event, at) => html`<div class="event">
-      <label>At <span class="input"><input inputmode="decimal" .value=${event.at} @input=${(/** @type {Event} */ input) => set(at, { at: value(input) })}><span class="unit">${unit}</span></span></label>
-      <select aria-label=${`What is done, ${at + 1}`} @change=${(/** @type {Event} */ input) => set(at, { kind: value(input) })}>${EVENTS.map(([kind, label]) => html`<option value=${kind} ?selected=${kind === event.kind}>${label}</option>`)}</select>
-      <span class="input"><input inputmode="decimal" aria-label=${event.kind === 'friction' ? 'Coefficient of friction' : 'Depth beyond that, in mm'} placeholder=${event.kind === 'friction' ? '0.15' : '0'} .value=${event.value} @input=${(/** @type {Event} */ input) => set(at, { value: value(input) })}>
+  return html`${events.map((event, at) => html`<div class="event" role="group" aria-label=${`Maintenance ${at + 1}`}>
+      <label>At <span class="input"><input inputmode="decimal" .value=${event.at} @input=${(/** @type {Event} */ input) => set(at, { at: valueOf(input) })}><span class="unit">${unit}</span></span></label>
+      <select aria-label=${`What is done, ${at + 1}`} @change=${(/** @type {Event} */ input) => set(at, { kind: valueOf(input), value: '', target: null })}>${EVENTS.map(([kind, label]) => html`<option value=${kind} ?selected=${kind === event.kind}>${label}</option>`)}</select>
+      ${event.kind === 'friction' ? nothing : html`to ${event.target ? html`<b>${event.target.name}</b> <button class="small ghost" @click=${() => set(at, { target: null })}>${TARGETS[event.kind]} instead</button>` : TARGETS[event.kind]}
+        <label class="button small">${event.target ? 'Another file' : 'Or a file'}<input type="file" class="visually-hidden" aria-label=${`Section of maintenance ${at + 1}`} @change=${chosen((file) => takeTarget(app, at, file).catch(app.refused))}></label>`}
+      <span class="input"><input inputmode="decimal" aria-label=${event.kind === 'friction' ? 'Coefficient of friction' : 'Depth beyond that, in mm'} placeholder=${event.kind === 'friction' ? '0.15' : '0'} .value=${event.value} @input=${(/** @type {Event} */ input) => set(at, { value: valueOf(input) })}>
         <span class="unit">${event.kind === 'friction' ? 'μ' : 'mm more'}</span></span>
       <button class="icon" aria-label=${`Remove event ${at + 1}`} @click=${() => writeForm(app, { events: events.filter((_, other) => other !== at) })}>×</button></div>`)}
-    <p><button class="small" @click=${() => writeForm(app, { events: [...events, { kind: 'grind', at: String(Number(wearing === 'wheel' ? form.km : form.mgt) / 2 || ''), value: '' }] })}>Add grinding, lubrication or turning</button></p>`;
+    <p><button class="small" @click=${() => writeForm(app, { events: [...events, { kind: wearing === 'wheel' ? 'reprofile' : 'grind', at: String(Number(wearing === 'wheel' ? form.km : form.mgt) / 2 || ''), value: '', target: null }] })}>Add grinding, lubrication or turning</button></p>`;
 }
 
 /** @param {App} app @param {Forecast} forecast */
@@ -128,15 +147,14 @@ function listPanel(app, { listed, ticked }) {
 /** @param {App} app @param {Job} job */
 function waitingPanel(app, job) {
   const open = job.state === 'queued' || job.state === 'running';
+  const ran = (Date.now() - Date.parse(job.started_at ?? '')) / 1000;
+  const left = job.progress > 0.01 && Math.round((ran * (1 - job.progress)) / job.progress);
   return html`<section class="panel wait"><h1>${job.name || 'Forecast'}</h1>
     <p role="status" class=${job.state === 'failed' ? 'fault big' : ''}>${job.state === 'queued' ? 'Waiting in the queue …' : job.state === 'running' ? 'Computing step by step …' : job.state === 'failed' ? (job.error?.detail ?? 'Failed') : job.state}</p>
-    ${open ? html`<progress max="1" .value=${job.progress} aria-label="Progress"></progress><button @click=${() => cancel('evolutions', job.id).catch(app.refused)}>Cancel</button>`
+    ${open ? html`<progress max="1" .value=${job.progress} aria-label="Progress"></progress>${left ? html`<p class="quiet">${Math.round(100 * job.progress)} %, about ${seconds(left)} left</p>` : nothing}<button @click=${() => cancel('evolutions', job.id).catch(app.refused)}>Cancel</button>`
       : html`<button @click=${() => repeatForecast(app, job).catch(app.refused)}>Change and repeat</button>`}
     <a class="button" href="#/forecast">To the forecasts</a></section>`;
 }
-
-/** @type {{ key: string, curve: ReturnType<typeof forecastCurve> } | null} */
-let made = null;
 
 /** @param {App} app @param {Forecast} forecast */
 function resultView(app, forecast) {
@@ -147,82 +165,97 @@ function resultView(app, forecast) {
   const unit = distanceUnit(first);
   const shapes = sides.map((side, at) => {
     const of = /** @type {WornRecord} */ (recordOf(side));
-    return { side, record: of, shape: sectionOf(answers[at], of, body, factor), contacts: contactsOf(of, body, sectionOf(answers[at], of, body, factor).now) };
+    const shape = sectionOf(answers[at], of, body, factor);
+    return { side, record: of, shape, contacts: contactsOf(of, body, shape) };
   });
-  const key = [...forecast.ids, forecast.curve, body].join();
-  if (made?.key !== key) made = { key, curve: forecastCurve(answers, forecast.curve, body) };
-  const { curve } = made;
-  const pick = (/** @type {number} */ place) => curve && chooseForecast(app, { step: nearestStep(first, curve.x[place]) });
+  const strongest = Math.max(...answers.flatMap(({ records }) => records.map(({ contact }) => contact.pressure_max_mpa)));
   const compared = sides.length > 1;
   const label = (/** @type {number} */ at) => (compared ? `${'AB'[at]}: ${sides[at].job.name || 'forecast'}` : `at ${number(distanceOf(record.progress), 3)} ${unit}`);
+  const title = sides.map(({ job }) => job.name || 'forecast').join(' and ');
+  const chart = forecastChart(answers, forecast.curve, body);
+  const numbers = numbersPanel(shapes.map((shape) => shape.record), BODIES.filter((name) => answers.some((answer) => wears(answer, name))), compared);
+  const over = html`<section class="panel" aria-labelledby="h-over"><header class="bar"><h2 id="h-over">Over the traffic</h2>
+      <div class="segs" role="group" aria-label="Curve of the forecast">${CURVES.map(([kind, name]) => html`<label class="seg"><input type="radio" name="forecast" .checked=${forecast.curve === kind} @change=${() => chooseForecast(app, { curve: kind })}><span>${name}</span></label>`)}</div></header>
+    <div class="cards"><div class="card">${savable(`${title} ${chart.name}`, drawChart({ ...chart, chosen: { x: distanceOf(record.progress), pick: (x) => chooseForecast(app, { step: nearestStep(first, x) }) } }))}
+      <p class="hint">Bands: 90 % of the scatter of the wear coefficients. Error bars: steps, condensed traffic and contact. A click chooses the step.</p></div></div></section>`;
   return html`<div class="result forecast">
     <header class="jobhead"><div><h1>${compared ? 'Two forecasts' : (sides[0].job.name || 'Forecast')}</h1>
       <p class="quiet">${sides.map(({ job }, at) => html`${compared ? html`<b>${'AB'[at]}</b> <a href=${formatRoute('forecast', [job.id])}>${job.name || job.id}</a> ` : html`<code>${job.id}</code> `}`)}</p></div>
       ${compared ? html`<a class="button small" href="#/forecast">To the forecasts</a>` : downloadsOf(app, forecast, sides[0], record)}</header>
     ${compared ? nothing : remarkList(first.remarks)}
+    ${compared ? limitsPanel(answers, sides) : nothing}
     <section class="panel" aria-labelledby="h-worn"><header class="bar"><h2 id="h-worn">Section</h2>
         <div class="segs" role="group" aria-label="Body">${BODIES.map((name) => html`<label class="seg"><input type="radio" name="worn" .checked=${body === name} @change=${() => chooseForecast(app, { body: name })}><span>${name}</span></label>`)}</div>
-        <label class="inline">wear drawn <select class="slim" @change=${(/** @type {Event} */ event) => chooseForecast(app, { factor: Number(/** @type {HTMLSelectElement} */ (event.target).value) })}>${FACTORS.map((times) => html`<option value=${times} ?selected=${times === factor}>${times === 1 ? 'to scale' : `${times} times larger`}</option>`)}</select></label></header>
-      <div class="pad">${drawWorn({
-        name: `Section of the ${body} at the start and after ${number(distanceOf(record.progress), 3)} ${unit}`, start: shapes[0].shape.start,
+        <label class="inline">wear drawn <select class="slim" @change=${(/** @type {Event} */ event) => chooseForecast(app, { factor: Number(valueOf(event)) })}>${FACTORS.map((times) => html`<option value=${times} ?selected=${times === factor}>${times === 1 ? 'to scale' : `${times} times larger`}</option>`)}</select></label></header>
+      <div class="pad">${savable(`${title} ${body} ${number(distanceOf(record.progress), 3)} ${unit}`, drawWorn({
+        name: `Section of the ${body} at the start and after ${number(distanceOf(record.progress), 3)} ${unit}`, start: shapes[0].shape.start, strongest,
         shapes: shapes.map(({ shape, contacts }, at) => ({ label: label(at), now: shape.now, low: shape.low, high: shape.high, contacts })),
-      })}
-        <p class="hint">Band: 90 % of the scatter of the wear coefficients. Circles: where the traffic touches, their area the share of its load.</p></div>
+      }))}
+        <p class="hint">Band: 90 % of the scatter of the wear coefficients. Circles: where the traffic touches, their area the share of its load. Needles: the largest pressure there; the longest of all steps is ${number(strongest, 4)} MPa.</p></div>
       <div class="film"><button aria-label=${forecast.playing ? 'Stop the film' : 'Play as a film'} @click=${() => playFilm(app)}>${forecast.playing ? '❚❚' : '▶'}</button>
         <label class="slide"><span>Traffic <output>${number(distanceOf(record.progress), 4)} ${unit}${record.progress.wheel_distance_km !== undefined && unit !== 'km' ? `, wheel ${count(Math.round(record.progress.wheel_distance_km))} km` : ''}</output></span>
-          <input type="range" min="0" max=${first.records.length - 1} .value=${String(step)} @input=${(/** @type {Event} */ event) => chooseForecast(app, { step: Number(/** @type {HTMLInputElement} */ (event.target).value) })}></label></div></section>
-    ${depthPanel(shapes, body, label)}
-    <div class="two">
-      <div class="aside"><section class="panel" aria-labelledby="h-over"><header class="bar"><h2 id="h-over">Over the traffic</h2>
-          <div class="segs" role="group" aria-label="Curve of the forecast">${CURVES.map(([kind, name]) => html`<label class="seg"><input type="radio" name="forecast" .checked=${forecast.curve === kind} @change=${() => chooseForecast(app, { curve: kind })}><span>${name}</span></label>`)}</div></header>
-        ${curve ? html`<creep-curve .shown=${{ curve, chosen: curve.x.lastIndexOf(distanceOf(record.progress)), pick }}></creep-curve>` : html`<p class="pad quiet">Nothing to draw.</p>`}
-        <p class="pad hint">Error bars: steps, condensed traffic and contact together, without the wear coefficients.</p></section>
-      ${limitsPanel(answers, sides)}</div>
-      ${numbersPanel(shapes.map((shape) => shape.record), BODIES.filter((name) => answers.some((answer) => wears(answer, name))), compared)}
-    </div></div>`;
+          <input type="range" min="0" max=${first.records.length - 1} .value=${String(step)} @input=${(/** @type {Event} */ event) => chooseForecast(app, { step: Number(valueOf(event)) })}></label></div></section>
+    ${depthPanel(shapes, body, label, title)}
+    <div class="two"><div class="aside">${over}${compared ? nothing : limitsPanel(answers, sides)}</div>${numbers}</div></div>`;
 }
 
 /** @param {Answer} answer @param {number} place */
 const nearestStep = ({ records }, place) => records.reduce((best, { progress }, at) => (Math.abs(distanceOf(progress) - place) <= Math.abs(distanceOf(records[best].progress) - place) ? at : best), 0);
 
-/** Places of contact of all states on a section as it is drawn. @param {WornRecord} record @param {'rail' | 'wheel'} body @param {readonly import('./drawing/axes.js').Point[]} drawn */
-function contactsOf(record, body, drawn) {
-  const { states, [body]: worn } = record;
-  const all = states.flatMap(({ share, patches }) => patches.map((patch) => ({ place: body === 'rail' ? patch.rail_mm : patch.wheel_mm, load: share * patch.normal_force_n })));
+/** Contacts of all states on a section as it is drawn. @param {WornRecord} record @param {'rail' | 'wheel'} body @param {ReturnType<typeof sectionOf>} shape @returns {import('./drawing/worn.js').WornContact[]} */
+function contactsOf(record, body, { now, normals }) {
+  const { states, [body]: { points_mm: points } } = record;
+  const all = states.flatMap(({ share, patches }) => patches.map((patch) => ({ place: body === 'rail' ? patch.rail_mm : patch.wheel_mm, load: share * patch.normal_force_n, pressure: patch.pressure_max_mpa })));
   const total = all.reduce((sum, { load }) => sum + load, 0) || 1;
-  return all.map(({ place: [y, z], load }) => {
-    const nearest = worn.points_mm.reduce((best, point, at) => (Math.hypot(point[0] - y, point[1] - z) < Math.hypot(worn.points_mm[best][0] - y, worn.points_mm[best][1] - z) ? at : best), 0);
-    return { at: drawn[nearest], size: load / total };
+  return all.map(({ place: [y, z], load, pressure }) => {
+    const distances = points.map((point) => Math.hypot(point[0] - y, point[1] - z));
+    const nearest = distances.indexOf(Math.min(...distances));
+    return { at: now[nearest], normal: normals[nearest], size: load / total, pressure };
   });
 }
 
-/** Depth and damage over the section. @param {{ side: Side, record: WornRecord }[]} shapes @param {'rail' | 'wheel'} body @param {(at: number) => string} label */
-function depthPanel(shapes, body, label) {
+/** Depth and damage over the section. @param {{ side: Side, record: WornRecord }[]} shapes @param {'rail' | 'wheel'} body @param {(at: number) => string} label @param {string} title */
+function depthPanel(shapes, body, label, title) {
   const points = (/** @type {WornRecord} */ record, /** @type {'depth_mm' | 'damage'} */ what, factor = 1) => record[body].points_mm.map(([y], at) => /** @type {[number, number]} */ ([y, factor * record[body][what][at]]));
   const looks = ['one', 'two'];
-  const [{ record }] = shapes;
-  const [low, high] = record[body].uncertainty.coefficients;
-  const band = shapes.length > 1 ? [] : [{ label: '90 % of coefficients', look: 'three', points: points(record, 'depth_mm', low) }, { label: '', look: 'three', points: points(record, 'depth_mm', high) }];
+  const band = (/** @type {WornRecord} */ record) => {
+    const [low, high] = record[body].uncertainty.coefficients;
+    return /** @type {const} */ ([points(record, 'depth_mm', low), points(record, 'depth_mm', high)]);
+  };
   const axis = `y on the ${body}, to the field side / mm`;
   return html`<section class="panel" aria-labelledby="h-depth"><header class="bar"><h2 id="h-depth">Depth and fatigue across the ${body}</h2></header><div class="cards">
-    <div class="card">${drawChart({ name: `Worn depth across the ${body}`, x: axis, y: 'worn depth / mm', lines: [...shapes.map((shape, at) => ({ label: label(at), look: looks[at], points: points(shape.record, 'depth_mm') })), ...band] })}</div>
-    <div class="card">${drawChart({ name: `Fatigue across the ${body}`, x: axis, y: 'RCF damage net of wear (1: visible crack)', lines: shapes.map((shape, at) => ({ label: label(at), look: looks[at], points: points(shape.record, 'damage') })) })}</div></div></section>`;
+    <div class="card">${savable(`${title} depth ${body}`, drawChart({ name: `Worn depth across the ${body}`, x: axis, y: 'worn depth / mm', lines: shapes.map((shape, at) => ({ label: label(at), look: looks[at], points: points(shape.record, 'depth_mm'), band: band(shape.record) })) }))}</div>
+    <div class="card">${savable(`${title} fatigue ${body}`, drawChart({ name: `Fatigue across the ${body}`, x: axis, y: 'RCF damage net of wear (1: visible crack)', lines: shapes.map((shape, at) => ({ label: label(at), look: looks[at], points: points(shape.record, 'damage') })) }))}</div></div></section>`;
 }
 
-/** When limits are reached. @param {readonly Answer[]} answers @param {readonly Side[]} sides */
+/** When limits are reached, and which of two plans goes on longer. @param {readonly Answer[]} answers @param {readonly Side[]} sides */
 function limitsPanel(answers, sides) {
-  const names = [...new Set(answers.flatMap(({ limits }) => limits.map(({ loss }) => loss)))];
+  const reached = reachedOf(answers);
   const unit = distanceUnit(answers[0]);
-  const told = (/** @type {Answer} */ answer, /** @type {string} */ loss) => {
-    const limit = answer.limits.find((known) => known.loss === loss);
-    if (!limit) return '–';
-    const when = (/** @type {WornRecord['progress'] | undefined} */ progress, /** @type {string} */ none) => (progress ? `${number(distanceOf(progress), 3)}` : none);
-    return html`${limit.reached ? html`<b>${when(limit.reached, '')} ${unit}</b>` : 'not reached'}<small> ${when(limit.earliest, 'later')} … ${when(limit.latest, 'later')}</small>`;
-  };
-  return html`<section class="panel" aria-labelledby="h-limits"><header class="bar"><h2 id="h-limits">Limits</h2></header>
-    ${names.length ? html`<div class="scroll" tabindex="0" role="region" aria-labelledby="h-limits"><table><thead><tr><th scope="col">loss</th><th scope="col">limit / mm</th>${sides.map((_, at) => html`<th scope="col">${sides.length > 1 ? `${'AB'[at]} reaches it at` : 'reached at'}</th>`)}</tr></thead>
-      <tbody>${names.map((loss) => html`<tr><th scope="row">${LOSSES.find(({ key }) => key === loss)?.label ?? loss}</th><td>${number(answers.flatMap(({ limits }) => limits).find((known) => known.loss === loss)?.limit_mm ?? NaN, 3)}</td>${answers.map((answer) => html`<td>${told(answer, loss)}</td>`)}</tr>`)}</tbody></table></div>`
-      : html`<p class="pad quiet">No limits were given.</p>`}</section>`;
+  const compared = sides.length > 1;
+  const when = (/** @type {number | null} */ place, none = 'later') => (place === null ? none : number(place, 3));
+  return html`<section class="panel" aria-labelledby="h-limits"><header class="bar"><h2 id="h-limits">${compared ? 'Decision' : 'Limits'}</h2></header>
+    ${compared ? html`<p class="pad decision" role="status">${decisionText(answers, sides)}</p>` : nothing}
+    ${reached.length ? html`<div class="scroll" tabindex="0" role="region" aria-labelledby="h-limits"><table><thead><tr><th scope="col">loss</th><th scope="col">limit</th>${sides.map((_, at) => html`<th scope="col">${compared ? `${'AB'[at]} reaches it at` : 'reached at'}</th>`)}</tr></thead>
+      <tbody>${reached.map(({ label, limit, lives }) => html`<tr><th scope="row">${label}</th><td>${limit}</td>${lives.map(({ mean, earliest, latest }) => html`<td>${mean === null ? 'not reached' : html`<b>${when(mean)} ${unit}</b>`}${earliest === latest ? nothing : html`<small> ${when(earliest)} … ${when(latest)}</small>`}</td>`)}</tr>`)}</tbody></table></div>`
+      : html`<p class="pad quiet">${answers.some(({ limits }) => limits.length) ? 'No limit is reached.' : 'No limits were given.'}</p>`}</section>`;
+}
+
+/** Which of two plans goes on longer. @param {readonly Answer[]} answers @param {readonly Side[]} sides */
+function decisionText(answers, sides) {
+  const { better, sure, ends } = decisionOf(reachedOf(answers));
+  const unit = distanceUnit(answers[0]);
+  const last = answers.map(({ records }) => records[records.length - 1]);
+  const end = (/** @type {0 | 1} */ side) => (ends[side].label ? `${ends[side].label}, at ${number(ends[side].place, 3)} ${unit}` : `none within ${number(distanceOf(last[side].progress), 3)} ${unit}`);
+  const name = (/** @type {0 | 1} */ side) => html`<b>${'AB'[side]}</b> (${sides[side].job.name})`;
+  const removed = BODIES.flatMap((body) => {
+    const [one, two] = last.map((record) => record[body].machined_area_mm2);
+    return one || two ? [`${body === 'rail' ? 'grinds' : 'turns'} ${number(one, 3)} (A) and ${number(two, 3)} (B) mm² off the ${body}`] : [];
+  });
+  return html`${better === null ? (ends[0].label ? 'Both reach their first limit at the same time.' : 'Neither reaches a limit: compare the losses and the fatigue below, or give limits.')
+    : html`${name(better)} goes on longer. Its first limit: ${end(better)}. That of ${name(better ? 0 : 1)}: ${end(better ? 0 : 1)}.
+      ${sure ? 'The lowest and the highest wear coefficients say the same.' : html`<span class="warn">With other wear coefficients it may be the other way round.</span>`}`}
+    ${removed.length ? ` Maintenance ${removed.join(', and ')}.` : nothing}`;
 }
 
 const BODIES = /** @type {const} */ (['rail', 'wheel']);
@@ -233,12 +266,13 @@ function numbersPanel(records, bodies, compared) {
   const rows = [
     ...LOSSES.filter(({ body }) => bodies.includes(body)).map(({ key, label }) => /** @type {[string, (record: WornRecord) => unknown]} */ ([`${label} / mm`, ({ losses }) => fixed(losses[key] ?? NaN, 3)])),
     ...bodies.flatMap((body) => /** @type {[string, (record: WornRecord) => unknown][]} */ ([
+      [`largest depth on the ${body} / mm`, (record) => html`${number(deepest(record, body), 3)}<small> at y ${fixed(record[body].points_mm[record[body].depth_mm.indexOf(deepest(record, body))]?.[0] ?? NaN, 1)} mm</small>`],
       [`worn area of the ${body} / mm²`, (record) => {
         const { worn_area_mm2: area, uncertainty: { coefficients } } = record[body];
         return html`${number(area, 3)} ± ${number(100 * numericalOf(record, body), 2)} %<small> coefficients: ${number(area * coefficients[0], 2)} … ${number(area * coefficients[1], 2)}</small>`;
       }],
       [`ground or turned off the ${body} / mm²`, (record) => number(record[body].machined_area_mm2, 3)],
-      [`largest RCF damage of the ${body}`, (record) => number(Math.max(0, ...record[body].damage), 3)],
+      [`largest RCF damage of the ${body}`, (record) => number(worstDamage(record, body), 3)],
     ])),
     ['largest pressure / MPa', ({ contact }) => number(contact.pressure_max_mpa, 4)],
     ['Tγ, mean / (J/m)', ({ contact }) => number(contact.t_gamma_mean_n, 3)],
@@ -256,16 +290,11 @@ function downloadsOf(app, { body, step }, { job }, record) {
   const name = fileName(job.name || job.id);
   const get = (/** @type {string} */ path, /** @type {string} */ file) => () => download(`/v1/evolutions/${job.id}/${path}`, file).catch(app.refused);
   const at = `${name}-${body}-${fixed(distanceOf(record.progress), 1)}`;
-  const picture = () => {
-    const drawing = document.querySelector('svg.worn');
-    if (drawing instanceof SVGSVGElement) save(new Blob([saveDrawing(drawing)], { type: 'image/svg+xml' }), `${at}.svg`);
-  };
   const section = (/** @type {string} */ format, /** @type {string} */ end) => get(`sections/${body}?record=${step}&format=${format}`, `${at}.${end}`);
   return html`<div class="downloads" role="group" aria-label="Download">
     <button class="small" @click=${get('table?of=records&format=csv', `${name}.csv`)}>CSV</button>
     <button class="small" @click=${get('table?of=points&format=parquet', `${name}-points.parquet`)}>Parquet</button>
-    <button class="small" @click=${picture}>SVG</button>
     <button class="small" @click=${section('miniprof', body === 'rail' ? 'ban' : 'whl')}>MiniProf</button>
     <button class="small" @click=${section('simpack', body === 'rail' ? 'prr' : 'prw')}>Simpack</button>
-    <button class="small primary" @click=${() => repeatForecast(app, job).catch(app.refused)}>Change and repeat</button></div>`;
+    <button class="small primary" @click=${() => repeatForecast(app, job).catch(app.refused)}>Compare with another plan</button></div>`;
 }

@@ -5,7 +5,7 @@ import { openComparison } from './compare.js';
 import { takeProfiles } from './contactform.js';
 import { openKept, solve } from './editing.js';
 import './fieldmap.js';
-import { leaveForecast, openForecast } from './forecast.js';
+import { leaveForecast, openForecast, takeForecastFiles } from './forecast.js';
 import { loadCurves } from './late.js';
 import { openLine } from './line.js';
 import { isGone, openJob } from './result.js';
@@ -66,7 +66,7 @@ function follow() {
   store.set({ route });
   if (route.view !== 'jobs') stopQueue();
   if (route.view === 'jobs') startQueue(app);
-  if (route.view === 'result' || route.view === 'line' || route.view === 'forecast') loadCurves();
+  if (route.view === 'result' || route.view === 'line') loadCurves();
   if (route.view === 'result') openJob(app, route.ids[0], route.query);
   if (route.view === 'compare') openComparison(app, route.ids, route.query);
   if (route.view === 'line' && route.query.kind === 'run' && route.ids[0]) openRun(app, route.ids[0], route.query).catch(app.refused);
@@ -105,7 +105,8 @@ addEventListener('drop', (event) => {
   event.preventDefault();
   const files = [...event.dataTransfer.files];
   if (!files.length) return;
-  if (store.get().route.view !== 'forecast') app.go(formatRoute('compose'));
+  if (store.get().route.view === 'forecast') return void takeForecastFiles(app, files).catch(app.refused);
+  app.go(formatRoute('compose'));
   takeProfiles(app, files).catch(app.refused);
 });
 // The first picture after "Solve" ends the time that the reader waited.

@@ -3,70 +3,136 @@
 import { parse } from './written.js';
 
 /** @typedef {import('./document.js').JsonValue} JsonValue */
-/** @typedef {{ rows: number, columns: Record<string, number[]>, passes: number[] | null }} Table Columns by JSON pointers, in the units of the API. */
+/**
+ * @typedef {object} Table
+ * @property {number} rows
+ * @property {Partial<Record<ColumnKey, number[]>>} values In the units that are shown.
+ * @property {Record<string, number[]>} others By JSON pointers, in the units of the API.
+ * @property {string[]} unused Titles of columns that are left out.
+ */
 
-/** Columns of the traffic: what a person writes, and what that is in the unit of the API. */
+/** Columns of the traffic: what a person writes, and what one of that is in the unit of the API. A radius becomes a yaw rate. */
 export const COLUMNS = /** @type {const} */ ([
-  { key: 'passes', label: 'passes', unit: '', pointer: '', factor: 1, title: /pass|count|share|number/i },
-  { key: 'load', label: 'wheel load Q', unit: 'kN', pointer: '/load/vertical_force_n', factor: 1000, title: /load|vertical_force|^q\b/i },
-  { key: 'shift', label: 'shift to the left', unit: 'mm', pointer: '/contact/lateral_shift_mm', factor: 1, title: /shift|^y\b/i },
-  { key: 'yaw', label: 'angle of attack', unit: 'mrad', pointer: '/contact/yaw_rad', factor: 0.001, title: /yaw|angle/i },
-  { key: 'friction', label: 'friction μ', unit: '', pointer: '/friction/coefficient', factor: 1, title: /friction|^mu\b|^μ/i },
+  { key: 'passes', label: 'passes', unit: '', pointer: '', factor: 1, title: /pass|axles|count|share|^n(umber)?\b/i, units: {} },
+  { key: 'load', label: 'wheel load Q', unit: 'kN', pointer: '/load/vertical_force_n', factor: 1000, title: /load|vertical_force|^q\b/i, units: { kn: 1, n: 0.001, t: 9.80665 } },
+  { key: 'speed', label: 'speed', unit: 'km/h', pointer: '/motion/wheelset/speed_mm_per_s', factor: 1000 / 3.6, title: /speed|velocity|^v\b/i, units: { 'km/h': 1, 'm/s': 3.6, 'mm/s': 0.0036 } },
+  { key: 'radius', label: 'curve radius', unit: 'm', pointer: '/motion/wheelset/yaw_rate_rad_per_s', factor: 1, title: /radius|^r\b/i, units: { m: 1, km: 1000 } },
+  { key: 'shift', label: 'shift to the left', unit: 'mm', pointer: '/contact/lateral_shift_mm', factor: 1, title: /shift|displacement|^y\b/i, units: { mm: 1, cm: 10, m: 1000 } },
+  { key: 'yaw', label: 'angle of attack', unit: 'mrad', pointer: '/contact/yaw_rad', factor: 0.001, title: /yaw|angle|attack/i, units: { mrad: 1, rad: 1000, deg: 1000 * (Math.PI / 180), '°': 1000 * (Math.PI / 180) } },
+  { key: 'friction', label: 'friction μ', unit: '', pointer: '/friction/coefficient', factor: 1, title: /friction|^mu\b|^μ/i, units: { '%': 0.01 } },
 ]);
 /** @typedef {typeof COLUMNS[number]['key']} ColumnKey */
-/** Units in titles of tables, in the unit that is shown. @type {Record<string, number>} */
-const UNITS = { n: 0.001, kn: 1, t: 9.80665, mm: 1, m: 1000, rad: 1000, mrad: 1, deg: 1000 * (Math.PI / 180), '°': 1000 * (Math.PI / 180) };
+/** @typedef {Record<ColumnKey, string>} Row */
 
 /** Rows of a traffic that are written by hand. */
 export const ROWS_MAX = 24;
+const DIGITS = 12;
+const rounded = (/** @type {number} */ value) => Number(value.toPrecision(DIGITS));
+
+/** The unit at the end of a title, as `[kN]`, `/ kN` or `_kn`. @param {string} title @param {Record<string, number>} units */
+function unitOf(title, units) {
+  const end = title.toLowerCase().replaceAll('_per_', '/').replace(/[\])\s]+$/, '');
+  return Object.keys(units).find((unit) => end.endsWith(unit) && !/[a-z]/.test(end.at(-1 - unit.length) ?? ' '));
+}
 
 /**
- * A table of a traffic: its first row has titles such as `Q [kN]`, `shift / mm`, `passes`, or JSON pointers.
+ * A table of a traffic: its first row has titles such as `Q [kN]`, `shift / mm`, `passes`, or JSON pointers. Columns of text and those of other titles are left out.
  * @param {string} text
  * @returns {Table | string} Or what is wrong with it.
  */
 export function parseTraffic(text) {
   const lines = text.split(/\r\n?|\n/).filter((line) => line.trim() && !/^\s*[#%]/.test(line));
   const mark = lines[0]?.includes(';') ? ';' : lines[0]?.includes('\t') ? '\t' : ',';
-  const [titles = [], ...rows] = lines.map((line) => line.split(mark).map((cell) => cell.trim()));
+  const [titles = [], ...rows] = lines.map((line) => line.split(mark).map((cell) => cell.trim().replace(/^"(.*)"$/, '$1')));
   if (!rows.length) return 'the table needs a row of titles and rows of numbers';
-  /** @type {Record<string, number[]>} */
-  const columns = {};
-  let passes = null;
+  /** @type {Table} */
+  const table = { rows: rows.length, values: {}, others: {}, unused: [] };
   for (const [place, title] of titles.entries()) {
-    const values = rows.map((row) => Number(mark === ',' ? row[place] : row[place]?.replace(',', '.')));
-    const wrong = values.findIndex((value, row) => !Number.isFinite(value) || !rows[row][place]);
-    const known = COLUMNS.find((column) => column.title.test(title));
-    const pointer = title.startsWith('/') ? title : known?.pointer;
-    if (pointer === undefined) return `the column “${title}” is not known; known are ${COLUMNS.map(({ label }) => label).join(', ')}, and JSON pointers of the case`;
+    const pointer = title.startsWith('/');
+    const known = COLUMNS.find((column) => (pointer ? column.pointer === title : column.title.test(title)));
+    const cells = rows.map((row) => row[place] ?? '');
+    // A row without a radius is on straight track.
+    const values = cells.map((cell) => (cell === '' && known?.key !== 'radius' ? NaN : Number(mark === ',' ? cell : cell.replace(',', '.'))));
+    const wrong = values.findIndex((value) => !Number.isFinite(value));
+    const text = wrong >= 0 && values.every((value) => !Number.isFinite(value));
+    if (text || (!known && !pointer) || (known && known.key in table.values)) {
+      table.unused.push(title);
+      continue;
+    }
     if (wrong >= 0) return `row ${wrong + 1} of “${title}” is no number`;
-    const unit = /[[(/]\s*([a-zA-Z°]+)\s*[\])]?\s*$/.exec(title.startsWith('/') ? '' : title)?.[1].toLowerCase();
-    const own = /_n$/.test(title) ? 0.001 : /_rad$/.test(title) ? 1000 : unit ? UNITS[unit] : 1;
+    if (pointer || !known) {
+      if (known && known.key !== 'radius') table.values[known.key] = values.map((value) => value / known.factor);
+      else table.others[title] = values;
+      continue;
+    }
+    const unit = unitOf(title, known.units);
+    const stated = /[[(]\s*([^\])]+?)\s*[\])]\s*$/.exec(title)?.[1];
+    if (!unit && stated && stated !== '-') return `the unit ${stated} of “${title}” is not known`;
     // A wheel carries half of an axle load.
-    const half = known?.key === 'load' && /axle/i.test(title) ? 0.5 : 1;
-    if (own === undefined) return `the unit ${unit} of “${title}” is not known`;
-    const scaled = title.startsWith('/') || !known ? values : values.map((value) => value * own * half * known.factor);
-    if (pointer === '') passes = scaled;
-    else columns[pointer] = scaled;
+    const factor = (unit ? /** @type {Record<string, number>} */ (known.units)[unit] : 1) * (known.key === 'load' && /axle/i.test(title) ? 0.5 : 1);
+    table.values[known.key] = values.map((value) => value * factor);
   }
-  return { rows: rows.length, columns, passes };
+  const known = Object.keys(table.values).length + Object.keys(table.others).length;
+  return known ? table : `no column of the table is known: ${COLUMNS.map(({ label }) => label).join(', ')}, or JSON pointers of the case`;
+}
+
+/** Is a text that was dropped a table of a traffic? A cross-section with titles has at most a y. @param {string} text */
+export function isTraffic(text) {
+  const table = parseTraffic(text);
+  return typeof table === 'string' ? /^row \d|^the unit/.test(table) : Object.keys(table.values).length + Object.keys(table.others).length > 1;
 }
 
 /**
  * The columns of the rows that were written, or of the table; those without any value are left to the case.
- * @param {{ rows: readonly Record<ColumnKey, string>[], table: Table | null }} form
+ * @param {{ rows: readonly Row[], table: Table | null }} form
+ * @param {number} speed That of the case, in mm/s, for radii without a speed.
  */
-export function trafficOf({ rows, table }) {
-  if (table) return { columns: table.columns, ...(table.passes ? { passes: table.passes } : {}) };
+export function trafficOf({ rows, table }, speed) {
+  const written = (/** @type {ColumnKey} */ key) => {
+    const values = rows.map((row) => parse(row[key]) ?? null);
+    return values.every((value) => value === null) ? undefined : values;
+  };
+  const valuesOf = (/** @type {ColumnKey} */ key) => /** @type {JsonValue[] | undefined} */ (table ? table.values[key] : written(key));
+  const speeds = valuesOf('speed');
+  /** @type {(value: JsonValue, row: number) => JsonValue} */
+  const rateOf = (value, row) => {
+    const own = speeds?.[row];
+    return value === null || value === 0 ? 0 : typeof value === 'number' ? rounded((typeof own === 'number' ? own / 0.0036 : speed) / value / 1000) : value;
+  };
   /** @type {Record<string, JsonValue[]>} */
-  const columns = {};
-  /** @type {JsonValue[]} */
-  let passes = [];
+  const columns = { ...table?.others };
   for (const { key, pointer, factor } of COLUMNS) {
-    const values = rows.map((row) => parse(row[key], factor) ?? null);
-    if (values.every((value) => value === null)) continue;
-    if (pointer) columns[pointer] = values;
-    else passes = values;
+    const values = valuesOf(key);
+    if (values && pointer) columns[pointer] = values.map((value, row) => (key === 'radius' ? rateOf(value, row) : typeof value === 'number' ? rounded(value * factor) : value));
   }
-  return { columns, ...(passes.length ? { passes } : {}) };
+  const passes = valuesOf('passes');
+  return { columns, ...(passes ? { passes } : {}) };
+}
+
+/**
+ * The table of a traffic that was computed.
+ * @param {Record<string, number[]>} columns
+ * @param {number[] | undefined} passes
+ * @param {number} speed That of the case, in mm/s.
+ * @returns {Table}
+ */
+export function tableOf(columns, passes, speed) {
+  const { values, others, rows } = /** @type {Table} */ ({ rows: Math.max(...Object.values(columns).map((column) => column.length)), values: passes ? { passes } : {}, others: {} });
+  for (const [pointer, column] of Object.entries(columns)) {
+    const known = COLUMNS.find((each) => each.pointer === pointer);
+    if (!known) others[pointer] = column;
+    else if (known.key !== 'radius') values[known.key] = column.map((value) => rounded(value / known.factor));
+    else values.radius = column.map((rate, row) => (rate === 0 ? 0 : rounded((columns['/motion/wheelset/speed_mm_per_s']?.[row] ?? speed) / rate / 1000)));
+  }
+  return { rows, values, others, unused: [] };
+}
+
+/** The rows of a table, to be changed by hand; null for more than fit, and for other columns. @param {Table} table @returns {Row[] | null} */
+export function rowsOf({ rows, values, others }) {
+  if (rows > ROWS_MAX || Object.keys(others).length) return null;
+  const text = (/** @type {ColumnKey} */ key, /** @type {number} */ row) => {
+    const value = values[key]?.[row];
+    return value === undefined || (key === 'radius' && value === 0) ? '' : String(value);
+  };
+  return Array.from({ length: rows }, (_, row) => /** @type {Row} */ (Object.fromEntries(COLUMNS.map(({ key }) => [key, text(key, row)]))));
 }

@@ -1,6 +1,7 @@
 // A wheelset: a slider of its shift that moves both wheels, what it does as a rigid body, and the positions that were solved.
 
 import { html, nothing } from '../vendor/lit-html.js';
+import { drawChart } from './drawing/axes.js';
 import { APART_MM, drawWheelset } from './drawing/wheelset.js';
 import { WINDOWS } from './en15302.js';
 import { fixed, number } from './format.js';
@@ -23,6 +24,8 @@ import { againstWindow, KINDS, nearest, wheelsetCurve } from './wheelsetdata.js'
 const SIDES = /** @type {const} */ (['left', 'right']);
 /** Contact lines are drawn at multiples of this shift, in mm. */
 const LINES_MM = 0.5;
+/** Values of a curve on paper up to which error bars do not touch each other. */
+const SHIFTS_WITH_BARS = 40;
 /** The amplitude of vehicle acceptance, in mm. */
 const ACCEPTANCE_MM = 3;
 
@@ -43,7 +46,29 @@ export function wheelsetPanel(app, looked, wheelset) {
   return html`<section class="panel wheelset" aria-labelledby="h-wheelset"><header class="bar"><h2 id="h-wheelset">Wheelset and conicity</h2>
       <p class="hint">${headline(kinematics)}</p></header>
     <div class="two pad">${shiftPart(app, looked, moving)}${curvePart(app, looked, wheelset, kinematics, moving)}</div>
+    ${paperPart(looked, wheelset, kinematics, moving)}
     ${positionTable(app, positions, chosen)}</section>`;
+}
+
+/** @type {{ wheelset: Wheelset, window: string, there: number, part: unknown } | null} */
+let printed = null;
+
+/** What the screen shows one after another: contact lines and all curves, for paper. @param {Looked} looked @param {Wheelset} wheelset @param {Kinematics} kinematics @param {Shifting} moving */
+function paperPart(looked, wheelset, kinematics, moving) {
+  const { window, wheels } = looked;
+  const there = SIDES.filter((side) => wheels[side]).length;
+  if (printed?.wheelset !== wheelset || printed.window !== window || printed.there !== there) {
+    const charts = KINDS.flatMap(([kind, name]) => {
+      const curve = wheelsetCurve(kinematics, kind, window);
+      if (!curve) return [];
+      const lines = curve.lines.map(({ label, colour, y, error }, at) => ({
+        label, look: colour === '--bad' ? 'limit' : ['one', 'two', 'three'][at], errors: curve.x.length > SHIFTS_WITH_BARS ? undefined : error, points: curve.x.map((x, place) => /** @type {[number, number]} */ ([x, y[place]])),
+      }));
+      return [drawChart({ name, x: curve.xLabel, y: curve.yLabel, lines: lines.filter(({ points }) => points.some(([, y]) => Number.isFinite(y))) })];
+    });
+    printed = { wheelset, window, there, part: html`<div class="paper pad" aria-hidden="true">${drawWheelset(sidesOf(looked, { ...moving, apart: true }), true, 0, false)}<div>${charts}</div></div>` };
+  }
+  return printed.part;
 }
 
 /** Conicity of vehicle acceptance, and where the wheelset rolls in balance. @param {Kinematics} kinematics */
@@ -68,11 +93,14 @@ function shiftPart(app, looked, moving) {
   return html`<div class="shifting">
     <div class="segs" role="group" aria-label="Picture of the wheelset">${parts.map(([on, label]) => html`<label class="seg">
       <input type="radio" name="apart" .checked=${apart === on} @change=${show(on)}><span>${label}</span></label>`)}</div>
-    ${drawWheelset(Object.fromEntries(SIDES.flatMap((side) => (looked.wheels[side] ? [[side, drawnSide(looked, moving, side)]] : []))), apart, shifts[at], isBent(looked.document))}
+    ${drawWheelset(sidesOf(looked, moving), apart, shifts[at], isBent(looked.document))}
     <label class="slide"><span>Shift to the left <output>${fixed(shifts[at], 1)} mm, Δr ${fixed(kinematics.radius_difference_mm[at], 3)} mm</output></span>
       <input type="range" min="0" max=${shifts.length - 1} .value=${String(at)} @input=${move}></label>
     ${carriedTable(moving)}</div>`;
 }
+
+/** The sides whose cross-sections are there. @param {Looked} looked @param {Shifting} moving */
+const sidesOf = (looked, moving) => Object.fromEntries(SIDES.flatMap((side) => (looked.wheels[side] ? [[side, drawnSide(looked, moving, side)]] : [])));
 
 /** @param {Looked} looked @param {Shifting} moving @param {Side} side */
 function drawnSide(looked, { kinematics, at, apart, pressed }, side) {

@@ -1,12 +1,15 @@
 // What drawings share: paths, and lines of a grid with their numbers.
 
-import { svg } from '../../vendor/lit-html.js';
+import { nothing, svg } from '../../vendor/lit-html.js';
 import { tickLabel, ticks } from '../format.js';
 
 /** @typedef {readonly [number, number]} Point */
 
-/** @param {readonly Point[]} points In pixels. */
-export const path = (points) => points.map(([x, y], place) => `${place ? 'L' : 'M'}${x.toFixed(2)} ${y.toFixed(2)}`).join('');
+/** A line with gaps where a value is missing. @param {readonly Point[]} points In pixels. */
+export const path = (points) => points.map(([x, y], place) => {
+  if (!Number.isFinite(y)) return '';
+  return `${place && Number.isFinite(points[place - 1][1]) ? 'L' : 'M'}${x.toFixed(2)} ${y.toFixed(2)}`;
+}).join('');
 
 /**
  * @typedef {object} Axes
@@ -50,8 +53,10 @@ export function grid(axes, labels) {
 /**
  * @typedef {object} ChartLine
  * @property {string} label
- * @property {string} look Its class: `one`, `two`, `three` or `limit`.
+ * @property {string} look Its class: `one`, `two`, `three` or `limit`; with `solid` or `dashed`.
  * @property {readonly Point[]} points
+ * @property {readonly (number | null)[]} [errors] Of the points: half the length of their bars.
+ * @property {readonly [readonly Point[], readonly Point[]]} [band] Its edges.
  */
 
 /**
@@ -63,23 +68,38 @@ export function grid(axes, labels) {
  * @property {readonly [number, number]} [xRange]
  * @property {readonly [number, number]} [yRange] Bottom and top.
  * @property {readonly { at: Point, label: string }[]} [marks]
+ * @property {{ x: number, pick: (x: number) => void }} [chosen] The place that is looked at; a click chooses another.
  */
 
-const CHART = { width: 460, height: 290 };
+/** The height is that above the legend. */
+const CHART = { width: 460, height: 268 };
+/** A character of the legend, and the line before it, in pixels. */
+const LEGEND = { character: 6.4, before: 34, row: 18 };
+const CAP = 3;
 
 /** Lines over two axes with their legend. @param {Chart} chart */
-export function drawChart({ name, x, y, lines, xRange, yRange, marks = [] }) {
-  const all = [...lines.flatMap(({ points }) => points), ...marks.map((mark) => mark.at)];
+export function drawChart({ name, x, y, lines, xRange, yRange, marks = [], chosen }) {
+  const all = [...lines.flatMap(({ points, band = [] }) => [points, ...band].flat()), ...marks.map((mark) => mark.at)].filter((point) => point.every(Number.isFinite));
   const axes = {
-    left: 56, right: CHART.width - 14, top: 26, bottom: CHART.height - 62,
+    left: 56, right: CHART.width - 14, top: 26, bottom: CHART.height - 40,
     x: xRange ?? rangeOf(all.map((point) => point[0])), y: yRange ?? rangeOf(all.map((point) => point[1])),
   };
   const T = scaleOf(axes);
   const box = `${axes.left} ${axes.top} ${axes.right - axes.left} ${axes.bottom - axes.top}`;
-  return svg`<svg class="drawing chart" viewBox=${`0 0 ${CHART.width} ${CHART.height}`} role="img" aria-label=${name}>
+  const named = lines.filter(({ label }) => label);
+  const columns = Math.max(1, Math.min(named.length, Math.floor((CHART.width - 56) / (LEGEND.before + LEGEND.character * Math.max(...named.map(({ label }) => label.length))))));
+  const height = CHART.height + LEGEND.row * Math.ceil(named.length / columns) + 4;
+  const pick = (/** @type {MouseEvent} */ event) => {
+    const { left, width } = /** @type {SVGElement} */ (event.currentTarget).getBoundingClientRect();
+    const at = ((event.clientX - left) / width) * CHART.width;
+    chosen?.pick(axes.x[0] + ((at - axes.left) / (axes.right - axes.left)) * (axes.x[1] - axes.x[0]));
+  };
+  return svg`<svg class="drawing chart" viewBox=${`0 0 ${CHART.width} ${height}`} role="img" aria-label=${name} @click=${chosen ? pick : nothing}>
     ${grid(axes, { x, y, columns: 6, rows: 5 })}
     <svg x=${axes.left} y=${axes.top} width=${axes.right - axes.left} height=${axes.bottom - axes.top} viewBox=${box}>
-      ${lines.map(({ look, points }) => svg`<path class=${`line ${look}`} d=${path(points.map(T))}/>`)}
+      ${lines.map(({ look, band }) => (band ? svg`<path class=${`band ${look}`} d=${`${path(band[0].map(T))}${path([...band[1]].reverse().map(T)).replace('M', 'L')}Z`}/>` : nothing))}
+      ${chosen ? svg`<path class="chosen" d=${`M${T([chosen.x, 0])[0]} ${axes.top}V${axes.bottom}`}/>` : nothing}
+      ${lines.map(({ look, points, errors }) => svg`<path class=${`line ${look}`} d=${path(points.map(T))}/>${errors ? svg`<path class=${`line bars ${look}`} d=${bars(points, errors, T)}/>` : nothing}`)}
     </svg>
     ${marks.map(({ at, label }, order) => {
       const [px, py] = T(at);
@@ -87,16 +107,18 @@ export function drawChart({ name, x, y, lines, xRange, yRange, marks = [] }) {
       const right = px > CHART.width * 0.8 || (px > CHART.width * 0.2 && order % 2 === 1);
       return svg`<g class="mark"><circle cx=${px} cy=${py} r="5"/><text x=${px + (right ? -9 : 9)} y=${py < axes.top + 14 ? py + 18 : py - 6} text-anchor=${right ? 'end' : 'start'}>${label}</text></g>`;
     })}
-    ${legend(lines.filter(({ label }) => label))}
+    ${named.map(({ label, look }, at) => {
+      const [left, bottom] = [56 + (at % columns) * ((CHART.width - 56) / columns), CHART.height + 12 + LEGEND.row * Math.floor(at / columns)];
+      return svg`<g class="legend"><path class=${`line ${look}`} d=${`M${left} ${bottom - 4}h22`}/><text x=${left + 28} y=${bottom}>${label}</text></g>`;
+    })}
   </svg>`;
 }
 
-/** @param {readonly ChartLine[]} lines */
-function legend(lines) {
-  const width = (CHART.width - 56) / Math.max(1, lines.length);
-  return lines.map(({ label, look }, at) => svg`<g class="legend">
-    <path class=${`line ${look}`} d=${`M${56 + at * width} ${CHART.height - 12}h22`}/><text x=${84 + at * width} y=${CHART.height - 8}>${label}</text></g>`);
-}
+/** Bars of errors with caps. @param {readonly Point[]} points @param {readonly (number | null)[]} errors @param {(point: Point) => Point} T */
+const bars = (points, errors, T) => points.map(([x, y], at) => {
+  const [[px, low], [, high]] = [T([x, y - (errors[at] ?? 0)]), T([x, y + (errors[at] ?? 0)])];
+  return errors[at] ? `M${px} ${low}V${high}M${px - CAP} ${low}h${2 * CAP}M${px - CAP} ${high}h${2 * CAP}` : '';
+}).join('');
 
 /** From the least to the largest value, with 0. @param {readonly number[]} values @returns {[number, number]} */
 function rangeOf(values) {

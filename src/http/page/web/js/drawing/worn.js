@@ -11,19 +11,29 @@ import { grid, path, scaleOf } from './axes.js';
  * @property {readonly Point[]} now
  * @property {readonly Point[]} low The edges of the band.
  * @property {readonly Point[]} high
- * @property {readonly { at: Point, size: number }[]} contacts Places and shares of the load.
+ * @property {readonly WornContact[]} contacts
  */
 
+/**
+ * @typedef {object} WornContact
+ * @property {Point} at
+ * @property {Point} normal Into the body.
+ * @property {number} size Its share of the load.
+ * @property {number} pressure The largest, in MPa.
+ */
+
+/** The radius of all of the load, and the length of the largest pressure, in pixels. */
 const LARGEST = 15;
+const NEEDLE = 60;
 const LOOKS = ['one', 'two'];
 
-/** @param {{ name: string, start: readonly Point[], shapes: readonly WornShape[] }} of */
-export function drawWorn({ name, start, shapes }) {
+/** @param {{ name: string, start: readonly Point[], strongest: number, shapes: readonly WornShape[] }} of `strongest`: the pressure of the longest needle, in MPa. */
+export function drawWorn({ name, start, strongest, shapes }) {
   // Text keeps its size: on a narrow screen the picture is smaller.
   const width = Math.min(1150, Math.max(420, innerWidth - 40));
   const all = [...start, ...shapes.flatMap(({ now }) => now)];
   const [ys, zs] = [all.map(([y]) => y), all.map(([, z]) => z)];
-  const [y0, y1, z0, z1] = [Math.min(...ys) - 4, Math.max(...ys) + 4, Math.min(...zs) - 3, Math.max(...zs) + 4];
+  const [y0, y1, z0, z1] = [Math.min(...ys) - 4, Math.max(...ys) + 4, Math.min(...zs) - 3, Math.max(...zs) + 5];
   const scale = (width - 66) / (y1 - y0);
   const bottom = 26 + (z1 - z0) * scale;
   const axes = { left: 50, right: width - 16, top: 26, bottom, x: /** @type {const} */ ([y0, y1]), y: /** @type {const} */ ([z0, z1]) };
@@ -36,7 +46,11 @@ export function drawWorn({ name, start, shapes }) {
     ${shapes.map((shape, at) => svg`<path class=${`band ${LOOKS[at]}`} d=${band(shape)}/>`)}
     <path class="line start" d=${path(start.map(T))}/>
     ${shapes.map(({ now }, at) => svg`<path class=${`line ${LOOKS[at]}`} d=${path(now.map(T))}/>`)}
-    ${shapes.map(({ contacts }, side) => contacts.map(({ at, size }) => svg`<circle class=${`touch ${LOOKS[side]}`} cx=${T(at)[0]} cy=${T(at)[1]} r=${LARGEST * Math.sqrt(size)}/>`))}
+    ${shapes.map(({ contacts }, side) => contacts.map(({ at, normal: [y, z], size, pressure }) => {
+      const [px, py] = T(at);
+      const length = (NEEDLE * pressure) / strongest;
+      return svg`<g class=${`touch ${LOOKS[side]}`}><circle cx=${px} cy=${py} r=${LARGEST * Math.sqrt(size)}/><path d=${`M${px} ${py}l${-length * y} ${length * z}`}/></g>`;
+    }))}
     ${legend.map(({ look, label }, at) => svg`<g class="legend"><path class=${`line ${look === 'limit' ? 'start' : look}`} d=${`M${50 + at * legendWidth} ${bottom + 52}h22`}/><text x=${80 + at * legendWidth} y=${bottom + 56}>${label}</text></g>`)}
     ${shapes.length ? nothing : svg`<text x="60" y="60">nothing yet</text>`}
   </svg>`;
