@@ -80,8 +80,10 @@ test('jobs of batches do not hide those submitted alone, and several are deleted
   await row(page, 'part 399').waitFor();
   assert.equal(await row(page, 'alone').count(), 0);
   assert.match(await row(page, 'part 399').locator('.n').innerText(), /^(solved before)?$/);
-  await page.getByLabel('Show').selectOption('alone');
+  await page.getByLabel('Show').selectOption({ label: 'single jobs' });
   await row(page, 'alone one').waitFor();
+  const { total } = await service.ask('/v1/jobs?batch=none&limit=1');
+  assert.equal(await page.locator('#h-jobs').innerText(), `Jobs ${total}`);
   // The list is searched while it is written.
   await page.getByLabel('Name').pressSequentially('alone t');
   await row(page, 'alone one').waitFor({ state: 'detached' });

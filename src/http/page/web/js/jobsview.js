@@ -5,7 +5,7 @@ import { cancel, download } from './api.js';
 import { isThere, removeLater } from './deleting.js';
 import { ago, count, seconds } from './format.js';
 import { COMPARED_MAX, mark, marked, toggleMark } from './marks.js';
-import { filterQueue, isLoadingMore, isNearEnd, jobsShown, loadMore, queueSeen, refreshSoon } from './queue.js';
+import { filterQueue, isNearEnd, jobsShown, loadMore, queueSeen, refreshSoon } from './queue.js';
 import { formatRoute } from './routes.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -28,9 +28,7 @@ export function jobsView(app) {
   const newest = [...queue.batches.values()].filter(isThere).sort((one, two) => (one.id < two.id ? 1 : -1));
   // Those that go on are always in sight; of the others the newest few.
   const shown = newest.filter((batch, at) => !batch.ended || at < ENDED_SHOWN);
-  const counted = queue.shown === 'all' || queue.batch !== '';
-  const more = queue.cursor !== '' && (!counted || queue.more);
-  const number = queue.loaded ? html` <span class="quiet n">${count(Math.max(counted ? queue.total : 0, jobs.length))}${more ? ' or more' : ''}</span>` : nothing;
+  const number = queue.loaded ? html` <span class="quiet n">${count(Math.max(queue.total, jobs.length))}${queue.more ? ' or more' : ''}</span>` : nothing;
   return html`<h1 class="visually-hidden">Jobs</h1>
     ${shown.map((batch) => batchPanel(app, batch))}
     <section class="panel jobs" aria-labelledby="h-jobs">
@@ -66,12 +64,13 @@ function filters(app) {
   };
   const toggle = (/** @type {string} */ state) => () =>
     filterQueue(app, { states: queue.states.includes(state) ? queue.states.filter((other) => other !== state) : [...queue.states, state] });
-  const show = (/** @type {Event} */ event) => filterQueue(app, { shown: /** @type {HTMLSelectElement} */ (event.target).value === 'all' ? 'all' : 'alone', batch: '' });
+  const show = (/** @type {Event} */ event) => filterQueue(app, { batch: /** @type {HTMLSelectElement} */ (event.target).value });
   const batch = queue.batches.get(queue.batch);
+  const one = queue.batch !== '' && queue.batch !== 'none';
   return html`<label class="inline">Show <select class="slim" @change=${show}>
-      ${queue.batch ? html`<option value="" selected>jobs of ${batch?.name || 'one batch'}</option>` : nothing}
-      <option value="alone" ?selected=${!queue.batch && queue.shown === 'alone'}>single jobs</option>
-      <option value="all" ?selected=${!queue.batch && queue.shown === 'all'}>all, with those of batches</option></select></label>
+      ${one ? html`<option value=${queue.batch} selected>jobs of ${batch?.name || 'one batch'}</option>` : nothing}
+      <option value="none" ?selected=${queue.batch === 'none'}>single jobs</option>
+      <option value="" ?selected=${!queue.batch}>all, with those of batches</option></select></label>
     <div class="segs" role="group" aria-label="States">${STATES.map((state) => html`<label class="seg">
       <input type="checkbox" .checked=${queue.states.includes(state)} @change=${toggle(state)}><span>${state}</span></label>`)}</div>
     <label class="inline">Name <input class="search" placeholder="part of it" .value=${queue.name} @input=${text('name')}></label>
@@ -125,8 +124,6 @@ function list(app, jobs) {
     ${queue.loaded && !jobs.length && !queue.cursor ? html`<p class="quiet pad">No jobs${queue.states.length ? ` that are ${queue.states.join(' or ')}` : ''}${queue.name ? ` with “${queue.name}” in their names` : ''}${queue.label ? ` with the label ${queue.label}` : ''}.
       <a href="#/compose">Start one.</a></p>` : nothing}
     ${queue.loaded ? nothing : html`<p class="quiet pad">Loading …</p>`}
-    ${queue.loaded && queue.cursor && jobs.length * ROW < height ? html`<p class="pad quiet">${isLoadingMore() ? 'Looking for jobs older than those of batches …'
-      : html`<button class="small" @click=${() => loadMore(app)}>Look further back</button>`}</p>` : nothing}
   </div>`;
 }
 

@@ -19,8 +19,7 @@ import { isTyped } from './typed.js';
  * @property {string[]} states Only jobs in one of these; none for all.
  * @property {string} label Only jobs with this label, `key:value`; empty for all.
  * @property {string} name Only jobs whose name contains this.
- * @property {'alone' | 'all'} shown Only jobs that were submitted alone, or those of batches too.
- * @property {string} batch Only jobs of this batch; empty for all.
+ * @property {string} batch Only jobs of this batch; `none` for those that were submitted alone, empty for all.
  * @property {Map<string, Batch>} batches
  * @property {import('./api.js').Schemas['Me'] | null} me Who asks, and what is used.
  * @property {number} top Pixels that the list is scrolled by.
@@ -29,9 +28,6 @@ import { isTyped } from './typed.js';
 const PAGE = 200;
 const MORE = 1000;
 const BATCHES = 20;
-/** Jobs that fill the list, and jobs among which they are searched by themselves. */
-const FILLED = 60;
-const SEARCHED_MAX = 20_000;
 /** Events of batches say nothing of their jobs: these are looked at again, but not more often than this. */
 const REFRESH_MS = 1000;
 /** What was deleted elsewhere is told by no event. */
@@ -39,7 +35,7 @@ const SELDOM_MS = 20_000;
 
 /** @type {Queue} */
 const queue = {
-  jobs: [], cursor: '', loaded: false, total: 0, more: false, states: [], label: '', name: '', shown: 'alone', batch: '', batches: new Map(), me: null, top: 0,
+  jobs: [], cursor: '', loaded: false, total: 0, more: false, states: [], label: '', name: '', batch: 'none', batches: new Map(), me: null, top: 0,
 };
 let stopping = new AbortController();
 let seldom = 0;
@@ -47,12 +43,10 @@ let soon = 0;
 let turn = 0;
 let loadingMore = false;
 
-export const isLoadingMore = () => loadingMore;
-
 export const queueSeen = () => queue;
 
-/** The jobs of the list: without those that are being deleted, and without rows of batches where these are not wanted. */
-export const jobsShown = () => queue.jobs.filter((job) => isThere(job) && (queue.shown === 'all' || queue.batch !== '' || !job.batch_id));
+/** The jobs of the list, without those that are being deleted. */
+export const jobsShown = () => queue.jobs.filter(isThere);
 
 /** Shows the lists, and follows everything of the tenant in one stream. @param {App} app */
 export function startQueue(app) {
@@ -113,13 +107,8 @@ async function refresh(app) {
   }
 }
 
-/** Loads more where rows of batches leave too few others, or the list is scrolled to its end. @param {App} app */
-function fill(app) {
-  if (!queue.cursor) return;
-  if (jobsShown().length < FILLED && queue.jobs.length < SEARCHED_MAX) loadMore(app);
-  // The list is as high as its rows after the next frame.
-  else requestAnimationFrame(() => isNearEnd(document.querySelector('.list')) && loadMore(app));
-}
+/** Loads more where the list is scrolled to its end; it is as high as its rows after the next frame. @param {App} app */
+const fill = (app) => requestAnimationFrame(() => isNearEnd(document.querySelector('.list')) && loadMore(app));
 
 /** Pixels before the end of the list at which the next page is loaded. */
 const AHEAD = 40 * 44;
@@ -139,7 +128,7 @@ export function refreshSoon(app, pause = 0) {
 function takeJob(app, job) {
   if (isTyped(job)) return;
   const known = queue.jobs.some(({ id }) => id === job.id);
-  const filtered = queue.states.length || queue.label || queue.name || queue.batch;
+  const filtered = queue.states.length || queue.label || queue.name || (queue.batch && queue.batch !== 'none');
   if (known && !filtered) {
     queue.jobs = queue.jobs.map((other) => (other.id === job.id ? job : other));
     app.redraw();
@@ -153,7 +142,7 @@ function takeBatch(app, batch) {
   refreshSoon(app, REFRESH_MS);
 }
 
-/** @param {App} app @param {Partial<Pick<Queue, 'states' | 'label' | 'name' | 'shown' | 'batch'>>} wanted */
+/** @param {App} app @param {Partial<Pick<Queue, 'states' | 'label' | 'name' | 'batch'>>} wanted */
 export function filterQueue(app, wanted) {
   turn += 1;
   Object.assign(queue, wanted, { jobs: [], cursor: '', loaded: false, top: 0 });
