@@ -69,6 +69,87 @@ test('nothing scrolls sideways on a small phone and a tablet, nor with text twic
   }
 });
 
+test('on paper a result fills one page and the conicity of a wheelset another, light and without what is pressed', async () => {
+  for (const [name, pages] of /** @type {const} */ ([['result-flange', 1], ['wheelset', 2]])) {
+    const [, hash, sign] = (await views()).find(([known]) => known === name) ?? [];
+    await onPage(`${hash}`, async (page) => {
+      await page.locator(`${sign}`).first().waitFor();
+      await drawn(page);
+      await page.waitForTimeout(400);
+      const pdf = await page.pdf({ preferCSSPageSize: true, printBackground: true });
+      assert.equal(pdf.toString('latin1').match(/\/Type\s*\/Page\b/g)?.length, pages, name);
+      await page.setViewportSize({ width: 718, height: 1046 });
+      await page.emulateMedia({ media: 'print' });
+      await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
+      assert.equal(await page.evaluate(() => getComputedStyle(document.querySelector('main h1') ?? document.body).color), 'rgb(19, 25, 31)', 'ink on paper');
+      for (const gone of ['nav', '.downloads', '.foot', '.bar button']) assert.equal(await page.locator(gone).filter({ visible: true }).count(), 0, `${gone} of ${name}`);
+      if (name === 'wheelset') {
+        for (const chart of ['Δr', 'Contact angles', 'Conicity']) await page.locator(`.paper svg[aria-label="${chart}"]`).waitFor();
+        assert.ok((await page.locator('.paper .touching').count()) > 20, 'contact lines');
+        const { height = Infinity, y = 0 } = (await page.locator('.panel.wheelset').boundingBox()) ?? {};
+        assert.ok(y + height < 1046, `the conicity ends ${y + height} px down a page of 1046`);
+      }
+      await page.screenshot({ path: join(OUTPUT, `paper-${name}.png`), fullPage: true });
+      await page.evaluate(() => dispatchEvent(new Event('afterprint')));
+      assert.equal(await page.evaluate(() => document.documentElement.dataset.theme), 'dark', 'the screen stays dark');
+    }, { colorScheme: 'dark' });
+  }
+});
+
+test('every view has one heading of its own, names for all that is drawn, and regions that speak', async () => {
+  const all = await views();
+  await onPage('#/compose', async (page) => {
+    for (const [name, hash, sign] of all) {
+      await page.goto(`${service.base}/${hash}`);
+      await page.locator(sign).first().waitFor();
+      assert.equal(await page.locator('h1').count(), 1, `headings of ${name}`);
+      const nameless = await page.evaluate(() => [...document.querySelectorAll('main :is(svg[role="img"], section, [role="region"], [role="group"], input, select, button)')].filter((element) => {
+        const said = (/** @type {Iterable<Element | null>} */ elements) => [...elements].some((of) => of?.textContent?.trim());
+        const labels = /** @type {HTMLInputElement} */ (element).labels ?? [];
+        return !element.getAttribute('aria-label')?.trim() && !said([element, ...labels]) && !said((element.getAttribute('aria-labelledby') ?? '').split(' ').map((id) => document.getElementById(id)));
+      }).map((element) => element.outerHTML.slice(0, 120)));
+      assert.deepEqual(nameless, [], name);
+      assert.equal(await page.locator('.toast[role="status"][aria-live="polite"]').count(), 1);
+    }
+    // What changes is said: faults of a case, a deletion, the state of a forecast.
+    await page.goto(`${service.base}/#/compose`);
+    await page.locator('.verdict .checked').waitFor();
+    await page.getByLabel('Wheel load Q').fill('-1');
+    await page.locator('[role="status"] .faults').waitFor();
+    await page.goto(`${service.base}/#/jobs`);
+    await page.getByRole('button', { name: /^Delete UIC60/ }).first().click();
+    await page.locator('[role="status"]').filter({ hasText: /UIC60.*deleted/i }).waitFor();
+    await page.getByRole('button', { name: 'Undo' }).click();
+  });
+});
+
+test('by keys alone: from a case to its result, its crosshair, and the step of a forecast', async () => {
+  const [, forecast] = (await views()).find(([name]) => name === 'forecast') ?? [];
+  await onPage('#/compose', async (page) => {
+    /** Tab until something has the focus. @param {string} selector */
+    const tabTo = async (selector) => {
+      for (let step = 0; step < 120; step += 1) {
+        await page.keyboard.press('Tab');
+        if (await page.evaluate((which) => document.activeElement?.matches(which), selector)) return;
+      }
+      assert.fail(`no Tab leads to ${selector}`);
+    };
+    await page.locator('.verdict .checked').waitFor();
+    await page.keyboard.press('Control+Enter');
+    await drawn(page);
+    assert.equal(await page.evaluate(() => document.activeElement?.id), 'main', 'a new view begins at its main part');
+    await tabTo('field-map.main .over');
+    const before = await page.locator('field-map.main .readout').innerText();
+    await page.keyboard.press('Shift+ArrowRight');
+    await page.waitForFunction((text) => document.querySelector('field-map.main .readout')?.textContent !== text, before);
+    await page.goto(`${service.base}/${forecast}`);
+    await page.locator('svg.worn').waitFor();
+    await tabTo('.film input');
+    await page.keyboard.press('Home');
+    await page.locator('.film output').filter({ hasText: /^0 MGT/ }).waitFor();
+  });
+});
+
 test('the page is quick: first load, solving, drawing', () => onPage('#/compose', async (page) => {
   await page.locator('.verdict .good').waitFor();
   const loaded = await page.evaluate(() => performance.now());

@@ -23,10 +23,12 @@ export async function makeViews(service) {
   const base = await service.solved(withFields('wheel-rail'));
   const bent = await service.solved({ ...withFields('wheel-rail'), contact: { ...example('wheel-rail').contact, reference_surface: 'curve', lateral_shift_mm: -6 } });
   const wheelset = await service.solved(withFields('wheelset'));
-  const evolution = await service.ask('/v1/evolutions?name=two+million+tonnes', { json: {
+  const plan = {
     template: { ...example('wheel-rail'), outputs: undefined }, traffic: { columns: { '/load/vertical_force_n': [75_000, 90_000], '/contact/lateral_shift_mm': [0, -3] }, passes: [3, 1] },
     wearing: 'rail', extent: { mgt: 2 }, records: 4, limits: { height_mm: 0.01 },
-  } });
+  };
+  const evolution = await service.ask('/v1/evolutions?name=leave+it', { json: plan });
+  const lubricated = await service.ask('/v1/evolutions?name=lubricate&wait=60', { json: { ...plan, events: [{ at: 0.5, friction_coefficient: 0.1 }] } });
   return [
     ['compose', '#/compose', '.verdict .good'],
     ['result-flange', `#/jobs/${flange.id}`, 'svg .comb'],
@@ -39,6 +41,7 @@ export async function makeViews(service) {
     ['wheelset', `#/jobs/${wheelset.id}`, '.shifting .comb'],
     ['forecasts', '#/forecast', '.forecasts a'],
     ['forecast', `#/forecast/${evolution.id}`, 'svg.worn .touch'],
+    ['forecast-two', `#/forecast/${evolution.id}/${lubricated.id}`, '.decision'],
     ['line', `#/line/${batch.id}`, 'line-strips canvas'],
     ['run', `#/line/${run.id}?kind=run`, 'line-strips canvas'],
   ];

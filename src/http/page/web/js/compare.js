@@ -7,7 +7,7 @@ import { indexOf } from './field/cells.js';
 import { offered, quantityOf, rangeOf, valuesOf } from './field/quantities.js';
 import { COMPARED_MAX } from './marks.js';
 import { tellingPoint } from './result.js';
-import { placed } from './placing.js';
+import { onSameRail, placed } from './placing.js';
 import { formatRoute } from './routes.js';
 import { hasSections } from './starts.js';
 import { bestFit, wearBetween } from './wear.js';
@@ -184,22 +184,6 @@ export const frictionOf = ({ document }) => numberAt(document, '/friction/coeffi
 
 /** One range of colours for all sides. @param {Comparison} of @param {Quantity} quantity */
 export const rangeOfAll = ({ sides }, quantity) => rangeOf(quantity, sides.flatMap(({ field }) => (field ? [field.cells] : [])), NaN);
-
-/**
- * Where a place of one patch is in the other, if both lie on the same place of the rail.
- * @param {Side} one
- * @param {Side} two
- * @returns {((place: { x: number, y: number }) => { x: number, y: number }) | null} Null where the patches have no place.
- */
-export function onSameRail(one, two) {
-  const [first, second] = [one, two].map(({ result, patch }) => result.patches[patch].position);
-  if (!first || !second) return null;
-  const [handOne, handTwo] = [sideOf(one.document), sideOf(two.document)];
-  return ({ x, y }) => ({
-    x: x + first.track_mm[0] - second.track_mm[0],
-    y: outward(handTwo, first.rail_mm[0] + outward(handOne, y * Math.cos(first.contact_angle_rad)) - second.rail_mm[0]) / Math.cos(second.contact_angle_rad),
-  });
-}
 
 /**
  * The difference of two fields at the cells of the first, where both have a value.

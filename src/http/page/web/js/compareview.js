@@ -1,7 +1,7 @@
 // Compare: maps at one scale with one crosshair, the difference of two, their numbers against the errors, and what differs in the cases.
 
 import { html, nothing } from '../vendor/lit-html.js';
-import { chooseCompared, chooseSide, common, compared, equal, frictionOf, knownDifference, onSameRail, rangeOfAll, shapeOf, wearOf } from './compare.js';
+import { chooseCompared, chooseSide, common, compared, equal, frictionOf, knownDifference, rangeOfAll, shapeOf, wearOf } from './compare.js';
 import { drawChart, drawShapes } from './drawing/axes.js';
 import { at, differences } from './document.js';
 import { quantityOf } from './field/quantities.js';
@@ -112,7 +112,7 @@ function differencePanel(app, of) {
   const two = of.sides[of.other];
   const known = two && knownDifference(one, two, of.quantity, of.sameRail);
   if (!known) return nothing;
-  const placed = onSameRail(one, two) !== null;
+  const placed = [one, two].every(({ result, patch }) => result.patches[patch].position);
   const same = (/** @type {Event} */ event) => chooseCompared(app, { sameRail: /** @type {HTMLSelectElement} */ (event.target).value === 'rail' });
   const letter = LETTERS[of.other];
   const shown = { field: known.field, quantity: known.quantity, tallest: 320, name: `${letter} − A` };

@@ -194,7 +194,7 @@ function resultView(app, forecast) {
         <p class="hint">Band: 90 % of the scatter of the wear coefficients. Circles: where the traffic touches, their area the share of its load. Needles: the largest pressure there; the longest of all steps is ${number(strongest, 4)} MPa.</p></div>
       <div class="film"><button aria-label=${forecast.playing ? 'Stop the film' : 'Play as a film'} @click=${() => playFilm(app)}>${forecast.playing ? '❚❚' : '▶'}</button>
         <label class="slide"><span>Traffic <output>${number(distanceOf(record.progress), 4)} ${unit}${record.progress.wheel_distance_km !== undefined && unit !== 'km' ? `, wheel ${count(Math.round(record.progress.wheel_distance_km))} km` : ''}</output></span>
-          <input type="range" min="0" max=${first.records.length - 1} .value=${String(step)} @input=${(/** @type {Event} */ event) => chooseForecast(app, { step: Number(valueOf(event)) })}></label></div></section>
+          <input type="range" aria-label="Traffic" aria-valuetext=${`${number(distanceOf(record.progress), 3)} ${unit}`} min="0" max=${first.records.length - 1} .value=${String(step)} @input=${(/** @type {Event} */ event) => chooseForecast(app, { step: Number(valueOf(event)) })}></label></div></section>
     ${depthPanel(shapes, body, label, title)}
     <div class="two"><div class="aside">${over}${compared ? nothing : limitsPanel(answers, sides)}</div>${numbers}</div></div>`;
 }

@@ -1,6 +1,7 @@
 // Cross-sections of rail and wheel where the service places them, and the gap between the two.
 
-import { outward } from './wheelloads.js';
+import { isBent } from './starts.js';
+import { outward, sideOf } from './wheelloads.js';
 import { nearest } from './wheelsetdata.js';
 
 /** @typedef {import('./api.js').CheckedCase} CheckedCase */
@@ -119,4 +120,66 @@ export function placeOn(line, from, fromY, side, cant) {
     }
     return highest ?? line[nearest(ys, wanted)];
   };
+}
+
+/**
+ * Places over the surface of a patch, by the coordinate across the patch and the height over it: a plane, or the rail itself.
+ * @param {import('./api.js').Patch} patch
+ * @param {readonly Readonly<Place>[]} rail
+ * @param {boolean} bent
+ * @returns {((across: number, height: number) => Place) | null} Null for a patch without a place.
+ */
+export function surfaceOf({ position }, rail, bent) {
+  if (!position) return null;
+  const [, y0, z0] = position.origin_track_mm;
+  if (bent) return unfolded(rail, [y0, z0]);
+  const [cos, sin] = [Math.cos(position.contact_angle_rad), Math.sin(position.contact_angle_rad)];
+  return (across, height) => [y0 + across * cos - height * sin, z0 + across * sin + height * cos];
+}
+
+/** @typedef {Pick<import('./compare.js').Side, 'result' | 'patch' | 'document' | 'sections' | 'field'>} OnRail A patch of a result. */
+
+/** Places across the second patch among which that of a place of the first is found. */
+const SAMPLES = 400;
+
+/**
+ * Where a place of one patch is in the other, if both lie on the same place of the rail.
+ * @param {OnRail} one
+ * @param {OnRail} two
+ * @returns {((place: { x: number, y: number }) => { x: number, y: number }) | null} Null where the patches have no place.
+ */
+export function onSameRail(one, two) {
+  const [first, second] = [one, two].map(onRail);
+  if (!first || !second || !two.field) return null;
+  const ys = two.field.cells.y_mm;
+  const [low, high] = [Math.min(...ys) - 1, Math.max(...ys) + 1];
+  const places = Array.from({ length: SAMPLES + 1 }, (_, at) => low + ((high - low) * at) / SAMPLES);
+  const points = places.map(second.of);
+  /** Cells of a strip lie at one y. @type {Map<number, number>} */
+  const known = new Map();
+  return ({ x, y }) => {
+    if (!known.has(y)) {
+      const [py, pz] = first.of(y);
+      const distances = points.map(([qy, qz]) => Math.hypot(qy - py, qz - pz));
+      known.set(y, places[distances.indexOf(Math.min(...distances))]);
+    }
+    return { x: x + first.x - second.x, y: known.get(y) ?? NaN };
+  };
+}
+
+/** Points of the rail, y to the field side and z up, by the coordinate across a patch: along its plane, or along the rail. @param {OnRail} side */
+function onRail({ result, patch, document, sections }) {
+  const { position } = result.patches[patch];
+  if (!position) return null;
+  const [x, y0, z0] = position.origin_track_mm;
+  const hand = y0 > 0 ? 'left' : 'right';
+  /** @type {readonly Place[]} */
+  const rail = isBent(document) && sections ? sections.rail : [];
+  // The rail on the left is that on the right, mirrored.
+  const own = sideOf(document) === hand ? rail : rail.map(([y, z]) => /** @type {Place} */ ([-y, z]));
+  const surface = surfaceOf(result.patches[patch], own, own.length > 0);
+  return { x, of: (/** @type {number} */ across) => {
+    const [y, z] = surface ? surface(across, 0) : [y0, z0];
+    return /** @type {Place} */ ([outward(hand, y), z]);
+  } };
 }

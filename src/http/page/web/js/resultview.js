@@ -298,7 +298,7 @@ function curvePanel(app, looked, patch) {
       <input type="radio" name="curve" .checked=${looked.curve === kind} @change=${() => choose(app, { curve: kind })}><span>${label}</span></label>`)}</div></header>
     <creep-curve .shown=${{ curve, chosen: looked.point, pick }}></creep-curve>
     <label class="slide"><span>Motion <output>${at + 1} of ${curve.order.length}: ${curve.xLabel.split(' /')[0]} ${number(curve.x[at])}</output></span>
-      <input type="range" min="0" max=${curve.order.length - 1} .value=${String(at)} @input=${slide}></label>
+      <input type="range" aria-label="Motion" min="0" max=${curve.order.length - 1} .value=${String(at)} @input=${slide}></label>
     <details class="as-table"><summary>As a table</summary><div class="scroll" tabindex="0" role="region" aria-label="Values of the curve"><table>
       <thead><tr><th scope="col">${curve.xLabel}</th>${curve.lines.map((line) => html`<th scope="col">${line.label} / ${line.unit}</th><th scope="col">±</th>`)}</tr></thead>
       <tbody>${curve.x.map((x, place) => html`<tr><td>${number(x)}</td>${curve.lines.map((line) => html`<td>${number(line.y[place])}</td><td>${number(line.error[place], 2)}</td>`)}</tr>`)}</tbody></table></div></details>

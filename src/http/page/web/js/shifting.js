@@ -44,6 +44,8 @@ const SIDES = /** @type {const} */ (['left', 'right']);
 
 /** @type {Shifting | null} */
 let shifting = null;
+/** A look while the slider moves needs three digits. */
+const LOOK = { target_error: 0.01 };
 /** The shift that is being computed, or that is to be next. */
 let wanted = -1;
 let busy = false;
@@ -76,7 +78,7 @@ export function rollingWheel(document, side, { lateral_shift_mm: shifts, left, r
   const rolling = at(motion, '/wheelset/0') ?? at(motion, '/wheelset');
   const speed = numberAt(rolling, '/speed_mm_per_s') || 20000;
   const radius = (left.rolling_radius_mm[place] + right.rolling_radius_mm[place]) / 2;
-  const one = oneWheel(document, side, shifts[place]);
+  const one = { ...oneWheel(document, side, shifts[place]), solver: LOOK };
   return put(one, '/motion', isObject(rolling) || !isObject(motion) || 'sweep' in motion ? { wheelset: { speed_mm_per_s: speed, free_rolling_radius_mm: radius } } : motion);
 }
 

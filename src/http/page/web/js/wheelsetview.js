@@ -95,7 +95,7 @@ function shiftPart(app, looked, moving) {
       <input type="radio" name="apart" .checked=${apart === on} @change=${show(on)}><span>${label}</span></label>`)}</div>
     ${drawWheelset(sidesOf(looked, moving), apart, shifts[at], isBent(looked.document))}
     <label class="slide"><span>Shift to the left <output>${fixed(shifts[at], 1)} mm, Δr ${fixed(kinematics.radius_difference_mm[at], 3)} mm</output></span>
-      <input type="range" min="0" max=${shifts.length - 1} .value=${String(at)} @input=${move}></label>
+      <input type="range" aria-label="Shift to the left" aria-valuetext=${`${fixed(shifts[at], 1)} mm`} min="0" max=${shifts.length - 1} .value=${String(at)} @input=${move}></label>
     ${carriedTable(moving)}</div>`;
 }
 

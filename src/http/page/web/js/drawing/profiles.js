@@ -2,7 +2,7 @@
 
 import { html, nothing, svg } from '../../vendor/lit-html.js';
 import { degrees, number, tickLabel, ticks } from '../format.js';
-import { unfolded } from '../placing.js';
+import { surfaceOf } from '../placing.js';
 import { grid, path, scaleOf } from './axes.js';
 
 /** @typedef {import('../placing.js').Placed} Placed */
@@ -80,21 +80,6 @@ function aroundPatches({ rail }, standing) {
   const half = (0.5 + NEAR) * size;
   const top = Math.max(...zs) + 2.6 * TAG * half;
   return [[middle - half, middle + half], [Math.min(top - 1.1 * half, Math.min(...zs) - NEAR * half), top]];
-}
-
-/**
- * Places over the surface of a patch, by the coordinate across the patch and the height over it: a plane, or the rail itself.
- * @param {Patch} patch
- * @param {readonly Point[]} rail
- * @param {boolean} bent
- * @returns {((across: number, height: number) => Point) | null} Null for a patch without a place.
- */
-export function surfaceOf({ position }, rail, bent) {
-  if (!position) return null;
-  const [, y0, z0] = position.origin_track_mm;
-  if (bent) return unfolded(rail, [y0, z0]);
-  const [cos, sin] = [Math.cos(position.contact_angle_rad), Math.sin(position.contact_angle_rad)];
-  return (across, height) => [y0 + across * cos - height * sin, z0 + across * sin + height * cos];
 }
 
 /**

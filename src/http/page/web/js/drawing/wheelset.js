@@ -2,8 +2,8 @@
 
 import { html, nothing, svg } from '../../vendor/lit-html.js';
 import { fixed, number } from '../format.js';
+import { surfaceOf } from '../placing.js';
 import { path } from './axes.js';
-import { surfaceOf } from './profiles.js';
 
 /** @typedef {import('../placing.js').Place} Place */
 /** @typedef {import('../wheelloads.js').Side} Side */
