@@ -41,7 +41,7 @@ export function compose(app) {
               <button ?disabled=${busy} @click=${() => queue(app)}>Add to queue</button>
               <button class="primary" ?disabled=${busy} @click=${() => solve(app)}>${state.solving ? 'Solving …' : 'Solve'}<kbd>Ctrl ↵</kbd></button>
             </div></header>
-          <div class="figure">${state.document ? drawing(state, state.document) : nothing}</div>
+          <div class=${state.faults.length ? 'figure stale' : 'figure'}>${state.document ? drawing(state, state.document) : nothing}</div>
           <div class="verdict" role="status">${verdict(app, state)}</div>
           ${previewOf(app, state)}
         </section>

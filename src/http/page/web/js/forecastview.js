@@ -53,7 +53,7 @@ function formPanel(app, forecast) {
     <div class="two pad">
       <fieldset><legend>Rail and wheel</legend>${typeof template === 'string' ? html`<p class="fault">${template}</p>`
         : html`<p>${String(document?.name ?? 'The pair of the view Contact')}${names ? html` <span class="quiet">(${names})</span>` : nothing}</p>
-          ${document ? html`<div class="figure pair-drawing">${drawing(state, document)}</div>` : nothing}
+          ${document ? html`<div class=${state.faults.length ? 'figure pair-drawing stale' : 'figure pair-drawing'}>${drawing(state, document)}</div>` : nothing}
           <div class="verdict" role="status">${verdict(app, state)}${adviceOf(app, BODIES)}</div>
           <p class="hint">Drop other files of a rail and a wheel, or a table of the traffic, anywhere here. Inclination, gauge, speed and steel are those of the view <a href="#/compose">Contact</a>.</p>`}</fieldset>
       <div>
@@ -252,7 +252,11 @@ function decisionText(answers, sides) {
     const [one, two] = last.map((record) => record[body].machined_area_mm2);
     return one || two ? [`${body === 'rail' ? 'grinds' : 'turns'} ${number(one, 3)} (A) and ${number(two, 3)} (B) mm² off the ${body}`] : [];
   });
-  return html`${better === null ? (ends[0].label ? 'Both reach their first limit at the same time.' : 'Neither reaches a limit: compare the losses and the fatigue below, or give limits.')
+  const worn = BODIES.filter((body) => answers.some((answer) => wears(answer, body))).map((body) => {
+    const [one, two] = last.map((record) => number(record[body].worn_area_mm2, 3));
+    return `${one} (A) and ${two} (B) mm² off the ${body}`;
+  });
+  return html`${better === null ? (ends[0].label ? 'Both reach their first limit at the same time.' : `Neither reaches a limit within ${number(distanceOf(last[0].progress), 3)} ${unit}. Until then traffic wears ${worn.join(', and ')}.`)
     : html`${name(better)} goes on longer. Its first limit: ${end(better)}. That of ${name(better ? 0 : 1)}: ${end(better ? 0 : 1)}.
       ${sure ? 'The lowest and the highest wear coefficients say the same.' : html`<span class="warn">With other wear coefficients it may be the other way round.</span>`}`}
     ${removed.length ? ` Maintenance ${removed.join(', and ')}.` : nothing}`;
