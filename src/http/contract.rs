@@ -15,7 +15,7 @@ use utoipa_axum::router::OpenApiRouter;
 
 use crate::http::examples::EXAMPLES;
 use crate::http::problem::body::ProblemBody;
-use crate::http::problem::catalogue::describe_also;
+use crate::http::problem::catalogue::{describe, describe_together};
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::{contract_forms, contract_shared};
 
@@ -96,7 +96,30 @@ pub(super) fn text(mut document: utoipa::openapi::OpenApi) -> String {
 #[derive(Debug, Clone, Copy)]
 pub struct Document(pub fn() -> &'static str);
 
-/// Says of every operation on what belongs to a tenant that it may need a key, and that jobs and batches may expire.
+/// What requests of a tenant may be answered with, whatever they ask.
+const COMMON: &[ProblemKind] = &[
+    ProblemKind::BadHeader,
+    ProblemKind::Unauthorized,
+    ProblemKind::Forbidden,
+    ProblemKind::CrossSite,
+    ProblemKind::HostNotAllowed,
+    ProblemKind::NotAcceptable,
+    ProblemKind::TooManyRequests,
+    ProblemKind::Internal,
+    ProblemKind::Overloaded,
+    ProblemKind::StorageUnwritable,
+    ProblemKind::StorageUnreachable,
+    ProblemKind::StorageFull,
+];
+/// The same of requests that concern no tenant.
+const COMMON_OPEN: &[ProblemKind] = &[
+    ProblemKind::NotAcceptable,
+    ProblemKind::Internal,
+    ProblemKind::Overloaded,
+];
+
+/// Says of every operation on what belongs to a tenant that it may need a key, and that its work may have expired; and of every operation
+/// which problems all have in common.
 fn require_keys(document: &mut utoipa::openapi::OpenApi) {
     let scheme = HttpBuilder::new()
         .scheme(HttpAuthScheme::Bearer)
@@ -106,53 +129,30 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
         .build();
     let components = document.components.get_or_insert_default();
     components.add_security_scheme("key", SecurityScheme::Http(scheme));
+    document.security = Some(vec![
+        SecurityRequirement::new("key", Vec::<String>::new()),
+        SecurityRequirement::default(),
+    ]);
     for (path, item) in &mut document.paths.paths {
-        let operations = [
-            (&mut item.get, false),
-            (&mut item.post, path != "/v1/cases/check"),
-            (&mut item.delete, true),
-        ];
-        let operations = operations.into_iter();
-        let operations =
-            operations.filter_map(|(operation, changes)| Some((operation.as_mut()?, changes)));
-        for (operation, changes) in operations {
-            if !matches!(path.as_str(), "/healthz" | "/readyz" | "/metrics") {
-                describe_also(
-                    &mut operation.responses.responses,
-                    &[ProblemKind::Overloaded],
-                );
-            }
+        let operations = [&mut item.get, &mut item.post, &mut item.delete];
+        for operation in operations.into_iter().filter_map(Option::as_mut) {
+            let id = operation.operation_id.as_deref().unwrap_or_default();
             let tags = operation.tags.as_deref().unwrap_or_default();
-            let open = tags.iter().any(|tag| tag == "service");
-            let keyed = ["get_metrics", "get_me"].map(Some);
-            let metrics = keyed.contains(&operation.operation_id.as_deref());
-            let lists = ["list_methods", "list_remarks", "list_examples"].map(Some);
-            if (open && !metrics) || lists.contains(&operation.operation_id.as_deref()) {
-                continue;
+            let open = tags.iter().any(|tag| tag == "service")
+                && !["get_metrics", "get_me"].contains(&id)
+                || ["list_methods", "list_remarks", "list_examples"].contains(&id);
+            let common = match open {
+                true => COMMON_OPEN,
+                false => COMMON,
+            };
+            if open {
+                operation.security = Some(Vec::new());
             }
-            operation.security = Some(vec![
-                SecurityRequirement::new("key", Vec::<String>::new()),
-                SecurityRequirement::default(),
-            ]);
-            let mut kinds = vec![
-                ProblemKind::Unauthorized,
-                ProblemKind::TooManyRequests,
-                ProblemKind::BadHeader,
-            ];
-            kinds.extend([ProblemKind::HostNotAllowed, ProblemKind::CrossSite]);
-            if changes {
-                kinds.push(ProblemKind::Forbidden);
+            let responses = &mut operation.responses.responses;
+            if !open && path.contains("{id}") {
+                responses.extend(describe(&[ProblemKind::Expired]));
             }
-            if path.contains("{id}") {
-                kinds.push(ProblemKind::Expired);
-            }
-            // A locked or failing disk, or a database that is away, can meet every request.
-            kinds.extend([
-                ProblemKind::StorageUnwritable,
-                ProblemKind::StorageUnreachable,
-            ]);
-            kinds.push(ProblemKind::StorageFull);
-            describe_also(&mut operation.responses.responses, &kinds);
+            responses.insert("default".to_owned(), describe_together(common));
         }
     }
 }

@@ -5,9 +5,14 @@ use std::collections::BTreeMap;
 use axum::http::StatusCode;
 use serde_json::{Map, Value, json};
 
-/// Moves responses of failures, parameters and examples that several operations have into `components`.
+/// Moves headers, responses of failures, parameters and examples that several operations have into `components`.
 pub(super) fn share(document: &mut Value) {
-    for kind in [Kind::Responses, Kind::Parameters, Kind::Examples] {
+    for kind in [
+        Kind::Headers,
+        Kind::Responses,
+        Kind::Parameters,
+        Kind::Examples,
+    ] {
         let mut uses: BTreeMap<String, usize> = BTreeMap::new();
         visit(document, kind, &mut |_, value| {
             *uses.entry(value.to_string()).or_default() += 1;
@@ -70,6 +75,7 @@ fn write(value: &Value, path: &[&str], text: &mut String) {
 /// A kind of component that operations share.
 #[derive(Debug, Clone, Copy)]
 enum Kind {
+    Headers,
     Responses,
     Parameters,
     Examples,
@@ -79,6 +85,7 @@ impl Kind {
     /// The member of `components`.
     fn name(self) -> &'static str {
         match self {
+            Kind::Headers => "headers",
             Kind::Responses => "responses",
             Kind::Parameters => "parameters",
             Kind::Examples => "examples",
@@ -96,7 +103,7 @@ impl Kind {
                     .unwrap_or(key)
             }
             Kind::Parameters => value["name"].as_str().unwrap_or(key),
-            Kind::Examples => key,
+            Kind::Headers | Kind::Examples => key,
         };
         let words = words.split(|letter: char| !letter.is_ascii_alphanumeric());
         let words = words.filter(|word| !word.is_empty());
@@ -114,8 +121,15 @@ fn visit(document: &mut Value, kind: Kind, with: &mut impl FnMut(&str, &mut Valu
         match kind {
             Kind::Responses => {
                 for (status, response) in members(operation, "responses") {
-                    if status.starts_with(['4', '5']) {
+                    if status.starts_with(['4', '5', 'd']) {
                         with(status, response);
+                    }
+                }
+            }
+            Kind::Headers => {
+                for (_, response) in members(operation, "responses") {
+                    for (name, header) in members(response, "headers") {
+                        with(name, header);
                     }
                 }
             }

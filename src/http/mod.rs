@@ -64,13 +64,14 @@ use crate::http::routes::service::{
     examples as service_examples, health, methods, problems, remarks,
 };
 use crate::http::routes::{
-    batch_list, batch_results, batches, cases, damage, evaluate, events, evolutions, fields,
-    job_list, jobs, me, plots, point_fields, profiles, resultants, results, run_results, run_row,
-    run_totals, runs, subsurface, tenant_events, zones,
+    batch_results, batches, cases, damage, evaluate, evolutions, fields, jobs, lists, me, plots,
+    point_fields, profiles, resultants, results, run_results, run_row, run_totals, runs,
+    subsurface, tenant_events, work, zones,
 };
 use crate::http::server::drain_body;
 use crate::http::state::AppState;
 use crate::jobs::Jobs;
+use crate::jobs::model::kind::Kind;
 
 pub use crate::http::layers::cors::allow_origins;
 pub use crate::http::options::{AddressRange, HttpOptions};
@@ -165,17 +166,17 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
 
 /// Every documented route, in the order of the contract.
 fn resources() -> OpenApiRouter<AppState> {
+    let every = |routes: fn(Kind) -> OpenApiRouter<AppState>| {
+        let routes = work::KINDS.map(routes).into_iter();
+        routes.fold(OpenApiRouter::new(), OpenApiRouter::merge)
+    };
     let changing = OpenApiRouter::with_openapi(contract::head())
         .routes(routes!(methods::methods))
         .routes(routes!(remarks::remarks))
         .routes(routes!(service_examples::examples))
         .route_layer(from_fn(query::refuse_parameters));
-    let work = OpenApiRouter::new()
-        .routes(routes!(jobs::get, jobs::delete))
-        .routes(routes!(batches::get, batches::delete))
-        .routes(routes!(evolutions::get, evolutions::delete))
-        .route_layer(from_fn(query::refuse_all_but_wait));
-    let changing = changing.merge(work).route_layer(from_fn(etag::revalidate));
+    let one = every(work::one).route_layer(from_fn(query::refuse_all_but_wait));
+    let changing = changing.merge(one).route_layer(from_fn(etag::revalidate));
     let changing = contract::conditional(changing);
     let case = OpenApiRouter::new()
         .routes(routes!(jobs::case))
@@ -190,15 +191,18 @@ fn resources() -> OpenApiRouter<AppState> {
     let finished = contract::conditional(finished);
     // They check their parameters themselves.
     let lists = OpenApiRouter::new()
-        .routes(routes!(jobs::submit, job_list::list))
-        .routes(routes!(batches::submit, batch_list::list))
-        .routes(routes!(evolutions::submit, evolutions::list))
+        .routes(routes!(jobs::submit))
+        .routes(routes!(batches::submit))
+        .routes(routes!(evolutions::submit))
+        .routes(routes!(runs::submit))
+        .merge(every(lists::list))
         .route_layer(from_fn(etag::revalidate));
     let lists = contract::conditional(lists);
-    let plain = OpenApiRouter::new()
-        .routes(routes!(jobs::cancel))
-        .routes(routes!(batches::cancel))
-        .routes(routes!(evolutions::cancel))
+    let plain = every(work::cancel)
+        .routes(routes!(profiles::keep))
+        .routes(routes!(profiles::get, profiles::delete))
+        .routes(routes!(run_results::manifest))
+        .routes(routes!(run_row::row))
         .routes(routes!(cases::check))
         .routes(routes!(problems::list))
         .routes(routes!(problems::explain))
@@ -207,6 +211,8 @@ fn resources() -> OpenApiRouter<AppState> {
         .merge(finished)
         .merge(plain)
         .routes(routes!(me::me))
+        .routes(routes!(profiles::list))
+        .routes(routes!(run_totals::totals))
         .merge(lists)
         .route_layer(from_fn(accept::require_json));
     // These choose among several forms themselves.
@@ -230,41 +236,16 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(contract::contract))
         .route_layer(from_fn(etag::revalidate));
     let contract = contract::conditional(contract);
-    let events = OpenApiRouter::new()
-        .routes(routes!(events::job))
-        .routes(routes!(events::batch))
-        .routes(routes!(events::run))
-        .routes(routes!(evolutions::events))
+    let events = every(work::events)
         .routes(routes!(tenant_events::follow))
         .route_layer(from_fn(query::refuse_parameters));
     v1.merge(parts)
-        .merge(profiles_and_runs())
+        .routes(routes!(run_results::results))
         .routes(routes!(batch_results::results))
         .routes(routes!(evaluate::evaluate))
         .merge(events)
         .merge(probes())
         .merge(contract)
-}
-
-/// Profiles and runs.
-fn profiles_and_runs() -> OpenApiRouter<AppState> {
-    let changing = OpenApiRouter::new()
-        .routes(routes!(runs::get, runs::delete))
-        .route_layer(from_fn(query::refuse_all_but_wait));
-    let lists = OpenApiRouter::new().routes(routes!(runs::submit, runs::list));
-    let tagged = changing.merge(lists).route_layer(from_fn(etag::revalidate));
-    let plain = OpenApiRouter::new()
-        .routes(routes!(profiles::keep, profiles::list))
-        .routes(routes!(profiles::get, profiles::delete))
-        .routes(routes!(runs::cancel))
-        .routes(routes!(run_results::manifest))
-        .routes(routes!(run_row::row))
-        .route_layer(from_fn(query::refuse_parameters));
-    contract::conditional(tagged)
-        .merge(plain)
-        .routes(routes!(run_totals::totals))
-        .route_layer(from_fn(accept::require_json))
-        .routes(routes!(run_results::results))
 }
 
 /// What is asked every few seconds, of a port of its own if there is one.

@@ -1,4 +1,4 @@
-//! Following everything that is a tenant's: jobs that were submitted alone, batches and runs.
+//! Following everything that is a tenant's: jobs that were submitted alone, evolutions, batches and runs.
 //!
 //! The store is asked again and again what changed since a moment; nothing is kept for a client. Changes are ordered by their
 //! time, but may become visible a little later than they say, so each poll reaches back, and what was told already is left out.
@@ -11,11 +11,10 @@ use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::{Job, State};
 use crate::jobs::model::kind::Kind;
-use crate::jobs::run::model::Run;
-use crate::jobs::store::list::{Change, Filter};
+use crate::jobs::store::list::{Change, Filter, Membership};
+use crate::jobs::work::Work;
 
 /// Time between two polls of the store.
 const PAUSE: Duration = Duration::from_millis(250);
@@ -26,24 +25,13 @@ const AT_ONCE: u32 = 1000;
 /// Running jobs whose progress is followed.
 const RUNNING_MAX: u32 = 100;
 
-/// Something of the tenant that changed.
-#[derive(Debug, Clone)]
-pub enum Changed {
-    /// A job that was submitted alone.
-    Job(Box<Job>),
-    /// A batch: its jobs are told together.
-    Batch(Box<Batch>),
-    /// A run: its chunks are told together.
-    Run(Box<Run>),
-}
-
 /// Where somebody who follows a tenant stands.
 #[derive(Debug)]
 pub struct Follower {
     jobs: Jobs,
     /// Everything that changed before this time was told.
     since: i64,
-    told: VecDeque<(Changed, i64)>,
+    told: VecDeque<(Work, i64)>,
     /// What was told of what changed lately: version of a job with its progress, counts of a batch or run.
     known: HashMap<Uuid, (i64, String)>,
 }
@@ -73,7 +61,7 @@ impl Follower {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn next(&mut self) -> Result<Option<(Changed, i64)>, JobsError> {
+    pub async fn next(&mut self) -> Result<Option<(Work, i64)>, JobsError> {
         let shared = self.jobs.shared.clone();
         loop {
             if let Some(next) = self.told.pop_front() {
@@ -137,7 +125,7 @@ impl Follower {
             Err(JobsError::NotFound | JobsError::Expired) => return Ok(()),
             Err(error) => return Err(error),
         };
-        self.tell(job.id, change.at, tag(&job), Changed::Job(Box::new(job)));
+        self.tell(job.id, change.at, tag(&job), job.into());
         Ok(())
     }
 
@@ -152,32 +140,30 @@ impl Follower {
             Err(error) => return gone(error),
         };
         let tag = batch.change_tag();
-        let changed = if kind == Kind::Cases {
-            Changed::Batch(Box::new(batch))
-        } else if self.is_known(id, &tag) {
-            // Its head need not be read.
+        if self.is_known(id, &tag) {
+            // The head of a run need not be read.
             self.known.insert(id, (at, tag));
             return Ok(());
-        } else {
-            match self.jobs.with_head(batch).await {
-                Ok(run) => Changed::Run(Box::new(run)),
-                Err(error) => return gone(error),
-            }
-        };
-        self.tell(id, at, tag, changed);
+        }
+        match self.jobs.work_of(batch).await {
+            Ok(work) => self.tell(id, at, tag, work),
+            Err(error) => return gone(error),
+        }
         Ok(())
     }
 
     async fn tell_progress(&mut self) -> Result<(), JobsError> {
         let filter = Filter {
             states: vec![State::Running],
+            member: Some(Membership::Alone),
             ..Filter::default()
         };
-        let running = self.jobs.list(&filter, None, RUNNING_MAX).await?;
-        for job in running.entries {
-            if job.batch_id.is_none() {
+        for kind in [Kind::Case, Kind::Evolution] {
+            let jobs = self.jobs.of_kind(kind);
+            let running = jobs.list(&filter, None, RUNNING_MAX).await?.entries;
+            for job in running {
                 let at = self.since.max(job.updated_at);
-                self.tell(job.id, at, tag(&job), Changed::Job(Box::new(job)));
+                self.tell(job.id, at, tag(&job), job.into());
             }
         }
         Ok(())
@@ -187,7 +173,7 @@ impl Follower {
         self.known.get(&id).is_some_and(|(_, known)| known == tag)
     }
 
-    fn tell(&mut self, id: Uuid, at: i64, tag: String, changed: Changed) {
+    fn tell(&mut self, id: Uuid, at: i64, tag: String, changed: Work) {
         let known = self.is_known(id, &tag);
         self.known.insert(id, (at, tag));
         if !known {

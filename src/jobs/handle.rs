@@ -19,7 +19,6 @@ use crate::jobs::options::Options;
 use crate::jobs::runtime_probe::{ProbedTime, probe};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::cluster::Bell;
-use crate::jobs::store::list::{Filter, Page};
 use crate::jobs::store::retention::{Deleted, Usage};
 
 /// Longest list page.
@@ -39,7 +38,7 @@ pub struct Jobs {
     pub(crate) shared: Arc<Shared>,
     /// Whose jobs this handle makes and sees.
     pub(crate) tenant: Arc<str>,
-    /// [`Kind::Case`], or [`Kind::Evolution`]: the kind of the jobs that this handle reads and controls.
+    /// The kind of the work that this handle reads and controls.
     pub(crate) kind: Kind,
     /// What this handle sees carries these labels, and what it makes gets them.
     pub(crate) bound: Arc<Labels>,
@@ -57,7 +56,7 @@ impl Jobs {
         }
     }
 
-    /// The same for the tenant's jobs of another kind.
+    /// The same for the tenant's work of another kind.
     #[must_use]
     pub fn of_kind(&self, kind: Kind) -> Jobs {
         Jobs {
@@ -154,35 +153,6 @@ impl Jobs {
             });
         }
         Ok(job)
-    }
-
-    /// One page of a list, newest first; `limit` is brought into 1 to [`PAGE_MAX`].
-    ///
-    /// # Errors
-    /// [`JobsError::BadCursor`], or a failed database.
-    pub async fn list(
-        &self,
-        filter: &Filter,
-        cursor: Option<&str>,
-        limit: u32,
-    ) -> Result<Page<Job>, JobsError> {
-        // The store makes cursors for the filter that it is asked, so the labels of the key come first.
-        let filter = &Filter {
-            kind: self.kind,
-            labels: self.narrowed(&filter.labels),
-            ..filter.clone()
-        };
-        let after = match cursor {
-            Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
-            None => None,
-        };
-        let store = &self.shared.store;
-        let mut page = store
-            .list(&self.tenant, filter, after, limit.clamp(1, PAGE_MAX))
-            .await?;
-        let jobs = page.entries.into_iter();
-        page.entries = jobs.filter_map(|job| self.unexpired(job).ok()).collect();
-        Ok(page)
     }
 
     /// What the tenant has here.

@@ -88,11 +88,12 @@ pub mod trace;
 #[cfg(not(feature = "otlp"))]
 #[path = "no_trace.rs"]
 pub mod trace;
+pub mod work;
 pub mod worker;
 
 pub use crate::jobs::error::JobsError;
 pub use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
 pub use crate::jobs::model::job::{Failure, FailureKind, Job, QueuePlace, State};
 pub use crate::jobs::options::Options;
-pub use crate::jobs::store::list::{BatchFilter, Filter, Membership, Page, Total};
+pub use crate::jobs::store::list::{Filter, Membership, Page, Total};
 pub use crate::jobs::store_error::StorageFault;

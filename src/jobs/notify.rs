@@ -32,7 +32,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
-    pub async fn job_changed_since(
+    pub(crate) async fn job_changed_since(
         &self,
         id: Uuid,
         seen: Option<u64>,
@@ -70,7 +70,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::BatchNotFound`], or a failed database.
-    pub async fn wait_batch(
+    pub(crate) async fn wait_batch(
         &self,
         kind: Kind,
         id: Uuid,
@@ -96,7 +96,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::BatchNotFound`], or a failed database.
-    pub async fn batch_changed_since(
+    pub(crate) async fn batch_changed_since(
         &self,
         kind: Kind,
         id: Uuid,
@@ -170,7 +170,7 @@ impl Jobs {
         // Subscribe first, then read: what ends in between is announced.
         let ended = self.announcements();
         let job = self.get(id).await?;
-        self.wait_from(ended, job, at_most).await
+        self.wait_job_from(ended, job, at_most).await
     }
 
     /// Subscribes to the announcements of ended jobs.
@@ -183,7 +183,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::wait`].
-    pub async fn wait_from(
+    pub(crate) async fn wait_job_from(
         &self,
         Announcements(mut ended): Announcements,
         mut job: Job,

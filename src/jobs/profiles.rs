@@ -12,12 +12,10 @@ use crate::contact::case::section_check::{SectionReport, check_section};
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::sections::{named_and_given, named_sections, put_section};
 use crate::jobs::error::JobsError;
-use crate::jobs::handle::Jobs;
+use crate::jobs::handle::{Jobs, PAGE_MAX};
 use crate::jobs::idempotency;
-use crate::jobs::store::profile::{ProfileKept, StoredProfile};
-
-/// Longest list.
-pub const PROFILES_MAX: u32 = 1000;
+use crate::jobs::store::list::Page;
+use crate::jobs::store::profile::{ProfileCursor, ProfileEntry, ProfileKept, StoredProfile};
 
 /// Cross-sections that were read a moment ago, by their digests.
 pub(crate) type KnownSections = HashMap<String, Value>;
@@ -66,14 +64,23 @@ impl Jobs {
         found.ok_or(JobsError::ProfileNotFound)
     }
 
-    /// Digests, sizes and times of what is kept, newest first, at most [`PROFILES_MAX`].
+    /// One page of what is kept, newest first; `limit` is brought into 1 to [`PAGE_MAX`].
     ///
     /// # Errors
-    /// [`JobsError::BoundKey`], or a failed database.
-    pub async fn profiles(&self) -> Result<Vec<(String, u64, i64)>, JobsError> {
+    /// [`JobsError::BoundKey`], [`JobsError::BadCursor`], or a failed database.
+    pub async fn profiles(
+        &self,
+        cursor: Option<&str>,
+        limit: u32,
+    ) -> Result<Page<ProfileEntry>, JobsError> {
         self.require_unbound("list the profiles of the tenant")?;
+        let after = match cursor {
+            Some(cursor) => Some(ProfileCursor::read(cursor).ok_or(JobsError::BadCursor)?),
+            None => None,
+        };
+        let limit = limit.clamp(1, PAGE_MAX);
         let store = &self.shared.store;
-        Ok(store.profiles(&self.tenant, PROFILES_MAX).await?)
+        Ok(store.profiles(&self.tenant, after.as_ref(), limit).await?)
     }
 
     /// Removes a kept cross-section. Jobs and runs that named it have it.

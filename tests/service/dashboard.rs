@@ -8,6 +8,7 @@ use tokio::time::timeout;
 
 use crate::batches::small;
 use crate::errors::assert_problem;
+use crate::evolutions::request as evolution;
 use crate::results::path_of;
 use crate::server::{Server, example};
 
@@ -246,7 +247,7 @@ impl Events {
 }
 
 #[tokio::test]
-async fn one_stream_tells_all_jobs_batches_and_runs_and_goes_on_where_it_was() {
+async fn one_stream_tells_all_work_and_goes_on_where_it_was() {
     let server = Server::start().await;
     let before = path_of(&server.solve(&case("before", 70_000)).await);
     tokio::time::sleep(Duration::from_millis(2_100)).await;
@@ -272,6 +273,20 @@ async fn one_stream_tells_all_jobs_batches_and_runs_and_goes_on_where_it_was() {
             assert_eq!(name, "run");
             if data["state"] == "succeeded" {
                 assert_eq!(data["rows_done"], 4);
+                break;
+            }
+        }
+    }
+    let evolution = server.post("/v1/evolutions", &evolution(1)).await;
+    assert_eq!(evolution.status, 202, "{}", evolution.text);
+    let path = evolution.header("location").expect("a location").to_owned();
+    server.post(&format!("{path}/cancel"), &json!({})).await;
+    loop {
+        let (name, _, data) = events.next().await;
+        if data["id"] == evolution.json["id"] {
+            assert_eq!(name, "evolution");
+            assert_eq!(data["links"]["self"], path);
+            if data["ended_at"].is_string() {
                 break;
             }
         }

@@ -54,11 +54,35 @@ async fn a_case_that_names_its_profiles_is_the_case_with_their_points() {
             Some(2)
         );
         assert_run(&server, &named, &kept_rail).await;
+        assert_pages(&server).await;
         assert_eq!(server.delete(&path).await.status, 204);
         assert_problem(&server.get(&path).await, 404, "profile-not-found", "digest");
         let gone = server.post("/v1/jobs", &named).await;
         assert_problem(&gone, 422, "faulty-case", "fault");
         assert!(gone.text.contains("/contact/rail/profile"), "{}", gone.text);
+    }
+}
+
+/// The two profiles are listed page by page, like everything else.
+async fn assert_pages(server: &Server) {
+    let first = server.get("/v1/profiles?limit=1").await;
+    let cursor = first.json["next_cursor"].as_str().expect("a next page");
+    let next = format!("/v1/profiles?limit=1&cursor={cursor}");
+    assert_eq!(
+        first.header("link"),
+        Some(&*format!("<{next}>; rel=\"next\""))
+    );
+    let second = server.get(&next).await.json;
+    assert_eq!(second["next_cursor"], Value::Null);
+    let all = server.get("/v1/profiles").await.json["profiles"].clone();
+    assert_eq!(
+        all,
+        json!([first.json["profiles"][0], second["profiles"][0]])
+    );
+    for wrong in ["cursor=x", "limit=0", "limit=1001", "name=x"] {
+        let refused = server.get(&format!("/v1/profiles?{wrong}")).await;
+        let (name, _) = wrong.split_once('=').expect("a value");
+        assert_problem(&refused, 400, "bad-query", name);
     }
 }
 

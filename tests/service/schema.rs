@@ -51,7 +51,19 @@ pub fn assert_documented(
         return;
     };
     let called = format!("{method} {path}");
-    let response = &operation["responses"][status.to_string()];
+    let mut response = &operation["responses"][status.to_string()];
+    if response.is_null() && status >= 400 {
+        response = &operation["responses"]["default"];
+        let slug = body["type"]
+            .as_str()
+            .and_then(|name| name.strip_prefix("/problems/"));
+        let meant = response["description"].as_str().expect("a description");
+        let named = slug.is_some_and(|slug| meant.contains(&format!("`{slug}`")));
+        assert!(
+            named || body.is_null(),
+            "{called} answered {status}, which the contract does not know: {body}"
+        );
+    }
     assert!(
         response.is_object(),
         "{called} answered {status}, which the contract does not know: {body}"

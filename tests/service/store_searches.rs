@@ -2,7 +2,7 @@
 
 use railhead::jobs::State;
 use railhead::jobs::model::kind::Kind;
-use railhead::jobs::store::list::{BatchFilter, Change, Filter, Membership, Total};
+use railhead::jobs::store::list::{Change, Filter, Membership, Total};
 use railhead::jobs::store::retention::Usage;
 use railhead::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds};
 use uuid::Uuid;
@@ -261,7 +261,7 @@ async fn batches_are_listed_with_their_counts_and_found_by_name_and_label(kind: 
     let table = Table::new(kind).await;
     let store = &table.store;
     let ids = four_batches(&table).await;
-    let list = async |filter: &BatchFilter, after, limit| {
+    let list = async |filter: &Filter, after, limit| {
         let page = store
             .batches("anonymous", filter, after, limit)
             .await
@@ -272,7 +272,7 @@ async fn batches_are_listed_with_their_counts_and_found_by_name_and_label(kind: 
             .map(|batch| ids.iter().position(|id| *id == batch.id).unwrap());
         (places.collect::<Vec<_>>(), page)
     };
-    let all = BatchFilter::all(Kind::Cases);
+    let all = Filter::of(Kind::Cases);
     let (first, page) = list(&all, None, 2).await;
     assert_eq!((first, page.total), (vec![2, 1], Total::Exactly(3)));
     let after = all.read_cursor(&page.next_cursor.unwrap());
@@ -292,14 +292,14 @@ async fn batches_are_listed_with_their_counts_and_found_by_name_and_label(kind: 
             .unwrap()
             .as_ref()
     );
-    let named = BatchFilter {
+    let named = Filter {
         name: Some("PLAN".to_owned()),
-        ..BatchFilter::all(Kind::Cases)
+        ..Filter::of(Kind::Cases)
     };
     assert_eq!(list(&named, None, 9).await.0, [1, 0]);
-    let labelled = BatchFilter {
+    let labelled = Filter {
         labels: vec![("part".to_owned(), "0".to_owned())],
-        ..BatchFilter::all(Kind::Cases)
+        ..Filter::of(Kind::Cases)
     };
     assert_eq!(list(&labelled, None, 9).await.0, [2, 0]);
     assert!(

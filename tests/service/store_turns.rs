@@ -6,7 +6,7 @@ use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, Reap, Release
 use railhead::jobs::store::submission::{
     BatchBegun, Enqueued, NewBatch, NewJob, QueueBounds, Refusal,
 };
-use railhead::jobs::{BatchFilter, Filter, State, Total};
+use railhead::jobs::{Filter, State, Total};
 
 use crate::store::{
     StoreKind, Table, claim_up_to, conformance, new_batch, new_job, queue_of, success,
@@ -171,7 +171,7 @@ async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind:
     assert_eq!(store.result("anonymous", chunk).await.unwrap(), None);
     assert_eq!(store.cancel("anonymous", chunk, 1).await.unwrap(), None);
     for (kind, found) in [(Kind::Rows, 1), (Kind::Cases, 0)] {
-        let filter = BatchFilter::all(kind);
+        let filter = Filter::of(kind);
         let page = store.batches("anonymous", &filter, None, 9).await.unwrap();
         assert_eq!(page.entries.len(), found);
         let batch = store.batch("anonymous", kind, run.id).await.unwrap();

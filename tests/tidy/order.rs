@@ -97,6 +97,7 @@ const ORDER: &[&str] = &[
     "jobs::maintenance",
     "jobs::batch",
     "jobs::run",
+    "jobs::work",
     "jobs::changes",
     "jobs::worker",
     "jobs::lifecycle",

@@ -79,7 +79,11 @@ async fn read_id<S: Send + Sync>(
     parsed(&text, kind, what)
 }
 
-fn parsed(text: &str, kind: ProblemKind, what: &str) -> Result<Uuid, ApiError> {
+/// The id that a text is.
+///
+/// # Errors
+/// The text is none: `kind`.
+pub(crate) fn parsed(text: &str, kind: ProblemKind, what: &str) -> Result<Uuid, ApiError> {
     Uuid::try_parse(text)
         .map_err(|_| ApiError::new(kind, format!("`{text}` is no {what} id; ids are UUIDs")))
 }

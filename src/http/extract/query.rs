@@ -35,6 +35,17 @@ pub trait Parameters: Sized {
     }
 }
 
+/// No parameters.
+impl Parameters for () {
+    type Limits = ();
+
+    fn names() -> Vec<&'static str> {
+        Vec::new()
+    }
+
+    fn take(_: &mut Query, (): &()) {}
+}
+
 /// Both groups of parameters.
 impl<A: Parameters<Limits = ()>, B: Parameters<Limits = ()>> Parameters for (A, B) {
     type Limits = ();

@@ -49,7 +49,7 @@ impl From<ProblemKind> for ProblemMeaning {
     }
 }
 
-/// Declares the problems that a route can answer, for its documentation. `NotAcceptable` and `Internal` are always among them.
+/// Declares the problems that a route can answer beside those that every route can, for its documentation.
 macro_rules! problems {
     ($(#[$meta:meta])* $name:ident: $($kind:ident),* $(,)?) => {
         $(#[$meta])*
@@ -72,50 +72,21 @@ problems! {
     PlainProblems: BadQuery
 }
 
-/// Adds problems that many operations can answer to the responses of one.
-pub(crate) fn describe_also(
-    responses: &mut BTreeMap<String, RefOr<Response>>,
-    kinds: &[ProblemKind],
-) {
-    for kind in kinds {
-        let status = kind.status().to_string();
-        let mut described = describe(&[*kind]);
-        match (responses.get_mut(&status), described.remove(&status)) {
-            (Some(RefOr::T(known)), Some(_)) => {
-                let line = format!("`{}`: {}", kind.slug(), kind.meaning());
-                if !known.description.contains(&line) {
-                    known.description = format!("{line}\n\n{}", known.description);
-                }
-            }
-            (None, Some(new)) => {
-                responses.insert(status, new);
-            }
-            _ => {}
-        }
-    }
-}
-
-/// The responses of these kinds of problems and of those every route has, one per status code.
+/// The responses of these kinds of problems, one per status code.
 #[must_use]
 pub(crate) fn describe(kinds: &[ProblemKind]) -> BTreeMap<String, RefOr<Response>> {
     let mut by_status = BTreeMap::<u16, Vec<ProblemKind>>::new();
-    for kind in kinds
-        .iter()
-        .copied()
-        .chain([ProblemKind::NotAcceptable, ProblemKind::Internal])
-    {
-        let same = by_status.entry(kind.status()).or_default();
-        if !same.contains(&kind) {
-            same.push(kind);
-        }
+    for kind in kinds {
+        by_status.entry(kind.status()).or_default().push(*kind);
     }
     by_status
         .into_iter()
-        .map(|(status, kinds)| (status.to_string(), describe_status(&kinds)))
+        .map(|(status, kinds)| (status.to_string(), describe_together(&kinds)))
         .collect()
 }
 
-fn describe_status(kinds: &[ProblemKind]) -> RefOr<Response> {
+/// One response for all of these kinds.
+pub(crate) fn describe_together(kinds: &[ProblemKind]) -> RefOr<Response> {
     let lines: Vec<String> = kinds
         .iter()
         .map(|kind| format!("`{}`: {}", kind.slug(), kind.meaning()))

@@ -1,25 +1,19 @@
 //! `/v1/evolutions`: profiles that wear under a traffic, as work of their own.
 
-use axum::Json;
 use axum::extract::{Path, State};
-use axum::http::{HeaderMap, StatusCode, Uri, header};
+use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
-use serde::Serialize;
 use serde_json::{Map, Value};
-use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord, WornBody};
 use crate::http::dto::evolution::EvolutionRequest;
-use crate::http::dto::job::JobAnswer;
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::json::JsonBody;
-use crate::http::extract::labels::{name, new_label};
-use crate::http::extract::query::{Parameters, Repeated, count, query, reader};
-use crate::http::extract::submit_options::SubmitQuery;
+use crate::http::extract::query::{Parameters, count, query, reader};
 use crate::http::extract::titles::place;
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
@@ -28,38 +22,15 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::format::Format;
 use crate::http::render::row_tables::{RowWriter, WriteError};
-use crate::http::routes::batches::labels_of;
-use crate::http::routes::event_stream::EventRequest;
-use crate::http::routes::events::{JobEventSent, job as follow_job};
-use crate::http::routes::job_list::{ListProblems, ListTotal, ListedJob};
-use crate::http::routes::jobs::{
-    DeleteProblems, GetProblems, SubmitProblems, cancel as cancel_job, delete as delete_job,
-    get as get_job, idempotency_key, mark_replay,
-};
-use crate::http::routes::next_page::{answer, list_query};
+use crate::http::routes::jobs::{GetProblems, SubmitProblems};
 use crate::http::routes::results::ResultProblems;
-use crate::http::routes::wait::{Wait, WaitQuery};
+use crate::http::routes::submission::{JobAccepted, NamedQuery, Submission, SubmitParameters};
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
 use crate::jobs::model::kind::Kind;
-use crate::jobs::store::list::Filter;
 use crate::jobs::{Jobs, JobsError};
 
-/// Evolutions in one page of a list when nothing is said.
-const LIST_LIMIT_DEFAULT: u32 = 20;
 /// The forms of the tables.
 const TABLES: &[Format] = &[Format::Csv, Format::Ndjson, Format::Arrow, Format::Parquet];
-
-query! {
-    /// What the query of a submission says about the evolution itself.
-    EvolutionQuery(() => ()) {
-        /// Name of the evolution
-        #[param(min_length = 1, max_length = 200, example = "grinding at 10 MGT")]
-        name: String as String = name();
-        /// A label of the evolution, written `key:value`; may be repeated, for at most 32 labels with different keys
-        #[param(max_items = 32, example = json!(["line:A12"]))]
-        label: Vec<(String, String)> as Vec<String> = Repeated(new_label());
-    }
-}
 
 /// Submits an evolution: profiles that wear under a traffic, step by step.
 ///
@@ -70,61 +41,30 @@ query! {
     path = "/v1/evolutions",
     tag = "evolutions",
     operation_id = "submit_evolution",
-    params(
-        EvolutionQuery,
-        SubmitQuery,
-        WaitQuery,
-        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10"),
-        ("Idempotency-Key" = Option<String>, Header, min_length = 1, max_length = 255, pattern = "^[!-~]+$", description = "1 to 255 visible ASCII characters. Repeating a request with the same key, the same evolution and the same options answers the first one instead of making another"),
-        ("traceparent" = Option<String>, Header, description = "W3C trace context: if the service exports traces, the trace of the evolution continues the client's trace. An unreadable value is ignored", example = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01")
-    ),
+    params(NamedQuery, SubmitParameters),
     request_body(content = EvolutionRequest, description = "Case, traffic and plan", content_type = "application/json"),
-    responses(
-        (status = 202, description = "The evolution is stored and will be solved", body = JobAnswer, headers(
-            ("Location" = String, description = "Path of the evolution"),
-            ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for"),
-            ("Idempotency-Replayed" = String, description = "`true` if this is the evolution of an earlier request with the same `Idempotency-Key`; absent otherwise")
-        )),
-        (status = 200, description = "The evolution ended within the wait", body = JobAnswer, headers(
-            ("Location" = String, description = "Path of the evolution"),
-            ("Preference-Applied" = String, description = "The wait that was applied"),
-            ("Idempotency-Replayed" = String, description = "`true` if this is the evolution of an earlier request with the same `Idempotency-Key`; absent otherwise")
-        )),
-        SubmitProblems
-    )
+    responses(JobAccepted, SubmitProblems)
 )]
 pub(crate) async fn submit(
-    Caller(jobs): Caller,
-    uri: Uri,
-    wait: Wait,
-    headers: HeaderMap,
+    Submission {
+        jobs,
+        own: named,
+        options,
+        idempotency_key,
+        reply,
+    }: Submission<NamedQuery>,
+    State(memory): State<Memory>,
     JsonBody { mut value, room }: JsonBody,
 ) -> Result<Response, ApiError> {
     let jobs = jobs.of_kind(Kind::Evolution);
-    let key = idempotency_key(&headers)?;
-    let ((own, submit), _) = <((EvolutionQuery, SubmitQuery), WaitQuery)>::read(&uri, &())?;
-    let mut labels = labels_of(own.label.unwrap_or_default())?;
-    jobs.bind(&mut labels)
-        .map_err(|faults| ApiError::bad_parameter("label", faults[0].detail.clone()))?;
+    let named = named.read_for(&jobs)?;
     name_columns(&mut value)?;
-    let options = submit.options(&headers);
-    let named = (own.name, labels);
-    let (mut job, replayed) = jobs.submit_evolution(value, named, key, options).await?;
+    let submitted = jobs.submit_evolution(value, named, idempotency_key, options);
+    let (job, replayed) = submitted.await?;
     drop(room);
-    let id = job.id;
-    let location = [(header::LOCATION, format!("/v1/evolutions/{id}"))];
-    // The evolution is stored: whatever ends the wait early, the client must learn its id.
-    let waited = wait.hold(&jobs, async |at_most| jobs.wait(id, at_most).await);
-    if let Ok(Some(Ok(later))) = waited.await {
-        job = later;
-    }
-    let status = match job.state.ended() && wait.at_most().is_some() {
-        true => StatusCode::OK,
-        false => StatusCode::ACCEPTED,
-    };
-    let mut response = (status, location, Json(JobAnswer::new(job))).into_response();
-    mark_replay(&mut response, replayed);
-    Ok(wait.tell_applied(response))
+    reply
+        .send(&jobs, &memory, (job.into(), replayed), None)
+        .await
 }
 
 /// Names the columns of the traffic by JSON pointers, in the units of the case. What is no table is left to the check.
@@ -165,78 +105,6 @@ fn name_columns(request: &mut Value) -> Result<(), ApiError> {
     }
 }
 
-/// A page of evolutions, newest first.
-#[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct EvolutionPage {
-    /// The evolutions of this page.
-    #[schema(value_type = Vec<ListedJob>)]
-    evolutions: Vec<JobAnswer>,
-    /// Give this as `cursor` for the next page; null on the last one.
-    next_cursor: Option<String>,
-    #[serde(flatten)]
-    count: ListTotal,
-}
-
-list_query! {
-    /// Filters and page of a list of evolutions.
-    EvolutionListQuery {
-        /// Evolutions in one page; 20 when left out
-        #[param(minimum = 1, maximum = 100)]
-        limit: u32 as u32 = count(1, 100);
-    }
-}
-
-/// Lists evolutions, newest first.
-#[utoipa::path(
-    get,
-    path = "/v1/evolutions",
-    tag = "evolutions",
-    operation_id = "list_evolutions",
-    params(EvolutionListQuery),
-    responses((status = 200, description = "A page of evolutions", body = EvolutionPage, headers(
-        ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
-    )), ListProblems)
-)]
-pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
-    let query = EvolutionListQuery::read(&uri, &())?;
-    let filter = Filter {
-        labels: query.label.unwrap_or_default(),
-        name: query.name,
-        created_after: query.created_after,
-        created_before: query.created_before,
-        ..Filter::default()
-    };
-    let limit = query.limit.unwrap_or(LIST_LIMIT_DEFAULT);
-    let jobs = jobs.of_kind(Kind::Evolution);
-    let page = jobs.list(&filter, query.cursor.as_deref(), limit).await?;
-    let cursor = page.next_cursor.clone();
-    let page = EvolutionPage {
-        evolutions: page.entries.into_iter().map(JobAnswer::new).collect(),
-        next_cursor: page.next_cursor,
-        count: page.total.into(),
-    };
-    Ok(answer(&uri, cursor.as_deref(), page))
-}
-
-/// Returns an evolution.
-#[utoipa::path(
-    get,
-    path = "/v1/evolutions/{id}",
-    tag = "evolutions",
-    operation_id = "get_evolution",
-    params(
-        ("id" = String, Path, description = "Id of the evolution", format = "uuid"),
-        WaitQuery,
-        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
-    ),
-    responses((status = 200, description = "The evolution", body = JobAnswer, headers(
-        ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
-    )), GetProblems)
-)]
-pub(crate) async fn get(Caller(jobs): Caller, id: JobId, wait: Wait) -> Result<Response, ApiError> {
-    get_job(Caller(jobs.of_kind(Kind::Evolution)), id, wait).await
-}
-
 /// An evolution as it was submitted, with the columns of its traffic named by JSON pointers.
 #[utoipa::path(
     get,
@@ -249,57 +117,6 @@ pub(crate) async fn get(Caller(jobs): Caller, id: JobId, wait: Wait) -> Result<R
 pub(crate) async fn request(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
     let text = jobs.of_kind(Kind::Evolution).case(id).await?;
     Ok(([(header::CONTENT_TYPE, Format::Json.media_type())], text).into_response())
-}
-
-/// Stops a queued or running evolution. One that has already ended stays as it is.
-#[utoipa::path(
-    post,
-    path = "/v1/evolutions/{id}/cancel",
-    tag = "evolutions",
-    operation_id = "cancel_evolution",
-    params(("id" = String, Path, description = "Id of the evolution", format = "uuid")),
-    responses(
-        (status = 200, description = "The evolution has ended", body = JobAnswer),
-        (status = 202, description = "The running evolution will stop shortly", body = JobAnswer),
-        GetProblems
-    )
-)]
-pub(crate) async fn cancel(Caller(jobs): Caller, id: JobId) -> Result<Response, ApiError> {
-    cancel_job(Caller(jobs.of_kind(Kind::Evolution)), id).await
-}
-
-/// Removes an ended evolution with its answer.
-#[utoipa::path(
-    delete,
-    path = "/v1/evolutions/{id}",
-    tag = "evolutions",
-    operation_id = "delete_evolution",
-    params(("id" = String, Path, description = "Id of the evolution", format = "uuid")),
-    responses((status = 204, description = "The evolution is gone"), DeleteProblems)
-)]
-pub(crate) async fn delete(Caller(jobs): Caller, id: JobId) -> Result<StatusCode, ApiError> {
-    delete_job(Caller(jobs.of_kind(Kind::Evolution)), id).await
-}
-
-/// Follows an evolution, as the events of a job.
-#[utoipa::path(
-    get,
-    path = "/v1/evolutions/{id}/events",
-    tag = "evolutions",
-    operation_id = "follow_evolution",
-    params(
-        ("id" = String, Path, description = "Id of the evolution", format = "uuid"),
-        ("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen")
-    ),
-    responses(
-        (status = 200, description = "One event per change", content((JobEventSent = "text/event-stream"))),
-        (status = 204, description = "The evolution has ended and the client has seen it"),
-        GetProblems
-    )
-)]
-pub(crate) async fn events(mut request: EventRequest, id: JobId) -> Result<Response, ApiError> {
-    request.jobs = request.jobs.of_kind(Kind::Evolution);
-    follow_job(request, id).await
 }
 
 /// The answer of a succeeded evolution.

@@ -3,7 +3,7 @@
 use axum::Json;
 use axum::extract::{FromRequestParts, Path};
 use axum::http::request::Parts;
-use axum::http::{StatusCode, header};
+use axum::http::{StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use serde_json::Value;
@@ -15,9 +15,11 @@ use crate::contact::solution::words::profile_quality::SectionQuality;
 use crate::http::dto::job::rfc3339;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
+use crate::http::extract::query::Parameters;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
+use crate::http::routes::lists::{LIMIT_DEFAULT, PageQuery, answer};
 
 /// The digest in the path.
 #[derive(Debug, Clone)]
@@ -111,8 +113,10 @@ pub(crate) struct ProfileEntry {
 /// What a tenant keeps.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct ProfileList {
-    /// Newest first, at most 1000.
+    /// The cross-sections of this page, newest first.
     profiles: Vec<ProfileEntry>,
+    /// Give this as `cursor` for the next page; null on the last one.
+    next_cursor: Option<String>,
     /// Bytes that may be kept in all.
     bytes_max: u64,
 }
@@ -130,19 +134,26 @@ problems! {
     path = "/v1/profiles",
     tag = "profiles",
     operation_id = "list_profiles",
-    responses((status = 200, description = "What is kept", body = ProfileList), ListProfilesProblems)
+    params(PageQuery),
+    responses((status = 200, description = "What is kept", body = ProfileList, headers(
+        ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
+    )), ListProfilesProblems)
 )]
-pub(crate) async fn list(Caller(jobs): Caller) -> Result<Json<ProfileList>, ApiError> {
-    let entries = jobs.profiles().await?.into_iter();
-    let entries = entries.map(|(digest, bytes, created_at)| ProfileEntry {
-        digest,
-        bytes,
-        created_at: rfc3339(created_at),
+pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
+    let PageQuery { limit, cursor } = PageQuery::read(&uri, &())?;
+    let limit = limit.unwrap_or(LIMIT_DEFAULT);
+    let page = jobs.profiles(cursor.as_deref(), limit).await?;
+    let entries = page.entries.into_iter().map(|entry| ProfileEntry {
+        digest: entry.digest,
+        bytes: entry.bytes,
+        created_at: rfc3339(entry.created_at),
     });
-    Ok(Json(ProfileList {
+    let list = ProfileList {
         profiles: entries.collect(),
+        next_cursor: page.next_cursor.clone(),
         bytes_max: jobs.options().tenant_profiles_max_bytes,
-    }))
+    };
+    Ok(answer(&uri, page.next_cursor.as_deref(), list))
 }
 
 problems! {

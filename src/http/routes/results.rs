@@ -18,6 +18,7 @@ use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
 use crate::http::routes::wait::{Wait, WaitQuery};
+use crate::http::routes::work::await_end;
 use crate::jobs::Jobs;
 
 problems! {
@@ -48,12 +49,7 @@ pub(crate) async fn result(
     uri: Uri,
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    if let Some(ended) = wait
-        .hold(&jobs, async |at_most| jobs.wait(id, at_most).await)
-        .await?
-    {
-        ended?;
-    }
+    await_end(&jobs, id, &wait).await?;
     let tag = match Known::of(&jobs, id, &uri, &headers, Format::Json).await? {
         Known::Unchanged(answer) => return Ok(answer),
         Known::Tag(tag) => tag,

@@ -25,7 +25,6 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::format::Format;
 use crate::http::render::row_tables::{RowWriter, WriteError};
-use crate::http::routes::runs::ended_run;
 use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::jobs::codec::table::{RowTable, TableKind};
 use crate::jobs::run::model::Run;
@@ -119,7 +118,8 @@ pub(crate) async fn results(
 ) -> Result<Response, ApiError> {
     let (query, _) = <(RunResultsQuery, WaitQuery)>::read(&uri, &())?;
     let format = choose(&headers, query.format, FORMATS)?;
-    let run = ended_run(&jobs, id, &wait).await?;
+    await_end(&jobs.of_kind(Kind::Rows), id, &wait).await?;
+    let run = jobs.run(id).await?;
     require_ended(&run)?;
     let columns = selected(&run, query.columns)?;
     let share = memory.ready_answer(jobs.tenant(), STREAM_BYTES)?;

@@ -17,15 +17,15 @@ use crate::http::dto::run::RunAnswer;
 use crate::http::problem::catalogue::PlainProblems;
 use crate::http::problem::error::ApiError;
 use crate::http::routes::event_stream::{EventRequest, changed, event};
-use crate::http::routes::events::event_schema;
-use crate::jobs::changes::{Changed, Follower};
+use crate::http::routes::work::{WorkAnswer, event_schema};
+use crate::jobs::changes::Follower;
 
 /// What an event of `/v1/events` tells, one by the name of the event.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(untagged)]
 #[expect(dead_code, reason = "names the data of an event in the contract")]
 pub(crate) enum TenantEvent {
-    /// `job`: the job as `/v1/jobs/{id}` answers it.
+    /// `job` and `evolution`: the job or evolution as its own address answers it.
     Job(Box<JobAnswer>),
     /// `batch`: the batch as `/v1/batches/{id}` answers it.
     Batch(Box<BatchAnswer>),
@@ -38,7 +38,10 @@ pub(crate) struct TenantEventSent;
 
 impl PartialSchema for TenantEventSent {
     fn schema() -> RefOr<Schema> {
-        event_schema::<TenantEvent>("`start`, `job`, `batch` or `run`")
+        event_schema(
+            "TenantEvent",
+            "`start`, `job`, `evolution`, `batch` or `run`",
+        )
     }
 }
 
@@ -49,9 +52,9 @@ impl ToSchema for TenantEventSent {
     }
 }
 
-/// Follows everything of the tenant: jobs that were submitted alone, batches and runs.
+/// Follows everything of the tenant: jobs that were submitted alone, evolutions, batches and runs.
 ///
-/// The first event is `start`. To miss no change, connect first and read the lists after `start`. Each `job`, `batch` or `run` event
+/// The first event is `start`. To miss no change, connect first and read the lists after `start`. Each `job`, `evolution`, `batch` or `run` event
 /// carries the changed resource as its route returns it; jobs of a batch and rows of a run are reported through these. Changes in quick succession are merged into one
 /// event; after `Last-Event-ID` some events may repeat. Deletions are not reported. The stream ends when the service shuts down.
 #[utoipa::path(
@@ -72,12 +75,11 @@ pub(crate) async fn follow(request: EventRequest) -> Result<Response, ApiError> 
 }
 
 async fn next(mut follower: Follower) -> Option<(Result<Event, Infallible>, Follower)> {
-    let (change, since) = changed(follower.next().await)?;
-    let since = since.to_string();
-    let event = match change {
-        Changed::Job(job) => event("job", &since, &JobAnswer::new(*job)),
-        Changed::Batch(batch) => event("batch", &since, &BatchAnswer::from(*batch)),
-        Changed::Run(run) => event("run", &since, &RunAnswer::from(*run)),
-    };
+    let (work, since) = changed(follower.next().await)?;
+    let event = event(
+        work.kind().noun(),
+        &since.to_string(),
+        &WorkAnswer::from(work),
+    );
     Some((Ok(event?), follower))
 }

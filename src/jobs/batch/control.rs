@@ -4,11 +4,10 @@ use uuid::Uuid;
 
 use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
-use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs};
+use crate::jobs::handle::Jobs;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::kind::Kind;
 use crate::jobs::store::cluster::Bell;
-use crate::jobs::store::list::{BatchFilter, Page};
 
 /// Jobs removed in one transaction.
 pub(crate) const DELETED_AT_ONCE: u32 = 500;
@@ -38,30 +37,6 @@ impl Jobs {
             Some(_) => Err(JobsError::BatchNotFound(kind)),
             None => Err(self.missing(id, JobsError::BatchNotFound(kind)).await),
         }
-    }
-
-    /// One page of the batches or of the runs, newest first; `limit` is brought into 1 to [`BATCH_PAGE_MAX`].
-    ///
-    /// # Errors
-    /// [`JobsError::BadCursor`], or a failed database.
-    pub async fn batches(
-        &self,
-        filter: &BatchFilter,
-        cursor: Option<&str>,
-        limit: u32,
-    ) -> Result<Page<Batch>, JobsError> {
-        // The store makes cursors for the filter that it is asked, so the labels of the key come first.
-        let filter = &BatchFilter {
-            labels: self.narrowed(&filter.labels),
-            ..filter.clone()
-        };
-        let after = match cursor {
-            Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
-            None => None,
-        };
-        let limit = limit.clamp(1, BATCH_PAGE_MAX);
-        let store = &self.shared.store;
-        Ok(store.batches(&self.tenant, filter, after, limit).await?)
     }
 
     /// Cancels every job of a batch or run that has not ended: queued ones end at once, running ones at the next tick of

@@ -39,6 +39,17 @@ impl Kind {
         }
     }
 
+    /// The same in the plural, also the name of the resource.
+    #[must_use]
+    pub fn nouns(self) -> &'static str {
+        match self {
+            Kind::Case => "jobs",
+            Kind::Cases => "batches",
+            Kind::Rows => "runs",
+            Kind::Evolution => "evolutions",
+        }
+    }
+
     /// The kind with this name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Kind> {

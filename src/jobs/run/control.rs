@@ -1,7 +1,5 @@
 //! Runs: batches of rows with what their chunks share.
 
-use std::time::Duration;
-
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
@@ -18,15 +16,6 @@ impl Jobs {
     /// [`JobsError::BatchNotFound`], [`JobsError::Expired`], or a failed database.
     pub async fn run(&self, id: Uuid) -> Result<Run, JobsError> {
         let batch = self.batch(Kind::Rows, id).await?;
-        self.with_head(batch).await
-    }
-
-    /// Waits until a run has ended, but not longer than `at_most`, and returns it as it then is.
-    ///
-    /// # Errors
-    /// As [`Jobs::run`].
-    pub async fn wait_run(&self, id: Uuid, at_most: Duration) -> Result<Run, JobsError> {
-        let batch = self.wait_batch(Kind::Rows, id, at_most).await?;
         self.with_head(batch).await
     }
 

@@ -14,40 +14,26 @@ pub enum Membership {
     Alone,
 }
 
-/// Which jobs to list; everything left out does not restrict.
+/// Which work of a kind to list; everything left out does not restrict. Lists of batches and runs know no states, memberships and times of
+/// changes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
-    /// [`Kind::Case`] or [`Kind::Evolution`].
+    /// The kind of the work.
     pub kind: Kind,
     /// Only jobs in one of these states; any if there is none.
     pub states: Vec<State>,
     /// Only jobs of one batch, or of none.
     pub member: Option<Membership>,
-    /// Only jobs that carry each of these labels with its value.
+    /// Only work that carry each of these labels with its value.
     pub labels: Vec<(String, String)>,
-    /// Only jobs whose name contains this text; ASCII letters match in either case.
+    /// Only work whose name contains this text; ASCII letters match in either case.
     pub name: Option<String>,
-    /// Only jobs submitted at or after this time (epoch milliseconds).
+    /// Only work submitted at or after this time (epoch milliseconds).
     pub created_after: Option<i64>,
-    /// Only jobs submitted before this time (epoch milliseconds). Together with `created_after`: a half-open window.
+    /// Only work submitted before this time (epoch milliseconds). Together with `created_after`: a half-open window.
     pub created_before: Option<i64>,
     /// Only jobs that changed at or after this time (epoch milliseconds), progress aside.
     pub updated_after: Option<i64>,
-}
-
-/// Which batches or runs to list; everything left out does not restrict.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct BatchFilter {
-    /// [`Kind::Cases`] or [`Kind::Rows`].
-    pub kind: Kind,
-    /// Only batches that carry each of these labels with its value.
-    pub labels: Vec<(String, String)>,
-    /// Only batches whose name contains this text; ASCII letters match in either case.
-    pub name: Option<String>,
-    /// Only batches submitted at or after this time (epoch milliseconds).
-    pub created_after: Option<i64>,
-    /// Only batches submitted before this time (epoch milliseconds).
-    pub created_before: Option<i64>,
 }
 
 /// One page of a list. It may have fewer entries than asked for although more follow: where many have to be looked at to find
@@ -60,6 +46,18 @@ pub struct Page<T> {
     pub next_cursor: Option<String>,
     /// Number of entries of the whole list.
     pub total: Total,
+}
+
+impl<T> Page<T> {
+    /// The same page with other entries.
+    #[must_use]
+    pub fn map<U>(self, entry: impl FnMut(T) -> U) -> Page<U> {
+        Page {
+            entries: self.entries.into_iter().map(entry).collect(),
+            next_cursor: self.next_cursor,
+            total: self.total,
+        }
+    }
 }
 
 /// Number of entries of a list.
@@ -85,16 +83,31 @@ pub struct Change {
 }
 
 impl Filter {
-    /// The cursor that continues this list after the job `last`: 40 characters of `[0-9a-f]`.
+    /// All work of a kind.
     #[must_use]
-    pub fn cursor_after(&self, last: Uuid) -> String {
-        cursor(last, &self.change_tag())
+    pub fn of(kind: Kind) -> Filter {
+        Filter {
+            kind,
+            ..Filter::default()
+        }
     }
 
-    /// The job after which `text` continues; `None` if it is not a cursor of this very filter.
+    /// The cursor that continues this list after the entry `last`: 40 characters of `[0-9a-f]`.
+    #[must_use]
+    pub fn cursor_after(&self, last: Uuid) -> String {
+        format!("{}{}", last.simple(), self.digest())
+    }
+
+    /// The entry after which `text` continues; `None` if it is not a cursor of this very filter.
     #[must_use]
     pub fn read_cursor(&self, text: &str) -> Option<Uuid> {
-        read_cursor(text, &self.change_tag())
+        let (id, digest) = text.split_at_checked(32)?;
+        if digest != self.digest() {
+            return None;
+        }
+        let read = Uuid::try_parse(id).ok()?;
+        // Only our own spelling is a cursor: the parser would also take capital letters.
+        (read.simple().to_string() == id).then_some(read)
     }
 
     /// Whether jobs themselves have to be read, because no index knows all that is asked for.
@@ -128,9 +141,10 @@ impl Filter {
         self.created_before.map(first_id_at)
     }
 
-    /// Eight hexadecimal digits that tell one filter from another.
-    fn change_tag(&self) -> String {
+    /// Eight hexadecimal digits of a digest of the filter.
+    fn digest(&self) -> String {
         let mut parts = vec![
+            Some(self.kind.name().to_owned()),
             self.created_after.map(|time| time.to_string()),
             self.created_before.map(|time| time.to_string()),
             self.updated_after.map(|time| time.to_string()),
@@ -141,78 +155,18 @@ impl Filter {
             self.name.clone(),
             Some(self.states.len().to_string()),
         ];
-        let states = self.states.iter();
-        parts.extend(states.map(|state| Some(state.name().to_owned())));
-        parts.extend(words(&self.labels));
-        digits_of(parts)
-    }
-}
-
-impl BatchFilter {
-    /// All batches or all runs.
-    #[must_use]
-    pub fn all(kind: Kind) -> BatchFilter {
-        BatchFilter {
-            kind,
-            labels: Vec::new(),
-            name: None,
-            created_after: None,
-            created_before: None,
+        let states = self.states.iter().map(|state| state.name().to_owned());
+        let labels = self.labels.iter().flat_map(|(key, value)| [key, value]);
+        parts.extend(states.chain(labels.cloned()).map(Some));
+        let mut hasher = blake3::Hasher::new();
+        for part in parts {
+            // Length first, so that neighbouring parts cannot run into each other.
+            let part = part.map_or_else(|| "-".to_owned(), |text| format!("+{text}"));
+            hasher.update(&(part.len() as u64).to_le_bytes());
+            hasher.update(part.as_bytes());
         }
+        hasher.finalize().to_hex()[..8].to_owned()
     }
-
-    /// The cursor that continues this list after the batch `last`.
-    #[must_use]
-    pub fn cursor_after(&self, last: Uuid) -> String {
-        cursor(last, &self.change_tag())
-    }
-
-    /// The batch after which `text` continues; `None` if it is not a cursor of this very filter.
-    #[must_use]
-    pub fn read_cursor(&self, text: &str) -> Option<Uuid> {
-        read_cursor(text, &self.change_tag())
-    }
-
-    fn change_tag(&self) -> String {
-        let mut parts = vec![
-            Some(self.kind.name().to_owned()),
-            self.created_after.map(|time| time.to_string()),
-            self.created_before.map(|time| time.to_string()),
-            self.name.clone(),
-        ];
-        parts.extend(words(&self.labels));
-        digits_of(parts)
-    }
-}
-
-fn words(labels: &[(String, String)]) -> impl Iterator<Item = Option<String>> {
-    let words = labels.iter().flat_map(|(key, value)| [key, value]);
-    words.map(|word| Some(word.clone()))
-}
-
-fn cursor(last: Uuid, tag: &str) -> String {
-    format!("{}{tag}", last.simple())
-}
-
-fn read_cursor(text: &str, tag: &str) -> Option<Uuid> {
-    let (id, mark) = text.split_at_checked(32)?;
-    if mark != tag {
-        return None;
-    }
-    let read = Uuid::try_parse(id).ok()?;
-    // Only our own spelling is a cursor: the parser would also take capital letters.
-    (read.simple().to_string() == id).then_some(read)
-}
-
-fn digits_of(parts: impl IntoIterator<Item = Option<String>>) -> String {
-    let mut hasher = blake3::Hasher::new();
-    for part in parts {
-        // Length first, so that neighbouring parts cannot run into each other.
-        let part = part.map_or_else(|| "-".to_owned(), |text| format!("+{text}"));
-        hasher.update(&(part.len() as u64).to_le_bytes());
-        hasher.update(part.as_bytes());
-    }
-    hasher.finalize().to_hex()[..8].to_owned()
 }
 
 /// The smallest UUID whose leading 48 bits are the given time; times outside 48 bits are clamped.
@@ -253,7 +207,7 @@ mod tests {
             labels: vec![(key.to_owned(), value.to_owned())],
             ..Filter::default()
         };
-        assert_ne!(with("ab", "c").change_tag(), with("a", "bc").change_tag());
+        assert_ne!(with("ab", "c").digest(), with("a", "bc").digest());
     }
 
     #[test]

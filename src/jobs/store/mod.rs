@@ -45,8 +45,8 @@ use crate::jobs::store::claim::{
 };
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::ending::{Ending, NewSlice, ResultRef, SliceRecord, StoredResult};
-use crate::jobs::store::list::{BatchFilter, Change, Filter, Page};
-use crate::jobs::store::profile::{ProfileKept, StoredProfile};
+use crate::jobs::store::list::{Change, Filter, Page};
+use crate::jobs::store::profile::{ProfileCursor, ProfileEntry, ProfileKept, StoredProfile};
 use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
 use crate::jobs::store::submission::{
     BatchBegun, CacheKey, ClaimedCase, Enqueued, FilledHere, NewBatch, NewJob, QueueBounds,
@@ -191,7 +191,7 @@ pub trait BatchLists: Send + Sync {
     async fn batches(
         &self,
         tenant: &str,
-        filter: &BatchFilter,
+        filter: &Filter,
         after: Option<Uuid>,
         limit: u32,
     ) -> Result<Page<Batch>, StoreError>;
@@ -269,12 +269,13 @@ pub trait Profiles: Send + Sync {
         digest: &str,
     ) -> Result<Option<StoredProfile>, StoreError>;
 
-    /// Digests, sizes and times of the cross-sections of a tenant, newest first, at most `limit`.
+    /// One page of the cross-sections of a tenant, newest first.
     async fn profiles(
         &self,
         tenant: &str,
+        after: Option<&ProfileCursor>,
         limit: u32,
-    ) -> Result<Vec<(String, u64, i64)>, StoreError>;
+    ) -> Result<Page<ProfileEntry>, StoreError>;
 
     /// Removes a cross-section of a tenant; `false` if there was none.
     async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool, StoreError>;

@@ -7,7 +7,7 @@ use railhead::jobs::State;
 use railhead::jobs::model::kind::{Kind, Queue};
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason};
-use railhead::jobs::store::list::{BatchFilter, Filter, Membership};
+use railhead::jobs::store::list::{Filter, Membership};
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
 use railhead::jobs::store::retention::{Moment, RetentionRule};
@@ -160,7 +160,7 @@ async fn read_lists(store: &Arc<dyn Store>, id: Uuid) {
     };
     store.list(TENANT, &labelled, None, 50).await.unwrap();
     store
-        .batches(TENANT, &BatchFilter::all(Kind::Cases), None, 50)
+        .batches(TENANT, &Filter::of(Kind::Cases), None, 50)
         .await
         .unwrap();
 }

@@ -13,7 +13,7 @@ use crate::jobs::model::batch::{Batch, RunRecord};
 use crate::jobs::model::job::State;
 use crate::jobs::model::kind::Kind;
 use crate::jobs::store::BatchLists;
-use crate::jobs::store::list::{BatchFilter, Page, Total, first_id_at};
+use crate::jobs::store::list::{Filter, Page, Total, first_id_at};
 use crate::jobs::store_error::StoreError;
 
 /// Most batches that are examined for one page, and how far they are counted.
@@ -23,7 +23,7 @@ const EXAMINED_MAX: i64 = 10_000;
 const COLUMNS: &str = "id, tenant, kind, created_at, count, rejected, name, labels, ended_at";
 
 impl SqlStore {
-    async fn count_batches(&self, tenant: &str, filter: &BatchFilter) -> Result<Total, StoreError> {
+    async fn count_batches(&self, tenant: &str, filter: &Filter) -> Result<Total, StoreError> {
         let mut query = QueryBuilder::new("SELECT COUNT(*) AS number FROM (");
         push_page(&mut query, "id", tenant, filter, None);
         query.push(" LIMIT ").push_bind(EXAMINED_MAX);
@@ -74,7 +74,7 @@ impl SqlStore {
     }
 }
 
-pub(crate) fn page_query(tenant: &str, filter: &BatchFilter, after: Option<Uuid>) -> QueryBuilder {
+pub(crate) fn page_query(tenant: &str, filter: &Filter, after: Option<Uuid>) -> QueryBuilder {
     let mut query = QueryBuilder::new("");
     push_page(&mut query, COLUMNS, tenant, filter, after);
     query
@@ -85,7 +85,7 @@ fn push_page(
     query: &mut QueryBuilder,
     columns: &str,
     tenant: &str,
-    filter: &BatchFilter,
+    filter: &Filter,
     after: Option<Uuid>,
 ) {
     query.push("SELECT ").push(columns);
@@ -133,7 +133,7 @@ impl BatchLists for SqlStore {
     async fn batches(
         &self,
         tenant: &str,
-        filter: &BatchFilter,
+        filter: &Filter,
         after: Option<Uuid>,
         limit: u32,
     ) -> Result<Page<Batch>, StoreError> {

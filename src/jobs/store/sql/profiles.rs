@@ -1,12 +1,13 @@
 //! Cross-sections that tenants keep.
 
-use super::engine::{self, DbRow, Row, SqlStore, query};
+use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::read_count;
 
 use async_trait::async_trait;
 
 use crate::jobs::store::Profiles;
-use crate::jobs::store::profile::{ProfileKept, StoredProfile};
+use crate::jobs::store::list::{Page, Total};
+use crate::jobs::store::profile::{ProfileCursor, ProfileEntry, ProfileKept, StoredProfile};
 use crate::jobs::store_error::StoreError;
 
 #[async_trait]
@@ -77,24 +78,40 @@ impl Profiles for SqlStore {
     async fn profiles(
         &self,
         tenant: &str,
+        after: Option<&ProfileCursor>,
         limit: u32,
-    ) -> Result<Vec<(String, u64, i64)>, StoreError> {
+    ) -> Result<Page<ProfileEntry>, StoreError> {
         engine::again(|| async move {
-            let rows = query(
-                "SELECT digest, bytes, created_at FROM profiles WHERE tenant = $1 ORDER BY created_at DESC, digest LIMIT $2",
-            )
-            .bind(tenant)
-            .bind(i64::from(limit))
-            .fetch_all(&self.readers)
-            .await?;
+            let mut query =
+                QueryBuilder::new("SELECT digest, bytes, created_at FROM profiles WHERE tenant = ");
+            query.push_bind(tenant.to_owned());
+            if let Some(ProfileCursor(time, digest)) = after {
+                query.push(" AND (created_at < ").push_bind(*time);
+                query.push(" OR created_at = ").push_bind(*time);
+                query.push(" AND substr(digest, 1, 28) > ");
+                query.push_bind(digest.clone()).push(")");
+            }
+            query.push(" ORDER BY created_at DESC, digest LIMIT ");
+            query.push_bind(i64::from(limit) + 1);
+            let rows = query.build().fetch_all(&self.readers).await?;
             let read = |row: &DbRow| {
-                Ok((
-                    row.try_get("digest")?,
-                    read_count(row, "bytes")?,
-                    row.try_get("created_at")?,
-                ))
+                Ok(ProfileEntry {
+                    digest: row.try_get("digest")?,
+                    bytes: read_count(row, "bytes")?,
+                    created_at: row.try_get("created_at")?,
+                })
             };
-            rows.iter().map(read).collect()
+            let entries: Result<Vec<_>, StoreError> = rows.iter().map(read).collect();
+            let mut entries = entries?;
+            let more = entries.len() > limit as usize;
+            entries.truncate(limit as usize);
+            let last = entries.last().filter(|_| more);
+            let next_cursor = last.map(|entry| ProfileCursor::after(entry).to_string());
+            Ok(Page {
+                next_cursor,
+                total: Total::AtLeast(entries.len() as u64),
+                entries,
+            })
         })
         .await
     }

@@ -4,7 +4,7 @@ use uuid::Uuid;
 
 use crate::jobs::model::job::State;
 use crate::jobs::model::kind::Kind;
-use crate::jobs::store::list::{BatchFilter, Filter, Membership};
+use crate::jobs::store::list::{Filter, Membership};
 use crate::jobs::store::sqlite::connection::{Row, query};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::engine::{CLAIM_BEGUN, CLAIM_NEW};
@@ -24,10 +24,10 @@ async fn the_list_of_batches_walks_its_index_without_sorting() {
         .await
         .unwrap();
     for after in [None, Some(Uuid::now_v7())] {
-        let filter = BatchFilter {
+        let filter = Filter {
             labels: vec![("line".to_owned(), "A12".to_owned())],
             name: Some("x".to_owned()),
-            ..BatchFilter::all(Kind::Cases)
+            ..Filter::of(Kind::Cases)
         };
         let query = batch_lists::page_query("t", &filter, after);
         let steps = plan(&store, query.sql()).await;

@@ -1,0 +1,345 @@
+//! Lists, newest first, page by page: of jobs, batches, runs and evolutions, and what other lists share with them.
+
+use axum::Json;
+use axum::http::{HeaderValue, Uri, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use serde::{Serialize, Serializer, ser::SerializeMap};
+use serde_json::Value;
+use utoipa::openapi::path::{OperationBuilder, ParameterIn};
+use utoipa::openapi::schema::{ArrayBuilder, Type};
+use utoipa::openapi::{Content, HttpMethod, ObjectBuilder, Ref, RefOr, ResponseBuilder, Schema};
+use utoipa::{IntoParams, PartialSchema};
+use utoipa_axum::router::OpenApiRouter;
+use uuid::Uuid;
+
+use crate::http::dto::job::JobAnswer;
+use crate::http::extract::caller::Caller;
+use crate::http::extract::labels::{label, name, time};
+use crate::http::extract::query::{Parameters, Query, Reader, Repeated, count, query, reader};
+use crate::http::problem::catalogue::describe;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+use crate::http::render::format::Format;
+use crate::http::routes::work::{WorkAnswer, answer_name, route, text_header};
+use crate::http::state::AppState;
+use crate::jobs::model::job::State as JobState;
+use crate::jobs::model::kind::Kind;
+use crate::jobs::{Filter, Membership, PAGE_MAX, Total};
+
+/// Entries of a page for which no number is given.
+pub(crate) const LIMIT_DEFAULT: u32 = 50;
+
+/// Members of a job that `fields` can name.
+const MEMBERS: [&str; 18] = [
+    "id",
+    "state",
+    "name",
+    "labels",
+    "batch_id",
+    "priority",
+    "created_at",
+    "updated_at",
+    "started_at",
+    "ended_at",
+    "deadline_at",
+    "expires_at",
+    "attempt",
+    "cached",
+    "progress",
+    "remarks",
+    "error",
+    "links",
+];
+
+query! {
+    /// The page of a list.
+    PageQuery(() => ()) {
+        /// Entries in one page; 50 when left out. A page of batches or runs has at most 100
+        #[param(minimum = 1, maximum = 1000)]
+        limit: u32 as u32 = count(1, PAGE_MAX);
+        /// `next_cursor` of the page before, with the same filters
+        #[param(pattern = "^[0-9a-f]{40}$")]
+        cursor: String as String = reader("a cursor of this service", |text| Some(text.to_owned()));
+    }
+}
+
+query! {
+    /// Filters of every kind of work.
+    FilterQuery(() => ()) {
+        /// Only those with this label, written `key:value`; may be repeated for those that have all of them
+        #[param(example = json!(["line:A12"]))]
+        label: Vec<(String, String)> as Vec<String> = Repeated(label());
+        /// Only those whose name contains this text; the letters A to Z match in either case
+        #[param(min_length = 1, max_length = 200, example = "crown")]
+        name: String as String = name();
+        /// Only those submitted at or after this time (RFC 3339)
+        #[param(format = "date-time", example = "2026-01-31T09:30:00Z")]
+        created_after: i64 as String = time();
+        /// Only those submitted before this time (RFC 3339)
+        #[param(format = "date-time")]
+        created_before: i64 as String = time();
+    }
+}
+
+query! {
+    /// Filters of jobs and evolutions, and what is shown of them.
+    StateQuery(() => ()) {
+        /// Only those in this state; may be repeated for those in one of several
+        state: Vec<JobState> as Vec<JobState> = Repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
+        /// Only those that changed at or after this time (RFC 3339), progress aside
+        #[param(format = "date-time")]
+        updated_after: i64 as String = time();
+        /// A comma-separated list of the members to answer; all when left out
+        #[param(pattern = "^[a-z_]+(,[a-z_]+)*$", example = "id,state,progress")]
+        fields: Vec<&'static str> as String = fields();
+    }
+}
+
+query! {
+    /// The filter by batch.
+    MemberQuery(() => ()) {
+        /// Only jobs of this batch; `none` for jobs that were submitted alone
+        #[param(pattern = "^(none|[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12})$", example = "none")]
+        batch: Membership as String = member();
+    }
+}
+
+/// The id of a batch, or `none`.
+fn member() -> Reader<Membership> {
+    reader("the id of a batch, or `none`", |text| match text {
+        "none" => Some(Membership::Alone),
+        id => Uuid::try_parse(id).ok().map(Membership::Batch),
+    })
+}
+
+fn fields() -> Reader<Vec<&'static str>> {
+    reader(
+        format!("a comma-separated list of {}", MEMBERS.join(", ")),
+        |text| {
+            let member = |name: &str| MEMBERS.into_iter().find(|member| *member == name);
+            text.split(',').map(member).collect()
+        },
+    )
+}
+
+/// A page of a list.
+struct Page<T> {
+    /// The name of the entries.
+    name: &'static str,
+    entries: Vec<T>,
+    next_cursor: Option<String>,
+    total: Total,
+}
+
+impl<T: Serialize> Serialize for Page<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut page = serializer.serialize_map(None)?;
+        page.serialize_entry(self.name, &self.entries)?;
+        page.serialize_entry("next_cursor", &self.next_cursor)?;
+        match self.total {
+            Total::Exactly(number) => page.serialize_entry("total", &number)?,
+            Total::AtLeast(number) => page.serialize_entry("total_at_least", &number)?,
+        }
+        page.end()
+    }
+}
+
+/// `GET` of the list of a kind.
+pub(crate) fn list(kind: Kind) -> OpenApiRouter<AppState> {
+    let handler = move |Caller(jobs): Caller, uri: Uri| async move {
+        list_work(kind, Caller(jobs), &uri).await
+    };
+    let nouns = kind.nouns();
+    let page = Content::new(Some(Ref::from_schema_name(page_name(kind))));
+    let link = text_header("The next page (`rel=next`), unless this is the last one");
+    let found = ResponseBuilder::new()
+        .description(format!("A page of {nouns}"))
+        .content(Format::Json.media_type(), page)
+        .header("Link", link);
+    let mut parameters = groups(kind).1;
+    parameters
+        .iter_mut()
+        .for_each(|parameter| parameter.parameter_in = ParameterIn::Query);
+    let mut listing = OperationBuilder::new()
+        .operation_id(Some(format!("list_{nouns}")))
+        .tag(nouns)
+        .summary(Some(format!("Lists {nouns}, newest first.")))
+        .parameters(Some(parameters))
+        .response("200", found.build());
+    if has_states(kind) {
+        listing = listing.description(Some(
+            "A filter by `name`, `updated_after`, a second `label`, or a label together with `batch=none`, examines everything that matches the other filters, up to \
+             20 000 per page: such a page may have fewer entries than asked for, or none, although `next_cursor` is there.",
+        ));
+    }
+    for (status, response) in describe(&[ProblemKind::BadQuery]) {
+        listing = listing.response(status, response);
+    }
+    let (mut schemas, paths, handler) = route(kind, "", HttpMethod::Get, listing, get(handler));
+    schemas.push((page_name(kind), page_schema(kind)));
+    schemas.push(("ListedJob".to_owned(), listed_job()));
+    OpenApiRouter::new().routes((schemas, paths, handler))
+}
+
+fn has_states(kind: Kind) -> bool {
+    matches!(kind, Kind::Case | Kind::Evolution)
+}
+
+/// The parameters of a list: their names, and what the contract says of them.
+fn groups(kind: Kind) -> (Vec<&'static str>, Vec<utoipa::openapi::path::Parameter>) {
+    fn add<P: Parameters + IntoParams>(
+        (names, described): &mut (Vec<&'static str>, Vec<utoipa::openapi::path::Parameter>),
+    ) {
+        names.extend(P::names());
+        described.extend(P::into_params(|| Some(ParameterIn::Query)));
+    }
+    let mut all = (Vec::new(), Vec::new());
+    if kind == Kind::Case {
+        add::<MemberQuery>(&mut all);
+    }
+    if has_states(kind) {
+        add::<StateQuery>(&mut all);
+    }
+    add::<FilterQuery>(&mut all);
+    add::<PageQuery>(&mut all);
+    all
+}
+
+async fn list_work(kind: Kind, Caller(jobs): Caller, uri: &Uri) -> Result<Response, ApiError> {
+    let mut query = Query::read(uri, &groups(kind).0);
+    let PageQuery { limit, cursor } = PageQuery::take(&mut query, &());
+    let common = FilterQuery::take(&mut query, &());
+    let own = StateQuery::take(&mut query, &());
+    let MemberQuery { batch } = MemberQuery::take(&mut query, &());
+    query.finish()?;
+    let mut states = own.state.unwrap_or_default();
+    states.sort_unstable();
+    states.dedup();
+    let filter = Filter {
+        kind,
+        states,
+        member: batch,
+        labels: common.label.unwrap_or_default(),
+        name: common.name,
+        created_after: common.created_after,
+        created_before: common.created_before,
+        updated_after: own.updated_after,
+    };
+    let jobs = jobs.of_kind(kind);
+    let limit = limit.unwrap_or(LIMIT_DEFAULT);
+    let page = jobs.works(&filter, cursor.as_deref(), limit).await?;
+    let next = page.next_cursor.clone();
+    let entries = page.entries.into_iter().map(|work| {
+        let mut entry = serde_json::to_value(WorkAnswer::from(work))?;
+        if let (Some(fields), Value::Object(members)) = (&own.fields, &mut entry) {
+            members.retain(|name, _| fields.contains(&name.as_str()));
+        }
+        Ok::<_, serde_json::Error>(entry)
+    });
+    let entries = entries.collect::<Result<Vec<_>, _>>();
+    let page = Page {
+        name: kind.nouns(),
+        entries: entries.map_err(|error| ApiError::internal(&error))?,
+        next_cursor: page.next_cursor,
+        total: page.total,
+    };
+    Ok(answer(uri, next.as_deref(), page))
+}
+
+/// A page as an answer, with a link to the next one (RFC 8288): the same address with another cursor.
+pub(crate) fn answer(uri: &Uri, cursor: Option<&str>, page: impl Serialize) -> Response {
+    let mut response = Json(page).into_response();
+    let Some(cursor) = cursor else {
+        return response;
+    };
+    if let Ok(link) = HeaderValue::from_str(&link(uri, cursor)) {
+        response.headers_mut().insert(header::LINK, link);
+    }
+    response
+}
+
+fn link(uri: &Uri, cursor: &str) -> String {
+    let query = uri.query().unwrap_or_default().split('&');
+    let others = query.filter(|pair| !pair.is_empty() && !pair.starts_with("cursor="));
+    let others: String = others.map(|pair| format!("{pair}&")).collect();
+    format!("<{}?{others}cursor={cursor}>; rel=\"next\"", uri.path())
+}
+
+fn page_name(kind: Kind) -> String {
+    match kind {
+        Kind::Evolution => "EvolutionPage".to_owned(),
+        kind => format!("{}Page", answer_name(kind)),
+    }
+}
+
+fn page_schema(kind: Kind) -> RefOr<Schema> {
+    let entry = match has_states(kind) {
+        true => "ListedJob",
+        false => answer_name(kind),
+    };
+    let count = |what: &str| {
+        let number = ObjectBuilder::new().schema_type(Type::Integer);
+        number.minimum(Some(0)).description(Some(what))
+    };
+    let cursor = ObjectBuilder::new()
+        .schema_type(
+            [Type::String, Type::Null]
+                .into_iter()
+                .collect::<utoipa::openapi::schema::SchemaType>(),
+        )
+        .description(Some(
+            "Give this as `cursor` for the next page; null on the last one",
+        ));
+    ObjectBuilder::new()
+        .description(Some(format!("A page of {}, newest first", kind.nouns())))
+        .property(kind.nouns(), ArrayBuilder::new().items(Ref::from_schema_name(entry)))
+        .required(kind.nouns())
+        .property("next_cursor", cursor)
+        .property("total", count("Number of entries of the whole list"))
+        .property(
+            "total_at_least",
+            count("Lower bound of the number of entries, instead of `total` if an exact count would be too expensive"),
+        )
+        .into()
+}
+
+/// A job in a list: any of its members may have been left out.
+fn listed_job() -> RefOr<Schema> {
+    let mut schema = JobAnswer::schema();
+    if let RefOr::T(Schema::Object(job)) = &mut schema {
+        job.required.clear();
+        job.description =
+            Some("A job, with all its members or those that `fields` names.".to_owned());
+    }
+    schema
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_member_of_a_listed_job_can_be_named() {
+        let schema = serde_json::to_value(JobAnswer::schema()).unwrap();
+        let members = schema["properties"].as_object().unwrap().keys();
+        // These two are never in a list.
+        let mut members: Vec<_> = members
+            .filter(|name| !["queue", "result"].contains(&name.as_str()))
+            .collect();
+        let mut named = MEMBERS.to_vec();
+        named.sort_unstable();
+        members.sort_unstable();
+        assert_eq!(members, named);
+    }
+
+    #[test]
+    fn the_next_page_has_the_same_filters_and_another_cursor() {
+        let link = |uri: &'static str, cursor| link(&Uri::from_static(uri), cursor);
+        assert_eq!(link("/v1/jobs", "a"), "</v1/jobs?cursor=a>; rel=\"next\"");
+        assert_eq!(
+            link("/v1/jobs?state=queued&cursor=a&label=x:%C3%A4", "b"),
+            "</v1/jobs?state=queued&label=x:%C3%A4&cursor=b>; rel=\"next\""
+        );
+    }
+}

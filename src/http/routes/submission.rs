@@ -1,0 +1,319 @@
+//! What submissions of every kind have in common: name, labels, priority, deadline, idempotency key and wait, and the answer to them.
+
+use std::collections::BTreeMap;
+
+use axum::body::Body;
+use axum::extract::{FromRef, FromRequestParts};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use utoipa::openapi::path::{Parameter, ParameterBuilder, ParameterIn};
+use utoipa::openapi::schema::Type;
+use utoipa::openapi::{Content, ObjectBuilder, Ref, RefOr, Required, ResponseBuilder};
+use utoipa::{IntoParams, IntoResponses};
+
+use crate::http::extract::caller::Caller;
+use crate::http::extract::labels::{LABELS_MAX, name, new_label};
+use crate::http::extract::query::{Parameters, Repeated, query};
+use crate::http::extract::submit_options::SubmitQuery;
+use crate::http::layers::auth::Access;
+use crate::http::limits::concurrency::ConcurrencyLimits;
+use crate::http::limits::holding_body::hold_while_sent;
+use crate::http::limits::memory::Memory;
+use crate::http::limits::shares::Share;
+use crate::http::problem::body::Fault;
+use crate::http::problem::error::ApiError;
+use crate::http::render::format::Format;
+use crate::http::routes::results::result_text;
+use crate::http::routes::wait::{Wait, WaitQuery};
+use crate::http::routes::work::{WorkAnswer, prefer, text_header};
+use crate::jobs::Jobs;
+use crate::jobs::model::job::State as JobState;
+use crate::jobs::model::kind::Kind;
+use crate::jobs::model::submit_options::SubmitOptions;
+use crate::jobs::notify::Announcements;
+use crate::jobs::work::Work;
+
+/// Longest idempotency key in characters.
+const IDEMPOTENCY_KEY_MAX_CHARS: usize = 255;
+
+const IDEMPOTENCY_REPLAYED: HeaderName = HeaderName::from_static("idempotency-replayed");
+const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
+
+query! {
+    /// Name and labels of work whose body has none.
+    NamedQuery(() => ()) {
+        /// Free text of the client
+        #[param(min_length = 1, max_length = 200, example = "timetable 2026")]
+        name: String as String = name();
+        /// A label, written `key:value`; may be repeated, for at most 32 labels with different keys
+        #[param(max_items = 32, example = json!(["line:A12"]))]
+        label: Vec<(String, String)> as Vec<String> = Repeated(new_label());
+    }
+}
+
+impl NamedQuery {
+    /// The name and the labels, with those of the key of the request.
+    ///
+    /// # Errors
+    /// There are too many labels, two have the same key, or one contradicts the key of the request.
+    pub(crate) fn read_for(
+        self,
+        jobs: &Jobs,
+    ) -> Result<(Option<String>, BTreeMap<String, String>), ApiError> {
+        let given = self.label.unwrap_or_default();
+        let number = given.len();
+        let mut labels: BTreeMap<String, String> = given.into_iter().collect();
+        if labels.len() < number || number > LABELS_MAX {
+            let detail = format!(
+                "{number} labels are given; at most {LABELS_MAX} with different keys are allowed"
+            );
+            return Err(ApiError::bad_parameter("label", detail));
+        }
+        jobs.bind(&mut labels)
+            .map_err(|faults| ApiError::bad_parameter("label", faults[0].detail.clone()))?;
+        Ok((self.name, labels))
+    }
+}
+
+/// What the query and the headers of a submission say; `P` are the parameters of its own.
+pub(crate) struct Submission<P> {
+    pub(crate) jobs: Jobs,
+    pub(crate) own: P,
+    pub(crate) options: SubmitOptions,
+    pub(crate) idempotency_key: Option<String>,
+    pub(crate) reply: Reply,
+}
+
+/// How a submission is answered.
+pub(crate) struct Reply {
+    wait: Wait,
+    /// Of jobs that end from now on.
+    announcements: Announcements,
+}
+
+impl<S: Send + Sync, P: Parameters<Limits = ()>> FromRequestParts<S> for Submission<P>
+where
+    Access: FromRef<S>,
+    ConcurrencyLimits: FromRef<S>,
+{
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        let Caller(jobs) = Caller::from_request_parts(parts, state).await?;
+        let wait = Wait::from_request_parts(parts, state).await?;
+        let idempotency_key = idempotency_key(&parts.headers)?;
+        let ((own, submit), _) = <((P, SubmitQuery), WaitQuery)>::read(&parts.uri, &())?;
+        Ok(Submission {
+            own,
+            options: submit.options(&parts.headers),
+            idempotency_key,
+            reply: Reply {
+                wait,
+                announcements: jobs.announcements(),
+            },
+            jobs,
+        })
+    }
+}
+
+/// Work that was submitted.
+#[derive(Serialize)]
+struct Submitted {
+    #[serde(flatten)]
+    work: WorkAnswer,
+    /// Of cases that were left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    errors: Option<Vec<Fault>>,
+}
+
+impl Reply {
+    /// Answers with the work, after the wait that the request asks for; a job that has succeeded by then with its result.
+    ///
+    /// # Errors
+    /// The work cannot be written as JSON.
+    pub(crate) async fn send(
+        self,
+        jobs: &Jobs,
+        memory: &Memory,
+        (mut work, replayed): (Work, bool),
+        errors: Option<Vec<Fault>>,
+    ) -> Result<Response, ApiError> {
+        let Reply {
+            wait,
+            announcements,
+        } = self;
+        let jobs = jobs.of_kind(work.kind());
+        // The work is stored: whatever ends the wait early, the client must learn its id.
+        let stored = work.clone();
+        let waited = wait.hold(&jobs, async |at_most| {
+            jobs.wait_from(announcements, stored, at_most).await
+        });
+        match waited.await {
+            Ok(Some(Ok(later))) => work = later,
+            Ok(Some(Err(reason))) => {
+                tracing::debug!(%reason, work = %work.id(), "the wait ended early");
+            }
+            Ok(None) | Err(_) => {}
+        }
+        let in_time = wait.at_most().is_some() && work.ended();
+        let location = format!("/v1/{}/{}", work.kind().nouns(), work.id());
+        let (body, share) = text(&jobs, memory, work, errors, in_time).await?;
+        let status = match in_time {
+            true => StatusCode::OK,
+            false => StatusCode::ACCEPTED,
+        };
+        let head = [
+            (header::LOCATION, location.as_str()),
+            (header::CONTENT_TYPE, Format::Json.media_type()),
+        ];
+        let mut response = hold_while_sent((status, head, body).into_response(), share);
+        let headers = response.headers_mut();
+        if !in_time {
+            headers.insert(header::RETRY_AFTER, HeaderValue::from(1));
+        }
+        if replayed {
+            headers.insert(IDEMPOTENCY_REPLAYED, HeaderValue::from_static("true"));
+        }
+        Ok(wait.tell_applied(response))
+    }
+}
+
+/// Work as JSON, with the result of a job if it can be read, and the memory for what is held of it.
+async fn text(
+    jobs: &Jobs,
+    memory: &Memory,
+    work: Work,
+    errors: Option<Vec<Fault>>,
+    in_time: bool,
+) -> Result<(Body, Option<Share>), ApiError> {
+    let solved = match &work {
+        Work::Job(job) => in_time && job.kind == Kind::Case && job.state == JobState::Succeeded,
+        _ => false,
+    };
+    let id = work.id();
+    let work = work.into();
+    let text = serde_json::to_string(&Submitted { work, errors });
+    let text = text.map_err(|error| ApiError::internal(&error))?;
+    if solved && let Some(open) = text.strip_suffix('}') {
+        // A client that submitted a job must learn its id, whatever became of the result.
+        match result_text(jobs, memory, id, [&format!("{open},\"result\":"), "}"]).await {
+            Ok(answer) => return Ok(answer),
+            Err(error) => tracing::error!(?error, job = %id, "a result cannot be read"),
+        }
+    }
+    Ok((Body::from(text), None))
+}
+
+/// The idempotency key of a request, if it has one.
+fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
+    let Some(value) = headers.get(&IDEMPOTENCY_KEY) else {
+        return Ok(None);
+    };
+    let key = value.to_str().unwrap_or_default();
+    let allowed = 1..=IDEMPOTENCY_KEY_MAX_CHARS;
+    let visible = key.bytes().all(|byte| byte.is_ascii_graphic());
+    if visible
+        && allowed.contains(&key.len())
+        && headers.get_all(&IDEMPOTENCY_KEY).iter().count() == 1
+    {
+        return Ok(Some(key.to_owned()));
+    }
+    Err(ApiError::bad_header(
+        "Idempotency-Key",
+        format!(
+            "`Idempotency-Key` is one value of 1 to {IDEMPOTENCY_KEY_MAX_CHARS} visible ASCII characters"
+        ),
+    ))
+}
+
+/// The parameters of every submission, in the contract.
+pub(crate) struct SubmitParameters;
+
+impl IntoParams for SubmitParameters {
+    fn into_params(place: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let header = |name: &str, about: &str, example: Option<&str>, text: ObjectBuilder| {
+            ParameterBuilder::new(name)
+                .parameter_in(ParameterIn::Header)
+                .required(Required::False)
+                .description(Some(about))
+                .schema(Some(text))
+                .example(example.map(Into::into))
+                .build()
+        };
+        let text = || ObjectBuilder::new().schema_type(Type::String);
+        let key = text()
+            .min_length(Some(1))
+            .max_length(Some(IDEMPOTENCY_KEY_MAX_CHARS))
+            .pattern(Some("^[!-~]+$"));
+        let mut all = SubmitQuery::into_params(&place);
+        all.extend(WaitQuery::into_params(&place));
+        all.push(prefer().build());
+        all.extend([
+            header(
+                "Idempotency-Key",
+                "1 to 255 visible ASCII characters. Repeating a request with the same key, body and options answers what the first one made instead of making another",
+                None,
+                key,
+            ),
+            header(
+                "Cache-Control",
+                "`no-cache`: solve every case, also those that are identical to cases solved before",
+                Some("no-cache"),
+                text(),
+            ),
+            header(
+                "traceparent",
+                "W3C trace context: if the service exports traces, the trace of the work continues the client's trace. An unreadable value is ignored",
+                Some("00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01"),
+                text(),
+            ),
+        ]);
+        all
+    }
+}
+
+/// The answers to every submission that is accepted, in the contract.
+macro_rules! accepted {
+    ($name:ident: $schema:literal) => {
+        pub(crate) struct $name;
+
+        impl IntoResponses for $name {
+            fn responses() -> BTreeMap<String, RefOr<utoipa::openapi::Response>> {
+                accepted_as($schema)
+            }
+        }
+    };
+}
+accepted!(JobAccepted: "Job");
+accepted!(BatchAccepted: "BatchReceipt");
+accepted!(RunAccepted: "Run");
+
+fn accepted_as(schema: &str) -> BTreeMap<String, RefOr<utoipa::openapi::Response>> {
+    let response = |about: &str| {
+        let content = Content::new(Some(Ref::from_schema_name(schema)));
+        ResponseBuilder::new()
+            .description(about)
+            .content(Format::Json.media_type(), content)
+            .header("Location", text_header("Path of what was submitted"))
+            .header(
+                "Preference-Applied",
+                text_header("The wait that was applied, if one was preferred"),
+            )
+            .header(
+                "Idempotency-Replayed",
+                text_header("`true` if an earlier request with the same `Idempotency-Key` made this; absent otherwise"),
+            )
+    };
+    let seconds = ObjectBuilder::new().schema_type(Type::Integer);
+    let again = utoipa::openapi::HeaderBuilder::new()
+        .schema(Some(seconds))
+        .description(Some("Seconds to wait before asking again"));
+    let stored = response("It is stored and will be solved").header("Retry-After", again.build());
+    let ended = response("It ended within the wait");
+    BTreeMap::from([
+        ("200".to_owned(), ended.build().into()),
+        ("202".to_owned(), stored.build().into()),
+    ])
+}

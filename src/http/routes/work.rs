@@ -1,0 +1,386 @@
+//! Jobs, batches, runs and evolutions: read, followed, cancelled and deleted by the same handlers, one router for each kind.
+
+use std::convert::Infallible;
+
+use axum::Json;
+use axum::extract::Path;
+use axum::http::StatusCode;
+use axum::response::sse::Event;
+use axum::response::{IntoResponse, Response};
+use axum::routing::{MethodRouter, delete, get, post};
+use futures_util::stream::unfold;
+use serde::Serialize;
+use serde_json::json;
+use utoipa::openapi::extensions::Extensions;
+use utoipa::openapi::path::{OperationBuilder, ParameterBuilder, ParameterIn};
+use utoipa::openapi::schema::{KnownFormat, SchemaFormat, Type};
+use utoipa::openapi::{
+    Content, HeaderBuilder, HttpMethod, ObjectBuilder, Paths, Ref, RefOr, Required,
+    ResponseBuilder, Schema,
+};
+use utoipa::{IntoParams, PartialSchema, ToSchema};
+use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter};
+use uuid::Uuid;
+
+use crate::http::dto::batch::{BatchAnswer, BatchReceipt};
+use crate::http::dto::job::JobAnswer;
+use crate::http::dto::run::RunAnswer;
+use crate::http::extract::caller::Caller;
+use crate::http::extract::ids::parsed;
+use crate::http::problem::catalogue::describe;
+use crate::http::problem::error::ApiError;
+use crate::http::problem::kinds::ProblemKind;
+use crate::http::render::format::Format;
+use crate::http::routes::event_stream::{EventRequest, changed, event};
+use crate::http::routes::wait::{Wait, WaitQuery};
+use crate::http::state::AppState;
+use crate::jobs::Jobs;
+use crate::jobs::model::job::{Job, State as JobState};
+use crate::jobs::model::kind::Kind;
+use crate::jobs::work::Work;
+
+/// Every kind of work.
+pub(crate) const KINDS: [Kind; 4] = [Kind::Case, Kind::Cases, Kind::Evolution, Kind::Rows];
+
+/// Work as a client sees it.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub(crate) enum WorkAnswer {
+    Job(Box<JobAnswer>),
+    Batch(Box<BatchAnswer>),
+    Run(Box<RunAnswer>),
+}
+
+impl From<Work> for WorkAnswer {
+    fn from(work: Work) -> WorkAnswer {
+        match work {
+            Work::Job(job) => WorkAnswer::Job(Box::new(JobAnswer::new(*job))),
+            Work::Batch(batch) => WorkAnswer::Batch(Box::new((*batch).into())),
+            Work::Run(run) => WorkAnswer::Run(Box::new((*run).into())),
+        }
+    }
+}
+
+/// The data of an event of a job or an evolution.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct JobEvent {
+    /// Where the job stands.
+    state: JobState,
+    /// Rough progress.
+    #[schema(minimum = 0.0, maximum = 1.0)]
+    progress: f64,
+    /// Grows with every change; also the id of the event.
+    version: u64,
+}
+
+impl JobEvent {
+    fn of(job: &Job) -> Self {
+        JobEvent {
+            state: job.state,
+            progress: job.progress,
+            version: job.version,
+        }
+    }
+}
+
+/// The id in a path; what is no id names no work.
+fn read_id(kind: Kind, text: &str) -> Result<Uuid, ApiError> {
+    let id = parsed(text, not_found(kind), kind.noun())?;
+    if kind.of_job() != Kind::Rows && kind != Kind::Cases {
+        tracing::Span::current().record("job", tracing::field::display(id));
+    }
+    Ok(id)
+}
+
+fn not_found(kind: Kind) -> ProblemKind {
+    match kind {
+        Kind::Case | Kind::Evolution => ProblemKind::JobNotFound,
+        Kind::Cases => ProblemKind::BatchNotFound,
+        Kind::Rows => ProblemKind::RunNotFound,
+    }
+}
+
+fn not_ended(kind: Kind) -> ProblemKind {
+    match kind {
+        Kind::Case | Kind::Evolution => ProblemKind::JobNotEnded,
+        Kind::Cases => ProblemKind::BatchNotEnded,
+        Kind::Rows => ProblemKind::RunNotEnded,
+    }
+}
+
+/// `GET` and `DELETE` of one piece of work.
+pub(crate) fn one(kind: Kind) -> OpenApiRouter<AppState> {
+    let read = move |Caller(jobs): Caller, Path(id): Path<String>, wait: Wait| async move {
+        let id = read_id(kind, &id)?;
+        let jobs = jobs.of_kind(kind);
+        await_end(&jobs, id, &wait).await?;
+        let work = jobs.work(id).await?;
+        Ok::<_, ApiError>(wait.tell_applied(Json(WorkAnswer::from(work)).into_response()))
+    };
+    let remove = move |Caller(jobs): Caller, Path(id): Path<String>| async move {
+        jobs.of_kind(kind).delete_work(read_id(kind, &id)?).await?;
+        Ok::<_, ApiError>(StatusCode::NO_CONTENT)
+    };
+    let noun = kind.noun();
+    let applied = text_header("The wait that was applied, if one was preferred");
+    let found = answer(kind, &format!("The {noun}")).header("Preference-Applied", applied);
+    let reading = operation(kind, "get", &format!("Returns {}.", a(kind)), &[])
+        .parameters(Some(WaitQuery::into_params(|| Some(ParameterIn::Query))))
+        .parameter(prefer())
+        .response("200", found.build());
+    let gone = ResponseBuilder::new().description(format!("The {noun} is gone"));
+    let summary = format!(
+        "Removes an ended {noun} with all that belongs to it: jobs or rows, cases and results."
+    );
+    let removing =
+        operation(kind, "delete", &summary, &[not_ended(kind)]).response("204", gone.build());
+    OpenApiRouter::new()
+        .routes(route(kind, "/{id}", HttpMethod::Get, reading, get(read)))
+        .routes(route(
+            kind,
+            "/{id}",
+            HttpMethod::Delete,
+            removing,
+            delete(remove),
+        ))
+}
+
+/// Waits for the end of work if the request asks for it.
+///
+/// # Errors
+/// There is none with this id, or the key of the request is revoked meanwhile.
+pub(crate) async fn await_end(jobs: &Jobs, id: Uuid, wait: &Wait) -> Result<(), ApiError> {
+    let waited = wait.hold(jobs, async |at_most| jobs.wait_for(id, at_most).await);
+    if let Some(ended) = waited.await? {
+        ended?;
+    }
+    Ok(())
+}
+
+/// `POST …/cancel`.
+pub(crate) fn cancel(kind: Kind) -> OpenApiRouter<AppState> {
+    let stop = move |Caller(jobs): Caller, Path(id): Path<String>| async move {
+        let work = jobs.of_kind(kind).cancel_work(read_id(kind, &id)?).await?;
+        let status = match work.ended() {
+            true => StatusCode::OK,
+            false => StatusCode::ACCEPTED,
+        };
+        Ok::<_, ApiError>((status, Json(WorkAnswer::from(work))))
+    };
+    let noun = kind.noun();
+    let summary = format!("Stops {}. What has ended stays as it is.", a(kind));
+    let stopping = operation(kind, "cancel", &summary, &[])
+        .response(
+            "200",
+            answer(kind, &format!("The {noun} has ended")).build(),
+        )
+        .response(
+            "202",
+            answer(kind, "What is being solved will stop shortly").build(),
+        );
+    OpenApiRouter::new().routes(route(
+        kind,
+        "/{id}/cancel",
+        HttpMethod::Post,
+        stopping,
+        post(stop),
+    ))
+}
+
+/// `GET …/events`: changes as they happen, as server-sent events.
+///
+/// Nothing is kept for a client: the next event is made when the connection takes it. The id of an event says what was
+/// seen, so `Last-Event-ID` resumes over lost connections and restarts of the service alike.
+pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
+    let follow = move |request: EventRequest, Path(id): Path<String>| async move {
+        follow(request, kind, read_id(kind, &id)?).await
+    };
+    let noun = kind.noun();
+    let data = match kind {
+        Kind::Case | Kind::Evolution => "JSON with `state`, `progress` and `version`".to_owned(),
+        _ => format!("the {noun} as `/v1/{}/{{id}}` answers it", kind.nouns()),
+    };
+    let seen = ParameterBuilder::new("Last-Event-ID")
+        .parameter_in(ParameterIn::Header)
+        .required(Required::False)
+        .description(Some("Id of the last event that was seen"))
+        .schema(Some(ObjectBuilder::new().schema_type(Type::String)));
+    let stream = Content::new(Some(Ref::from_schema_name(event_name(kind))));
+    let sent = ResponseBuilder::new()
+        .description("One event per change")
+        .content("text/event-stream", stream);
+    let over = format!("The {noun} has ended and the client has seen it");
+    let following = operation(kind, "follow", &format!("Follows {}.", a(kind)), &[])
+        .description(Some(format!(
+            "Events are called `state`; their data is {data}. Changes in quick succession are merged into one event. The first event comes at \
+             once, unless `Last-Event-ID` says that it was seen; the stream closes after the final state, and when the service shuts down. If \
+             the last event was seen the answer is `204`, which tells an `EventSource` not to connect again."
+        )))
+        .parameter(seen)
+        .response("200", sent.build())
+        .response("204", ResponseBuilder::new().description(over).build());
+    OpenApiRouter::new().routes(route(
+        kind,
+        "/{id}/events",
+        HttpMethod::Get,
+        following,
+        get(follow),
+    ))
+}
+
+async fn follow(request: EventRequest, kind: Kind, id: Uuid) -> Result<Response, ApiError> {
+    let jobs = request.jobs.of_kind(kind);
+    let work = jobs.work(id).await?;
+    let seen = request.seen.clone();
+    if work.ended() && seen.as_deref() == Some(&work.version()) {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    request.answer(unfold(Some(seen), move |seen| {
+        let jobs = jobs.clone();
+        async move { next_event(&jobs, id, seen?).await }
+    }))
+}
+
+/// The next event, and what has then been seen; nothing after the final one.
+async fn next_event(
+    jobs: &Jobs,
+    id: Uuid,
+    seen: Option<String>,
+) -> Option<(Result<Event, Infallible>, Option<Option<String>>)> {
+    let work = changed(jobs.changed_since(id, seen.as_deref()).await)?;
+    let (version, ended) = (work.version(), work.ended());
+    let event = match work {
+        Work::Job(job) => event("state", &version, &JobEvent::of(&job)),
+        work => event("state", &version, &WorkAnswer::from(work)),
+    };
+    Some((Ok(event?), (!ended).then_some(Some(version))))
+}
+
+/// `a job`.
+fn a(kind: Kind) -> String {
+    let article = match kind {
+        Kind::Evolution => "an",
+        _ => "a",
+    };
+    format!("{article} {}", kind.noun())
+}
+
+/// The name of the schema of the answer.
+pub(crate) fn answer_name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Case | Kind::Evolution => "Job",
+        Kind::Cases => "Batch",
+        Kind::Rows => "Run",
+    }
+}
+
+fn event_name(kind: Kind) -> String {
+    format!("{}EventSent", answer_name(kind))
+}
+
+/// The schemas of what these routes answer.
+pub(crate) fn schemas() -> Vec<(String, RefOr<Schema>)> {
+    fn add<T: ToSchema>(all: &mut Vec<(String, RefOr<Schema>)>) {
+        all.push((T::name().into_owned(), T::schema()));
+        T::schemas(all);
+    }
+    let mut all = Vec::new();
+    add::<JobAnswer>(&mut all);
+    add::<BatchAnswer>(&mut all);
+    add::<BatchReceipt>(&mut all);
+    add::<RunAnswer>(&mut all);
+    add::<JobEvent>(&mut all);
+    for (kind, data) in [
+        (Kind::Case, "JobEvent"),
+        (Kind::Cases, "Batch"),
+        (Kind::Rows, "Run"),
+    ] {
+        all.push((event_name(kind), event_schema(data, "`state`")));
+    }
+    all
+}
+
+/// An event line by line, called so; its data is the schema `data` as JSON text.
+pub(crate) fn event_schema(data: &str, names: &str) -> RefOr<Schema> {
+    let text = |what: &str| {
+        let text = ObjectBuilder::new().schema_type(Type::String);
+        text.description(Some(what))
+    };
+    let holds = json!({ "$ref": format!("#/components/schemas/{data}") });
+    let data = text("What changed, as JSON")
+        .content_media_type("application/json")
+        .extensions(Some(Extensions::from_iter([("contentSchema", holds)])));
+    let retry = ObjectBuilder::new()
+        .schema_type(Type::Integer)
+        .description(Some("Milliseconds after which to connect again"));
+    let event = ObjectBuilder::new()
+        .description(Some("One event of the stream, line by line"))
+        .property("event", text(names))
+        .required("event")
+        .property("id", text("What was seen, for `Last-Event-ID`"))
+        .required("id")
+        .property("retry", retry)
+        .property("data", data)
+        .required("data");
+    event.into()
+}
+
+/// An operation on one piece of work, which may be unknown.
+fn operation(kind: Kind, verb: &str, summary: &str, more: &[ProblemKind]) -> OperationBuilder {
+    let id = ObjectBuilder::new()
+        .schema_type(Type::String)
+        .format(Some(SchemaFormat::KnownFormat(KnownFormat::Uuid)));
+    let id = ParameterBuilder::new("id")
+        .parameter_in(ParameterIn::Path)
+        .required(Required::True)
+        .description(Some(format!("Id of the {}", kind.noun())))
+        .schema(Some(id));
+    let problems = [&[ProblemKind::BadQuery, not_found(kind)], more].concat();
+    let mut operation = OperationBuilder::new()
+        .operation_id(Some(format!("{verb}_{}", kind.noun())))
+        .tag(kind.nouns())
+        .summary(Some(summary))
+        .parameter(id);
+    for (status, response) in describe(&problems) {
+        operation = operation.response(status, response);
+    }
+    operation
+}
+
+fn answer(kind: Kind, description: &str) -> ResponseBuilder {
+    let content = Content::new(Some(Ref::from_schema_name(answer_name(kind))));
+    ResponseBuilder::new()
+        .description(description)
+        .content(Format::Json.media_type(), content)
+}
+
+/// A header of an answer, a text.
+pub(crate) fn text_header(description: &str) -> utoipa::openapi::Header {
+    let text = ObjectBuilder::new().schema_type(Type::String);
+    let header = HeaderBuilder::new().schema(Some(text));
+    header.description(Some(description)).build()
+}
+
+/// `Prefer: wait=N` of a request.
+pub(crate) fn prefer() -> ParameterBuilder {
+    ParameterBuilder::new("Prefer")
+        .parameter_in(ParameterIn::Header)
+        .required(Required::False)
+        .description(Some("`wait=N`, as `?wait=N` (RFC 7240)"))
+        .schema(Some(ObjectBuilder::new().schema_type(Type::String)))
+        .example(Some("wait=10".into()))
+}
+
+/// A route below the resource of a kind.
+pub(crate) fn route(
+    kind: Kind,
+    below: &str,
+    method: HttpMethod,
+    operation: OperationBuilder,
+    handler: MethodRouter<AppState>,
+) -> UtoipaMethodRouter<AppState> {
+    let mut paths = Paths::new();
+    let path = format!("/v1/{}{below}", kind.nouns());
+    paths.add_path_operation(path, vec![method], operation.build());
+    (schemas(), paths, handler)
+}
