@@ -134,14 +134,6 @@ pub(crate) enum AnswerColumnKind {
     Text,
 }
 
-impl RunAnswer {
-    /// Nothing more will change.
-    #[must_use]
-    pub(crate) fn ended(&self) -> bool {
-        self.state.ended()
-    }
-}
-
 /// The columns of the answers of a run.
 #[must_use]
 pub(crate) fn answer_columns(run: &Run) -> Vec<AnswerColumn> {

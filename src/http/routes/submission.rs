@@ -10,7 +10,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::openapi::path::{Parameter, ParameterBuilder, ParameterIn};
 use utoipa::openapi::schema::Type;
-use utoipa::openapi::{Content, ObjectBuilder, Ref, RefOr, Required, ResponseBuilder};
+use utoipa::openapi::{Content, ObjectBuilder, Ref, RefOr, ResponseBuilder};
 use utoipa::{IntoParams, IntoResponses};
 
 use crate::http::extract::caller::Caller;
@@ -27,7 +27,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
 use crate::http::routes::results::result_text;
 use crate::http::routes::wait::{Wait, WaitQuery};
-use crate::http::routes::work::{WorkAnswer, prefer, text_header};
+use crate::http::routes::work::{WorkAnswer, header_parameter, prefer, text_header};
 use crate::jobs::Jobs;
 use crate::jobs::model::job::State as JobState;
 use crate::jobs::model::kind::Kind;
@@ -233,43 +233,29 @@ pub(crate) struct SubmitParameters;
 
 impl IntoParams for SubmitParameters {
     fn into_params(place: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        let header = |name: &str, about: &str, example: Option<&str>, text: ObjectBuilder| {
-            ParameterBuilder::new(name)
-                .parameter_in(ParameterIn::Header)
-                .required(Required::False)
-                .description(Some(about))
-                .schema(Some(text))
-                .example(example.map(Into::into))
-                .build()
-        };
-        let text = || ObjectBuilder::new().schema_type(Type::String);
-        let key = text()
+        let key = ObjectBuilder::new()
+            .schema_type(Type::String)
             .min_length(Some(1))
             .max_length(Some(IDEMPOTENCY_KEY_MAX_CHARS))
             .pattern(Some("^[!-~]+$"));
+        let key = header_parameter(
+            "Idempotency-Key",
+            "1 to 255 visible ASCII characters. Repeating a request with the same key, body and options answers what the first one made instead of making another",
+        )
+        .schema(Some(key));
+        let cache = header_parameter(
+            "Cache-Control",
+            "`no-cache`: solve every case, also those that are identical to cases solved before",
+        )
+        .example(Some("no-cache".into()));
+        let trace = header_parameter(
+            "traceparent",
+            "W3C trace context: if the service exports traces, the trace of the work continues the client's trace. An unreadable value is ignored",
+        )
+        .example(Some("00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01".into()));
         let mut all = SubmitQuery::into_params(&place);
         all.extend(WaitQuery::into_params(&place));
-        all.push(prefer().build());
-        all.extend([
-            header(
-                "Idempotency-Key",
-                "1 to 255 visible ASCII characters. Repeating a request with the same key, body and options answers what the first one made instead of making another",
-                None,
-                key,
-            ),
-            header(
-                "Cache-Control",
-                "`no-cache`: solve every case, also those that are identical to cases solved before",
-                Some("no-cache"),
-                text(),
-            ),
-            header(
-                "traceparent",
-                "W3C trace context: if the service exports traces, the trace of the work continues the client's trace. An unreadable value is ignored",
-                Some("00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01"),
-                text(),
-            ),
-        ]);
+        all.extend([prefer(), key, cache, trace].map(ParameterBuilder::build));
         all
     }
 }

@@ -13,12 +13,12 @@ use serde::Serialize;
 use serde_json::json;
 use utoipa::openapi::extensions::Extensions;
 use utoipa::openapi::path::{OperationBuilder, ParameterBuilder, ParameterIn};
-use utoipa::openapi::schema::{KnownFormat, SchemaFormat, Type};
+use utoipa::openapi::schema::{SchemaFormat, Type};
 use utoipa::openapi::{
     Content, HeaderBuilder, HttpMethod, ObjectBuilder, Paths, Ref, RefOr, Required,
     ResponseBuilder, Schema,
 };
-use utoipa::{IntoParams, PartialSchema, ToSchema};
+use utoipa::{IntoParams, ToSchema};
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter};
 use uuid::Uuid;
 
@@ -200,11 +200,7 @@ pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
         Kind::Case | Kind::Evolution => "JSON with `state`, `progress` and `version`".to_owned(),
         _ => format!("the {noun} as `/v1/{}/{{id}}` answers it", kind.nouns()),
     };
-    let seen = ParameterBuilder::new("Last-Event-ID")
-        .parameter_in(ParameterIn::Header)
-        .required(Required::False)
-        .description(Some("Id of the last event that was seen"))
-        .schema(Some(ObjectBuilder::new().schema_type(Type::String)));
+    let seen = header_parameter("Last-Event-ID", "Id of the last event that was seen");
     let stream = Content::new(Some(Ref::from_schema_name(event_name(kind))));
     let sent = ResponseBuilder::new()
         .description("One event per change")
@@ -329,8 +325,9 @@ pub(crate) fn event_schema(data: &str, names: &str) -> RefOr<Schema> {
 fn operation(kind: Kind, verb: &str, summary: &str, more: &[ProblemKind]) -> OperationBuilder {
     let id = ObjectBuilder::new()
         .schema_type(Type::String)
-        .format(Some(SchemaFormat::KnownFormat(KnownFormat::Uuid)));
-    let id = ParameterBuilder::new("id")
+        .format(Some(SchemaFormat::Custom("uuid".to_owned())));
+    let id = ParameterBuilder::new()
+        .name("id")
         .parameter_in(ParameterIn::Path)
         .required(Required::True)
         .description(Some(format!("Id of the {}", kind.noun())))
@@ -361,14 +358,19 @@ pub(crate) fn text_header(description: &str) -> utoipa::openapi::Header {
     header.description(Some(description)).build()
 }
 
-/// `Prefer: wait=N` of a request.
-pub(crate) fn prefer() -> ParameterBuilder {
-    ParameterBuilder::new("Prefer")
+/// A header that a request may have, a text.
+pub(crate) fn header_parameter(name: &str, about: &str) -> ParameterBuilder {
+    ParameterBuilder::new()
+        .name(name)
         .parameter_in(ParameterIn::Header)
         .required(Required::False)
-        .description(Some("`wait=N`, as `?wait=N` (RFC 7240)"))
+        .description(Some(about))
         .schema(Some(ObjectBuilder::new().schema_type(Type::String)))
-        .example(Some("wait=10".into()))
+}
+
+/// `Prefer: wait=N` of a request.
+pub(crate) fn prefer() -> ParameterBuilder {
+    header_parameter("Prefer", "`wait=N`, as `?wait=N` (RFC 7240)").example(Some("wait=10".into()))
 }
 
 /// A route below the resource of a kind.

@@ -47,7 +47,9 @@ impl Claims for SqlStore {
             if let Some(known) = self.known_queues() {
                 return Ok(known);
             }
-            let rows = query(QUEUES).fetch_all(&self.readers).await?;
+            let mut connection = self.readers.acquire().await?;
+            let rows = query(QUEUES).fetch_all(&mut *connection).await?;
+            drop(connection);
             let read = |row: &DbRow| {
                 Ok(Queue {
                     tenant: row.try_get::<String, _>("tenant")?.into(),

@@ -32,7 +32,9 @@ impl Leases for SqlStore {
             );
             push_list(&mut query, ids);
             query.push(")");
-            let rows = query.build().fetch_all(&self.readers).await?;
+            let mut connection = self.readers.acquire().await?;
+            let rows = query.build().fetch_all(&mut *connection).await?;
+            drop(connection);
             let mut templates: HashMap<String, (Bytes, Option<Bytes>)> = HashMap::new();
             let mut cases = HashMap::with_capacity(rows.len());
             for row in &rows {
