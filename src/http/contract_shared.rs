@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use axum::http::StatusCode;
 use serde_json::{Map, Value, json};
 
-/// Moves headers, responses of failures, parameters and examples that several operations have into `components`.
+/// Moves headers, responses, parameters and examples that several operations have into `components`.
 pub(super) fn share(document: &mut Value) {
     for kind in [
         Kind::Headers,
@@ -121,9 +121,7 @@ fn visit(document: &mut Value, kind: Kind, with: &mut impl FnMut(&str, &mut Valu
         match kind {
             Kind::Responses => {
                 for (status, response) in members(operation, "responses") {
-                    if status.starts_with(['4', '5', 'd']) {
-                        with(status, response);
-                    }
+                    with(status, response);
                 }
             }
             Kind::Headers => {

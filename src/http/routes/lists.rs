@@ -304,13 +304,18 @@ fn page_schema(kind: Kind) -> RefOr<Schema> {
         .into()
 }
 
-/// A job in a list: any of its members may have been left out.
+/// A job in a list: any of its members may have been left out. The job itself describes them.
 fn listed_job() -> RefOr<Schema> {
     let mut schema = JobAnswer::schema();
     if let RefOr::T(Schema::Object(job)) = &mut schema {
         job.required.clear();
+        for member in job.properties.values_mut() {
+            if let RefOr::T(Schema::Object(member)) = member {
+                member.description = None;
+            }
+        }
         job.description =
-            Some("A job, with all its members or those that `fields` names.".to_owned());
+            Some("A job with all its members, or with those that `fields` names.".to_owned());
     }
     schema
 }

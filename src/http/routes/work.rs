@@ -196,9 +196,18 @@ pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
         follow(request, kind, read_id(kind, &id)?).await
     };
     let noun = kind.noun();
-    let data = match kind {
-        Kind::Case | Kind::Evolution => "JSON with `state`, `progress` and `version`".to_owned(),
-        _ => format!("the {noun} as `/v1/{}/{{id}}` answers it", kind.nouns()),
+    let about = match kind {
+        Kind::Case => {
+            "Events are called `state`; their data is JSON with `state`, `progress` and `version`. Changes in quick succession are merged into one \
+             event. The first event comes at once, unless `Last-Event-ID` says that it was seen; the stream closes after the final state, and when \
+             the service shuts down. If the last event was seen the answer is `204`, which tells an `EventSource` not to connect again."
+                .to_owned()
+        }
+        Kind::Evolution => "As the events of a job.".to_owned(),
+        _ => format!(
+            "As the events of a job; their data is the {noun} as `/v1/{}/{{id}}` answers it.",
+            kind.nouns()
+        ),
     };
     let seen = header_parameter("Last-Event-ID", "Id of the last event that was seen");
     let stream = Content::new(Some(Ref::from_schema_name(event_name(kind))));
@@ -207,11 +216,7 @@ pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
         .content("text/event-stream", stream);
     let over = format!("The {noun} has ended and the client has seen it");
     let following = operation(kind, "follow", &format!("Follows {}.", a(kind)), &[])
-        .description(Some(format!(
-            "Events are called `state`; their data is {data}. Changes in quick succession are merged into one event. The first event comes at \
-             once, unless `Last-Event-ID` says that it was seen; the stream closes after the final state, and when the service shuts down. If \
-             the last event was seen the answer is `204`, which tells an `EventSource` not to connect again."
-        )))
+        .description(Some(about))
         .parameter(seen)
         .response("200", sent.build())
         .response("204", ResponseBuilder::new().description(over).build());
