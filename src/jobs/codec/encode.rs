@@ -1,6 +1,8 @@
 //! Fields into their stored form.
 
-use std::io::{Cursor, Error, Result, Write};
+use std::io::{Error, Result};
+
+use zstd::bulk::Compressor;
 
 use crate::contact::solution::words::fields::Fields;
 use crate::contact::solution::words::zone::Zone;
@@ -13,7 +15,10 @@ const ZSTD_LEVEL: i32 = 3;
 /// # Errors
 /// Compression ran out of memory.
 pub fn encode(fields: &Fields) -> Result<Vec<u8>> {
+    let mut compressor = Compressor::new(ZSTD_LEVEL)?;
+    compressor.include_checksum(true)?;
     let mut blocks = Blocks {
+        compressor,
         list: Vec::new(),
         body: Vec::new(),
     };
@@ -95,6 +100,8 @@ impl Place {
 
 /// Blocks in the making.
 struct Blocks {
+    /// Kept for all blocks: making one takes longer than compressing a small block.
+    compressor: Compressor<'static>,
     list: Vec<Block>,
     body: Vec<u8>,
 }
@@ -118,13 +125,8 @@ impl Blocks {
         count: usize,
     ) -> Result<()> {
         let offset = self.body.len();
-        let mut target = Cursor::new(&mut self.body);
-        target.set_position(offset as u64);
-        let mut encoder = zstd::Encoder::new(target, ZSTD_LEVEL)?;
-        encoder.include_checksum(true)?;
-        encoder.set_pledged_src_size(Some(values.len() as u64))?;
-        encoder.write_all(values)?;
-        encoder.finish()?;
+        self.body
+            .extend_from_slice(&self.compressor.compress(values)?);
         self.list.push(Block {
             patch: at.patch,
             point: at.point,

@@ -27,6 +27,12 @@ const PREPARED: usize = 100;
 /// Longer statements, such as insertions of many rows, are not kept.
 const PREPARED_TEXT_MAX: usize = 4096;
 
+/// Commits neither wait for the disk nor move the log into the database.
+const RELAX: &str = "PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 0";
+
+/// What holds otherwise.
+const TIGHTEN: &str = "PRAGMA synchronous = FULL; PRAGMA wal_autocheckpoint = 1000";
+
 /// Opens a connection.
 type Open = Box<dyn Fn() -> rusqlite::Result<rusqlite::Connection> + Send + Sync>;
 
@@ -73,6 +79,7 @@ impl Pool {
         Ok(Pooled {
             connection: Connection(Some(connection)),
             pool: self.0.clone(),
+            relaxed: false,
             _permit: permit,
         })
     }
@@ -80,6 +87,18 @@ impl Pool {
     /// Begins a transaction that writes. One that reads first and then turns into a writer would fail at once beside another.
     pub(crate) async fn begin(&self) -> Result<Transaction, StoreError> {
         let mut connection = self.acquire().await?;
+        unlocked(&mut connection, |connection| {
+            connection.execute_batch("BEGIN IMMEDIATE")
+        })
+        .await?;
+        Ok(Transaction(connection))
+    }
+
+    /// As [`Pool::begin`], for what may be lost in a power cut, though not with the process: the commit does not wait for the disk.
+    pub(crate) async fn begin_relaxed(&self) -> Result<Transaction, StoreError> {
+        let mut connection = self.acquire().await?;
+        connection.batch(RELAX)?;
+        connection.relaxed = true;
         unlocked(&mut connection, |connection| {
             connection.execute_batch("BEGIN IMMEDIATE")
         })
@@ -121,6 +140,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 pub(crate) struct Pooled {
     connection: Connection,
     pool: Arc<Shared>,
+    /// Its commits do not wait for the disk until it is given back.
+    relaxed: bool,
     _permit: OwnedSemaphorePermit,
 }
 
@@ -145,7 +166,8 @@ impl Drop for Pooled {
                 // A full disk can leave a connection inside a transaction for ever; such a connection is closed.
                 let _ = connection.execute_batch("ROLLBACK");
             }
-            if connection.is_autocommit() {
+            let strict = !self.relaxed || connection.execute_batch(TIGHTEN).is_ok();
+            if connection.is_autocommit() && strict {
                 self.pool.give_back(connection);
             }
         }
@@ -157,8 +179,11 @@ pub(crate) struct Transaction(Pooled);
 
 impl Transaction {
     pub(crate) async fn commit(mut self) -> Result<(), StoreError> {
-        self.0
-            .with(|connection| blocking(|| connection.execute_batch("COMMIT")))
+        let relaxed = self.0.relaxed;
+        self.0.with(|connection| match relaxed {
+            true => connection.execute_batch("COMMIT"),
+            false => blocking(|| connection.execute_batch("COMMIT")),
+        })
     }
 }
 
@@ -679,6 +704,30 @@ mod tests {
         assert_eq!(buried(&store).await, ["a", "b", "e"]);
         store.close().await;
         assert!(store.writer.begin().await.is_err());
+    }
+
+    #[tokio::test]
+    async fn only_a_relaxed_transaction_does_not_wait_for_the_disk() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("jobs.db");
+        let store = SqliteStore::open(&file).await.unwrap();
+        let mode = async |connection: &mut Connection| {
+            let mode = query_scalar("PRAGMA synchronous");
+            mode.fetch_one::<i64>(connection).await.unwrap()
+        };
+        for commits in [true, false] {
+            let mut relaxed = store.writer.begin_relaxed().await.unwrap();
+            let id = if commits { "a" } else { "b" };
+            bury(&mut relaxed, id).await.unwrap();
+            assert_eq!(mode(&mut relaxed).await, 1);
+            match commits {
+                true => relaxed.commit().await.unwrap(),
+                false => drop(relaxed),
+            }
+            let mut next = store.writer.begin().await.unwrap();
+            assert_eq!(mode(&mut next).await, 2, "FULL");
+        }
+        assert_eq!(buried(&store).await, ["a"]);
     }
 
     #[tokio::test]

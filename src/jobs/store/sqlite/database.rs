@@ -1,7 +1,7 @@
 //! The job table on one machine, embedded: SQLite with one writing connection and a pool of readers.
 //!
 //! There is one writing connection, because SQLite's busy handler has no queue: of several writers one starves. The queue of
-//! the pool is fair. `synchronous=FULL`, because a job that was acknowledged must survive a power cut. Every
+//! the pool is fair. `synchronous=FULL`, because a job that was acknowledged must survive a power cut; claims need not. Every
 //! transaction that writes begins with `BEGIN IMMEDIATE`: a deferred one that reads first fails at once when it
 //! turns into a writer.
 

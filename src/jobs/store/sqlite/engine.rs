@@ -111,6 +111,8 @@ impl SqliteStore {
             ClaimKind::New => CLAIM_NEW,
             ClaimKind::Begun => CLAIM_BEGUN,
         };
+        // A claim that a power cut undoes leaves its jobs in the queue.
+        let mut transaction = self.writer.begin_relaxed().await?;
         let rows = query(claim)
             .bind(&*request.queue.tenant)
             .bind(count(request.jobs))
@@ -123,8 +125,9 @@ impl SqliteStore {
             .bind(request.lease.now.saturating_add(request.lease.ms))
             .bind(request.worker)
             .bind(request.now)
-            .fetch_all(&self.writer)
+            .fetch_all(&mut *transaction)
             .await?;
+        transaction.commit().await?;
         Ok(rows)
     }
 
