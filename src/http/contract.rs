@@ -23,7 +23,7 @@ use crate::http::{contract_forms, contract_shared};
 #[openapi(
     info(
         title = "railhead",
-        description = "Rolling-contact stress service: describe how two bodies touch, press and roll, and get tractions, stick and slip zones and forces.\n\nUnits are part of every name: mm, N, MPa; creepages are dimensionless, spin is in 1/mm. x is along rolling, y to the left, z up; forces and tractions act on the lower body. Times are RFC 3339 in UTC. Every failure is a problem (RFC 9457) with a `type` that explains itself.",
+        description = "Rolling-contact stress service: describe how two bodies touch, press and roll, and get tractions, stick and slip zones and forces.\n\nUnits are part of every name: mm, N, MPa; creepages are dimensionless, spin is in 1/mm. x is along rolling, y to the left, z up; forces and tractions act on the lower body. Numbers are of double precision; times are RFC 3339 in UTC. Every failure is a problem (RFC 9457) with a `type` that explains itself.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     servers((url = "/", description = "The service that answers this document")),

@@ -114,13 +114,6 @@ pub(super) fn complete(document: &mut OpenApi) {
             fix_length(schema, length);
         }
     }
-    for item in document.paths.paths.values_mut() {
-        let operations = [&mut item.get, &mut item.post, &mut item.delete];
-        for operation in operations.into_iter().flatten() {
-            // Not to be asked for is not the same as not to be said.
-            operation.security.get_or_insert_default();
-        }
-    }
 }
 
 fn forms<'a>(components: &'a mut Components, name: &str) -> Option<&'a mut Vec<RefOr<Schema>>> {

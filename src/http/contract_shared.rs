@@ -7,6 +7,7 @@ use serde_json::{Map, Value, json};
 
 /// Moves headers, responses, parameters and examples that several operations have into `components`.
 pub(super) fn share(document: &mut Value) {
+    leave_out_double(document);
     for kind in [
         Kind::Headers,
         Kind::Responses,
@@ -41,6 +42,23 @@ pub(super) fn share(document: &mut Value) {
         if !shared.is_empty() {
             document["components"][kind.name()] = shared.into();
         }
+    }
+}
+
+/// Leaves out that numbers are of double precision: all are, as the head of the document says.
+fn leave_out_double(value: &mut Value) {
+    match value {
+        Value::Object(members) => {
+            if members
+                .get("format")
+                .is_some_and(|format| format == "double")
+            {
+                members.remove("format");
+            }
+            members.values_mut().for_each(leave_out_double);
+        }
+        Value::Array(items) => items.iter_mut().for_each(leave_out_double),
+        _ => {}
     }
 }
 
