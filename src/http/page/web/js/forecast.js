@@ -201,7 +201,7 @@ export function templateOf(app) {
 const speedOf = (template) => numberAt(template, '/motion/wheelset/speed_mm_per_s');
 
 /** What is submitted. @param {App} app @param {JsonObject} template @returns {JsonObject} */
-export function requestOf(app, template) {
+function requestOf(app, template) {
   const { form } = forecast;
   const { examples } = app.store.get().compose;
   const number = (/** @type {string} */ text) => parse(text) ?? null;
@@ -295,7 +295,7 @@ export async function takeForecastFiles(app, files) {
 }
 
 /** Takes the text of a table of the traffic. @param {App} app @param {string} name @param {string} text */
-export function takeTable(app, name, text) {
+function takeTable(app, name, text) {
   const parsed = parseTraffic(text);
   if (typeof parsed === 'string') app.say(`${name}: ${parsed}.`);
   else writeForm(app, { table: { name, ...parsed } });

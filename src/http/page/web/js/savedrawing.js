@@ -7,7 +7,7 @@ import { fileName } from './downloads.js';
 const LOOKS = ['fill', 'fill-opacity', 'stroke', 'stroke-width', 'stroke-dasharray', 'font-family', 'font-size', 'font-weight', 'text-anchor', 'opacity'];
 
 /** @param {SVGSVGElement} drawing @returns {string} */
-export function saveDrawing(drawing) {
+function saveDrawing(drawing) {
   const copy = /** @type {SVGSVGElement} */ (drawing.cloneNode(true));
   const [from, to] = [drawing, copy].map((root) => [root, ...root.querySelectorAll('*')]);
   from.forEach((element, at) => {

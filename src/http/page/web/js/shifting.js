@@ -73,7 +73,7 @@ export function shifted({ placed, shift: before }, shift) {
  * @param {Kinematics} kinematics
  * @param {number} place
  */
-export function rollingWheel(document, side, { lateral_shift_mm: shifts, left, right }, place) {
+function rollingWheel(document, side, { lateral_shift_mm: shifts, left, right }, place) {
   const motion = Array.isArray(document.motion) ? document.motion[0] : document.motion;
   const rolling = at(motion, '/wheelset/0') ?? at(motion, '/wheelset');
   const speed = numberAt(rolling, '/speed_mm_per_s') || 20000;

@@ -58,6 +58,9 @@ export function wheelLoads(result, document, at) {
  * @returns {{ x_n: number, left_n: number, down_n: number }}
  */
 export function inTrackAxes({ position, normal_force_n: normal, points }, point) {
+  // On the curve of the rail the normals of a patch differ: its force is that of the service.
+  const { force_track_n: force } = /** @type {{ force_track_n?: number[] }} */ (points[point]);
+  if (force) return { x_n: force[0], left_n: force[1], down_n: -force[2] };
   const angle = position?.contact_angle_rad ?? 0;
   const { force_x_n: x_n, force_y_n: y } = points[point];
   return { x_n, left_n: y * Math.cos(angle) + normal * Math.sin(angle), down_n: normal * Math.cos(angle) - y * Math.sin(angle) };

@@ -133,7 +133,7 @@ function carriedTable({ kinematics, at, carried, failure }) {
   ];
   return html`<table class="carried"><thead><tr><th></th>${SIDES.map((side) => html`<th scope="col">${side}</th>`)}</tr></thead>
     <tbody>${rows.map(([name, of]) => html`<tr><th scope="row">${name}</th>${SIDES.map((side) => html`<td>${of(side)}</td>`)}</tr>`)}</tbody></table>
-    <p class="hint">Axle level; each wheel with half the load, without yaw.</p>`;
+    <p class="hint">Axle level; each wheel with half the load, without yaw, forces to 1 % of μN.</p>`;
 }
 
 /** @param {App} app @param {Looked} looked @param {Wheelset} wheelset @param {Kinematics} kinematics @param {Shifting} moving */
