@@ -297,7 +297,8 @@ impl Contact {
         }
     }
 
-    /// Chooses the curved surface of the rail for a contact of profiles. Other contacts stay unchanged.
+    /// Requires the curved surface of the rail, which is the default, for a contact of profiles, and chooses the influence on it. Other contacts stay
+    /// unchanged.
     ///
     /// ```
     /// use railhead_contact::{
@@ -328,6 +329,21 @@ impl Contact {
         {
             *reference_surface = Some(SurfaceName::Curve);
             *influence = Some(asked);
+        }
+        self
+    }
+
+    /// Chooses planes of contact for a contact of profiles. Other contacts stay unchanged.
+    #[must_use]
+    pub fn on_planes(mut self) -> Contact {
+        if let Contact::Profiles {
+            reference_surface,
+            influence,
+            ..
+        } = &mut self
+        {
+            *reference_surface = Some(SurfaceName::Plane);
+            *influence = None;
         }
         self
     }

@@ -57,6 +57,7 @@ pub mod rolling;
 pub mod rolling_stage;
 pub mod slices;
 pub mod solution;
+pub(crate) mod surface_fallback;
 pub mod time_limit;
 pub mod unlike_bodies;
 pub(crate) mod unlike_motions;
@@ -176,10 +177,17 @@ fn solve_motions(
 ) -> Result<(Solution, Fields), SolveError> {
     let began = monitor.elapsed();
     let answer = match &case.problem.task {
-        NormalTask::Wheel(wheel) => match case.problem.pull() {
-            None => trust::solve(operators, case, wheel, monitor)?,
-            Some(forces) => pulled_wheel::solve(operators, case, wheel, forces, monitor)?,
-        },
+        NormalTask::Wheel(wheel) => {
+            let solved = surface_fallback::solve_wheel(case, wheel, monitor, |case, wheel| {
+                match case.problem.pull() {
+                    None => trust::solve(operators, case, wheel, monitor),
+                    Some(forces) => pulled_wheel::solve(operators, case, wheel, forces, monitor),
+                }
+            });
+            let ((mut solution, fields), remark) = solved?;
+            solution.remarks.extend(remark);
+            (solution, fields)
+        }
         NormalTask::Wheelset(wheelset) => {
             wheelset::solve::solve(operators, case, wheelset, monitor)?
         }

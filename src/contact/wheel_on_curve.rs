@@ -58,21 +58,22 @@ const BALANCE: f64 = 1e-4;
 const CHANGE_ROUGH: f64 = 0.02;
 /// When the rounds are used up, a change of the forces relative to μN up to this is answered with a remark.
 const CHANGE_POOR: f64 = 5e-3;
-/// A surface that turns by less than this over the contact, in rad, has no remark.
-const TURN_REMARKED: f64 = 0.05;
-/// Turn of a patch, in rad, from which half-spaces describe it only roughly.
-const TURN_OF_HALF_SPACE: f64 = 0.35;
-/// What the factors for the turn leave open: this part of the change that they make, and of μN. Both cover the differences to boundary elements of
-/// seven wheels on rails, on which they were chosen.
-const OPEN: [f64; 2] = [0.15, 0.01];
+/// Errors of the factors for the turn relative to μN: this times the standard deviation of the angle over the load, in rad, and at most that. Against
+/// boundary elements of seven wheels on rails with μ of 0.3 they are 0.2 to 1.5 % where the angle deviates by 0.07 to 0.5 rad; half of these the factors were
+/// fitted to.
+const OPEN_BY_TURN: f64 = 0.2;
+const OPEN_MAX: f64 = 0.035;
+/// Lateral forces of pressures count as under this coefficient of friction at least.
+const FRICTION_OPEN: f64 = 0.3;
 /// Axes, origins and signs in words.
 const FRAME: &str = "every patch on the surface of the rail: x along rolling (leading edge at larger x), y to the left along the cross-section, \
                      z out of the rail, origin at its load centre; forces of a patch at its mean contact angle; total in track axes: x along \
                      rolling, y to the left, z up; forces, moments and tractions act on the lower body, slip is that of the upper body relative \
                      to the lower one";
 
-/// Solves a case on the curve of the rail. `before` is asked before tractions are solved whether there is any point in it. Tractions change pressures,
-/// so that every motion has its own; of several motions, the wheel and the patches of the answer are those of the first.
+/// Solves a case on the curve of the rail. `before` is asked before tractions are solved whether there is any point in it, of several motions about the
+/// wheel without tractions. Tractions change pressures, so that every motion has its own; of several motions, the wheel and the patches of the answer are
+/// those of the first.
 ///
 /// # Errors
 /// A named reason why there is no answer.
@@ -86,6 +87,10 @@ pub(crate) fn solve(
 ) -> Result<(WheelContact, Solution, Fields), SolveError> {
     let motions = case.problem.motions.len();
     let curve = ReferenceCurve::new(&contact.geometry);
+    let patches = match case.problem.part.all {
+        1 => None,
+        _ => Some(patches_at_rest(case, contact, influence, before, monitor)?),
+    };
     let mut whole: Option<(WheelContact, Solution, Fields)> = None;
     for index in 0..motions {
         let part = case.slice(index..index + 1);
@@ -96,7 +101,7 @@ pub(crate) fn solve(
         };
         let watch = TimeLimit::new(&share, case.run.time_limit, 1);
         let solve = CurveSolve::new(operators, &part, contact, influence, &curve, &watch);
-        let solved = solve.and_then(|solve| solve.motion(before));
+        let solved = solve.and_then(|solve| solve.motion(before, patches));
         let (wheel, solution, fields) = solved.map_err(|error| watch.explained(error, &part))?;
         match &mut whole {
             None => whole = Some((wheel, solution, fields)),
@@ -110,6 +115,33 @@ pub(crate) fn solve(
         unreachable!("a case has at least one motion")
     };
     Ok(whole)
+}
+
+/// How many patches a wheel has on the curve of its rail without tractions: those of an answer to several motions, which has one list of patches.
+///
+/// # Errors
+/// Why the wheel does not come to rest; or what `before` says.
+pub(crate) fn patches_at_rest(
+    case: &CheckedCase,
+    contact: &WheelTask,
+    influence: Influence,
+    before: &mut dyn FnMut(&WheelContact) -> Result<(), SolveError>,
+    monitor: &dyn Monitor,
+) -> Result<usize, SolveError> {
+    let curve = ReferenceCurve::new(&contact.geometry);
+    let watch = TimeLimit::new(monitor, case.run.time_limit, 1);
+    let operators = Arc::default();
+    let solve = CurveSolve::new(&operators, case, contact, influence, &curve, &watch)?;
+    let workspace = &mut Workspace::default();
+    let task = solve.task();
+    let coarse = task.coarse(workspace, &watch);
+    let at_rest = coarse
+        .and_then(|coarse| task.fine(&coarse, &Friction::default(), workspace, &watch))
+        .map_err(|failure| watch.explained(failure.into(), case))?;
+    let wheel = solve.wheel(&at_rest, 0.0)?;
+    before(&wheel)?;
+    let patches = wheel.patches.iter().map(|gap| gap.field.patches().len());
+    Ok(patches.sum())
 }
 
 /// A wheel on the curve of its rail, in one motion.
@@ -132,18 +164,7 @@ struct Found {
     /// Vertical force of the tractions in N.
     lift: f64,
     parts: Vec<Part>,
-    /// The contact on the coarse grid, and rough tractions on it.
-    rough: Option<(CurveContact, Rough)>,
     remarks: Vec<RemarkEntry>,
-}
-
-/// Tractions on a coarse grid.
-struct Rough {
-    parts: Vec<Part>,
-    /// Forces on the rail in track axes relative to the friction limit, for the load that they leave to the pressures.
-    force: [f64; 3],
-    /// Friction limit in N.
-    limit: f64,
 }
 
 /// Patches that are solved together.
@@ -178,6 +199,30 @@ impl PatchForces {
     fn in_track(&self) -> [f64; 3] {
         let ([across, down], [x, y, z]) = (self.pressed, self.sheared);
         [x, y + across, z - down]
+    }
+}
+
+impl Part {
+    /// Adds to the estimates of all forces what the factors for the turn leave open of them, relative to the friction limit.
+    fn leave_open(&mut self, share: f64) {
+        let mut all = ErrorEstimate::default();
+        for patch in &mut self.solution.patches {
+            let limit = patch.friction_limit_n.unwrap_or(0.0);
+            let open = ErrorEstimate {
+                force_x_n: share * limit,
+                force_y_n: share * limit,
+                moment_z_n_mm: 0.0,
+            };
+            let point = &mut patch.points[0];
+            point.error_estimate = point.error_estimate.map(|error| error.plus(open));
+            let of_pressure = share * FRICTION_OPEN * patch.normal_force_n;
+            all = all.plus(ErrorEstimate {
+                force_y_n: open.force_y_n.max(of_pressure),
+                ..open
+            });
+        }
+        let total = &mut self.solution.total[0];
+        total.error_estimate = total.error_estimate.map(|error| error.plus(all));
     }
 }
 
@@ -224,29 +269,43 @@ impl<'a> CurveSolve<'a> {
         }
     }
 
-    /// The wheel at rest, and the answer to the motion.
+    /// The wheel at rest, and the answer to the motion. As one of several it has a number of `patches`: where its tractions would change that, or leave
+    /// no answer, pressures are those without tractions.
     fn motion(
         &self,
         before: &mut dyn FnMut(&WheelContact) -> Result<(), SolveError>,
+        patches: Option<usize>,
     ) -> Result<(WheelContact, Solution, Fields), SolveError> {
         let MotionPart { before: index, all } = self.case.problem.part;
         let workspace = &mut Workspace::default();
         let began = self.watch.elapsed();
-        let mut unasked = |_: &WheelContact| Ok(());
-        let before = if index == 0 { before } else { &mut unasked };
-        let mut found = self.rounds(true, before, workspace)?;
-        if all > 1 && patches(&found.parts) != self.patches_at_rest(workspace)? {
-            found = self.rounds(false, &mut |_| Ok(()), workspace)?;
-            found
-                .remarks
-                .push(Remark::NormalForcesAloneBalance {}.into());
-        }
+        let found = match patches {
+            None => self.rounds(true, before, workspace),
+            Some(patches) => match self.rounds(true, &mut |_| Ok(()), workspace) {
+                Ok(found) if count(&found.parts) == patches => Ok(found),
+                Ok(_) | Err(SolveError::NormalProblem { .. }) => self
+                    .rounds(false, &mut |_| Ok(()), workspace)
+                    .map(|mut found| {
+                        let remark = Remark::NormalForcesAloneBalance {};
+                        found.remarks.push(remark.into());
+                        found
+                    }),
+                Err(error) => Err(error),
+            },
+        }?;
         let rest = (self.watch.elapsed() - began).as_secs_f64();
         let mut wheel = self.wheel(&found.contact, found.lift)?;
         wheel.remarks.extend(found.remarks.iter().cloned());
-        if index == 0 {
-            let change = self.change_by_turn(&found, workspace)?;
-            wheel.remarks.extend(change.map(RemarkEntry::from));
+        let turn_rad = turn(&found.contact);
+        if self.influence == Influence::AngleCorrected && turn_rad > TURN_MAX {
+            let range_rad = TURN_MAX;
+            wheel.remarks.push(
+                Remark::TurnBeyondRange {
+                    turn_rad,
+                    range_rad,
+                }
+                .into(),
+            );
         }
         if all > 1 {
             let of_motion = |remark: &mut RemarkEntry| remark.point = Some(index);
@@ -257,14 +316,6 @@ impl<'a> CurveSolve<'a> {
             solution.patches.iter_mut().for_each(tell_region);
         }
         Ok((wheel, solution, fields))
-    }
-
-    /// How many patches there are without tractions: those of an answer to several motions, which has one list of patches.
-    fn patches_at_rest(&self, workspace: &mut Workspace) -> Result<usize, SolveError> {
-        let task = self.task();
-        let coarse = task.coarse(workspace, self.watch)?;
-        let contact = task.fine(&coarse, &Friction::default(), workspace, self.watch)?;
-        Ok(self.wheel(&contact, 0.0)?.patches.len())
     }
 
     /// Pressures and tractions in turn: on a coarse grid until friction is known about, then on the fine one. `before` is asked of the wheel at rest
@@ -283,24 +334,22 @@ impl<'a> CurveSolve<'a> {
         let task = self.task();
         let mut coarse = task.coarse(workspace, self.watch)?;
         let mut friction = Friction::default();
-        let mut rough = None;
+        let rough = with_tractions(&run.for_resultants(TARGET_ROUGH), &[]);
         let mut earlier = None;
         for _ in 0..if coupled { ROUNDS_MAX } else { 0 } {
-            let found = self.rough(&coarse, friction.lift, workspace)?;
-            let next = self.friction(&coarse, &found.parts, workspace);
-            let limit = found.limit;
+            let parts = self.tractions(&coarse, &rough, workspace)?;
+            let next = self.friction(&coarse, &parts, workspace);
+            let limit = self.limit(&parts);
             let [by_lift, by_gap] = coarse.change_by(&friction, &next);
-            rough = Some(found);
             friction = accelerated(&friction, next, &mut earlier);
             if by_lift.max(by_gap * coarse.normal_force() / limit) <= CHANGE_ROUGH {
                 break;
             }
             coarse = task.again(coarse, &friction, workspace, self.watch)?;
+            friction.opened.clone_from(&coarse.opened);
         }
         let mut contact = task.fine(&coarse, &friction, workspace, self.watch)?;
-        friction.opened = friction
-            .opened
-            .map(|opened| contact.interpolated(&coarse, &opened));
+        friction.opened.clone_from(&contact.opened);
         before(&self.wheel(&contact, friction.lift)?)?;
         let exact = with_tractions(run, &run.outputs);
         let target = run.resolution.target_or_usual();
@@ -336,41 +385,14 @@ impl<'a> CurveSolve<'a> {
                     contact,
                     lift: forces.iter().flatten().map(|patch| patch.sheared[2]).sum(),
                     parts,
-                    rough: rough.map(|rough| (coarse, rough)),
                     remarks: (change > 1.0).then(|| remark.into()).into_iter().collect(),
                 });
             }
             friction = accelerated(&friction, next, &mut earlier);
             contact = task.again(contact, &friction, workspace, self.watch)?;
+            friction.opened.clone_from(&contact.opened);
         }
         unreachable!("the last round ends them")
-    }
-
-    /// Solves tractions on a coarse mesh, on pressures that count on a vertical force in N of the tractions.
-    fn rough(
-        &self,
-        contact: &CurveContact,
-        lift: f64,
-        workspace: &mut Workspace,
-    ) -> Result<Rough, SolveError> {
-        let run = with_tractions(&self.case.run.for_resultants(TARGET_ROUGH), &[]);
-        let parts = self.tractions(contact, &run, workspace)?;
-        let forces = self.forces(contact, &parts);
-        let limit = self.limit(&parts);
-        // Where they carry another part of the load, all forces grow with what is left to the pressures.
-        let grown = match self.contact.loading {
-            WheelLoad::Vertical(load) => {
-                let found: f64 = forces.iter().flatten().map(|patch| patch.sheared[2]).sum();
-                load / (load + lift - found)
-            }
-            WheelLoad::Normal(_) | WheelLoad::Lowering(_) => 1.0,
-        };
-        let force = sum(forces.iter().flatten().map(PatchForces::in_track));
-        Ok(Rough {
-            force: force.map(|part| grown * part / limit.max(f64::MIN_POSITIVE)),
-            limit,
-            parts,
-        })
     }
 
     /// Effect of the tractions of all parts on the contact.
@@ -673,35 +695,34 @@ impl<'a> CurveSolve<'a> {
         patches.filter_map(|patch| patch.friction_limit_n).sum()
     }
 
-    /// Change of the forces on the rail by the correction for the turn, from rough tractions on the coarse grid; `None` where the surface hardly turns.
-    fn change_by_turn(
-        &self,
-        found: &Found,
-        workspace: &mut Workspace,
-    ) -> Result<Option<Remark>, SolveError> {
-        let turn = turn(&found.contact);
-        let Some((coarse, rough)) = &found.rough else {
-            return Ok(None);
-        };
-        if self.influence != Influence::AngleCorrected || turn < TURN_REMARKED || rough.limit <= 0.0
-        {
-            return Ok(None);
+    /// What the factors for the turn leave open of a force, relative to the friction limit.
+    fn left_open(&self, contact: &CurveContact) -> f64 {
+        match self.influence {
+            Influence::AngleCorrected => {
+                let [_, deviation] = contact.angles();
+                (OPEN_BY_TURN * deviation).min(OPEN_MAX)
+            }
+            Influence::HalfSpace => 0.0,
         }
-        let unfolded = CurveSolve {
-            influence: Influence::Unfolded,
-            ..*self
-        };
-        let task = unfolded.task();
-        let contact = task.on_grid_of(coarse, found.lift, workspace, self.watch)?;
-        let other = unfolded.rough(&contact, found.lift, workspace)?;
-        let [change_x, change_y] = [0, 1].map(|k| rough.force[k] - other.force[k]);
-        Ok(Some(Remark::TurnCorrected {
-            turn_rad: turn,
-            change_x,
-            change_y,
-            open: OPEN[0] * change_x.abs().max(change_y.abs()) + OPEN[1],
-            range_rad: TURN_MAX,
-        }))
+    }
+
+    /// Fails where the wheel's profile ends beside a patch.
+    fn check_ends(&self, contact: &CurveContact, field: &PressureField) -> Result<(), SolveError> {
+        let beyond = contact.grid.step[1];
+        for [.., low, high] in field.patches().iter().map(|patch| patch.extent) {
+            for s in [low - beyond, high + beyond] {
+                let place = self.curve.at(s);
+                if self.curve.nearest(&place, contact.centre).is_none() {
+                    let [y, _] = self.contact.geometry.on_rail(place.rail);
+                    return Err(SolveError::NormalProblem {
+                        reason: format!(
+                            "the contact at y = {y:.1} mm on the rail reaches the end of a profile, where it may be cut off; longer profiles are needed"
+                        ),
+                    });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The wheel at rest, with the vertical force of tractions in N.
@@ -710,6 +731,7 @@ impl<'a> CurveSolve<'a> {
         for strips in contact.parts(self.influence) {
             for patch in contact.patches(strips)? {
                 let field = CurveContact::field(vec![patch])?;
+                self.check_ends(contact, &field)?;
                 let centre = field.load_centre(None);
                 let (place, over) = self.load_centre(contact, centre)?;
                 let [_, y, z] = place.point(centre[0], 0.0);
@@ -754,6 +776,7 @@ impl<'a> CurveSolve<'a> {
     ) -> Result<(Solution, Fields), SolveError> {
         let forces = self.forces(&found.contact, &found.parts);
         let Found { contact, parts, .. } = found;
+        let open = self.left_open(&contact);
         let mut remarks = self.case.remarks.clone();
         remarks.extend(wheel.remarks.iter().cloned());
         let centre = load_centre_of_all(self.curve, &parts);
@@ -772,6 +795,7 @@ impl<'a> CurveSolve<'a> {
                 patch: remark.patch.map(|patch| patch + first),
                 ..remark.clone()
             }));
+            part.leave_open(open);
             let error = self.error_of(&part, centre);
             total.error_estimate = total.error_estimate.zip(error).map(|(a, b)| a.plus(b));
             for (k, forces) in forces.iter().enumerate() {
@@ -781,12 +805,6 @@ impl<'a> CurveSolve<'a> {
                 total.force_y_n += y;
                 total.force_z_n = total.force_z_n.map(|sum| sum + z);
                 total.moment_z_n_mm += moment;
-                let [.., low, high] = part.solution.patches[k].extent_mm;
-                let turned = [low, high].map(|s| self.curve.at(s + part.centres[k][1]).angle);
-                let turn_rad = (turned[1] - turned[0]).abs();
-                if self.influence == Influence::HalfSpace && turn_rad > TURN_OF_HALF_SPACE {
-                    remarks.push(Remark::ContactTurns { turn_rad }.at_patch(first + k));
-                }
             }
             match &mut whole {
                 None => whole = Some((part.solution, part.fields)),
@@ -875,6 +893,7 @@ impl<'a> CurveSolve<'a> {
         let elasticity = &self.case.problem.elasticity;
         let point = &mut patch.points[0];
         point.force_y_n = y_share * cos + z_share * sin;
+        point.force_track_n = Some(forces.in_track());
         point.motion = motion.into();
         point.normalised = normalised(elasticity, patch.area_mm2, limit, &motion);
         point.friction_power_without_spin_n =
@@ -895,7 +914,7 @@ impl<'a> CurveSolve<'a> {
         Ok(moment)
     }
 
-    /// The errors of the forces of a part in track axes, of its moment about the vertical line through a point `[x, y]`.
+    /// The errors of the forces of a part in track axes, and of its moment about the vertical line through a point `[x, y]`.
     fn error_of(&self, part: &Part, about: [f64; 2]) -> Option<ErrorEstimate> {
         let [x, s] = part.origin;
         let arm = [x - about[0], self.curve.at(s).at[0] - about[1]];
@@ -999,7 +1018,7 @@ fn covered([from, to]: [f64; 2], cells: usize) -> Vec<(usize, f64)> {
 }
 
 /// How many patches some parts have.
-fn patches(parts: &[Part]) -> usize {
+fn count(parts: &[Part]) -> usize {
     parts.iter().map(|part| part.patches.len()).sum()
 }
 
@@ -1032,8 +1051,4 @@ fn load_centre_of_all(curve: &ReferenceCurve, parts: &[Part]) -> [f64; 2] {
         }
     }
     sum.map(|sum| sum / load.max(f64::MIN_POSITIVE))
-}
-
-fn sum(forces: impl Iterator<Item = [f64; 3]>) -> [f64; 3] {
-    forces.fold([0.0; 3], |sum, force| [0, 1, 2].map(|k| sum[k] + force[k]))
 }

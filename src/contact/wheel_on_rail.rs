@@ -63,7 +63,7 @@ pub(crate) fn solve(
     judge: &mut dyn Judge,
     monitor: &dyn Monitor,
 ) -> Result<SolvedWheel, SolveError> {
-    if let ReferenceSurface::Curve(influence) = contact.surface {
+    if let ReferenceSurface::Curve { influence, .. } = contact.surface {
         let before = &mut |wheel: &WheelContact| judge.before(wheel);
         let found = wheel_on_curve::solve(operators, case, contact, influence, before, monitor);
         let (wheel, solution, fields) = found?;
@@ -100,6 +100,24 @@ pub(crate) fn solve(
         at_rest.wheel.remarks.push(remark.into());
     }
     at_rest.found(case, contact, answers)
+}
+
+/// Whether a wheel comes to rest on the curve of its rail without tractions. There is no such question on planes.
+///
+/// # Errors
+/// Why it does not; or what `judge` has against it.
+pub(crate) fn comes_to_rest(
+    case: &CheckedCase,
+    contact: &WheelTask,
+    judge: &mut dyn Judge,
+    monitor: &dyn Monitor,
+) -> Result<(), SolveError> {
+    let ReferenceSurface::Curve { influence, .. } = contact.surface else {
+        return Ok(());
+    };
+    let before = &mut |wheel: &WheelContact| judge.before(wheel);
+    wheel_on_curve::patches_at_rest(case, contact, influence, before, monitor)?;
+    Ok(())
 }
 
 /// Who judges a wheel at rest before and after its motions are solved.

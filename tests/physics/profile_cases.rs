@@ -49,6 +49,11 @@ pub fn benchmark() -> Option<Value> {
     ))
 }
 
+/// The case on planes of contact.
+pub fn on_planes(case: &Value) -> Value {
+    put(case, "contact", json!({ "reference_surface": "plane" }))
+}
+
 /// The case with other members in one of its objects.
 pub fn put(case: &Value, object: &str, members: Value) -> Value {
     let mut case = case.clone();

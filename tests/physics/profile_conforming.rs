@@ -8,7 +8,7 @@ use railhead::contact::normal::normal_task::NormalTask;
 use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
-use crate::profile_cases::{generated, put};
+use crate::profile_cases::{generated, on_planes, put};
 use crate::profile_worn::{solved, worn};
 
 /// Where a worn wheel comes nearest to the rail, from the middle of the rail in mm, the radius of the clearance there and its least value, in
@@ -176,7 +176,7 @@ fn forces_and_pressures_do_not_jump_with_the_load() {
         }
         // Creepages follow the meshes of the tangential problem besides.
         assert!(bend(&lateral) < 0.015, "{name}: {lateral:?}");
-        assert!(bend(&peaks) < 0.01, "{name}: {peaks:?}");
+        assert!(bend(&peaks) < 0.015, "{name}: {peaks:?}");
     }
 }
 
@@ -211,7 +211,7 @@ fn patches_in_gaps_of_their_own_are_told_with_what_they_would_exchange() {
     );
     let text = std::fs::read_to_string(path).expect("an example");
     let two: Value = serde_json::from_str(&text).expect("a case");
-    let solution = solved(&two).expect("an answer");
+    let solution = solved(&on_planes(&two)).expect("an answer");
     assert!(solution.patches.len() > 1, "gauge corner and flange");
     let told = |solution: &Solution| {
         let code = solution
@@ -223,7 +223,7 @@ fn patches_in_gaps_of_their_own_are_told_with_what_they_would_exchange() {
     let text = told(&solution).expect("a remark");
     assert!(text.contains("% of the load"), "{text}");
     let one = put(&generated(), "contact", json!({ "lateral_shift_mm": -1.0 }));
-    assert_eq!(told(&solved(&one).expect("an answer")), None);
+    assert_eq!(told(&solved(&on_planes(&one)).expect("an answer")), None);
 }
 
 /// Places of a patch across the track: its ends along the rail in mm, and the inclination of the rail there in rad.
@@ -276,7 +276,7 @@ fn a_thin_overlap_between_two_places_does_not_put_them_into_one_plane() {
                 (-14.0, 2000.0, 0.066 + lift),
             ];
             let mut case = put(
-                &worn_with(&lobes),
+                &on_planes(&worn_with(&lobes)),
                 "contact",
                 json!({ "accept_rough_profiles": true }),
             );

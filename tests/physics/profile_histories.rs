@@ -6,7 +6,7 @@ use railhead::contact::solution::words::answer::{PatchSolution, PointSolution, S
 use serde_json::{Value, json};
 
 use crate::cases::assert_fault;
-use crate::profile_cases::{generated, put};
+use crate::profile_cases::{generated, on_planes, put};
 use crate::reference::{assert_none, solve};
 
 const MU: f64 = 0.3;
@@ -44,7 +44,8 @@ fn ends(patch: &PatchSolution) -> [f64; 2] {
 #[test]
 fn every_patch_ends_in_steady_rolling() {
     let mut failures = Vec::new();
-    for mut case in [generated(), two_patches()] {
+    for case in [generated(), two_patches()] {
+        let mut case = on_planes(&case);
         case["load"] = json!({ "normal_force_n": 75_000 });
         let [x, y, spin] = CREEPAGES;
         let steady = moving(

@@ -4,7 +4,7 @@ use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead::contact::solution::words::answer::{PatchSolution, Position, Solution};
 use serde_json::{Value, json};
 
-use crate::profile_cases::{by_origin, generated, put, wheel_on_rail};
+use crate::profile_cases::{by_origin, generated, on_planes, put, wheel_on_rail};
 use crate::reference::solve;
 
 fn position(patch: &PatchSolution) -> Position {
@@ -48,7 +48,7 @@ pub fn cone_on_arc() -> Value {
 fn a_cone_on_an_arc_is_hertzs_contact_at_its_angle() {
     let angle = 0.05_f64.atan();
     for force in [1e3, 75e3] {
-        let (solution, _) = solve(&load(&cone_on_arc(), "vertical_force_n", force));
+        let (solution, _) = solve(&on_planes(&load(&cone_on_arc(), "vertical_force_n", force)));
         assert_eq!(solution.patches.len(), 1);
         let patch = &solution.patches[0];
         let found = position(patch);
@@ -100,7 +100,10 @@ fn normal_and_tangential_forces_together_carry_the_vertical_force() {
             (vertical / 75e3 - 1.0).abs() < 1e-3,
             "shift {shift}: {vertical}"
         );
-        // The parts of every patch, turned by hand.
+        // The parts of every patch, turned by hand. On planes the pressures of a patch have one direction.
+        let (solution, _) = solve(&on_planes(&case));
+        let total = solution.total[0];
+        let vertical = -total.force_z_n.expect("a vertical force");
         let (mut across, mut up) = (0.0, 0.0);
         for patch in &solution.patches {
             let (sin, cos) = position(patch).contact_angle_rad.sin_cos();
@@ -192,9 +195,9 @@ fn left_and_right_are_mirror_images_in_every_number() {
 
 #[test]
 fn a_free_wheel_rolls_without_longitudinal_creepage_at_its_own_radius_only() {
-    let (still, _) = solve(&generated());
+    let (still, _) = solve(&on_planes(&generated()));
     let radius = position(&still.patches[0]).rolling_radius_mm;
-    let mut rolling = generated();
+    let mut rolling = on_planes(&generated());
     let wheelset = |free: f64| json!({ "wheelset": { "speed_mm_per_s": 20000, "free_rolling_radius_mm": free } });
     for free in [radius, radius + 1.0] {
         rolling["motion"] = wheelset(free);
@@ -214,7 +217,7 @@ fn a_free_wheel_rolls_without_longitudinal_creepage_at_its_own_radius_only() {
 
 #[test]
 fn several_motions_share_their_patches_and_a_remark_says_what_balances() {
-    let mut case = place(&generated(), -8.0, 0.0, 0.0);
+    let mut case = on_planes(&place(&generated(), -8.0, 0.0, 0.0));
     let motion = |y: f64| json!({ "creepage_y": y });
     case["motion"] = json!([motion(0.0), motion(0.02)]);
     let (solution, _) = solve(&case);

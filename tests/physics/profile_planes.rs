@@ -5,7 +5,7 @@ use railhead::contact::remark::figure::Figure;
 use railhead::contact::solution::words::answer::{Solution, Total};
 use serde_json::{Value, json};
 
-use crate::profile_cases::{by_origin, generated, put, wheel_on_rail};
+use crate::profile_cases::{by_origin, generated, on_planes, put, wheel_on_rail};
 use crate::profile_reference_files::reference_file;
 use crate::reference::solve;
 
@@ -53,7 +53,7 @@ fn question(input: &Value) -> Option<Value> {
             "gauge_height_mm": input["gauge_height_mm"], "flange_back_distance_mm": input["flange_back_dist_mm"],
             "flange_back_position_mm": input["flange_back_pos_mm"],
             "lateral_shift_mm": -number(&input["y_ws_mm"]), "yaw_rad": -number(&input["yaw_rad"]), "roll_rad": input["roll_rad"],
-            "accept_rough_profiles": true,
+            "accept_rough_profiles": true, "reference_surface": "plane",
         }),
     ))
 }
@@ -135,6 +135,7 @@ fn a_cone_leaves_nothing_open_and_a_hollow_wheel_does() {
         json!({ "lateral_shift_mm": -5.3, "roll_rad": -0.00043 }),
     );
     for case in [&mut cone, &mut hollow] {
+        *case = on_planes(case);
         case["motion"] =
             json!({ "wheelset": { "speed_mm_per_s": 2000, "free_rolling_radius_mm": 461 } });
     }
@@ -161,7 +162,7 @@ fn the_normals_are_open_where_creepages_are_given_as_well() {
     let corner = put(
         &generated(),
         "contact",
-        json!({ "lateral_shift_mm": -5.9, "roll_rad": -0.0006 }),
+        json!({ "lateral_shift_mm": -5.9, "roll_rad": -0.0006, "reference_surface": "plane" }),
     );
     let mut given = corner.clone();
     given["motion"] = json!({ "creepage_x": 0.001 });
@@ -179,7 +180,11 @@ fn the_normals_are_open_where_creepages_are_given_as_well() {
         "{share}"
     );
     // On the tread nothing is open.
-    let mut tread = put(&generated(), "contact", json!({ "lateral_shift_mm": 3.0 }));
+    let mut tread = put(
+        &on_planes(&generated()),
+        "contact",
+        json!({ "lateral_shift_mm": 3.0 }),
+    );
     tread["motion"] = json!({ "creepage_x": 0.001 });
     assert_eq!(told(&solve(&tread).0), None);
 }

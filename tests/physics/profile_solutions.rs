@@ -78,7 +78,7 @@ impl Record {
         let placed = put(
             &benchmark()?,
             "contact",
-            json!({ "lateral_shift_mm": -shift, "yaw_rad": -yaw, "roll_rad": roll }),
+            json!({ "lateral_shift_mm": -shift, "yaw_rad": -yaw, "roll_rad": roll, "reference_surface": "plane" }),
         );
         let load = json!({ "vertical_force_n": input["fz_N"] });
         let value = |name: &str| {

@@ -7,7 +7,7 @@ use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
-use crate::profile_cases::{put, wheel_on_rail};
+use crate::profile_cases::{on_planes, put, wheel_on_rail};
 use crate::profile_reference_files::reference_file;
 use crate::reference::assert_none;
 
@@ -79,7 +79,7 @@ fn tread_gauge_corner_and_flange_share_the_load() {
     let Some(case) = worn(-14.74, 137e3, 0.0) else {
         return;
     };
-    let solution = solved(&case).expect("an answer");
+    let solution = solved(&on_planes(&case)).expect("an answer");
     let expected = [(91.1e3, 837.0), (53.7e3, 1606.0), (0.98e3, 381.0)];
     assert_eq!(solution.patches.len(), expected.len());
     for (patch, (force, pressure)) in solution.patches.iter().zip(expected) {
@@ -94,9 +94,10 @@ fn tread_gauge_corner_and_flange_share_the_load() {
 #[test]
 fn a_patch_that_grows_over_the_line_between_two_planes_is_told_with_its_place() {
     for (lowering, cut) in [(0.065, false), (0.17, true), (0.21, false)] {
-        let Some(mut case) = worn(-14.74, 0.0, 0.0) else {
+        let Some(case) = worn(-14.74, 0.0, 0.0) else {
             return;
         };
+        let mut case = on_planes(&case);
         case["load"] = json!({ "approach_mm": lowering });
         let solution = solved(&case).expect("an answer");
         let told: Vec<_> = solution

@@ -36,6 +36,7 @@ const ORDER: &[&str] = &[
     "contact::wheel_on_curve",
     "contact::wheel_on_rail",
     "contact::profile_trust",
+    "contact::surface_fallback",
     "contact::pulled_rolling",
     "contact::pulled_wheel",
     "contact::wheelset",

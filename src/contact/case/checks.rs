@@ -81,15 +81,19 @@ impl CheckedParts {
             (None, Some(contact)) if contact.has_profiles() => {
                 let history = motions.as_ref().is_some_and(|all| all.history.is_some());
                 let surface = surface(&given, elasticity, history);
-                let surface = surface.unwrap_or_else(|found| {
+                let (surface, remark) = surface.unwrap_or_else(|found| {
                     faults.extend(found);
-                    ReferenceSurface::Planes
+                    (ReferenceSurface::Planes, None)
                 });
                 let task = on_rails(contact, &given, elasticity, surface, limits);
-                task.unwrap_or_else(|found| {
+                let mut task = task.unwrap_or_else(|found| {
                     faults.extend(found);
                     None
-                })
+                });
+                if let Some((_, remarks)) = &mut task {
+                    remarks.extend(remark.map(RemarkEntry::from));
+                }
+                task
             }
             (task, _) => task.and_then(|task| collect_fault(task, &mut faults)),
         };
@@ -145,19 +149,21 @@ impl CheckedParts {
     }
 }
 
-/// The surface on which the contact of profiles is solved.
+/// The surface on which the contact of profiles is solved: the curve of the rail unless the case asks for planes. A case that leaves it open and that the
+/// curve does not support is solved on planes, with a remark.
 ///
 /// # Errors
-/// Parts of the case that the requested reference surface does not support.
+/// Parts of the case that the requested curve does not support.
 fn surface(
     given: &PartialCase,
     elasticity: Option<Elasticity>,
     history: bool,
-) -> Result<ReferenceSurface, Vec<Fault>> {
+) -> Result<(ReferenceSurface, Option<Remark>), Vec<Fault>> {
     let (asked, influence) = given.contact.map_or((None, None), Contact::surface);
-    if asked != Some(SurfaceName::Curve) {
-        return Ok(ReferenceSurface::Planes);
+    if asked == Some(SurfaceName::Plane) {
+        return Ok((ReferenceSurface::Planes, None));
     }
+    let required = asked.is_some() || influence.is_some();
     let method = given.solver.map(|solver| solver.method);
     let other_method = !matches!(
         method,
@@ -173,24 +179,35 @@ fn surface(
             "only boundary_element is solved",
         ),
     ];
-    let faults = refused.into_iter().filter(|(applies, ..)| *applies);
-    let faults: Vec<Fault> = faults
-        .map(|(_, pointer, what)| {
+    let refused: Vec<_> = refused
+        .into_iter()
+        .filter(|(applies, ..)| *applies)
+        .collect();
+    if !refused.is_empty() && !required {
+        let reasons: Vec<&str> = refused.iter().map(|(.., what)| *what).collect();
+        let remark = Remark::OnPlanes {
+            reason: format!("{} on the curve of the rail", reasons.join(", ")),
+        };
+        return Ok((ReferenceSurface::Planes, Some(remark)));
+    }
+    if !refused.is_empty() {
+        let fault = |(_, pointer, what): (bool, &str, &str)| {
             let detail = format!(
-                "{what} with contact.reference_surface \"curve\"; give reference_surface \"plane\" for it"
+                "{what} on the curve of the rail; give contact.reference_surface \"plane\" for it"
             );
             Fault::new(pointer, detail)
-        })
-        .collect();
-    if !faults.is_empty() {
-        return Err(faults);
+        };
+        return Err(refused.into_iter().map(fault).collect());
     }
-    Ok(ReferenceSurface::Curve(
-        match influence.unwrap_or_default() {
-            InfluenceName::AngleCorrected => Influence::AngleCorrected,
-            InfluenceName::HalfSpace => Influence::HalfSpace,
-        },
-    ))
+    let influence = match influence.unwrap_or_default() {
+        InfluenceName::AngleCorrected => Influence::AngleCorrected,
+        InfluenceName::HalfSpace => Influence::HalfSpace,
+    };
+    let surface = ReferenceSurface::Curve {
+        influence,
+        required,
+    };
+    Ok((surface, None))
 }
 
 /// Faults of a history beside what it has to go with.

@@ -15,6 +15,7 @@ use crate::contact::normal::wheel_height::task::ReferenceSurface;
 use crate::contact::post::units::NANOMETRES;
 use crate::contact::solution::words::answer::{PatchSolution, Position};
 use crate::contact::solution::words::evolution::{StateContact, StatePatch};
+use crate::contact::surface_fallback::is_on_planes;
 
 /// Wear of one body: of the rail in one pass, of the wheel over 1 mm rolled.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -109,7 +110,7 @@ pub(crate) fn pass(
     let NormalTask::Wheel(wheel) = &checked.problem.task else {
         return Ok(unsolved("not a wheel on a rail".to_owned()));
     };
-    let on_curve = wheel.surface != ReferenceSurface::Planes;
+    let on_curve = wheel.surface != ReferenceSurface::Planes && !is_on_planes(&solution);
     let mut wear = on.points.map(|points| BodyWear::none(points.len()));
     let mut patches = Vec::new();
     for patch in &solution.patches {

@@ -33,8 +33,6 @@ pub enum Influence {
     HalfSpace,
     /// With factors for the turn between them, across the whole contact.
     AngleCorrected,
-    /// As on a half-space, across the whole contact: what the factors for the turn start from.
-    Unfolded,
 }
 
 /// Turn up to which the factors were compared with boundary elements, in rad.

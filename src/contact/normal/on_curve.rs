@@ -118,6 +118,8 @@ pub(crate) struct CurveContact {
     pub(crate) heights: u32,
     /// By which part the force is missed.
     pub(crate) missed: f64,
+    /// The gap in mm that tractions open at each cell, where any do.
+    pub(crate) opened: Option<Vec<f64>>,
     over: WheelOverGrid,
     /// Strips whose deformed surfaces nearly touch.
     near: Vec<bool>,
@@ -454,7 +456,7 @@ impl CurveTask<'_> {
             let centre = self.touch - lowering;
             let over = grid.over(self.curve, centre);
             let runs = match self.influence {
-                Influence::AngleCorrected | Influence::Unfolded => vec![[0, grid.places.len() - 1]],
+                Influence::AngleCorrected => vec![[0, grid.places.len() - 1]],
                 // Overlaps are wider than contacts, so that runs of strips that touch may only be found with what acts alone.
                 Influence::HalfSpace => {
                     let deep: Vec<f64> = over.gap.iter().map(|gap| (-gap).max(0.0)).collect();
@@ -554,31 +556,6 @@ impl CurveTask<'_> {
         self.settled(start, friction, tolerance, workspace, monitor)
     }
 
-    /// Brings the wheel to rest on the grid of a rest with another influence, with the vertical force in N of tractions.
-    ///
-    /// # Errors
-    /// As [`coarse`](Self::coarse).
-    pub(crate) fn on_grid_of(
-        &self,
-        other: &CurveContact,
-        lift: f64,
-        workspace: &mut Workspace,
-        monitor: &dyn Monitor,
-    ) -> Result<CurveContact, NormalError> {
-        let start = Start {
-            grid: other.grid.clone(),
-            runs: other.runs.clone(),
-            pressure: other.pressure.clone(),
-            centre: other.centre,
-            operator: None,
-            over: Some(other.over.clone()),
-            heights: 0,
-            iterations: 0,
-        };
-        let friction = Friction { lift, opened: None };
-        self.settled(start, &friction, FIRST_TOLERANCE, workspace, monitor)
-    }
-
     /// A coarse grid over all places where the bodies overlap at a lowering in mm.
     fn over_overlaps(&self, lowering: f64) -> Result<CurveGrid, NormalError> {
         // So that a little more than the lowering still fits.
@@ -661,11 +638,12 @@ impl CurveTask<'_> {
     ) -> Result<CurveContact, NormalError> {
         let mut friction = friction.clone();
         for _ in 0..GRIDS_MAX {
-            let found = self.on_grid(start, &friction, tolerance, workspace, monitor)?;
+            let mut found = self.on_grid(start, &friction, tolerance, workspace, monitor)?;
+            let opened = friction.opened.take();
             let Some(grid) = found.grid.enlarged(self.curve, &found.pressure) else {
+                found.opened = opened;
                 return Ok(found);
             };
-            let opened = friction.opened.take();
             friction.opened = opened.map(|opened| grid.interpolated(&found.grid, &opened));
             start = Start {
                 runs: grid.runs_of(&found.grid, &found.runs),
@@ -801,6 +779,7 @@ impl CurveTask<'_> {
                 let near = found.distance.chunks_exact(nx);
                 return Ok(CurveContact {
                     patches: Once::default(),
+                    opened: None,
                     near: near
                         .map(|row| row.iter().any(|distance| *distance < NEAR * depth))
                         .collect(),
@@ -997,7 +976,7 @@ impl CurveContact {
         let last = self.grid.places.len() - 1;
         let runs = self.grid.runs(&self.pressure);
         match influence {
-            Influence::AngleCorrected | Influence::Unfolded => vec![[0, last]],
+            Influence::AngleCorrected => vec![[0, last]],
             Influence::HalfSpace => {
                 let of_strips = self.grid.run_of_strips(&self.runs);
                 let mut parts: Vec<[usize; 2]> = Vec::new();
@@ -1017,39 +996,37 @@ impl CurveContact {
         self.grid.area() * self.pressure.iter().sum::<f64>()
     }
 
-    /// Values at the cells of another grid, at those of this one.
-    pub(crate) fn interpolated(&self, other: &CurveContact, values: &[f64]) -> Vec<f64> {
-        self.grid.interpolated(&other.grid, values)
+    /// Mean angle of the strips in rad, and its standard deviation, weighted with their loads.
+    pub(crate) fn angles(&self) -> [f64; 2] {
+        let rows = self.pressure.chunks_exact(self.grid.x.len());
+        let (mut load, mut first, mut second) = (0.0, 0.0, 0.0);
+        for (row, place) in rows.zip(&self.grid.places) {
+            let sum: f64 = row.iter().sum();
+            load += sum;
+            first += sum * place.angle;
+            second += sum * place.angle * place.angle;
+        }
+        let mean = first / load;
+        [mean, (second / load - mean * mean).max(0.0).sqrt()]
     }
 
     /// About what changes with the friction: the vertical force that the pressures carry, relative to it; and, by the gap that tractions open, the
     /// lateral force relative to all normal forces.
     pub(crate) fn change_by(&self, from: &Friction, to: &Friction) -> [f64; 2] {
-        let (mut load, mut vertical) = (0.0, 0.0);
         let (mut depth, mut opened) = (0.0, 0.0);
-        let mut angles = [0.0; 2];
-        let rows = self.pressure.chunks_exact(self.grid.x.len()).enumerate();
-        for ((j, row), place) in rows.zip(&self.grid.places) {
-            for (k, p) in (j * row.len()..).zip(row).filter(|(_, p)| **p > 0.0) {
-                let [before, after] = [from, to].map(|friction| {
-                    let opened = friction.opened.as_ref();
-                    opened.map_or(0.0, |opened| opened[k])
-                });
-                depth -= p * self.gap[k];
-                opened += p * (after - before).abs();
-            }
-            let sum: f64 = row.iter().sum();
-            load += sum;
-            vertical += sum * place.angle.cos();
-            angles[0] += sum * place.angle;
-            angles[1] += sum * place.angle * place.angle;
+        for (k, p) in self.pressure.iter().enumerate().filter(|(_, p)| **p > 0.0) {
+            let [before, after] = [from, to].map(|friction| {
+                let opened = friction.opened.as_ref();
+                opened.map_or(0.0, |opened| opened[k])
+            });
+            depth -= p * self.gap[k];
+            opened += p * (after - before).abs();
         }
-        let [mean, square] = angles.map(|sum| sum / load);
-        let turn = (square - mean * mean).max(0.0).sqrt();
-        let force = vertical * self.grid.area();
+        let vertical = carried(WheelLoad::Vertical(0.0), &self.grid, &self.pressure);
+        let [_, deviation] = self.angles();
         [
-            (to.lift - from.lift).abs() / force.abs().max(f64::MIN_POSITIVE),
-            turn * opened / depth.max(f64::MIN_POSITIVE),
+            (to.lift - from.lift).abs() / vertical.abs().max(f64::MIN_POSITIVE),
+            deviation * opened / depth.max(f64::MIN_POSITIVE),
         ]
     }
 

@@ -33,7 +33,7 @@ impl Problem {
     /// where the gap is known. Points of a history that goes on share their patches.
     #[must_use]
     pub fn is_coupled(&self, run: &Run) -> bool {
-        let on_curve = |wheel: &WheelTask| matches!(wheel.surface, ReferenceSurface::Curve(_));
+        let on_curve = |wheel: &WheelTask| matches!(wheel.surface, ReferenceSurface::Curve { .. });
         match &self.task {
             NormalTask::Wheel(wheel) if on_curve(wheel) => return true,
             NormalTask::Wheelset(wheelset) if on_curve(&wheelset.sides[0]) => return true,

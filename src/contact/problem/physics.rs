@@ -100,6 +100,15 @@ impl Problem {
         }
     }
 
+    /// The same question about another wheel.
+    #[must_use]
+    pub(crate) fn with_wheel(&self, wheel: Arc<WheelTask>) -> Problem {
+        Problem {
+            task: NormalTask::Wheel(wheel),
+            ..self.clone()
+        }
+    }
+
     /// The same question about one wheel of a wheelset that moves as a whole.
     #[must_use]
     pub(crate) fn of_wheel(&self, wheel: Arc<WheelTask>, wheelset: WheelsetMotion) -> Problem {

@@ -14,8 +14,9 @@ pub const AMBIGUOUS: f64 = 0.09;
 const WAVES_BEYOND_SHAPE: f64 = 0.3;
 /// Median waviness, relative to the largest pressure, above which it extends beyond the contact and indicates waves.
 const WAVES_EVERYWHERE: f64 = 0.03;
-/// Share of the load below which a patch may lie entirely where two arcs meet.
-const LIGHT: f64 = 0.02;
+/// Share of the load below which a patch may lie entirely where two arcs meet: its pressure then says nothing of the profiles, and the forces do not depend
+/// on it.
+pub const LIGHT: f64 = 0.02;
 /// Roughness, relative to the largest pressure, that gets a remark even if other readings of the points change the answer little.
 const ROUGH_IN_ANY_CASE: f64 = 0.15;
 /// Noise, relative to the largest pressure, that may remain on each body after smoothing; the advised smoothing leaves 0.07 on both

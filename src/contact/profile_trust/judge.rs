@@ -9,7 +9,7 @@ use crate::contact::geometry::profile_quality::points::{
 use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::wheel_contact::GapContact;
-use crate::contact::profile_trust::finding::{AMBIGUOUS, Cause, Finding};
+use crate::contact::profile_trust::finding::{AMBIGUOUS, Cause, Finding, LIGHT};
 use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileQuality};
 
 /// Share of the roughness of both bodies from which that of one body is reported.
@@ -222,7 +222,8 @@ fn roughness(
         over_width: found.over_width,
         smoothing,
         advised: more,
-        refused: found.roughness.ambiguity > AMBIGUOUS_MAX * patch.pressure.max(PRESSURE_LIGHT),
+        refused: patch.load_share > LIGHT
+            && found.roughness.ambiguity > AMBIGUOUS_MAX * patch.pressure.max(PRESSURE_LIGHT),
         cause: own.cause(advised > 0.0),
     }
 }
@@ -254,7 +255,7 @@ fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
         over_width: found.over_width,
         smoothing: own.profile.smoothing(),
         advised: 0.0,
-        refused: found.over_width > COARSE_MAX,
+        refused: patch.load_share > LIGHT && found.over_width > COARSE_MAX,
         cause: Cause::Spacing,
     })
 }

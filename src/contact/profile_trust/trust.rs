@@ -59,6 +59,21 @@ pub(crate) fn judged(
     )
 }
 
+/// Whether a wheel comes to rest on the curve of its rail without tractions, on profiles that allow an answer.
+///
+/// # Errors
+/// Why it does not.
+pub(crate) fn comes_to_rest(
+    case: &CheckedCase,
+    contact: &WheelTask,
+    monitor: &dyn Monitor,
+) -> Result<(), SolveError> {
+    let settled = settle::settled(case, contact, monitor)?;
+    let contact = settled.as_ref().unwrap_or(contact);
+    let mut judgement = Judgement::new(contact);
+    wheel_on_rail::comes_to_rest(case, contact, &mut judgement, monitor)
+}
+
 /// Assesses the profiles under the patches of a wheel that was solved.
 ///
 /// # Errors

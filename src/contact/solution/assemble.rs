@@ -276,6 +276,7 @@ fn point_solution(
         force_x_n: found.force_x,
         force_y_n: found.force_y,
         moment_z_n_mm: found.moment_z,
+        force_track_n: None,
         profile_uncertainty: None,
         error_estimate: point.errors[index]
             .map(|e| absolute(std::slice::from_ref(patch), limit, e)),

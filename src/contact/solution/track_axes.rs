@@ -53,6 +53,16 @@ pub fn in_track(
             let centre = gap.field.load_centre(Some(k));
             let place = geometry.moved(&gap.frame, centre, wheel.centre)?;
             patch.position = Some(position(geometry, &place, &gap.frame));
+            let (sin, cos) = gap.frame.angle.sin_cos();
+            for point in &mut patch.points {
+                let region = point.region.as_ref();
+                let normal = region.map_or(patch.normal_force_n, |region| region.normal_force_n);
+                point.force_track_n = Some([
+                    point.force_x_n,
+                    point.force_y_n * cos + normal * sin,
+                    point.force_y_n * sin - normal * cos,
+                ]);
+            }
             let [.., y_min, y_max] = patch.extent_mm;
             let turn = turn(geometry, gap, [y_min, y_max])?;
             if turn > TURN_USUAL_MAX {

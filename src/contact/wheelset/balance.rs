@@ -17,6 +17,7 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_trust::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::answer::{PatchSolution, Solution};
+use crate::contact::surface_fallback;
 use crate::contact::wheel_on_rail::SolvedWheel;
 
 /// The heights of the centre by both wheels may differ by so much in mm. It leaves a roll of 2e-7 rad, which moves a contact by 1e-4 mm.
@@ -81,6 +82,29 @@ impl Both {
 }
 
 impl WheelsetSolve<'_> {
+    /// The wheelset at rest in a position. Where the curve of a rail has no answer and the case does not ask for it, both wheels are solved on planes.
+    ///
+    /// # Errors
+    /// As [`at_rest`](Self::at_rest).
+    pub(crate) fn on_either_surface(&self, rigid: &RigidPose) -> Result<AtRest, SolveError> {
+        let error = match self.at_rest(rigid) {
+            Ok(found) => return Ok(found),
+            Err(error) => error,
+        };
+        let remark = surface_fallback::fallback(&self.sides[0], error)?;
+        let planes = WheelsetSolve {
+            sides: &[self.sides[0].on_planes(), self.sides[1].on_planes()],
+            ..*self
+        };
+        let mut found = planes.at_rest(rigid)?;
+        let remarks = found
+            .sides
+            .iter_mut()
+            .map(|side| &mut side.solution.remarks);
+        remarks.for_each(|remarks| remarks.push(remark.clone()));
+        Ok(found)
+    }
+
     /// The wheelset at rest in a position, from that of the rigid one.
     ///
     /// # Errors
@@ -255,9 +279,12 @@ fn torque_of_rails(found: &[SolvedWheel; 2], pose: [f64; 3], height: f64) -> f64
     found.iter().map(patches).sum()
 }
 
-/// That of one patch: friction acts about the origin of its frame, the normal force at its load centre.
+/// That of one patch: friction acts about the origin of its frame, the rest of the force, which is that of the pressures, at its load centre.
 fn torque(patch: &PatchSolution, centre: [f64; 3], axle: [f64; 3]) -> f64 {
     let (Some(position), Some(point)) = (&patch.position, patch.points.first()) else {
+        return 0.0;
+    };
+    let Some(force) = point.force_track_n else {
         return 0.0;
     };
     let (sin, cos) = position.contact_angle_rad.sin_cos();
@@ -276,7 +303,7 @@ fn torque(patch: &PatchSolution, centre: [f64; 3], axle: [f64; 3]) -> f64 {
         point.force_y_n * cos,
         point.force_y_n * sin,
     ];
-    let normal = [0.0, patch.normal_force_n * sin, -patch.normal_force_n * cos];
+    let normal = [0, 1, 2].map(|k| force[k] - tangential[k]);
     let spin = point.moment_z_n_mm * (axle[2] * cos - axle[1] * sin);
     -(about(position.origin_track_mm, tangential) + about(position.track_mm, normal) + spin)
 }

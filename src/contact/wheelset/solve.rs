@@ -52,7 +52,7 @@ pub(crate) fn solve(
             sides: &sides,
             monitor: &part,
         };
-        gathering.add(solve.at_rest(&rigid)?);
+        gathering.add(solve.on_either_surface(&rigid)?);
     }
     let kinematics = match &task.kinematics {
         None => None,

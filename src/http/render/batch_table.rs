@@ -295,15 +295,13 @@ impl TableLine<'_> {
             }
         }
         let position = patch.position?;
-        // The normal of the patch is (0, −sin, cos); the rail is pressed against it.
-        let (sin, cos) = position.contact_angle_rad.sin_cos();
         match name {
             "contact_angle_rad" => Some(position.contact_angle_rad),
             "rolling_radius_mm" => Some(position.rolling_radius_mm),
             "track_y_mm" => Some(position.track_mm[1]),
             "track_z_mm" => Some(position.track_mm[2]),
-            "force_track_y_n" => Some(point.force_y_n * cos + patch.normal_force_n * sin),
-            "force_track_z_n" => Some(point.force_y_n * sin - patch.normal_force_n * cos),
+            "force_track_y_n" => Some(point.force_track_n?[1]),
+            "force_track_z_n" => Some(point.force_track_n?[2]),
             _ => None,
         }
     }

@@ -24,6 +24,14 @@ pub fn all() -> Vec<(String, Value)> {
     cases.extend(variants());
     for (_, case) in &mut cases {
         round(case);
+        // The answers on planes, which change less often than those on the curve of the rail.
+        let contact = &mut case["contact"];
+        let on_rails = ["profiles", "wheelset"]
+            .iter()
+            .any(|name| contact["type"] == *name);
+        if on_rails && contact.get("reference_surface").is_none() {
+            contact["reference_surface"] = json!("plane");
+        }
         // Everything that is recorded has to be there.
         case["outputs"] = json!(["resultants", "zones", "tractions", "pressure", "slip"]);
     }

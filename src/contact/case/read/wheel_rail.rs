@@ -117,10 +117,10 @@ pub(crate) fn surface(block: &mut Object) -> Option<(Option<SurfaceName>, Option
         true => Some(block.word("influence", &INFLUENCES, &[])?),
         false => None,
     };
-    if surface != Some(SurfaceName::Curve) && influence.is_some() {
+    if surface == Some(SurfaceName::Plane) && influence.is_some() {
         block.fault(
             "influence",
-            "given for planes of contact, which are half-spaces; give reference_surface: \"curve\" too, or leave it out",
+            "given for planes of contact, which are half-spaces; leave it out, or give reference_surface: \"curve\"",
         );
         return None;
     }

@@ -108,11 +108,11 @@ pub enum Contact {
         #[serde(skip_serializing_if = "is_false")]
         #[schema(required = false)]
         accept_rough_profiles: bool,
-        /// The surface on which the contact is solved. `plane` when left out.
+        /// The surface on which the contact is solved. When left out, the curve where it can be solved, else planes with the remark `on-planes`.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schema(nullable = false)]
         reference_surface: Option<SurfaceName>,
-        /// How cells of a curved surface act on each other; only with `reference_surface: "curve"`, `angle_corrected` when left out.
+        /// How cells of a curved surface act on each other; not with `reference_surface: "plane"`, `angle_corrected` when left out.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schema(nullable = false)]
         influence: Option<InfluenceName>,
@@ -358,7 +358,7 @@ pub enum SideName {
 #[serde(rename_all = "snake_case")]
 #[schema(as = ReferenceSurface)]
 pub enum SurfaceName {
-    /// A plane of contact for each patch, or for patches near each other.
+    /// A plane of contact for each patch, or for patches near each other: for comparison, histories and bodies that differ.
     Plane,
     /// The cross-section of the rail: normals, slips and influences follow the bend of its surface, and all patches of a wheel are one problem. For
     /// bodies that do not differ, and without a history.

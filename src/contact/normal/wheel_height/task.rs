@@ -40,8 +40,36 @@ pub enum ReferenceSurface {
     /// A plane for each patch, or for patches near each other.
     #[default]
     Planes,
-    /// The cross-section of the rail, with the influence between its strips.
-    Curve(Influence),
+    /// The cross-section of the rail.
+    Curve {
+        /// How its strips act on each other.
+        influence: Influence,
+        /// Whether the case asks for it. Otherwise planes are the fallback.
+        required: bool,
+    },
+}
+
+impl WheelTask {
+    /// The same wheel on planes of contact.
+    #[must_use]
+    pub(crate) fn on_planes(&self) -> WheelTask {
+        WheelTask {
+            surface: ReferenceSurface::Planes,
+            ..self.clone()
+        }
+    }
+
+    /// Whether planes may answer in place of the curve.
+    #[must_use]
+    pub(crate) fn may_fall_back(&self) -> bool {
+        matches!(
+            self.surface,
+            ReferenceSurface::Curve {
+                required: false,
+                ..
+            }
+        )
+    }
 }
 
 /// What a case says about the trust in its profiles.

@@ -95,25 +95,28 @@ macro_rules! wheel_remarks {
                 "the rail is inclined to the plane of contact by up to {turn_rad:.2} rad under the patches, which leaves forces uncertain by {:.1} % of μN ({:.1} % by the direction of the normals)", 100.0 * share, 100.0 * of_normals
             ),
 
-            /// The surface turns over the contact, which is solved on the curve of the rail: factors for the turn change the forces, and leave a part open.
-            TurnCorrected {
+            /// The case does not ask for a reference surface, and the curve of the rail does not solve it: it is solved on planes of contact.
+            OnPlanes {
+                /// Why.
+                reason: String = "a history is not solved on the curve of the rail".to_owned(),
+            }
+            code: "on-planes",
+            severity: Warning,
+            advice: "Expect larger errors than the error estimate where the rail bends under a patch: 15 % of μN at a gauge corner. Give `reference_surface` \"plane\" to solve on planes without this remark.",
+            detail: format!("solved on planes of contact: {reason}"),
+
+            /// The surface turns over the contact by more than the factors of the influence are known for.
+            TurnBeyondRange {
                 /// Turn of the rail's surface from one end of the contact to the other.
-                turn_rad: f64 = 0.75,
-                /// Change of the longitudinal force by the factors, relative to μN.
-                change_x: f64 = -0.03,
-                /// Change of the lateral force.
-                change_y: f64 = 0.13,
-                /// Error of either force that the factors leave, relative to μN.
-                open: f64 = 0.03,
-                /// Turn up to which they were compared with boundary elements.
+                turn_rad: f64 = 1.4,
+                /// Turn up to which the factors were compared with boundary elements.
                 range_rad: f64 = 1.25,
             }
-            code: "turn-corrected",
+            code: "turn-beyond-range",
             severity: Info,
-            advice: "Take the part that is left open as a further error of the forces; `error_estimate` does not have it. Beyond the range of the factors it is not known.",
+            advice: "Take the forces as approximate: the influence between the ends of the contact is extrapolated, and the rail head is no half-space there.",
             detail: format!(
-                "the surface turns by {turn_rad:.2} rad over the contact; factors of the influence for this turn, known up to {range_rad} rad, change forces by {:+.1} and \
-                 {:+.1} % of μN, and leave them uncertain by {:.1} %", 100.0 * change_x, 100.0 * change_y, 100.0 * open
+                "the surface turns by {turn_rad:.2} rad over the contact; the influence between its ends is known up to {range_rad} rad"
             ),
 
             /// The force jumps at the height of the wheel that carries the load, where patches merge; forces were scaled to the load.

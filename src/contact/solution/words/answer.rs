@@ -192,6 +192,11 @@ pub struct PointSolution {
     pub moment_z_n_mm: f64,
     /// Estimated absolute errors of the three resultants; null where there is nothing to estimate them from.
     pub error_estimate: Option<ErrorEstimate>,
+    /// Force of the patch on the lower body in N in track axes, `[x, y, z]`, with the normal force; only for `profiles` and `wheelset`. On the curve of a rail pressures and
+    /// tractions of a patch have several directions, so that their sum does not follow from `normal_force_n` and the contact angle.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
+    pub force_track_n: Option<[f64; 3]>,
     /// What the measurement of the profiles leaves open; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub profile_uncertainty: Option<ProfileUncertainty>,

@@ -61,7 +61,7 @@ function profileFields(app) {
     ${surfaceFields(app)}`;
 }
 
-const SURFACES = /** @type {const} */ ([[undefined, 'planes'], ['curve', 'curve of the rail']]);
+const SURFACES = /** @type {const} */ ([[undefined, 'curve of the rail'], ['plane', 'planes']]);
 const INFLUENCES = /** @type {const} */ ([[undefined, 'corrected for the bend'], ['half_space', 'as on a half-space']]);
 
 /** The surface on which the contact is solved. @param {App} app */
@@ -73,8 +73,8 @@ function surfaceFields(app) {
   })}
       ${bent ? choice(app, '/contact/influence', 'Influence of cells', INFLUENCES) : nothing}</div>
     <p class="hint">${bent
-      ? 'The contact bends around the rail: for the gauge corner and conformal contact. It takes longer.'
-      : 'A plane of contact for each patch. At a gauge corner the contact bends: there choose the curve of the rail.'}</p>`;
+      ? 'The contact bends around the rail. What the curve does not solve, such as a history, is solved on planes.'
+      : 'A plane of contact for each patch, for comparison. At a gauge corner the contact bends, and planes are off.'}</p>`;
 }
 
 /** Dimensions of the track and of the wheelset. @param {App} app */

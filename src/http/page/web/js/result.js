@@ -7,7 +7,7 @@ import { hasFields, loadField } from './fields.js';
 import { offered, quantityOf, rangeOf } from './field/quantities.js';
 import { placed } from './placing.js';
 import { formatRoute } from './routes.js';
-import { hasSections, isBent } from './starts.js';
+import { hasSections, isSolvedBent } from './starts.js';
 import { firstPatch, flangeAngle, oneWheel, sideOf } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -159,7 +159,7 @@ async function followJob(app) {
 function show(app, result) {
   if (!looked) return;
   looked.result = result;
-  looked.near = isBent(looked.document);
+  looked.near = isSolvedBent(looked.document, result);
   placeProfiles(app).catch(app.refused);
   if (looked.patch < 0) looked.patch = firstPatch(result);
   looked.patch = Math.min(looked.patch, result.patches.length - 1);

@@ -10,7 +10,7 @@ import { drawProfiles } from './drawing/profiles.js';
 import { editDocument, solve } from './editing.js';
 import { loadsPanel } from './loadsview.js';
 import { remarkList } from './remarks.js';
-import { inOrder, isBent, standardSection, withEverything, withFields, withSpeed } from './starts.js';
+import { inOrder, isSolvedBent, standardSection, withEverything, withFields, withSpeed } from './starts.js';
 import { indexOf } from './field/cells.js';
 import { combOf } from './field/comb.js';
 import { hasFields } from './fields.js';
@@ -187,7 +187,7 @@ function fieldPanel(app, looked, answer) {
   const toggles = /** @type {const} */ ([['border', 'stick–slip line'], ['arrows', 'arrows'], ['mesh', 'cells']]);
   const shown = field && quantity && all.includes(quantity) ? {
     field, quantity, range: rangeShown(looked, quantity), friction: frictionOf(looked), border: looked.border, arrows: looked.arrows,
-    mesh: looked.mesh, held: looked.held, bent: isBent(looked.document), name: `${quantity.heading} of patch ${looked.patch}`,
+    mesh: looked.mesh, held: looked.held, bent: isSolvedBent(looked.document, answer), name: `${quantity.heading} of patch ${looked.patch}`,
   } : null;
   const moved = (/** @type {CrosshairEvent} */ { detail: { x, y, held } }) => {
     looked.held = held ? { x, y } : null;
@@ -267,7 +267,7 @@ function cellTable({ cells }) {
 function profilePanel(app, looked, answer) {
   const standing = {
     patches: answer.patches, combs: answer.patches.map((_, at) => combOf(looked.fields[at])), chosen: looked.patch,
-    choose: (/** @type {number} */ patch) => choose(app, { patch }), bent: isBent(looked.document), near: looked.near,
+    choose: (/** @type {number} */ patch) => choose(app, { patch }), bent: isSolvedBent(looked.document, answer), near: looked.near,
   };
   const parts = /** @type {const} */ ([[false, 'Whole head'], [true, 'Contact']]);
   return html`<section class="panel" aria-labelledby="h-profiles"><header class="bar"><h2 id="h-profiles">On the profiles</h2>

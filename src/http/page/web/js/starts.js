@@ -132,8 +132,12 @@ const withExtras = (document, wanted) => Object.keys(EXTRAS).reduce((/** @type {
 /** A case that asks for all that is drawn: fields, damage, stresses below the surface, temperature. @param {JsonObject} document */
 export const withEverything = (document) => withExtras({ ...document, outputs: withFields(document.outputs) }, true);
 
-/** Is the contact solved on the curve of the rail? @param {JsonObject | null} document */
-export const isBent = (document) => at(document ?? undefined, '/contact/reference_surface') === 'curve';
+/** Does a case ask for the curve of the rail, which is the default? @param {JsonObject | null} document */
+export const isBent = (document) => ['profiles', 'wheelset'].includes(String(at(document ?? undefined, '/contact/type')))
+  && at(document ?? undefined, '/contact/reference_surface') !== 'plane';
+
+/** Was it solved there? @param {JsonObject | null} document @param {{ remarks: { code: string }[] }} result */
+export const isSolvedBent = (document, { remarks }) => isBent(document) && remarks.every(({ code }) => code !== 'on-planes');
 
 /** A case with a speed, which temperature and Archard's wear need; lists of motions have theirs. @param {JsonObject} document @returns {JsonObject} */
 export function withSpeed(document) {

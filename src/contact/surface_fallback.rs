@@ -1,0 +1,76 @@
+//! Chooses planes of contact where a case leaves the reference surface open and the curve of the rail has no answer.
+
+use std::sync::Arc;
+
+use crate::contact::error::SolveError;
+use crate::contact::monitor::Monitor;
+use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::profile_trust::trust;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::list::Remark;
+use crate::contact::solution::words::answer::Solution;
+
+/// Solves a wheel on its reference surface, or on planes where the curve has no answer and the case does not ask for it.
+///
+/// Motions of a case share their patches. Of several motions, all are solved on planes if the wheel without tractions does not come to rest on the
+/// curve; so each part of a sweep makes the same choice.
+///
+/// # Errors
+/// That of `solve` on the surface that was tried last.
+pub(crate) fn solve_wheel<T>(
+    case: &CheckedCase,
+    contact: &WheelTask,
+    monitor: &dyn Monitor,
+    solve: impl Fn(&CheckedCase, &WheelTask) -> Result<T, SolveError>,
+) -> Result<(T, Option<RemarkEntry>), SolveError> {
+    let error = match solve(case, contact) {
+        Ok(found) => return Ok((found, None)),
+        Err(error) => error,
+    };
+    let all = case.problem.part.all;
+    let error = match all > 1 && contact.may_fall_back() {
+        true => match trust::comes_to_rest(case, contact, monitor) {
+            Ok(()) => return Err(error),
+            Err(error) => error,
+        },
+        false => error,
+    };
+    let remark = fallback(contact, error)?;
+    let planes = contact.on_planes();
+    let case = CheckedCase {
+        problem: case.problem.with_wheel(Arc::new(planes.clone())),
+        ..case.clone()
+    };
+    Ok((solve(&case, &planes)?, Some(remark)))
+}
+
+/// The remark that planes answer in place of the curve.
+///
+/// # Errors
+/// Planes are no alternative: the case asks for its surface, or the work was stopped.
+pub(crate) fn fallback(contact: &WheelTask, error: SolveError) -> Result<RemarkEntry, SolveError> {
+    let of_surface = matches!(
+        error,
+        SolveError::NormalProblem { .. }
+            | SolveError::RoughProfile { .. }
+            | SolveError::NotConverged { .. }
+            | SolveError::Unmeshable { .. }
+    );
+    if !of_surface || !contact.may_fall_back() {
+        return Err(error);
+    }
+    let reason = format!("on the curve of the rail, {error}");
+    Ok(Remark::OnPlanes { reason }.into())
+}
+
+/// Whether a solution is one on planes in place of the curve.
+pub(crate) fn is_on_planes(solution: &Solution) -> bool {
+    let code = Remark::OnPlanes {
+        reason: String::new(),
+    };
+    solution
+        .remarks
+        .iter()
+        .any(|remark| remark.code == code.code())
+}
