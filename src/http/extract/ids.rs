@@ -7,44 +7,34 @@ use uuid::Uuid;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 
-/// The id in the path. A text that is no id names no job, so it is answered like an unknown one.
-#[derive(Debug, Clone, Copy)]
-pub struct JobId(pub Uuid);
+/// Declares the id in the path of a resource. A text that is no id names nothing, so it is answered like an unknown one.
+macro_rules! id {
+    ($(#[doc = $doc:literal])* $name:ident: $problem:ident, $noun:literal) => {
+        $(#[doc = $doc])*
+        #[derive(Debug, Clone, Copy)]
+        pub struct $name(pub Uuid);
 
-impl<S: Send + Sync> FromRequestParts<S> for JobId {
-    type Rejection = ApiError;
+        impl<S: Send + Sync> FromRequestParts<S> for $name {
+            type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
-        let id = read_id(parts, state, ProblemKind::JobNotFound, "job").await?;
-        tracing::Span::current().record("job", tracing::field::display(id));
-        Ok(JobId(id))
-    }
+            async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+                read_id(parts, state, ProblemKind::$problem, $noun).await.map($name)
+            }
+        }
+    };
 }
 
-/// The id of a batch in the path.
-#[derive(Debug, Clone, Copy)]
-pub struct BatchId(pub Uuid);
-
-impl<S: Send + Sync> FromRequestParts<S> for BatchId {
-    type Rejection = ApiError;
-
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
-        let id = read_id(parts, state, ProblemKind::BatchNotFound, "batch").await?;
-        Ok(BatchId(id))
-    }
+id! {
+    /// The id of a job or an evolution.
+    JobId: JobNotFound, "job"
 }
-
-/// The id of a run in the path.
-#[derive(Debug, Clone, Copy)]
-pub struct RunId(pub Uuid);
-
-impl<S: Send + Sync> FromRequestParts<S> for RunId {
-    type Rejection = ApiError;
-
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
-        let id = read_id(parts, state, ProblemKind::RunNotFound, "run").await?;
-        Ok(RunId(id))
-    }
+id! {
+    /// The id of a batch.
+    BatchId: BatchNotFound, "batch"
+}
+id! {
+    /// The id of a run.
+    RunId: RunNotFound, "run"
 }
 
 /// The id of a run in the path, and the number of one of its rows.
@@ -76,7 +66,11 @@ async fn read_id<S: Send + Sync>(
     let Path(text) = Path::<String>::from_request_parts(parts, state)
         .await
         .map_err(|rejection| ApiError::new(kind, rejection.body_text()))?;
-    parsed(&text, kind, what)
+    let id = parsed(&text, kind, what)?;
+    if kind == ProblemKind::JobNotFound {
+        tracing::Span::current().record("job", tracing::field::display(id));
+    }
+    Ok(id)
 }
 
 /// The id that a text is.

@@ -1,11 +1,13 @@
 //! Lists, newest first, page by page: of jobs, batches, runs and evolutions, and what other lists share with them.
 
+use std::sync::LazyLock;
+
 use axum::Json;
 use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use serde::{Serialize, Serializer, ser::SerializeMap};
-use serde_json::Value;
+use serde::Serialize;
+use serde_json::{Value, json};
 use utoipa::openapi::path::{OperationBuilder, ParameterIn};
 use utoipa::openapi::schema::{ArrayBuilder, Type};
 use utoipa::openapi::{Content, HttpMethod, ObjectBuilder, Ref, RefOr, ResponseBuilder, Schema};
@@ -30,27 +32,16 @@ use crate::jobs::{Filter, Membership, PAGE_MAX, Total};
 /// Entries of a page for which no number is given.
 pub(crate) const LIMIT_DEFAULT: u32 = 50;
 
-/// Members of a job that `fields` can name.
-const MEMBERS: [&str; 18] = [
-    "id",
-    "state",
-    "name",
-    "labels",
-    "batch_id",
-    "priority",
-    "created_at",
-    "updated_at",
-    "started_at",
-    "ended_at",
-    "deadline_at",
-    "expires_at",
-    "attempt",
-    "cached",
-    "progress",
-    "remarks",
-    "error",
-    "links",
-];
+/// Members of a job that `fields` can name: all that a list has.
+static MEMBERS: LazyLock<Vec<String>> = LazyLock::new(|| match JobAnswer::schema() {
+    RefOr::T(Schema::Object(job)) => {
+        let members = job.properties.into_iter().map(|(name, _)| name);
+        members
+            .filter(|name| !["queue", "result"].contains(&name.as_str()))
+            .collect()
+    }
+    _ => Vec::new(),
+});
 
 query! {
     /// The page of a list.
@@ -92,7 +83,7 @@ query! {
         updated_after: i64 as String = time();
         /// A comma-separated list of the members to answer; all when left out
         #[param(pattern = "^[a-z_]+(,[a-z_]+)*$", example = "id,state,progress")]
-        fields: Vec<&'static str> as String = fields();
+        fields: Vec<String> as String = fields();
     }
 }
 
@@ -113,36 +104,18 @@ fn member() -> Reader<Membership> {
     })
 }
 
-fn fields() -> Reader<Vec<&'static str>> {
+fn fields() -> Reader<Vec<String>> {
     reader(
         format!("a comma-separated list of {}", MEMBERS.join(", ")),
         |text| {
-            let member = |name: &str| MEMBERS.into_iter().find(|member| *member == name);
-            text.split(',').map(member).collect()
+            let names = text.split(',').map(str::to_owned);
+            let names: Vec<String> = names.collect();
+            names
+                .iter()
+                .all(|name| MEMBERS.contains(name))
+                .then_some(names)
         },
     )
-}
-
-/// A page of a list.
-struct Page<T> {
-    /// The name of the entries.
-    name: &'static str,
-    entries: Vec<T>,
-    next_cursor: Option<String>,
-    total: Total,
-}
-
-impl<T: Serialize> Serialize for Page<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut page = serializer.serialize_map(None)?;
-        page.serialize_entry(self.name, &self.entries)?;
-        page.serialize_entry("next_cursor", &self.next_cursor)?;
-        match self.total {
-            Total::Exactly(number) => page.serialize_entry("total", &number)?,
-            Total::AtLeast(number) => page.serialize_entry("total_at_least", &number)?,
-        }
-        page.end()
-    }
 }
 
 /// `GET` of the list of a kind.
@@ -229,22 +202,25 @@ async fn list_work(kind: Kind, Caller(jobs): Caller, uri: &Uri) -> Result<Respon
     let jobs = jobs.of_kind(kind);
     let limit = limit.unwrap_or(LIMIT_DEFAULT);
     let page = jobs.works(&filter, cursor.as_deref(), limit).await?;
-    let next = page.next_cursor.clone();
     let entries = page.entries.into_iter().map(|work| {
         let mut entry = serde_json::to_value(WorkAnswer::from(work))?;
         if let (Some(fields), Value::Object(members)) = (&own.fields, &mut entry) {
-            members.retain(|name, _| fields.contains(&name.as_str()));
+            members.retain(|name, _| fields.contains(name));
         }
         Ok::<_, serde_json::Error>(entry)
     });
     let entries = entries.collect::<Result<Vec<_>, _>>();
-    let page = Page {
-        name: kind.nouns(),
-        entries: entries.map_err(|error| ApiError::internal(&error))?,
-        next_cursor: page.next_cursor,
-        total: page.total,
+    let (count, number) = match page.total {
+        Total::Exactly(number) => ("total", number),
+        Total::AtLeast(number) => ("total_at_least", number),
     };
-    Ok(answer(uri, next.as_deref(), page))
+    let next = page.next_cursor.as_deref();
+    let body = json!({
+        kind.nouns(): entries.map_err(|error| ApiError::internal(&error))?,
+        "next_cursor": next,
+        count: number,
+    });
+    Ok(answer(uri, next, body))
 }
 
 /// A page as an answer, with a link to the next one (RFC 8288): the same address with another cursor.
@@ -325,17 +301,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_member_of_a_listed_job_can_be_named() {
-        let schema = serde_json::to_value(JobAnswer::schema()).unwrap();
-        let members = schema["properties"].as_object().unwrap().keys();
-        // These two are never in a list.
-        let mut members: Vec<_> = members
-            .filter(|name| !["queue", "result"].contains(&name.as_str()))
-            .collect();
-        let mut named = MEMBERS.to_vec();
-        named.sort_unstable();
-        members.sort_unstable();
-        assert_eq!(members, named);
+    fn members_of_a_listed_job_can_be_named() {
+        assert!(MEMBERS.len() > 15, "{:?}", *MEMBERS);
+        assert!(MEMBERS.contains(&"progress".to_owned()));
     }
 
     #[test]

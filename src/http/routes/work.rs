@@ -35,7 +35,7 @@ use crate::http::routes::event_stream::{EventRequest, changed, event};
 use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::http::state::AppState;
 use crate::jobs::Jobs;
-use crate::jobs::model::job::{Job, State as JobState};
+use crate::jobs::model::job::State as JobState;
 use crate::jobs::model::kind::Kind;
 use crate::jobs::work::Work;
 
@@ -71,16 +71,6 @@ pub(crate) struct JobEvent {
     progress: f64,
     /// Grows with every change; also the id of the event.
     version: u64,
-}
-
-impl JobEvent {
-    fn of(job: &Job) -> Self {
-        JobEvent {
-            state: job.state,
-            progress: job.progress,
-            version: job.version,
-        }
-    }
 }
 
 /// The id in a path; what is no id names no work.
@@ -251,7 +241,14 @@ async fn next_event(
     let work = changed(jobs.changed_since(id, seen.as_deref()).await)?;
     let (version, ended) = (work.version(), work.ended());
     let event = match work {
-        Work::Job(job) => event("state", &version, &JobEvent::of(&job)),
+        Work::Job(job) => {
+            let data = JobEvent {
+                state: job.state,
+                progress: job.progress,
+                version: job.version,
+            };
+            event("state", &version, &data)
+        }
         work => event("state", &version, &WorkAnswer::from(work)),
     };
     Some((Ok(event?), (!ended).then_some(Some(version))))
