@@ -1,6 +1,6 @@
 // Cross-sections of rail and wheel where the service places them, and the gap between the two.
 
-import { isBent } from './starts.js';
+import { isSolvedBent } from './starts.js';
 import { outward, sideOf } from './wheelloads.js';
 import { nearest } from './wheelsetdata.js';
 
@@ -174,7 +174,7 @@ function onRail({ result, patch, document, sections }) {
   const [x, y0, z0] = position.origin_track_mm;
   const hand = y0 > 0 ? 'left' : 'right';
   /** @type {readonly Place[]} */
-  const rail = isBent(document) && sections ? sections.rail : [];
+  const rail = isSolvedBent(document, result) && sections ? sections.rail : [];
   // The rail on the left is that on the right, mirrored.
   const own = sideOf(document) === hand ? rail : rail.map(([y, z]) => /** @type {Place} */ ([-y, z]));
   const surface = surfaceOf(result.patches[patch], own, own.length > 0);

@@ -5,6 +5,7 @@ import { at, isObject, numberAt, put } from './document.js';
 import { loadField } from './fields.js';
 import { combOf } from './field/comb.js';
 import { gapOf } from './placing.js';
+import { isSolvedBent } from './starts.js';
 import { TYPED } from './typed.js';
 import { oneWheel, outward } from './wheelloads.js';
 import { nearest } from './wheelsetdata.js';
@@ -17,7 +18,7 @@ import { nearest } from './wheelsetdata.js';
 /** @typedef {import('./result.js').Standing} Standing */
 /** @typedef {import('./field/comb.js').Comb} Comb */
 /** @typedef {import('./api.js').Patch} Patch */
-/** @typedef {{ patch: Patch, comb: Comb | null }} Pressed */
+/** @typedef {{ patch: Patch, comb: Comb | null, bent: boolean }} Pressed `bent`: the pressure stands along the rail. */
 
 /**
  * @typedef {object} Carried
@@ -136,7 +137,7 @@ async function solveWheel(document, side) {
         normal_n: sum((patch) => patch.normal_force_n), y_n: outward(side, total.force_y_n), x_n: total.force_x_n, area_mm2: sum((patch) => patch.area_mm2),
         pressure_mpa: Math.max(...patches.map((patch) => patch.pressure_max_mpa)), power_n: sum(({ points: [point] }) => point.friction_power_n),
       },
-      pressed: patches.map((patch, at) => ({ patch, comb: combOf(fields[at]) })),
+      pressed: patches.map((patch, at) => ({ patch, comb: combOf(fields[at]), bent: isSolvedBent(document, result) })),
     };
   } finally {
     if (job.state === 'queued' || job.state === 'running') await cancel('jobs', job.id).catch(() => {});

@@ -136,8 +136,8 @@ export const withEverything = (document) => withExtras({ ...document, outputs: w
 export const isBent = (document) => ['profiles', 'wheelset'].includes(String(at(document ?? undefined, '/contact/type')))
   && at(document ?? undefined, '/contact/reference_surface') !== 'plane';
 
-/** Was it solved there? @param {JsonObject | null} document @param {{ remarks: { code: string }[] }} result */
-export const isSolvedBent = (document, { remarks }) => isBent(document) && remarks.every(({ code }) => code !== 'on-planes');
+/** Was it solved there? @param {JsonObject | null} document @param {{ remarks?: readonly { code: string }[] }} result */
+export const isSolvedBent = (document, { remarks = [] }) => isBent(document) && remarks.every(({ code }) => code !== 'on-planes');
 
 /** A case with a speed, which temperature and Archard's wear need; lists of motions have theirs. @param {JsonObject} document @returns {JsonObject} */
 export function withSpeed(document) {

@@ -8,7 +8,6 @@ import { fixed, number } from './format.js';
 import { placeOn } from './placing.js';
 import { choose } from './result.js';
 import { begin, shifted, shiftingOf, shiftTo } from './shifting.js';
-import { isBent } from './starts.js';
 import { againstWindow, KINDS, nearest, wheelsetCurve } from './wheelsetdata.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -66,7 +65,7 @@ function paperPart(looked, wheelset, kinematics, moving) {
       }));
       return [drawChart({ name, x: curve.xLabel, y: curve.yLabel, lines: lines.filter(({ points }) => points.some(([, y]) => Number.isFinite(y))) })];
     });
-    printed = { wheelset, window, there, part: html`<div class="paper pad" aria-hidden="true">${drawWheelset(sidesOf(looked, { ...moving, apart: true }), true, 0, false)}<div>${charts}</div></div>` };
+    printed = { wheelset, window, there, part: html`<div class="paper pad" aria-hidden="true">${drawWheelset(sidesOf(looked, { ...moving, apart: true }), true, 0)}<div>${charts}</div></div>` };
   }
   return printed.part;
 }
@@ -93,7 +92,7 @@ function shiftPart(app, looked, moving) {
   return html`<div class="shifting">
     <div class="segs" role="group" aria-label="Picture of the wheelset">${parts.map(([on, label]) => html`<label class="seg">
       <input type="radio" name="apart" .checked=${apart === on} @change=${show(on)}><span>${label}</span></label>`)}</div>
-    ${drawWheelset(sidesOf(looked, moving), apart, shifts[at], isBent(looked.document))}
+    ${drawWheelset(sidesOf(looked, moving), apart, shifts[at])}
     <label class="slide"><span>Shift to the left <output>${fixed(shifts[at], 1)} mm, Δr ${fixed(kinematics.radius_difference_mm[at], 3)} mm</output></span>
       <input type="range" aria-label="Shift to the left" aria-valuetext=${`${fixed(shifts[at], 1)} mm`} min="0" max=${shifts.length - 1} .value=${String(at)} @input=${move}></label>
     ${carriedTable(moving)}</div>`;

@@ -17,7 +17,7 @@ import { path } from './axes.js';
  * @property {readonly Place[]} wheel
  * @property {Touch} touch At the shift that is drawn.
  * @property {readonly Touch[]} lines At other shifts.
- * @property {readonly { patch: import('../api.js').Patch, comb: import('../field/comb.js').Comb | null }[]} pressed
+ * @property {readonly import('../shifting.js').Pressed[]} pressed
  */
 
 const WIDTH = 900;
@@ -29,8 +29,8 @@ const COMB_MM = 16;
 /** Least distance of the numbers at contact lines, in pixels. */
 const APART_PX = 30;
 
-/** @param {Partial<Record<Side, DrawnSide>>} sides @param {boolean} apart @param {number} shift @param {boolean} bent Pressures stand along the rail. */
-export function drawWheelset(sides, apart, shift, bent) {
+/** @param {Partial<Record<Side, DrawnSide>>} sides @param {boolean} apart @param {number} shift */
+export function drawWheelset(sides, apart, shift) {
   const all = Object.values(sides);
   if (!all.length) return html`<p class="pad quiet">Loading the cross-sections …</p>`;
   const spans = all.map(({ rail }) => /** @type {const} */ ([Math.min(...rail.map(([y]) => y)) - MARGIN_MM, Math.max(...rail.map(([y]) => y)) + MARGIN_MM]));
@@ -49,7 +49,7 @@ export function drawWheelset(sides, apart, shift, bent) {
         <path class="rail" d=${`${path(side.rail.map(T))}V${height + 20}H${T(side.rail[0])[0]}Z`}/>
         <path class="wheel" d=${`${path(side.wheel.map(T))}V-20H${T(side.wheel[0])[0]}Z`}/>
         ${apart ? contactLines(side, T) : nothing}
-        ${side.pressed.map(({ patch, comb }) => pressure(patch, comb, surfaceOf(patch, side.rail, bent), (COMB_MM * patch.pressure_max_mpa) / most, T))}
+        ${side.pressed.map(({ patch, comb, bent }) => pressure(patch, comb, surfaceOf(patch, side.rail, bent), (COMB_MM * patch.pressure_max_mpa) / most, T))}
         ${apart ? nothing : svg`<circle class="dot" cx=${T(side.touch.rail)[0]} cy=${T(side.touch.rail)[1]} r="4"/>`}</svg>`;
       left += width + BETWEEN;
       return part;
