@@ -252,6 +252,60 @@ def gap_grids():
             }, converged))
     write_lines("gap_grids.json", out)
 
+
+def usfd_rate(over_area):
+    """The wear map in ug/(m mm2), of the friction power over area and speed in N/mm2 (Braghin et al. 2006)."""
+    return 5.3 * min(over_area, 10.4) + 61.9 * max(over_area - 77.2, 0.0)
+
+
+def wear():
+    """Friction power over speed and width, and wear depth of the map, of each row of elements: sums of |p| times slip along x.
+
+    `power_n` is the power of the converged forces. Sums over elements fall short of it, by more the smaller the slip.
+    """
+    powers = {}
+    for name in CLASSES[:5]:
+        for r in json.loads((TARGET / f"{name}.json").read_text()):
+            limit, c = r["friction"] * r["normal_force_n"], math.sqrt(r["a_mm"] * r["b_mm"])
+            powers[r["id"]] = limit * (r["force_x"]["value"] * r["creepage_x"] + r["force_y"]["value"] * r["creepage_y"]
+                                       + c * r["moment_z"]["value"] * r["spin_per_mm"])
+    for r in json.loads((TARGET / "gap_grids.json").read_text()):
+        powers[r["id"]] = (r["force_x_n"]["value"] * r["creepage_x"] + r["force_y_n"]["value"] * r["creepage_y"]
+                           + r["moment_z_n_mm"]["value"] * r["spin_per_mm"])
+    out = []
+    for path in sorted((SOURCE / "reference/fields").glob("*.json.gz")):
+        fields = json.loads(gzip.decompress(path.read_bytes()))
+        if fields["id"] not in powers or fields.get("patch", 0) != 0:
+            continue
+        if "table" in fields:
+            grid, columns = fields["table"], fields["table"]["cols"]
+            first = grid["yc1"]
+            rows = [k // grid["mx"] for k in range(grid["mx"] * grid["my"])]
+        else:
+            grid, columns = fields["grid"], fields["columns"]
+            first, rows = grid["y_center_first"], columns["iy"]
+        power, depth = {}, {}
+        for row, px, py, slip in zip(rows, columns["px"], columns["py"], columns["srel"]):
+            of_element = math.hypot(px or 0.0, py or 0.0) * (slip or 0.0)
+            power[row] = power.get(row, 0.0) + of_element * grid["dx"]
+            # In nm, of steel with 7850 kg/m3.
+            depth[row] = depth.get(row, 0.0) + usfd_rate(of_element) * grid["dx"] / 7.85
+        kept = [row for row in sorted(power) if power[row] > 0.0]
+        # Fewer rows do not resolve a patch, and what loses more of its power has too little slip for its elements.
+        found = sum(power.values()) * grid["dy"]
+        if len(kept) < 20 or abs(found / powers[fields["id"]] - 1.0) > 0.08:
+            continue
+        out.append({
+            "id": fields["id"],
+            "power_n": round(powers[fields["id"]], 4),
+            "dy_mm": grid["dy"],
+            "y_mm": [round(first + row * grid["dy"], 6) for row in kept],
+            "power_n_per_mm": [round(power[row], 6) for row in kept],
+            "usfd_depth_nm": [round(depth[row], 6) for row in kept],
+        })
+    write_lines("wear.json", out)
+
+
 def subsurface():
     """Stresses in the upper body: every fifth point from a depth of 0.01 semi-axes on whose uncertainty is small."""
     records = []
@@ -485,3 +539,4 @@ pressing()
 cylinders()
 transient()
 prescribed_forces()
+wear()

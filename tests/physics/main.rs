@@ -108,6 +108,7 @@ mod units;
 mod unlike;
 mod unlike_wheels;
 mod watched;
+mod wear;
 mod wheelset;
 mod wheelset_pulls;
 mod workspaces;

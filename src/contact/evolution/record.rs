@@ -8,6 +8,7 @@ use crate::contact::geometry::conicity::RadiusDifference;
 use crate::contact::geometry::profile::{Body, Profile, Reading};
 use crate::contact::geometry::wheel_rail::{Placement, RailPlace, WheelRail};
 use crate::contact::geometry::wheelset_pose::PairOfRails;
+use crate::contact::numerics::sampling::halton;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::evolution::{
@@ -87,17 +88,6 @@ fn coefficients(task: &Evolution, areas: &[f64; 3]) -> [f64; 2] {
         .collect();
     samples.sort_by(f64::total_cmp);
     [0.05, 0.95].map(|share| samples[(share * f64::from(SAMPLES - 1)).round() as usize])
-}
-
-/// Element of Halton's sequence (Halton 1960).
-fn halton(mut k: u32, base: u32) -> f64 {
-    let (mut sum, mut part) = (0.0, 1.0);
-    while k > 0 {
-        part /= f64::from(base);
-        sum += part * f64::from(k % base);
-        k /= base;
-    }
-    sum
 }
 
 fn losses(state: &EvolutionState) -> WearLosses {

@@ -25,8 +25,7 @@ use crate::contact::evolution::traffic::condensed;
 use crate::contact::geometry::profile::Body;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::solution::words::evolution::{
-    BodyState, CondensedTraffic, EvolutionRecord, EvolutionState, StateContact, TrafficState,
-    WornBody,
+    BodyState, CondensedTraffic, EvolutionRecord, EvolutionState, StateContact, WornBody,
 };
 
 /// Two shares of the extent that differ by less are one.
@@ -111,9 +110,9 @@ impl Evolution {
         let Some(traffic) = &before.traffic else {
             let on = sections([&before.rail, &before.wheel], before.friction, 0.0);
             let mut solves = 0;
-            let mut solve = |values: &[f64]| {
-                solves += 1;
-                pass(self, context, on, values, monitor)
+            let mut solve = |states: &[&[f64]]| {
+                solves += states.len() as u32;
+                self.passes(context, on, states, monitor)
             };
             state.traffic = Some(condensed(self, &mut solve)?);
             state.solves = solves;
@@ -242,7 +241,8 @@ impl Evolution {
         let on = sections(bodies, of.friction, radius);
         let mut wear = on.points.map(|points| BodyWear::none(points.len()));
         let mut states = Vec::with_capacity(traffic.states.len());
-        let passes = self.passes(context, on, &traffic.states, monitor)?;
+        let values: Vec<&[f64]> = traffic.states.iter().map(|state| &*state.values).collect();
+        let passes = self.passes(context, on, &values, monitor)?;
         for (state, Pass { wear: own, contact }) in traffic.states.iter().zip(passes) {
             (0..2).for_each(|k| wear[k].add(state.share, &own[k]));
             states.push(StateContact {
@@ -279,15 +279,15 @@ impl Evolution {
         Ok(Evaluation { wear, states })
     }
 
-    /// Solves states, each on its own, on the threads of the context.
+    /// Solves the states of these values, each on its own, on the threads of the context.
     fn passes(
         &self,
         context: &SolveContext,
         on: Sections,
-        states: &[TrafficState],
+        states: &[&[f64]],
         monitor: &(dyn Monitor + Sync),
     ) -> Result<Vec<Pass>, SolveError> {
-        let solve = |state: &TrafficState| pass(self, context, on, &state.values, monitor);
+        let solve = |values: &&[f64]| pass(self, context, on, values, monitor);
         if context.threads <= 1 {
             return states.iter().map(solve).collect();
         }

@@ -160,7 +160,6 @@ fn twice_the_passes_at_half_the_weight_are_the_same() {
     }
 }
 
-/// Left after any step and continued from its text by other threads, an evolution gives the same bits.
 /// Creepages of both signs with mean 0 beside widely spread loads: the reported error covers the true one, which falls with the number of states.
 #[test]
 fn the_error_of_a_condensed_traffic_covers_what_all_rows_wear() {
@@ -204,6 +203,7 @@ fn the_error_of_a_condensed_traffic_covers_what_all_rows_wear() {
     assert!(last < 0.05, "{last}");
 }
 
+/// Left after any step and continued from its text by other threads, an evolution gives the same bits.
 #[test]
 fn an_evolution_is_continued_to_the_same_bits() {
     let mut plan = request(&[-2.0, 1.0], &[1.0, 3.0], 2);
@@ -291,6 +291,93 @@ fn wear_across_a_section_is_that_of_the_power_of_the_cells() {
         "{} {right}",
         on_wheel * turn
     );
+}
+
+/// Means and variances of the samples are those of the distributions, columns are uncorrelated, and a table of the same rows is the same traffic.
+#[test]
+fn distributions_are_sampled_evenly_and_independently() {
+    let mut sampled = request(&[0.0], &[1.0], 1);
+    sampled["traffic"] = json!({ "samples": 3000, "columns": {
+        "/contact/lateral_shift_mm": { "min": -6, "max": 6, "mean": 1, "standard_deviation": 1.5 },
+        "/load/vertical_force_n": { "min": 50e3, "max": 110e3 },
+    } });
+    let task = checked(&sampled);
+    let column = |name: &str| {
+        let k = task.pointers.iter().position(|pointer| pointer == name);
+        &task.columns[k.expect("a column")]
+    };
+    let [shifts, loads] = ["/contact/lateral_shift_mm", "/load/vertical_force_n"].map(column);
+    let moments = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / 3000.0;
+        let squares = values.iter().map(|value| (value - mean).powi(2));
+        (mean, (squares.sum::<f64>() / 3000.0).sqrt())
+    };
+    let ((shift, shift_spread), (load, load_spread)) = (moments(shifts), moments(loads));
+    // The ends cut off 1e-3 of the normal distribution.
+    assert!(
+        (shift - 1.0).abs() < 0.02 && (shift_spread - 1.5).abs() < 0.02,
+        "{shift} {shift_spread}"
+    );
+    assert!(
+        (load - 80e3).abs() < 50.0 && (load_spread - 60e3 / 12.0_f64.sqrt()).abs() < 50.0,
+        "{load} {load_spread}"
+    );
+    let pairs = shifts.iter().zip(loads);
+    let products: f64 = pairs.map(|(a, b)| (a - shift) * (b - load)).sum();
+    assert!((products / 3000.0 / shift_spread / load_spread).abs() < 0.02);
+    let mut table = sampled.clone();
+    table["traffic"] = json!({ "columns": { "/contact/lateral_shift_mm": shifts, "/load/vertical_force_n": loads } });
+    let table = checked(&table);
+    assert_eq!(
+        (&table.columns, &table.shares),
+        (&task.columns, &task.shares)
+    );
+}
+
+#[test]
+fn faults_of_distributions_name_what_is_allowed() {
+    let good = json!({ "min": 0, "max": 1 });
+    for (traffic, pointer, detail) in [
+        (
+            json!({ "columns": { "/contact/lateral_shift_mm": { "min": 2, "max": 1 } } }),
+            "/traffic/columns/~1contact~1lateral_shift_mm/max",
+            "at least min",
+        ),
+        (
+            json!({ "columns": { "/contact/lateral_shift_mm": { "min": 0, "max": 1, "mean": 0.5 } } }),
+            "/traffic/columns/~1contact~1lateral_shift_mm/standard_deviation",
+            "missing",
+        ),
+        (
+            json!({ "columns": { "/contact/lateral_shift_mm": [0, 1], "/load/vertical_force_n": good } }),
+            "/traffic/columns/~1contact~1lateral_shift_mm",
+            "an object",
+        ),
+        (
+            json!({ "columns": { "/contact/lateral_shift_mm": good }, "samples": 0 }),
+            "/traffic/samples",
+            "1 to 200000",
+        ),
+        (
+            json!({ "columns": { "/contact/lateral_shift_mm": good }, "passes": [1] }),
+            "/traffic/passes",
+            "columns of numbers",
+        ),
+        (
+            json!({ "columns": { "/contact/lateral_shift_mm": [0, 1] }, "samples": 5 }),
+            "/traffic/samples",
+            "distributions",
+        ),
+    ] {
+        let mut bad = request(&[0.0], &[1.0], 1);
+        bad["traffic"] = traffic;
+        let error = Evolution::check(&bad, &Limits::default()).expect_err("a fault");
+        let told = error
+            .0
+            .iter()
+            .any(|fault| fault.pointer == pointer && fault.detail.contains(detail));
+        assert!(told, "{pointer}: {:?}", error.0);
+    }
 }
 
 #[test]

@@ -35,13 +35,16 @@ struct Parted {
     halves: Option<[Group; 2]>,
 }
 
+/// Solves the states of these values, one pass for each.
+pub(crate) type SolveStates<'a> = dyn FnMut(&[&[f64]]) -> Result<Vec<Pass>, SolveError> + 'a;
+
 /// A traffic of a few states.
 ///
 /// # Errors
 /// Those of `solve`.
 pub(crate) fn condensed(
     task: &Evolution,
-    solve: &mut dyn FnMut(&[f64]) -> Result<Pass, SolveError>,
+    solve: &mut SolveStates,
 ) -> Result<CondensedTraffic, SolveError> {
     let scales = scales(task);
     let rows: Vec<usize> = (0..task.shares.len())
@@ -64,11 +67,8 @@ pub(crate) fn condensed(
         parts.splice(next..=next, [low, high]);
     }
     let most = task.plan.accuracy.states_max as usize;
-    let mut groups = Vec::with_capacity(most);
-    for rows in parts {
-        groups.push(group(task, rows, solve)?);
-    }
-    let mut parted: Vec<Option<Parted>> = vec![None; groups.len()];
+    let mut groups = groups_of(task, parts, solve)?;
+    let mut known: Vec<Option<Parted>> = vec![None; groups.len()];
     loop {
         let total = [0, 1].map(|body| {
             let mut all = BodyWear::none(groups[0].pass.wear[body].area.len());
@@ -82,12 +82,13 @@ pub(crate) fn condensed(
             let bodies = (0..2).filter(|body| wearing[*body]);
             bodies.map(|body| size(&wear[body]) / total[body]).sum()
         };
-        for (group, parted) in groups.iter().zip(&mut parted) {
-            if parted.is_none() {
-                *parted = Some(parting(task, &scales, group, &part, solve)?);
-            }
+        let new: Vec<usize> = (0..groups.len()).filter(|k| known[*k].is_none()).collect();
+        let parents: Vec<&Group> = new.iter().map(|k| &groups[*k]).collect();
+        let found = parted(task, &scales, &parents, &part, solve)?;
+        for (k, parted) in new.into_iter().zip(found) {
+            known[k] = Some(parted);
         }
-        let changes: Vec<&[BodyWear; 2]> = parted
+        let changes: Vec<&[BodyWear; 2]> = known
             .iter()
             .flatten()
             .map(|parted| &parted.change)
@@ -101,23 +102,21 @@ pub(crate) fn condensed(
         });
         let error = [0, 1].map(|body| if wearing[body] { error[body] } else { 0.0 });
         if error[0].max(error[1]) <= task.plan.accuracy.states_tolerance || groups.len() >= most {
+            let states = groups.into_iter().map(|group| TrafficState {
+                share: group.share,
+                rows: group.rows.len() as u32,
+                values: group.values,
+            });
             return Ok(CondensedTraffic {
                 rows: task.shares.len() as u32,
                 pointers: task.pointers.clone(),
-                states: groups
-                    .into_iter()
-                    .map(|group| TrafficState {
-                        share: group.share,
-                        rows: group.rows.len() as u32,
-                        values: group.values,
-                    })
-                    .collect(),
+                states: states.collect(),
                 error,
             });
         }
         let weights: Vec<f64> = changes.iter().map(|change| part(change)).collect();
         let divisible = |k: &usize| {
-            parted[*k]
+            known[*k]
                 .as_ref()
                 .is_some_and(|group| group.halves.is_some())
         };
@@ -127,9 +126,9 @@ pub(crate) fn condensed(
         order.truncate(count.min(most - groups.len()));
         order.sort_unstable();
         for k in order.into_iter().rev() {
-            if let Some([low, high]) = parted[k].take().and_then(|parted| parted.halves) {
+            if let Some([low, high]) = known[k].take().and_then(|parted| parted.halves) {
                 groups.splice(k..=k, [low, high]);
-                parted.splice(k..=k, [None, None]);
+                known.splice(k..=k, [None, None]);
             }
         }
     }
@@ -140,61 +139,73 @@ fn size(wear: &BodyWear) -> f64 {
     wear.area.iter().map(|area| area.abs()).sum()
 }
 
-/// Parts a group along each column in which its rows differ; `part` is the size of wear relative to that of the traffic.
-fn parting(
+/// Parts groups along each column in which their rows differ; `part` is the size of wear relative to that of the traffic.
+fn parted(
     task: &Evolution,
     scales: &[f64],
-    group: &Group,
+    parents: &[&Group],
     part: &dyn Fn(&[BodyWear; 2]) -> f64,
-    solve: &mut dyn FnMut(&[f64]) -> Result<Pass, SolveError>,
-) -> Result<Parted, SolveError> {
-    let points = [0, 1].map(|body| group.pass.wear[body].area.len());
-    let mut change = points.map(BodyWear::none);
-    let mut best: Option<(f64, [Group; 2])> = None;
-    for (column, _) in spreads(task, scales, &group.rows) {
-        let Some([low, high]) = halves(task, column, &group.rows) else {
-            continue;
-        };
-        let halves = [
-            self::group(task, low, solve)?,
-            self::group(task, high, solve)?,
-        ];
-        let mut own = points.map(BodyWear::none);
-        for body in 0..2 {
-            own[body].add(-group.share, &group.pass.wear[body]);
-            for half in &halves {
-                own[body].add(half.share, &half.pass.wear[body]);
+    solve: &mut SolveStates,
+) -> Result<Vec<Parted>, SolveError> {
+    // Two halves of the rows of `parents[owner]` each.
+    let (mut owners, mut rows) = (Vec::new(), Vec::new());
+    for (k, group) in parents.iter().enumerate() {
+        for (column, _) in spreads(task, scales, &group.rows) {
+            if let Some(halves) = halves(task, column, &group.rows) {
+                owners.push(k);
+                rows.extend(halves);
             }
-            change[body].add(1.0, &own[body]);
-        }
-        let own = part(&own);
-        if best.as_ref().is_none_or(|(most, _)| own > *most) {
-            best = Some((own, halves));
         }
     }
-    Ok(Parted {
-        change,
-        halves: best.map(|(_, halves)| halves),
-    })
+    let mut solved = groups_of(task, rows, solve)?.into_iter();
+    let unchanged = |group: &&Group| Parted {
+        change: [0, 1].map(|body| BodyWear::none(group.pass.wear[body].area.len())),
+        halves: None,
+    };
+    let mut all: Vec<Parted> = parents.iter().map(unchanged).collect();
+    let mut largest = vec![f64::NEG_INFINITY; parents.len()];
+    for k in owners {
+        let (Some(low), Some(high)) = (solved.next(), solved.next()) else {
+            break;
+        };
+        let group = parents[k];
+        let own = [0, 1].map(|body| {
+            let mut own = BodyWear::none(group.pass.wear[body].area.len());
+            own.add(-group.share, &group.pass.wear[body]);
+            own.add(low.share, &low.pass.wear[body]);
+            own.add(high.share, &high.pass.wear[body]);
+            all[k].change[body].add(1.0, &own);
+            own
+        });
+        let own = part(&own);
+        if own > largest[k] {
+            largest[k] = own;
+            all[k].halves = Some([low, high]);
+        }
+    }
+    Ok(all)
 }
 
-fn group(
+fn groups_of(
     task: &Evolution,
-    rows: Vec<usize>,
-    solve: &mut dyn FnMut(&[f64]) -> Result<Pass, SolveError>,
-) -> Result<Group, SolveError> {
-    let share: f64 = rows.iter().map(|row| task.shares[*row]).sum();
-    let values: Vec<f64> = task
-        .columns
-        .iter()
-        .map(|column| mean(task, &rows, column))
-        .collect();
-    Ok(Group {
-        share,
-        pass: solve(&values)?,
-        values,
+    parts: Vec<Vec<usize>>,
+    solve: &mut SolveStates,
+) -> Result<Vec<Group>, SolveError> {
+    let mean_of = |rows: &Vec<usize>| -> Vec<f64> {
+        let columns = task.columns.iter();
+        columns.map(|column| mean(task, rows, column)).collect()
+    };
+    let means: Vec<Vec<f64>> = parts.iter().map(mean_of).collect();
+    let states: Vec<&[f64]> = means.iter().map(Vec::as_slice).collect();
+    let passes = solve(&states)?;
+    let groups = parts.into_iter().zip(means).zip(passes);
+    let groups = groups.map(|((rows, values), pass)| Group {
+        share: rows.iter().map(|row| task.shares[*row]).sum(),
         rows,
-    })
+        values,
+        pass,
+    });
+    Ok(groups.collect())
 }
 
 /// Mean of a column over rows.

@@ -10,6 +10,7 @@
 //! | the largest value in an interval | [`maximum`] |
 //! | values between nodes | [`cubic`] (one interval), [`hermite`] (given slopes, or slopes without overshoot), [`spline`] (smoothing), [`lagrange`] (one polynomial) |
 //! | integrals | [`quadrature`] |
+//! | evenly spread samples, normal distribution | [`sampling`] |
 //! | linear equations | [`dense_lu`], up to 32 unknowns [`small_lu`], [`gmres`]; few unknowns fitted to samples: [`least_squares`] |
 //! | lengths of vectors in inner loops | [`length`] |
 //! | connected cells | [`flood_fill`] |
@@ -44,6 +45,7 @@ pub mod maximum;
 pub mod monotone_root;
 pub mod pair_root;
 pub mod quadrature;
+pub(crate) mod sampling;
 pub mod simd;
 pub mod simd_ln;
 pub mod small_lu;

@@ -22,13 +22,43 @@ pub(crate) struct EvolutionRequest {
     plan: EvolutionWords,
 }
 
-/// A table of states.
+/// States of a traffic: a table, or distributions that the service samples.
 #[derive(Debug, Serialize, ToSchema)]
 #[allow(dead_code, reason = "the contract; bodies are read by `contact`")]
 pub(crate) struct Traffic {
-    /// Columns of numbers, all of the same length, named as those of a run.
-    columns: BTreeMap<String, Vec<f64>>,
-    /// Relative numbers of passes of the states; 1 for each when left out.
+    /// Columns named as those of a run: all of them numbers, as many in each, or all of them distributions, which are independent of each other.
+    columns: BTreeMap<String, TrafficColumn>,
+    /// Relative numbers of passes of the rows of a table; 1 for each when left out.
     #[schema(required = false)]
     passes: Vec<f64>,
+    /// Samples of distributions; 4096 when left out.
+    #[schema(required = false, minimum = 1, maximum = 200_000)]
+    samples: u32,
+}
+
+/// A column of a traffic.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+#[allow(dead_code, reason = "the contract; bodies are read by `contact`")]
+pub(crate) enum TrafficColumn {
+    /// The values of the rows.
+    Numbers(Vec<f64>),
+    /// A distribution.
+    Distribution(TrafficDistribution),
+}
+
+/// Distribution of a column: normal between two values if it has a mean and a standard deviation, else uniform.
+#[derive(Debug, Serialize, ToSchema)]
+#[allow(dead_code, reason = "the contract; bodies are read by `contact`")]
+pub(crate) struct TrafficDistribution {
+    /// Least value.
+    min: f64,
+    /// Largest value.
+    max: f64,
+    /// Mean before the ends are cut off.
+    #[schema(required = false)]
+    mean: f64,
+    /// Standard deviation before the ends are cut off.
+    #[schema(required = false, exclusive_minimum = 0.0)]
+    standard_deviation: f64,
 }

@@ -81,7 +81,12 @@ fn name_columns(request: &mut Value) -> Result<(), ApiError> {
         };
         match place(&title, None) {
             Ok(Some(found)) => {
-                for value in values.as_array_mut().into_iter().flatten() {
+                let numbers: Box<dyn Iterator<Item = &mut Value>> = match &mut values {
+                    Value::Array(numbers) => Box::new(numbers.iter_mut()),
+                    Value::Object(distribution) => Box::new(distribution.values_mut()),
+                    _ => Box::new(std::iter::empty()),
+                };
+                for value in numbers {
                     if let Some(number) = value.as_f64().filter(|_| found.factor != 1.0) {
                         *value = (found.factor * number).into();
                     }

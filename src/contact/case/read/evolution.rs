@@ -1,6 +1,6 @@
 //! Reads what is asked of an evolution: its plan, and its traffic as columns of numbers.
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::object::{Object, join, number, shown};
@@ -10,6 +10,7 @@ use crate::contact::case::words::evolution::{
     EvolutionAccuracy, EvolutionEvent, EvolutionExtent, EvolutionWords, WearLimits, WearingBodies,
 };
 use crate::contact::error::{CaseError, Fault};
+use crate::contact::numerics::sampling::{PRIMES, halton, normal_probability, normal_quantile};
 
 const BODIES: [(&str, WearingBodies); 3] = [
     ("rail", WearingBodies::Rail),
@@ -39,6 +40,8 @@ const SHARE: AllowedRange = AllowedRange::positive(1.0, "");
 const EVENTS_MAX: usize = 100;
 /// Rows of a traffic.
 pub const ROWS_MAX: usize = 200_000;
+/// Samples of a traffic whose columns are distributions.
+const SAMPLES_DEFAULT: u32 = 4096;
 
 /// An evolution as it was sent, without faults of the text.
 #[derive(Debug, Clone, PartialEq)]
@@ -162,7 +165,7 @@ fn accuracy(block: &mut Object) -> Option<EvolutionAccuracy> {
         true => block.required_count(name, 1, most),
         false => Some(or),
     };
-    let states_max = count_or(block, "states_max", 200, or.states_max);
+    let states_max = count_or(block, "states_max", 2000, or.states_max);
     let states_tolerance = number_or(block, "states_tolerance", SHARE, or.states_tolerance);
     let step_tolerance = number_or(block, "step_tolerance", SHARE, or.step_tolerance);
     let depth = AllowedRange::positive(1.0, "mm");
@@ -268,7 +271,7 @@ fn section_or(
 type Traffic = (Vec<(String, Vec<f64>)>, Vec<f64>);
 
 fn traffic(block: &mut Object) -> Option<Traffic> {
-    block.only(&["columns", "passes"], &[]);
+    block.only(&["columns", "passes", "samples"], &[]);
     let value = block.required("columns", "an object of columns")?;
     let pointer = block.pointer_to("columns");
     let Value::Object(members) = value else {
@@ -278,6 +281,15 @@ fn traffic(block: &mut Object) -> Option<Traffic> {
         );
         return None;
     };
+    if members.values().any(Value::is_object) {
+        return sampled_traffic(block, members, &pointer);
+    }
+    if block.has("samples") {
+        block.fault(
+            "samples",
+            "given for columns of numbers; it belongs to distributions",
+        );
+    }
     let faults = block.faults();
     let any = AllowedRange::closed(-1e12, 1e12, "");
     let read = members.iter().map(|(name, values)| {
@@ -315,6 +327,105 @@ fn traffic(block: &mut Object) -> Option<Traffic> {
         block.fault("passes", "all are 0; at least one more than 0 is needed");
     }
     Some((columns, passes))
+}
+
+/// A traffic whose columns are distributions, at the points of Halton's sequence: one dimension for each column, all independent.
+fn sampled_traffic(
+    block: &mut Object,
+    members: &Map<String, Value>,
+    pointer: &str,
+) -> Option<Traffic> {
+    if block.has("passes") {
+        block.fault(
+            "passes",
+            "given for distributions; it belongs to columns of numbers",
+        );
+    }
+    let samples = match block.has("samples") {
+        true => block.required_count("samples", 1, ROWS_MAX as u32),
+        false => Some(SAMPLES_DEFAULT),
+    };
+    if members.len() > PRIMES.len() {
+        let detail = format!(
+            "{} distributions given; at most {} are allowed",
+            members.len(),
+            PRIMES.len()
+        );
+        block.fault("columns", detail);
+        return None;
+    }
+    let faults = block.faults();
+    let read = members.iter().map(|(name, value)| {
+        let mut block = Object::open(value, join(pointer, name), faults)?;
+        Some((name.clone(), distribution(&mut block)?))
+    });
+    let read: Vec<Option<(String, Distribution)>> = read.collect();
+    let samples = samples?;
+    let columns = read.into_iter().zip(PRIMES).map(|(read, base)| {
+        let (name, distribution) = read?;
+        let values = (1..=samples).map(|k| distribution.value_at(halton(k, base)));
+        Some((name, values.collect()))
+    });
+    let columns = columns.collect::<Option<Vec<_>>>()?;
+    Some((columns, vec![1.0; samples as usize]))
+}
+
+/// A distribution of a column between two values: uniform, or normal where it has a mean and a standard deviation.
+struct Distribution {
+    range: [f64; 2],
+    normal: Option<[f64; 2]>,
+}
+
+impl Distribution {
+    /// The value below which this share of the traffic lies.
+    fn value_at(&self, share: f64) -> f64 {
+        let [low, high] = self.range;
+        let Some([mean, deviation]) = self.normal else {
+            return low + share * (high - low);
+        };
+        let [from, to] = self
+            .range
+            .map(|end| normal_probability((end - mean) / deviation));
+        (mean + deviation * normal_quantile(from + share * (to - from))).clamp(low, high)
+    }
+}
+
+fn distribution(block: &mut Object) -> Option<Distribution> {
+    block.only(&["min", "max", "mean", "standard_deviation"], &[]);
+    let any = AllowedRange::closed(-1e12, 1e12, "");
+    let low = block.required_number("min", any);
+    let high = block.required_number("max", any);
+    let is_normal = block.has("mean") || block.has("standard_deviation");
+    let normal = match is_normal {
+        true => {
+            let mean = block.required_number("mean", any);
+            let spread = AllowedRange::positive(1e12, "");
+            let deviation = block.required_number("standard_deviation", spread);
+            Some([mean?, deviation?])
+        }
+        false => None,
+    };
+    let range = [low?, high?];
+    if range[0] > range[1] {
+        block.fault(
+            "max",
+            format!("{} given; at least min, {}, is needed", range[1], range[0]),
+        );
+        return None;
+    }
+    if let Some([mean, _]) = normal
+        && !(range[0]..=range[1]).contains(&mean)
+    {
+        block.fault(
+            "mean",
+            format!(
+                "{mean} given; {} to {} is allowed, min to max",
+                range[0], range[1]
+            ),
+        );
+        return None;
+    }
+    Some(Distribution { range, normal })
 }
 
 fn numbers(

@@ -1,4 +1,4 @@
-//! What is asked of an evolution: which bodies wear, by which law, how far, with which events and limits.
+//! Request of an evolution: the bodies that wear, the wear model, the extent, events and limits.
 
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -6,7 +6,7 @@ use utoipa::ToSchema;
 use crate::contact::case::words::contact::CrossSection;
 use crate::contact::case::words::damage::DamageModel;
 
-/// How profiles wear under a traffic, apart from the case and the traffic themselves.
+/// Plan of an evolution: what it wears, how far and how accurately.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = EvolutionPlan)]
 pub struct EvolutionWords {
@@ -24,7 +24,7 @@ pub struct EvolutionWords {
     /// Tolerances of the condensed traffic and of the steps.
     #[schema(required = false)]
     pub accuracy: EvolutionAccuracy,
-    /// Losses whose time is wanted.
+    /// Losses for which the time is reported.
     #[schema(required = false)]
     pub limits: WearLimits,
     /// Maintenance, in any order.
@@ -50,21 +50,21 @@ pub enum WearingBodies {
 }
 
 impl WearingBodies {
-    /// Does the rail wear, and does the wheel?
+    /// Whether the rail and the wheel wear.
     #[must_use]
     pub fn flags(self) -> [bool; 2] {
         [self != WearingBodies::Wheel, self != WearingBodies::Rail]
     }
 }
 
-/// How far an evolution goes. Rail and wheel advance in proportion.
+/// Extent of an evolution. Rail and wheel advance in proportion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct EvolutionExtent {
     /// Traffic over the rail in million gross tonnes; a row of the traffic counts twice its wheel load.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub mgt: Option<f64>,
-    /// The same as a number of axles. Excludes `mgt`.
+    /// Traffic over the rail as a number of axles, in place of `mgt`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub axle_passes: Option<f64>,
@@ -77,10 +77,10 @@ pub struct EvolutionExtent {
 /// Tolerances of an evolution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct EvolutionAccuracy {
-    /// Most representative states; 100 when left out.
-    #[schema(required = false, minimum = 1, maximum = 200)]
+    /// Largest number of representative states; 100 when left out.
+    #[schema(required = false, minimum = 1, maximum = 2000)]
     pub states_max: u32,
-    /// Error of the condensed traffic relative to the worn area, measured with twice the states; 0.03 when left out.
+    /// Error of the representative states relative to the worn area, at which no more are added; 0.03 when left out.
     #[schema(required = false, exclusive_minimum = 0.0)]
     pub states_tolerance: f64,
     /// Change of the distribution of wear over a step, relative to the worn area; 0.1 when left out.
@@ -110,7 +110,7 @@ impl Default for EvolutionAccuracy {
     }
 }
 
-/// Losses at which a profile has to be replaced, in mm. What is left out is not watched.
+/// Losses in mm at which a profile has to be maintained. One that is left out is not checked.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema)]
 pub struct WearLimits {
     /// W1: height of the rail in its middle.
@@ -138,7 +138,7 @@ pub struct WearLimits {
 /// Maintenance at one time.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct EvolutionEvent {
-    /// When, in the unit of the extent: `mgt` or `axle_passes`, and km where only the wheel wears.
+    /// Time of the event, in the unit of the extent: `mgt` or `axle_passes`, and km where only the wheel wears.
     #[schema(minimum = 0.0)]
     pub at: f64,
     /// Grinds the rail to this section, lowered until it lies nowhere above the present one.

@@ -9,29 +9,29 @@ use crate::contact::solution::words::damage::DamageFiguresUsed;
 /// The answer of an evolution.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EvolutionAnswer {
-    /// The stored steps, from the unworn sections on; one before and one after each event.
+    /// Profiles and contact at the start, at each stored step, and before and after each event.
     pub records: Vec<EvolutionRecord>,
-    /// When the limits are reached, between the records linearly.
+    /// When each limit is reached, interpolated linearly between records.
     pub limits: Vec<LimitReached>,
-    /// The traffic as it was condensed.
+    /// The representative states that stand for the traffic.
     pub traffic: CondensedTraffic,
-    /// Steps taken, and steps taken again because they were too long.
+    /// Accepted steps.
     pub steps: u32,
-    /// See `steps`.
+    /// Steps that were repeated with a shorter length.
     pub steps_rejected: u32,
     /// Contacts solved.
     pub solves: u32,
     /// The figures that wear and damage were computed with.
     pub damage_parameters: DamageFiguresUsed,
-    /// What the client should know before using the numbers.
+    /// Remarks that matter to the use of the numbers.
     pub remarks: Vec<RemarkEntry>,
 }
 
-/// How far an evolution has come.
+/// Progress of an evolution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = EvolutionProgress)]
 pub struct Progress {
-    /// Share of the extent.
+    /// Fraction of the extent that is done.
     pub share: f64,
     /// Traffic over the rail in million gross tonnes; absent where only the wheel wears.
     #[serde(skip_serializing_if = "Option::is_none", default)]
@@ -70,7 +70,7 @@ pub struct EvolutionRecord {
     pub states: Vec<StateContact>,
 }
 
-/// A section and what has become of it. Arrays have one entry for each point.
+/// A worn section. Arrays have one entry for each point.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct WornBody {
     /// Points `[y, z]` in mm, y to the field side and z down, as `points_mm` of a cross-section.
@@ -87,16 +87,16 @@ pub struct WornBody {
     pub uncertainty: WearUncertainty,
 }
 
-/// Three separate uncertainties of worn areas and depths, relative.
+/// Uncertainties of worn areas and depths by their source, relative to the worn area.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct WearUncertainty {
-    /// Of the steps: from halving each.
+    /// Of the step length, from halving each step.
     pub steps: f64,
-    /// Of the condensed traffic: from its groups halved along each column.
+    /// Of replacing the traffic by representative states, from halving each group of rows along each column.
     pub states: f64,
-    /// Of the contact: from the error estimates of its friction power.
+    /// Of the contact solutions, from the error estimates of their friction power.
     pub contact: f64,
-    /// Of the wear coefficients: factors that bound 90 % of the samples of their scatter.
+    /// Of the wear coefficients: the factors on worn areas that bound 90 % of the sampled coefficients.
     pub coefficients: [f64; 2],
 }
 
@@ -138,7 +138,7 @@ pub struct ContactRange {
     pub y_over_q_mean: f64,
     /// Mean over the traffic of the friction power over the speed, in N.
     pub t_gamma_mean_n: f64,
-    /// Share of the traffic without an answer; it wears nothing.
+    /// Share of the traffic whose contact could not be solved; it is taken to wear nothing.
     pub unsolved_share: f64,
 }
 
@@ -181,16 +181,16 @@ pub struct CondensedTraffic {
     pub pointers: Vec<String>,
     /// The states.
     pub states: Vec<TrafficState>,
-    /// Change of the distributions of wear of rail and wheel with twice the states, relative to the worn area.
+    /// Change of the distribution of wear of rail and wheel when every group of rows is halved, relative to the worn area.
     pub error: [f64; 2],
 }
 
-/// A state that stands for some rows of the traffic.
+/// A representative state of the traffic.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TrafficState {
     /// Share of the traffic.
     pub share: f64,
-    /// Rows that it stands for.
+    /// Number of rows that it represents.
     pub rows: u32,
     /// Their means, in the order of `pointers`.
     pub values: Vec<f64>,
@@ -217,7 +217,7 @@ pub struct LimitReached {
     pub latest: Option<Progress>,
 }
 
-/// An evolution between two steps: all that the next one depends on. Through JSON it keeps every bit.
+/// State of an evolution between two steps; the next step depends on nothing else. JSON keeps every bit of it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct EvolutionState {
     /// Share of the extent that is done.
@@ -238,9 +238,9 @@ pub struct EvolutionState {
     pub rail: BodyState,
     /// The wheel.
     pub wheel: BodyState,
-    /// Steps taken.
+    /// Accepted steps.
     pub steps: u32,
-    /// Steps taken again.
+    /// Repeated steps.
     pub rejected: u32,
     /// Contacts solved.
     pub solves: u32,
@@ -251,11 +251,11 @@ pub struct EvolutionState {
 pub struct BodyState {
     /// Points at the start, as `points_mm`.
     pub start_mm: Vec<[f64; 2]>,
-    /// What the next record has of it.
+    /// The body as the next record shows it.
     pub worn: WornBody,
     /// Worn area by regimes: mild, severe, and seizure or catastrophic.
     pub regimes_mm2: [f64; 3],
-    /// Depth at every point that a step would have removed less without its half step.
+    /// Sum of the differences in depth between the midpoint rule and Euler's rule, at each point.
     pub step_change_mm: Vec<f64>,
     /// Area that the errors of the contact leave open.
     pub contact_mm2: f64,
