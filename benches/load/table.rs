@@ -12,7 +12,7 @@ use railhead::jobs::model::kind::{Kind, Queue};
 use railhead::jobs::model::submit_options::SubmitOptions;
 use railhead::jobs::store::Store;
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, ReleaseReason};
-use railhead::jobs::store::list::Filter;
+use railhead::jobs::store::list::{Filter, Membership};
 use railhead::jobs::store::sqlite::database::SqliteStore;
 use railhead::jobs::store::submission::{NewBatch, NewJob, QueueBounds};
 use uuid::Uuid;
@@ -99,7 +99,8 @@ pub async fn lists() -> Vec<Row> {
 /// Filters with the number of jobs that they find on a page of 50.
 fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
     let label = vec![("run".to_owned(), "big".to_owned())];
-    let (failed, none) = (vec![State::Failed], Some(Uuid::now_v7()));
+    let failed = vec![State::Failed];
+    let of = |batch: Uuid| Some(Membership::Batch(batch));
     let all = Filter::default();
     [
         ("nothing asked, a full page", all.clone(), 50),
@@ -123,7 +124,7 @@ fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
         (
             "batch and state",
             Filter {
-                batch: Some(batch),
+                member: of(batch),
                 states: failed.clone(),
                 ..all.clone()
             },
@@ -133,7 +134,7 @@ fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
             "label and another batch",
             Filter {
                 labels: label.clone(),
-                batch: none,
+                member: of(Uuid::now_v7()),
                 ..all.clone()
             },
             0,
@@ -142,7 +143,7 @@ fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
             "label, batch and state",
             Filter {
                 labels: label,
-                batch: Some(batch),
+                member: of(batch),
                 states: failed.clone(),
                 ..all.clone()
             },

@@ -250,14 +250,23 @@ impl Evolution {
             .filter_map(|(name, limit, of, rail)| Some((name, limit?, of, rail)));
         let reached = asked.map(|(loss, limit_mm, of, rail)| {
             let at = |factor: &dyn Fn(&WearUncertainty) -> f64| {
-                let losses: Vec<[f64; 2]> = records
-                    .iter()
-                    .filter_map(|record| {
-                        let body = if rail { &record.rail } else { &record.wheel };
-                        let loss = of(&record.losses)?;
-                        Some([record.progress.share, loss * factor(&body.uncertainty)])
-                    })
-                    .collect();
+                // Between two records at one time maintenance removes material, whose depth is not uncertain.
+                let (mut machined, mut last) = (0.0, None);
+                let losses = records.iter().filter_map(|record| {
+                    let body = if rail { &record.rail } else { &record.wheel };
+                    let loss = of(&record.losses)?;
+                    let share = record.progress.share;
+                    if let Some((at, before)) = last.replace((share, loss))
+                        && at == share
+                    {
+                        machined += loss - before;
+                    }
+                    Some([
+                        share,
+                        machined + (loss - machined) * factor(&body.uncertainty),
+                    ])
+                });
+                let losses: Vec<[f64; 2]> = losses.collect();
                 crossing(&losses, limit_mm).map(|share| self.progress(share))
             };
             let open = |own: &WearUncertainty| own.steps.hypot(own.states).hypot(own.contact);

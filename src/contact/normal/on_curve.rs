@@ -776,13 +776,12 @@ impl CurveTask<'_> {
                 if missed.abs() > FORCE_POOR {
                     return Err(load_missed(missed));
                 }
-                let near = found.distance.chunks_exact(nx);
+                let rows = found.distance.chunks_exact(nx);
+                let near = rows.map(|row| row.iter().any(|distance| *distance < NEAR * depth));
                 return Ok(CurveContact {
                     patches: Once::default(),
                     opened: None,
-                    near: near
-                        .map(|row| row.iter().any(|distance| *distance < NEAR * depth))
-                        .collect(),
+                    near: near.collect(),
                     gap: over.at(centre),
                     work: NormalWork {
                         cells: grid.cells(),

@@ -223,7 +223,8 @@ async function solveTyped(app, digest) {
       answer = { ...answer, result, patch, point, field: hasFields(result) ? await loadField(job.id, result, patch, point) : null };
     }
   } finally {
-    app.compose({ preview: answer });
+    // An answer that comes after the switch was turned off is not shown.
+    app.compose({ preview: app.store.get().compose.live ? answer : null });
     const open = job.state === 'queued' || job.state === 'running';
     if (open) await cancel('jobs', job.id).catch(() => {});
     setTimeout(() => remove('jobs', job.id).catch(() => {}), open ? CANCELLED_MS : 0);
