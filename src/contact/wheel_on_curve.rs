@@ -51,6 +51,8 @@ use crate::contact::wheel_balance::next_share;
 const TARGET_ROUGH: f64 = 0.2;
 /// Rounds at most; 3 to 6 suffice.
 const ROUNDS_MAX: u32 = 16;
+/// Patches at most. Rough profiles have more, each of a few points; their tractions would be solved together for minutes and mean nothing.
+const PATCHES_MAX: usize = 4;
 /// Change of the forces relative to μN over the target that ends the rounds, and of the vertical force relative to it.
 const CHANGE: f64 = 0.05;
 const BALANCE: f64 = 1e-4;
@@ -428,9 +430,19 @@ impl<'a> CurveSolve<'a> {
             .slip_of_pressure(&contact.pressure, workspace);
         let parts = contact.parts(self.influence);
         let watch = TimeLimit::new(self.watch, run.time_limit, parts.len());
+        let parts = parts.into_iter().map(|strips| contact.patches(strips));
+        let parts: Vec<Vec<GridPressure>> = parts.collect::<Result<_, _>>()?;
+        let patches: usize = parts.iter().map(Vec::len).sum();
+        if patches > PATCHES_MAX {
+            return Err(SolveError::NormalProblem {
+                reason: format!(
+                    "the contact on the curve of the rail falls into {patches} patches, of which at most {PATCHES_MAX} are solved together; smooth the \
+                     profiles, or give reference_surface \"plane\""
+                ),
+            });
+        }
         let mut solved = Vec::with_capacity(parts.len());
-        for strips in parts {
-            let patches = contact.patches(strips)?;
+        for patches in parts {
             solved.push(self.part(contact, patches, slip.as_ref(), run, &watch)?);
         }
         Ok(solved)

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use railhead::contact::solution::words::damage::WearAcross;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -10,7 +11,7 @@ use crate::reference::{assert_none, cases, read, solve};
 
 /// What the total power may be off, and the share of it on either side of any line.
 const TOTAL: f64 = 0.02;
-const SHARE: f64 = 0.02;
+const SHARE: f64 = 0.025;
 
 /// Rows of elements: friction power over speed and width, and depth of the wear map; and the power of the converged forces.
 #[derive(Debug, Deserialize)]
@@ -63,30 +64,36 @@ fn wear_across_agrees_with_tractions_times_slips_of_the_reference() {
         case["outputs"] = json!(["resultants", "damage"]);
         case["solver"] = json!({ "target_error": 0.005 });
         let (solution, _) = solve(&case);
-        let damage = solution.patches[0].points[0].damage.as_ref();
-        let across = damage
-            .and_then(|damage| damage.across.clone())
+        let damages = solution.patches.iter().map(|patch| &patch.points[0].damage);
+        let strips: Vec<WearAcross> = damages
+            .map(|damage| damage.as_ref().and_then(|damage| damage.across.clone()))
+            .collect::<Option<_>>()
             .expect("strips");
-        let own = |k: usize| across.dy_mm[k];
+        let all = |of: fn(&WearAcross) -> &[f64]| -> Vec<f64> {
+            strips.iter().flat_map(of).copied().collect()
+        };
+        let (middles, widths) = (all(|strips| &strips.y_mm), all(|strips| &strips.dy_mm));
+        let powers = all(|strips| &strips.t_gamma_n_per_mm);
+        let depths = all(|strips| strips.usfd_depth_nm.as_deref().expect("depths"));
+        let own = |k: usize| widths[k];
         let theirs = |_: usize| reference.dy_mm;
-        let depths = across.usfd_depth_nm.as_ref().expect("depths");
         for (name, found, expected) in [
-            ("power", &across.t_gamma_n_per_mm, &reference.power_n_per_mm),
-            ("depth", depths, &reference.usfd_depth_nm),
+            ("power", &powers, &reference.power_n_per_mm),
+            ("depth", &depths, &reference.usfd_depth_nm),
         ] {
             let off = difference(
-                (&across.y_mm, &own, found),
+                (&middles, &own, found),
                 (&reference.y_mm, &theirs, expected),
             );
             if off > SHARE {
                 failures.push(format!("{} {name}: {off}", reference.id));
             }
         }
-        let power = right_of((&across.y_mm, &own, &across.t_gamma_n_per_mm), 1e3);
+        let power = right_of((&middles, &own, &powers), 1e3);
         let off = power / reference.power_n - 1.0;
         if off.abs() > TOTAL {
             failures.push(format!("{} total power: {off}", reference.id));
         }
     }
-    assert_none("wear that is off by more than 2 %", &failures);
+    assert_none("wear that is off by more than is allowed", &failures);
 }
