@@ -234,7 +234,7 @@ fn profiles() -> Feature {
     feature
 }
 
-/// The same under a vertical force, of which friction carries a part: one motion alone balances it.
+/// The same under a vertical force, of which friction carries a part, so that every motion has its own normal force.
 fn profiles_under_vertical_force() -> Feature {
     let mut feature = profiles()
         .named("profiles under a vertical force")
