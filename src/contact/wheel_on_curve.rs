@@ -53,6 +53,10 @@ const TARGET_ROUGH: f64 = 0.2;
 const ROUNDS_MAX: u32 = 16;
 /// Patches at most. Rough profiles have more, each of a few points; their tractions would be solved together for minutes and mean nothing.
 const PATCHES_MAX: usize = 4;
+/// Length over width at most, of patches with more than this share of the load. Hertz's patch of a gauge corner of 13 mm is 11 times as long as wide; a
+/// single point that is off makes a ridge a hundred times as long.
+const SLENDER_MAX: f64 = 20.0;
+const SLENDER_SHARE: f64 = 0.02;
 /// Change of the forces relative to μN over the target that ends the rounds, and of the vertical force relative to it.
 const CHANGE: f64 = 0.05;
 const BALANCE: f64 = 1e-4;
@@ -460,6 +464,22 @@ impl<'a> CurveSolve<'a> {
         let CheckedCase { problem, label, .. } = self.case;
         let field = CurveContact::field(patches.clone())?;
         let loads = field.patches();
+        let slender = loads.iter().find(|patch| {
+            let [rear, front, low, high] = patch.extent;
+            patch.normal_force > SLENDER_SHARE * contact.normal_force()
+                && front - rear > SLENDER_MAX * (high - low)
+        });
+        if let Some(Patch { extent, .. }) = slender {
+            let [rear, front, low, high] = extent;
+            return Err(SolveError::NormalProblem {
+                reason: format!(
+                    "a patch on the curve of the rail is {:.1} mm long and {:.2} mm wide, more than {SLENDER_MAX} times as long as wide, as on a ridge; \
+                     smooth the profiles, or give reference_surface \"plane\"",
+                    front - rear,
+                    high - low
+                ),
+            });
+        }
         let centres: Vec<[f64; 2]> = (0..loads.len())
             .map(|k| field.load_centre(Some(k)))
             .collect();
