@@ -1,4 +1,4 @@
-//! The worn sections of the reference files: `shared/reference` beside the checkout, or the folder that `RAILHEAD_REFERENCE` names.
+//! Reads the worn rail and wheel of the reference files, from the folder that `RAILHEAD_REFERENCE` names or, by default, `shared/reference` beside the checkout.
 
 use std::path::PathBuf;
 

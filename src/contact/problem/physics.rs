@@ -100,7 +100,7 @@ impl Problem {
         }
     }
 
-    /// The same question about another wheel.
+    /// This problem with its wheel replaced.
     #[must_use]
     pub(crate) fn with_wheel(&self, wheel: Arc<WheelTask>) -> Problem {
         Problem {

@@ -50,7 +50,7 @@ pub enum ReferenceSurface {
 }
 
 impl WheelTask {
-    /// The same wheel on planes of contact.
+    /// This task with planes of contact in place of the curve.
     #[must_use]
     pub(crate) fn on_planes(&self) -> WheelTask {
         WheelTask {
