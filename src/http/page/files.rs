@@ -96,6 +96,7 @@ pub(crate) const FILES: &[PageFile] = files!(
     "js/wheelloads.js",
     "js/wheelsetdata.js",
     "js/wheelsetview.js",
+    "js/words.js",
     "js/written.js",
     "page.css",
     "theme.css",

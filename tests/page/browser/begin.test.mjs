@@ -23,10 +23,14 @@ test('the first screen says what it is for, asks for two files, and shows a resu
   await page.locator('.preview dd').first().waitFor();
   const shown = await page.locator('.preview').innerText();
   for (const name of ['Q', 'Y, outward', 'Y/Q, Nadal', 'pmax']) assert.ok(shown.replace(/\s+/g, ' ').includes(name), `${name} in ${shown}`);
+  assert.match(shown, /\d ± \d+ MPa/, 'the largest pressure has an error');
   assert.equal(await page.locator('.code textarea').isVisible(), false, 'JSON is folded');
   assert.equal(await page.locator('.segs[aria-label="Kind of contact"] .seg').first().innerText(), 'Profiles');
   assert.doesNotMatch(await page.locator('body').innerText(), /\bSound\b|\bMB\b|approach/);
   await page.screenshot({ path: join(OUTPUT, 'first.png') });
+  // The name of the example tells its load: with another it is not that example.
+  await page.getByLabel('Wheel load Q').fill('90');
+  await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent?.endsWith(', changed'));
 }));
 
 test('an inclination is written as 1:40, and free rolling is the motion of files', () => onPage('', async (page) => {
@@ -160,6 +164,8 @@ test('a curve radius sets the yaw rate, and another speed keeps the radius', () 
 
 test('the contact is solved on the curve of the rail or on planes, of a wheel and of a wheelset', () => onPage('', async (page) => {
   await ready(page);
+  const unfold = () => page.locator('summary', { hasText: 'Contact surface' }).click();
+  await unfold();
   await page.getByText('The contact bends around the rail').waitFor();
   await page.getByLabel('Influence of cells').selectOption('as on a half-space');
   const { contact } = await json(page);
@@ -169,6 +175,7 @@ test('the contact is solved on the curve of the rail or on planes, of a wheel an
   assert.deepEqual([(await json(page)).contact.reference_surface, (await json(page)).contact.influence], ['plane', undefined]);
   await ready(page);
   await page.getByRole('radio', { name: 'Wheelset' }).check();
+  await unfold();
   await page.getByLabel('Contact surface').selectOption('planes');
   await ready(page);
 }));

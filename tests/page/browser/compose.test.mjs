@@ -58,7 +58,7 @@ test('faults stand at their fields and in a list that leads to them', () => onPa
   }
   // The limits are told in the unit of the field.
   assert.match(await page.locator('#field-load-normal_force_n-fault').innerText(), /more than 0 and at most 10⁹ kN/);
-  const link = page.getByRole('button', { name: '/friction/coefficient' });
+  const link = page.getByRole('button', { name: 'friction coefficient' });
   await link.focus();
   await page.keyboard.press('Enter');
   assert.equal(await page.evaluate(() => document.activeElement?.id), 'field-friction-coefficient');

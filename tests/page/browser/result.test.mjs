@@ -336,7 +336,9 @@ test('on the curve of the rail the pressure stands along the rail', () => onPage
   const away = await page.evaluate(() => {
     const [rail, base] = ['.drawing .rail', '.drawing .patch .comb'].map((name) => (document.querySelector(name)?.getAttribute('d') ?? '')
       .split(/[MLZ]/).filter(Boolean).map((pair) => pair.split(' ').map(Number)));
-    return Math.max(...base.slice(0, base.length / 2).map(([x, y]) => Math.min(...rail.slice(1).map(([x1, y1], at) => {
+    // It ends where the line over it begins.
+    const end = base.findIndex(([x, y], at) => at > 0 && x === base[at - 1][0] && y === base[at - 1][1]);
+    return Math.max(...base.slice(0, end).map(([x, y]) => Math.min(...rail.slice(1).map(([x1, y1], at) => {
       const [x0, y0] = rail[at];
       const share = Math.min(1, Math.max(0, ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / ((x1 - x0) ** 2 + (y1 - y0) ** 2 || 1)));
       return Math.hypot(x - x0 - share * (x1 - x0), y - y0 - share * (y1 - y0));
@@ -345,4 +347,22 @@ test('on the curve of the rail the pressure stands along the rail', () => onPage
   assert.ok(away < 1, `${away}`);
   await page.getByRole('radio', { name: 'Whole head' }).check();
   await page.getByRole('button', { name: 'Solve again with damage' }).waitFor();
+  // Across the patch is the arc length along the rail, in a comparison too.
+  await page.waitForFunction(() => document.querySelectorAll('field-map.main .readout dt')[1]?.textContent === 's');
+  const flat = await service.solved({ ...bent, contact: { ...bent.contact, reference_surface: 'plane' } });
+  await page.goto(`${service.base}/#/compare/${id}/${flat.id}`);
+  await drawn(page, '[aria-label="Job B"] field-map');
+  const across = (/** @type {string} */ side) => page.locator(`[aria-label="${side}"] field-map .readout dt`).nth(1).innerText();
+  assert.deepEqual([await across('Job A'), await across('Job B'), await across('Difference')], ['s', 'y', 's']);
+}));
+
+test('what the curve does not solve stands on planes, and says so', () => onPage('', async (page) => {
+  const rolled = { ...withFields('wheel-rail'), motion: { history: { distance_mm: [0, 2, 4], creepage_x: [0, 0.001, 0.001], spin_per_mm: 0 } } };
+  const job = await service.solved(rolled);
+  await page.goto(`${service.base}/#/jobs/${job.id}`);
+  await drawn(page);
+  await page.locator('.remark.warning[data-code="on-planes"]').waitFor();
+  await page.getByText('pressure on the rail').waitFor();
+  await page.waitForFunction(() => document.querySelectorAll('field-map.main .readout dt')[1]?.textContent === 'y');
+  assert.ok(await page.getByRole('radio', { name: 'Whole head' }).isChecked());
 }));

@@ -1,8 +1,8 @@
 // What drawings compute, what files say, and the order of a case.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { gapOf, unfolded } from '../../../src/http/page/web/js/placing.js';
-import { inOrder } from '../../../src/http/page/web/js/starts.js';
+import { acrossSection, gapOf, unfolded } from '../../../src/http/page/web/js/placing.js';
+import { inOrder, isSolvedBent } from '../../../src/http/page/web/js/starts.js';
 import { bodiesOf, decoded, profileKind } from '../../../src/http/page/web/js/files.js';
 import { parseGapCurve, parseGrid } from '../../../src/http/page/web/js/tables.js';
 
@@ -100,4 +100,30 @@ test('places over an arc are found from the arc length, whichever way its points
       assert.ok(Math.hypot(y - (10 + height) * Math.sin(angle), z - (10 + height) * Math.cos(angle)) < 0.01, `${s}, ${height}: ${y}, ${z}`);
     }
   }
+});
+
+test('wear on the curve of the rail lies where the arc length leads, on planes along the plane', () => {
+  // A gauge corner: an arc of 13 mm radius about (-717, -14), from the top to 80° down toward the track centre.
+  const rail = Array.from({ length: 161 }, (_, i) => (i / 2 / 180) * Math.PI).map((angle) => /** @type {[number, number]} */ ([-717 + 13 * Math.sin(angle), -14 + 13 * Math.cos(angle)])).reverse();
+  const at = Math.PI / 6;
+  const [y, z] = [-717 + 13 * Math.sin(at), -14 + 13 * Math.cos(at)];
+  const position = { origin_track_mm: [0, y, z], track_mm: [0, y, z], contact_angle_rad: -at, rail_mm: [-30, 5], wheel_mm: [-35, 7], rolling_radius_mm: 465 };
+  const patch = /** @type {import('../../../src/http/page/web/js/api.js').Patch} */ (/** @type {unknown} */ ({ position }));
+  const standing = /** @type {import('../../../src/http/page/web/js/result.js').Standing} */ (/** @type {unknown} */ ({ placed: { rail }, cant: 0 }));
+  // To the left is toward the track centre: away from the field side on the right rail.
+  const bent = acrossSection(patch, 'rail', 'right', standing, true);
+  for (const s of [-4, 0, 4]) assert.ok(Math.abs(bent(s) - (-30 - 13 * (Math.sin(at + s / 13) - Math.sin(at)))) < 0.01, `${s}: ${bent(s)}`);
+  assert.ok(Math.abs(acrossSection(patch, 'wheel', 'right', standing, true)(4) - (bent(4) - 5)) < 1e-9);
+  assert.ok(Math.abs(acrossSection(patch, 'rail', 'right', standing, false)(4) - (-30 - 4 * Math.cos(at))) < 1e-9);
+});
+
+test('a remark on planes is on the patches of one wheel of a wheelset, or on all', () => {
+  const document = { contact: { type: 'wheelset' } };
+  const wheel = (/** @type {number[]} */ ...patches) => ({ patches });
+  const positions = [{ left: wheel(0, 1), right: wheel(2) }, { left: wheel(3), right: wheel(4) }];
+  const result = (/** @type {number | undefined} */ patch) => /** @type {import('../../../src/http/page/web/js/api.js').JobResult} */ (/** @type {unknown} */ ({ wheelset: { positions }, remarks: [{ code: 'on-planes', patch }] }));
+  const bent = (/** @type {number | undefined} */ patch) => [0, 1, 2, 3, 4].filter((at) => isSolvedBent(document, result(patch), at));
+  assert.deepEqual(bent(0), [2, 3, 4]);
+  assert.deepEqual(bent(undefined), []);
+  assert.equal(isSolvedBent({ contact: { type: 'profiles', reference_surface: 'plane' } }, result(0), 3), false);
 });

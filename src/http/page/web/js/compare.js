@@ -51,7 +51,7 @@ export async function openComparison(app, ids, query) {
   const key = wanted.join('/');
   if (comparison?.key === key) return;
   /** @type {Comparison} */
-  const mine = { key, sides: [], quantity: query.field ?? '', other: Math.max(1, Math.min(wanted.length - 1, Number(query.with) || 1)), body: 'rail', fitted: false, sameRail: true };
+  const mine = { key, sides: [], quantity: query.field ?? '', other: Math.max(1, Math.min(wanted.length - 1, Number(query.with) || 1)), body: 'rail', fitted: true, sameRail: true };
   comparison = mine;
   try {
     mine.sides = await Promise.all(wanted.map((id, at) => loadSide(id, query[`patch${at}`] ?? query.patch, query[`point${at}`] ?? query.point)));
@@ -201,7 +201,8 @@ function differenceOf(one, two, quantity, move) {
   const differences = Float64Array.from(x_mm, (x, cell) => {
     const place = move ? move({ x, y: y_mm[cell] }) : { x, y: y_mm[cell] };
     const other = index.nearest(place.x, place.y);
-    return other < 0 ? NaN : others[other] - values[cell];
+    // Beyond its border the other patch has neither pressure nor traction.
+    return other < 0 ? (quantity.vanishes ? -values[cell] : NaN) : others[other] - values[cell];
   });
   return {
     key: 'difference', label: 'Difference', heading: `Δ ${quantity.heading}`, unit: quantity.unit, scale: 'signed',
@@ -221,7 +222,7 @@ export function knownDifference(first, second, name, sameRail) {
   const key = `${name} ${move !== null}`;
   if (differenceBefore?.one !== one || differenceBefore.two !== two || differenceBefore.key !== key) {
     // A field of its own: values are kept by the cells that they belong to.
-    const field = { cells: { ...one.cells }, border: one.border };
+    const field = { cells: { ...one.cells, zone: undefined }, border: one.border };
     differenceBefore = { one, two, key, quantity: differenceOf(one, two, quantity, move), field };
   }
   return differenceBefore;

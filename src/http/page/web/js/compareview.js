@@ -3,12 +3,15 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { chooseCompared, chooseSide, common, compared, equal, frictionOf, knownDifference, rangeOfAll, shapeOf, wearOf } from './compare.js';
 import { drawChart, drawShapes } from './drawing/axes.js';
-import { at, differences } from './document.js';
+import { differences } from './document.js';
 import { quantityOf } from './field/quantities.js';
 import { FieldMap } from './fieldmap.js';
-import { fixed, number } from './format.js';
+import { fixed, number, plusMinus } from './format.js';
 import { formatRoute } from './routes.js';
+import { isSolvedBent } from './starts.js';
 import { wheelLoads } from './wheelloads.js';
+import { valueInWords, wordsOf } from './words.js';
+import { inWords } from './remarks.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./compare.js').Side} Side */
@@ -20,23 +23,29 @@ const LETTERS = 'ABCD';
 const DIFFERENCES_MAX = 30;
 /** @type {readonly [unknown, keyof Point, string, number][]} Numbers of the chosen patch and motion, with their units. */
 const NUMBERS = [
-  [html`F<sub>x</sub>`, 'force_x_n', 'N', 1], [html`F<sub>y</sub>`, 'force_y_n', 'N', 1], [html`M<sub>z</sub>`, 'moment_z_n_mm', 'N·m', 1000],
+  [html`F<sub>x</sub>`, 'force_x_n', 'kN', 1000], [html`F<sub>y</sub>`, 'force_y_n', 'kN', 1000], [html`M<sub>z</sub>`, 'moment_z_n_mm', 'N·m', 1000],
   ['stick area', 'stick_area_mm2', 'mm²', 1], ['largest traction', 'traction_max_mpa', 'MPa', 1], ['friction power', 'friction_power_n', 'J/m', 1],
 ];
 
-/** Numbers of the wheel, over all its patches. @type {readonly [string, string, (side: Side) => number | undefined][]} */
+/** Numbers of the wheel, over all its patches, with their errors. @type {readonly [string, string, (side: Side) => number | undefined, ((side: Side) => number | undefined)?][]} */
 const OF_WHEEL = [
   ['patches', '', ({ result }) => result.patches.length],
   ['Q', 'kN', (side) => loadOf(side, ({ q_n }) => q_n / 1000)],
-  ['Y, outward', 'kN', (side) => loadOf(side, ({ y_n }) => y_n / 1000)],
-  ['Y/Q', '', (side) => loadOf(side, ({ y_n, q_n }) => y_n / q_n)],
-  ['largest pressure', 'MPa', ({ result }) => Math.max(...result.patches.map((patch) => patch.pressure_max_mpa))],
+  ['Y, outward', 'kN', (side) => loadOf(side, ({ y_n }) => y_n / 1000), (side) => loadOf(side, ({ y_error_n = 0 }) => y_error_n / 1000)],
+  ['Y/Q', '', (side) => loadOf(side, ({ y_n, q_n }) => y_n / q_n), (side) => loadOf(side, ({ y_error_n = 0, q_n }) => y_error_n / q_n)],
+  ['largest pressure', 'MPa', (side) => strongest(side).pressure_max_mpa, (side) => openPressure(strongest(side), side.point)],
   ['area', 'mm²', ({ result }) => total(result.patches.map((patch) => patch.area_mm2))],
   ['Tγ', 'J/m', ({ result, point }) => total(result.patches.map(({ points }) => points[Math.min(point, points.length - 1)].friction_power_n))],
   ['wear depth, Tγ/A law, largest mean', 'nm', (side) => damageOf(side, ({ usfd_wear }) => usfd_wear?.depth_nm.value)],
   ['RCF damage, WLRM', '10⁻⁶', (side) => damageOf(side, ({ wlrm }) => wlrm && wlrm.damage_per_pass.value * 1e6)],
   ['load over shakedown limit', '', (side) => damageOf(side, ({ shakedown }) => shakedown?.over_limit.value)],
 ];
+
+/** @param {Side} side */
+const strongest = ({ result }) => result.patches.reduce((most, patch) => (patch.pressure_max_mpa > most.pressure_max_mpa ? patch : most));
+
+/** What the profiles leave open of the largest pressure. @param {import('./api.js').Patch} patch @param {number} point */
+const openPressure = ({ points }, point) => points[Math.min(point, points.length - 1)].profile_uncertainty?.pressure_max_mpa;
 
 /** @param {readonly number[]} values */
 const total = (values) => values.reduce((sum, value) => sum + value, 0);
@@ -89,7 +98,7 @@ function together(event) {
 function sidePanel(app, of, side, place) {
   const quantity = quantityOf(of.quantity);
   const shown = side.field && quantity ? {
-    field: side.field, quantity, range: rangeOfAll(of, quantity), friction: frictionOf(side), border: true, arrows: true, tallest: 320,
+    field: side.field, quantity, range: rangeOfAll(of, quantity), friction: frictionOf(side), border: true, arrows: true, tallest: 320, bent: isBentSide(side),
     name: `${quantity.heading} of ${LETTERS[place]}`,
   } : null;
   const { patches } = side.result;
@@ -106,6 +115,9 @@ function sidePanel(app, of, side, place) {
     ${shown ? html`<field-map .shown=${shown}></field-map>` : html`<p class="pad quiet">No field that all of them have.</p>`}</section>`;
 }
 
+/** @param {Side} side */
+const isBentSide = ({ document, result, patch }) => isSolvedBent(document, result, patch);
+
 /** @param {App} app @param {Comparison} of */
 function differencePanel(app, of) {
   const [one] = of.sides;
@@ -115,7 +127,7 @@ function differencePanel(app, of) {
   const placed = [one, two].every(({ result, patch }) => result.patches[patch].position);
   const same = (/** @type {Event} */ event) => chooseCompared(app, { sameRail: /** @type {HTMLSelectElement} */ (event.target).value === 'rail' });
   const letter = LETTERS[of.other];
-  const shown = { field: known.field, quantity: known.quantity, tallest: 320, name: `${letter} − A` };
+  const shown = { field: known.field, quantity: known.quantity, tallest: 320, bent: isBentSide(one), name: `${letter} − A` };
   return html`<section class="panel" aria-label="Difference"><header class="bar"><h2>${letter} − A</h2>
       ${of.sides.length > 2 ? html`<div class="segs" role="group" aria-label="Compared with A">${of.sides.slice(1).map((_, place) => html`<label class="seg">
         <input type="radio" name="other" .checked=${of.other === place + 1} @change=${() => chooseCompared(app, { other: place + 1 })}><span>${LETTERS[place + 1]}</span></label>`)}</div>` : nothing}
@@ -144,22 +156,23 @@ export function apart(difference, error) {
 function numbersPanel({ sides, other }) {
   const points = sides.map(pointOf);
   const letter = LETTERS[other];
-  const line = (/** @type {unknown} */ label, /** @type {string} */ unit, /** @type {readonly (number | undefined)[]} */ values, error = 0) => {
+  const line = (/** @type {unknown} */ label, /** @type {string} */ unit, /** @type {readonly (number | undefined)[]} */ values, /** @type {readonly (number | undefined)[]} */ errors = []) => {
     const [one, two] = [values[0], values[other]];
     if (one === undefined || two === undefined || !Number.isFinite(one) || !Number.isFinite(two)) return nothing;
-    return html`<tr><th scope="row">${label}${unit ? ` / ${unit}` : ''}</th>${values.map((value) => html`<td>${Number.isInteger(value) ? value : number(value, 5)}</td>`)}
-      <td>${number(two - one, 3)}</td><td class="quiet">${apart(two - one, error)}</td></tr>`;
+    const error = Math.hypot(errors[0] ?? 0, errors[other] ?? 0);
+    return html`<tr><th scope="row">${label}${unit ? ` / ${unit}` : ''}</th>${values.map((value, at) => html`<td>${Number.isInteger(value) ? value : plusMinus(value ?? NaN, errors[at])}</td>`)}
+      <td>${number(two - one, 3)}</td><td class="quiet wrapped">${apart(two - one, error)}</td></tr>`;
   };
   return html`<section class="panel" aria-labelledby="h-numbers"><header class="bar"><h2 id="h-numbers">Numbers</h2></header><div class="scroll" tabindex="0" role="region" aria-labelledby="h-numbers">
     <table><thead><tr><th></th>${points.map((_, place) => html`<th scope="col">${LETTERS[place]}</th>`)}<th scope="col">${letter} − A</th><th></th></tr></thead>
     <tbody><tr><th scope="rowgroup" colspan=${sides.length + 3}>All patches</th></tr>
-      ${OF_WHEEL.map(([label, unit, value]) => line(label, unit, sides.map(value)))}
+      ${OF_WHEEL.map(([label, unit, value, error]) => line(label, unit, sides.map(value), error && sides.map(error)))}
       <tr><th scope="rowgroup" colspan=${sides.length + 3}>The patch and motion above</th></tr>
       ${line('N', 'kN', sides.map(({ result, patch }) => result.patches[patch].normal_force_n / 1000))}
       ${line('largest pressure', 'MPa', sides.map(({ result, patch }) => result.patches[patch].pressure_max_mpa),
-        Math.hypot(...[points[0], points[other]].map(({ profile_uncertainty: open }) => open?.pressure_max_mpa ?? 0)))}
+        sides.map(({ result, patch, point }) => openPressure(result.patches[patch], point)))}
       ${NUMBERS.map(([label, name, unit, factor]) => line(label, unit, points.map((point) => (typeof point[name] === 'number' ? point[name] / factor : undefined)),
-        Math.hypot(errorOf(points[0], name), errorOf(points[other], name)) / factor))}</tbody></table></div></section>`;
+        points.map((point) => errorOf(point, name) / factor)))}</tbody></table></div></section>`;
 }
 
 /** The cross-sections over each other, and what one lacks against the other. @param {App} app @param {Comparison} of */
@@ -191,14 +204,11 @@ function profilesPanel(app, of) {
 
 /** @param {Comparison} of */
 function casesPanel({ sides }) {
-  const pointers = [...new Set(sides.slice(1).flatMap((side) => differences(sides[0].document, side.document)))];
-  const text = (/** @type {Side} */ side, /** @type {string} */ pointer) => {
-    const value = JSON.stringify(at(side.document, pointer)) ?? '–';
-    return value.length > 40 ? `${value.slice(0, 39)}…` : value;
-  };
+  const places = sides.slice(1).flatMap((side) => differences(sides[0].document, side.document)).map((pointer) => wordsOf(pointer).pointer);
+  const pointers = [...new Set(places)];
   return html`<section class="panel" aria-labelledby="h-cases"><header class="bar"><h2 id="h-cases">What differs in the cases</h2></header><div class="scroll" tabindex="0" role="region" aria-labelledby="h-cases">
     <table><thead><tr><th></th>${sides.map((_, place) => html`<th scope="col">${LETTERS[place]}</th>`)}</tr></thead>
-    <tbody>${pointers.slice(0, DIFFERENCES_MAX).map((pointer) => html`<tr><th scope="row"><code>${pointer}</code></th>${sides.map((side) => html`<td>${text(side, pointer)}</td>`)}</tr>`)}
+    <tbody>${pointers.slice(0, DIFFERENCES_MAX).map((pointer) => html`<tr><th scope="row">${inWords(pointer)}</th>${sides.map((side) => html`<td>${valueInWords(side.document, pointer)}</td>`)}</tr>`)}
       ${pointers.length ? nothing : html`<tr><td colspan=${sides.length + 1} class="quiet">Nothing.</td></tr>`}</tbody></table></div>
     ${pointers.length > DIFFERENCES_MAX ? html`<p class="pad quiet">and ${pointers.length - DIFFERENCES_MAX} more</p>` : nothing}</section>`;
 }

@@ -3,17 +3,17 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { apiKey } from './api.js';
 import { takeProfiles } from './contactform.js';
-import { at, numberAt, placeInText } from './document.js';
+import { at, numberAt, placeInText, put } from './document.js';
 import { drawEllipse } from './drawing/patch.js';
 import { drawGapCurve, drawGrid } from './drawing/gaps.js';
 import { drawGap, drawProfiles, drawSection } from './drawing/profiles.js';
-import { change, editText, isUntouched, openExample, queue, solve, solveLive } from './editing.js';
+import { change, editDocument, editText, isUntouched, openExample, queue, solve, solveLive } from './editing.js';
 import { offered, rangeOf } from './field/quantities.js';
 import { fieldId } from './field.js';
 import { caseForm } from './form.js';
 import { count, fixed, number, seconds, withError } from './format.js';
 import { placed } from './placing.js';
-import { remarkList } from './remarks.js';
+import { inWords, remarkList } from './remarks.js';
 import { hasSections, lacksSection } from './starts.js';
 import { flangeAngle, nadal, wheelLoads } from './wheelloads.js';
 
@@ -106,8 +106,8 @@ export function drawing({ understood, lone }, document) {
 
 const BODIES = /** @type {const} */ (['rail', 'wheel']);
 
-/** @param {App} app @param {Compose} state */
-export function verdict(app, state) {
+/** Whether a case can be solved. @param {App} app @param {Compose} state @param {boolean} [timed] Says how long that takes. */
+export function verdict(app, state, timed = true) {
   const { unreadable, faults, refusal, checked, document } = state;
   if (unreadable) return html`<p class="fault big">${unreadable}</p>`;
   if (refusal) return html`<p class="fault big">${refusal}</p>`;
@@ -118,14 +118,26 @@ export function verdict(app, state) {
   if (wrong.length) {
     return html`${wanted}<p class="fault big">${wrong.length === 1 ? 'One fault' : `${wrong.length} faults`}</p>
       <ul class="faults">${wrong.map((fault) => html`<li>
-        <button class="link" @click=${() => lead(app, fault.pointer ?? '')}>${fault.pointer || 'case'}</button> ${fault.detail}${excerpt(state, fault)}</li>`)}</ul>`;
+        <button class="link" @click=${() => lead(app, fault.pointer ?? '')}>${fault.pointer ? inWords(fault.pointer) : 'case'}</button> ${fault.detail}${excerpt(state, fault)}</li>`)}</ul>`;
   }
   if (!checked) return html`<p class="quiet">Checking …</p>`;
   const motions = checked.motions > 1 ? `${count(checked.motions)} motions, about` : 'About';
   const warnings = checked.remarks.filter(({ severity }) => severity === 'warning').length;
   const told = warnings === 0 ? 'Ready to solve' : warnings === 1 ? '1 warning' : `${warnings} warnings`;
-  return html`<p class=${warnings ? 'checked warn' : 'checked good'}>${told}. ${motions} ${seconds(checked.estimate.seconds)}.</p>
-    ${remarkList(checked.remarks)}`;
+  return html`<p class=${warnings ? 'checked warn' : 'checked good'}>${told}.${timed ? ` ${motions} ${seconds(checked.estimate.seconds)}.` : ''}</p>
+    ${adviceOf(app)}${remarkList(checked.remarks)}`;
+}
+
+/** The smoothing that the noise of the files asks for, on one click. @param {App} app */
+function adviceOf(app) {
+  const { document, checked } = app.store.get().compose;
+  const advised = BODIES.flatMap((body) => {
+    const length = checked?.quality?.[body]?.smoothing_suggested_mm ?? 0;
+    return length && at(document ?? undefined, `/contact/${body}/smoothing_mm`) === undefined ? [{ body, length }] : [];
+  });
+  if (!advised.length || !document) return nothing;
+  const smooth = () => editDocument(app, advised.reduce((of, { body, length }) => put(of, `/contact/${body}/smoothing_mm`, length), document));
+  return html`<button class="small" @click=${smooth}>The points are noisy: smooth ${advised.map(({ body, length }) => `the ${body} by ${number(length, 2)} mm`).join(' and ')}, as advised</button>`;
 }
 
 /** Lines shown before and after the line at fault. */
@@ -158,19 +170,20 @@ function previewOf(app, { preview, document, checked, understood }) {
   const placement = understood?.of.placement;
   const angle = load && placement ? flangeAngle(/** @type {import('./placing.js').Place[]} */ (placement.wheel_mm), load.side) : NaN;
   const friction = numberAt(document ?? undefined, '/friction/coefficient');
+  const strongest = patches.reduce((most, each) => (each.pressure_max_mpa > most.pressure_max_mpa ? each : most));
   /** @type {[unknown, number, number | null | undefined, string][]} */
   const rows = load ? [
     ['Q', load.q_n / 1000, undefined, 'kN'],
     ['Y, outward', load.y_n / 1000, load.y_error_n && load.y_error_n / 1000, 'kN'],
-    [Number.isFinite(angle) ? `Y/Q, Nadal ${fixed(nadal(angle, friction), 2)}` : 'Y/Q', load.y_n / load.q_n, undefined, ''],
-    [html`F<sub>x</sub>`, load.x_n / 1000, result.total[point]?.error_estimate?.force_x_n && result.total[point].error_estimate.force_x_n / 1000, 'kN'],
+    [Number.isFinite(angle) ? `Y/Q, Nadal ${fixed(nadal(angle, friction), 2)}` : 'Y/Q', load.y_n / load.q_n, load.y_error_n && load.y_error_n / load.q_n, ''],
+    [html`F<sub>x</sub>`, load.x_n / 1000, load.x_error_n && load.x_error_n / 1000, 'kN'],
   ] : [
     ['N', patches[patch].normal_force_n / 1000, undefined, 'kN'],
     [html`F<sub>x</sub>`, of.force_x_n / 1000, of.error_estimate && of.error_estimate.force_x_n / 1000, 'kN'],
     [html`F<sub>y</sub>`, of.force_y_n / 1000, of.error_estimate && of.error_estimate.force_y_n / 1000, 'kN'],
   ];
-  rows.push([html`p<sub>max</sub>`, Math.max(...patches.map((each) => each.pressure_max_mpa)), undefined, 'MPa'],
-    ['area', patches[patch].area_mm2, undefined, 'mm²']);
+  rows.push([html`p<sub>max</sub>`, strongest.pressure_max_mpa, strongest.points[Math.min(point, strongest.points.length - 1)].profile_uncertainty?.pressure_max_mpa, 'MPa'],
+    ['contact area', patches.reduce((sum, each) => sum + each.area_mm2, 0), undefined, 'mm²']);
   const shown = field && thumbnail(field, friction);
   const notes = [
     patches.length > 1 ? `${patches.length} patches; the one drawn carries ${number(patches[patch].normal_force_n / 1000, 3)} kN` : '',

@@ -68,13 +68,14 @@ const INFLUENCES = /** @type {const} */ ([[undefined, 'corrected for the bend'],
 function surfaceFields(app) {
   const { document } = app.store.get().compose;
   const bent = isBent(document);
-  return html`<div class="pair">${choice(app, '/contact/reference_surface', 'Contact surface', SURFACES, {
+  return html`<details class="reading"><summary>Contact surface <span class="hint">${bent ? 'curve of the rail' : 'planes'}</span></summary>
+    <div class="pair">${choice(app, '/contact/reference_surface', 'Contact surface', SURFACES, {
     take: (value) => editDocument(app, put(put(document ?? {}, '/contact/reference_surface', value), '/contact/influence', undefined)),
   })}
       ${bent ? choice(app, '/contact/influence', 'Influence of cells', INFLUENCES) : nothing}</div>
     <p class="hint">${bent
       ? 'The contact bends around the rail. What the curve does not solve, such as a history, is solved on planes.'
-      : 'A plane of contact for each patch, for comparison. At a gauge corner the contact bends, and planes are off.'}</p>`;
+      : 'A plane of contact for each patch, for comparison. At a gauge corner the contact bends, and planes are off.'}</p></details>`;
 }
 
 /** Dimensions of the track and of the wheelset. @param {App} app */
@@ -131,22 +132,9 @@ function sectionZones(app) {
   const there = BODIES.filter((body) => document && isObject(at(document, `/contact/${body}`)) && !lacksSection(document, body));
   return html`<div class="pair">${sectionZone(app, 'rail')}${sectionZone(app, 'wheel')}</div>
     ${there.length === 2 ? html`<button class="link" @click=${() => exchange(app)}>Exchange rail and wheel</button>` : nothing}
-    ${adviceOf(app, there)}
     ${there.map((body) => readingFields(app, body))}
     ${at(document ?? undefined, '/contact/accept_rough_profiles') === true ? html`<div class="checks"><label><input type="checkbox" checked
       @change=${() => change(app, '/contact/accept_rough_profiles', undefined)}> solve although the profiles are rough</label></div>` : nothing}`;
-}
-
-/** The smoothing that the noise of the files asks for, on one click. @param {App} app @param {readonly Body[]} there */
-export function adviceOf(app, there) {
-  const { document, checked } = app.store.get().compose;
-  const advised = there.flatMap((body) => {
-    const length = checked?.quality?.[body]?.smoothing_suggested_mm ?? 0;
-    return length && at(document ?? undefined, `/contact/${body}/smoothing_mm`) === undefined ? [{ body, length }] : [];
-  });
-  if (!advised.length || !document) return nothing;
-  const smooth = () => editDocument(app, advised.reduce((of, { body, length }) => put(of, `/contact/${body}/smoothing_mm`, length), document));
-  return html`<button class="link" @click=${smooth}>The points are noisy: smooth ${advised.map(({ body, length }) => `the ${body} by ${number(length, 2)} mm`).join(' and ')}, as advised</button>`;
 }
 
 const UNITS = /** @type {const} */ ([[undefined, 'as in the file, else mm'], ['mm', 'mm'], ['cm', 'cm'], ['m', 'm'], ['inch', 'inch']]);

@@ -88,8 +88,8 @@ export function curveOf(patch, kind, friction) {
     x,
     order,
     lines: moment
-      ? [line('moment_z_n_mm', { label: 'M z', unit: 'N·m', colour: '--c3' })]
-      : [line('force_x_n', { label: 'F x', unit: 'kN', colour: '--c1' }), line('force_y_n', { label: 'F y', unit: 'kN', colour: '--c2', dash: [7, 4] })],
+      ? [line('moment_z_n_mm', { label: 'Mz', unit: 'N·m', colour: '--c3' })]
+      : [line('force_x_n', { label: 'Fx', unit: 'kN', colour: '--c1' }), line('force_y_n', { label: 'Fy', unit: 'kN', colour: '--c2', dash: [7, 4] })],
     bound: moment ? NaN : (friction * patch.normal_force_n) / 1000,
   };
 }

@@ -6,7 +6,9 @@ import { indexOf } from './field/cells.js';
 import { fixed, number } from './format.js';
 import { patchesWith } from './loadsview.js';
 import { choose, stressesBelow } from './result.js';
-import { outward, sideOf } from './wheelloads.js';
+import { acrossSection } from './placing.js';
+import { isSolvedBent } from './starts.js';
+import { sideOf } from './wheelloads.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./result.js').Looked} Looked */
@@ -47,7 +49,7 @@ export function damagePanel(app, looked, answer, again) {
       ${chosen.point.damage ? html`<div class="card tall"><h3>Wear and fatigue</h3>${table(shown, figures)}</div>` : nothing}
       ${wearCard(app, looked, answer, shown)}
       ${shakedownCard(shown, figures)}
-      ${depthCard(app, looked, chosen, figures)}
+      ${depthCard(app, looked, answer, chosen, figures)}
       ${temperatureCard(looked, chosen)}
     </div>
     ${figures ? sources(figures) : nothing}</section>`;
@@ -93,23 +95,20 @@ function wearCard(app, looked, answer, shown) {
   if (!shown.some(({ point }) => point.damage?.across)) return nothing;
   const body = looked.wornBody;
   const placed = shown.every(({ patch }) => patch.position);
-  const side = sideOf(looked.document);
   /** @type {(name: 'usfd_depth_nm' | 'archard_depth_nm', label: string, look: string) => ChartLine[]} */
-  const lines = (name, label, look) => shown.flatMap(({ patch, point }, order) => {
+  const lines = (name, label, look) => shown.flatMap(({ at, patch, point }, order) => {
     const across = point.damage?.across;
     const depths = across?.[name];
     if (!across || !depths) return [];
-    const origin = patch.position ? (body === 'rail' ? patch.position.rail_mm[0] : patch.position.wheel_mm[0]) : 0;
-    const cos = patch.position ? Math.cos(patch.position.contact_angle_rad) : 1;
-    // y of a cross-section is positive to the field side, y of a patch to the left.
-    const place = (/** @type {number} */ y) => origin + (patch.position ? outward(answer.wheelset ? sideIn(answer, patch) : side, y * cos) : y);
+    const hand = answer.wheelset ? sideIn(answer, at) : sideOf(looked.document);
+    const place = acrossSection(patch, body, hand, looked.wheels[hand], isSolvedBent(looked.document, answer, at));
     const last = across.y_mm.length - 1;
     const points = /** @type {[number, number][]} */ ([
       [place(across.y_mm[0] - across.dy_mm[0] / 2), 0],
       ...across.y_mm.map((y, strip) => [place(y), depths[strip]]),
       [place(across.y_mm[last] + across.dy_mm[last] / 2), 0],
     ]);
-    return [{ label: order ? '' : label, look, points }];
+    return [{ label: order ? '' : label, look, points, smooth: true }];
   });
   const all = [...lines('usfd_depth_nm', 'Tγ/A law', 'one'), ...lines('archard_depth_nm', 'Archard', 'two')];
   if (!all.length) return nothing;
@@ -125,9 +124,8 @@ function wearCard(app, looked, answer, shown) {
     <p class="hint">${placed && body === 'wheel' ? 'At the places of the wheel where the rail wears; both laws are those of a rail passed once, and of a wheel once per turn.' : `Archard: middle of the range of its coefficient.${answer.wheelset ? ' Lines of both wheels.' : ''}`}</p></div>`;
 }
 
-/** @param {JobResult} answer @param {Shown['patch']} patch */
-const sideIn = ({ wheelset, patches }, patch) =>
-  wheelset?.positions.some(({ left }) => left.patches.includes(patches.indexOf(patch))) ? 'left' : 'right';
+/** @param {JobResult} answer @param {number} patch */
+const sideIn = ({ wheelset }, patch) => (wheelset?.positions.some(({ left }) => left.patches.includes(patch)) ? 'left' : 'right');
 
 /** The shakedown map with a point for each patch. @param {readonly Shown[]} shown @param {Schemas['DamageFiguresUsed'] | undefined | null} figures */
 function shakedownCard(shown, figures) {
@@ -148,12 +146,15 @@ function shakedownCard(shown, figures) {
     <p class="hint">Yield in shear ${number(figures?.shear_yield_mpa ?? NaN, 3)} MPa; change it for your steel in the form.</p></div>`;
 }
 
-/** Stresses below the chosen patch. @param {App} app @param {Looked} looked @param {Shown} chosen @param {Schemas['DamageFiguresUsed'] | undefined | null} figures */
-function depthCard(app, looked, { at, patch, point }, figures) {
+/** Stresses below the chosen patch. @param {App} app @param {Looked} looked @param {JobResult} answer @param {Shown} chosen @param {Schemas['DamageFiguresUsed'] | undefined | null} figures */
+function depthCard(app, looked, answer, { at, patch, point }, figures) {
   const worst = point.subsurface?.worst;
   if (!point.subsurface) return nothing;
   const below = stressesBelow(app, looked, at);
-  const points = [...(below?.points ?? [])].sort((one, two) => one.at_mm[2] - two.at_mm[2]);
+  const depths = below?.points ?? [];
+  // The worst point is one of the line, if that goes through it.
+  const through = worst && depths.length && Math.hypot(depths[0].at_mm[0] - worst.at_mm[0], depths[0].at_mm[1] - worst.at_mm[1]) < 1e-6;
+  const points = [...depths, ...(through ? [worst] : [])].sort((one, two) => one.at_mm[2] - two.at_mm[2]);
   const deepest = Math.max(1, ...points.map(({ at_mm }) => at_mm[2]));
   const yieldMpa = figures ? Math.sqrt(3) * figures.shear_yield_mpa : NaN;
   /** @type {ChartLine[]} */
@@ -170,7 +171,7 @@ function depthCard(app, looked, { at, patch, point }, figures) {
       marks: worst ? [{ at: [worst.von_mises_mpa, worst.at_mm[2]], label: `${number(worst.von_mises_mpa, 3)} MPa` }] : [],
     }) : nothing}
     ${worst ? html`<p>Worst point: von Mises <b>${number(worst.von_mises_mpa, 3)} MPa</b>, shear ${number(worst.shear_max_mpa, 3)} MPa, <b>${number(worst.at_mm[2], 2)} mm</b> deep,
-      at x ${fixed(worst.at_mm[0], 1)}, y ${fixed(worst.at_mm[1], 1)} mm of the patch.</p>` : nothing}
+      at x ${fixed(worst.at_mm[0], 1)}, ${isSolvedBent(looked.document, answer, at) ? 's' : 'y'} ${fixed(worst.at_mm[1], 1)} mm of the patch.</p>` : nothing}
     <p class="hint">Numerical error up to 0.3 % of the largest pressure (${number(0.003 * patch.pressure_max_mpa, 2)} MPa)${typeof open === 'number' ? `; the profiles leave the pressure open by ± ${number(open, 2)} MPa` : ''}.</p></div>`;
 }
 
@@ -182,13 +183,14 @@ function temperatureCard(looked, { at, point }) {
   const { temperature_c: temperatures, x_mm } = field?.cells ?? {};
   const index = field && indexOf(field);
   const cells = index ? index.row(index.stripAt(heat.at_mm[1])) : [];
+  const coldest = temperatures ? Math.min(...cells.map((cell) => temperatures[cell])) : 0;
   /** @type {ChartLine[]} */
   const lines = temperatures && x_mm && cells.length
     ? [{ label: 'both surfaces', look: 'one', points: cells.map((cell) => [x_mm[cell], temperatures[cell]]) }] : [];
   return html`<div class="card"><h3>Flash temperature, patch ${at}</h3>
     ${lines.length ? drawChart({
       name: `Temperature along rolling: ${number(heat.max_c, 3)} °C at most`, lines, x: 'x along rolling / mm', y: 'temperature / °C',
-      xRange: [x_mm?.[cells[0]] ?? 0, x_mm?.[cells[cells.length - 1]] ?? 1], marks: [{ at: [heat.at_mm[0], heat.max_c], label: `${number(heat.max_c, 3)} °C` }],
+      xRange: [x_mm?.[cells[0]] ?? 0, x_mm?.[cells[cells.length - 1]] ?? 1], yRange: [coldest, coldest + 1.15 * Math.max(1, heat.max_c - coldest)], marks: [{ at: [heat.at_mm[0], heat.max_c], label: `${number(heat.max_c, 3)} °C` }],
     }) : nothing}
     <p>Largest <b>${number(heat.max_c, 3)} °C</b>, a rise of ${number(heat.rise_max_k, 3)} K by friction.</p>
     <p class="hint">Within 2 % where heat flows into the depth only (Péclet number ${number(heat.peclet, 2)}, to be well above 10); ${number(100 * heat.heat_share_lower, 2)} % of the heat flows into the rail.</p></div>`;

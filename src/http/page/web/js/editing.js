@@ -30,6 +30,7 @@ const FIRST_SECONDS_MAX = 10;
 let timer = 0;
 let began = -Infinity;
 let asking = new AbortController();
+const CHANGED = ', changed';
 /** The text of the example as it was opened. */
 let opened = '';
 /** Is a case being solved while it is written? */
@@ -72,7 +73,11 @@ export const editDocument = (app, document) => take(app, document, pretty(docume
  * @param {JsonValue | undefined} value
  */
 export function change(app, pointer, value) {
-  editDocument(app, put(app.store.get().compose.document ?? {}, pointer, value));
+  const { document, example, examples } = app.store.get().compose;
+  const changed = put(document ?? {}, pointer, value);
+  const known = at(/** @type {JsonObject | undefined} */ (/** @type {unknown} */ (examples.find(({ name }) => name === example)?.case)), '/name');
+  // The name of an example tells its numbers.
+  editDocument(app, known && pointer !== '/name' && changed.name === known ? { ...changed, name: `${known}${CHANGED}` } : changed);
 }
 
 /** An example with all fields. @param {App} app @param {string} name */

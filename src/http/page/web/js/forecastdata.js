@@ -98,7 +98,9 @@ function linesOf(answer, kind, body) {
   };
   switch (kind) {
     case 'losses':
-      return [{ ...line('largest depth', 0, (record) => deepest(record, body)), ...uncertain((record) => deepest(record, body)) }, ...LOSSES.filter((loss) => loss.body === body).flatMap(({ key, label }, at) => {
+      // The largest depth has no limit: beside one it would seem to pass it.
+      return [...(LOSSES.some((loss) => loss.body === body && limits.some((known) => known.loss === loss.key)) ? []
+        : [{ ...line('largest depth', 0, (record) => deepest(record, body)), ...uncertain((record) => deepest(record, body)) }]), ...LOSSES.filter((loss) => loss.body === body).flatMap(({ key, label }, at) => {
         const of = (/** @type {WornRecord} */ record) => record.losses[key] ?? 0;
         const known = limits.find(({ loss }) => loss === key);
         if (!known && !records.some((record) => of(record) > NO_LOSS_MM)) return [];

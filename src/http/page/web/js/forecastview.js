@@ -3,7 +3,6 @@
 import { html, nothing } from '../vendor/lit-html.js';
 import { cancel, download } from './api.js';
 import { drawing, verdict } from './compose.js';
-import { adviceOf } from './contactform.js';
 import { removeLater, isThere } from './deleting.js';
 import { drawChart } from './drawing/axes.js';
 import { drawWorn } from './drawing/worn.js';
@@ -11,8 +10,8 @@ import { numberAt } from './document.js';
 import { fileName } from './downloads.js';
 import { chooseForecast, EVENTS, FACTORS, forecastSeen, nameOf, openForecast, playFilm, recordOf, repeatForecast, startForecast, takeForecastFiles, takeTarget, TARGETS, templateOf, writeForm } from './forecast.js';
 import { CURVES, decisionOf, deepest, distanceOf, distanceUnit, forecastChart, LOSSES, numericalOf, reachedOf, sectionOf, wears, worstDamage } from './forecastdata.js';
-import { count, fixed, number, seconds } from './format.js';
-import { remarkList } from './remarks.js';
+import { count, fixed, number, plusMinus, seconds } from './format.js';
+import { inWords, remarkList } from './remarks.js';
 import { formatRoute } from './routes.js';
 import { savable } from './savedrawing.js';
 import { COLUMNS, ROWS_MAX } from './traffic.js';
@@ -49,13 +48,13 @@ function formPanel(app, forecast) {
   return html`<section class="panel" aria-labelledby="h-forecast"><header class="bar"><h1 id="h-forecast">${against ? 'Another plan' : 'Forecast: wear and fatigue under a traffic'}</h1>
       ${against ? html`<span class="hint">compared with <b>${against.name}</b></span><button class="small ghost" @click=${() => chooseForecast(app, { against: null })}>Do not compare</button>` : nothing}
       <button class="primary" ?disabled=${sending || typeof template === 'string'} @click=${() => startForecast(app)}>${sending ? 'Sending …' : against ? 'Compute and compare' : 'Compute'}</button></header>
-    ${refusal ? html`<div class="pad" role="alert"><p class="fault big">${refusal}</p><ul class="faults">${faults.map(({ pointer, detail }) => html`<li><code>${pointer}</code> ${detail}</li>`)}</ul></div>` : nothing}
+    ${refusal ? html`<div class="pad" role="alert"><p class="fault big">${refusal}</p><ul class="faults">${faults.map(({ pointer, detail }) => html`<li><b>${inWords(pointer ?? '')}</b> ${detail}</li>`)}</ul></div>` : nothing}
     <div class="two pad">
       <fieldset><legend>Rail and wheel</legend>${typeof template === 'string' ? html`<p class="fault">${template}</p>`
         : html`<p>${String(document?.name ?? 'The pair of the view Contact')}${names ? html` <span class="quiet">(${names})</span>` : nothing}</p>
           ${document ? html`<div class=${state.faults.length ? 'figure pair-drawing stale' : 'figure pair-drawing'}>${drawing(state, document)}</div>` : nothing}
-          <div class="verdict" role="status">${verdict(app, state)}${adviceOf(app, BODIES)}</div>
-          <p class="hint">Drop other files of a rail and a wheel, or a table of the traffic, anywhere here. Inclination, gauge, speed and steel are those of the view <a href="#/compose">Contact</a>.</p>`}</fieldset>
+          <div class="verdict" role="status">${verdict(app, state, false)}</div>
+          <p class="hint">Drop other files of a rail and a wheel, or a table of the traffic, anywhere here. Inclination, gauge and steel are those of the view <a href="#/compose">Contact</a>; loads, shifts and friction are those of the traffic below.</p>`}</fieldset>
       <div>
         <fieldset><legend>How far</legend><div class="pair">${form.wearing === 'wheel' ? nothing : entry('mgt', 'Traffic over the rail', 'MGT')}${form.wearing === 'rail' ? nothing : entry('km', 'Distance of the wheel', 'km')}</div>
           <div class="pair">${select('wearing', 'What wears', [['both', 'rail and wheel'], ['rail', 'the rail'], ['wheel', 'the wheel']])}${select('law', 'Law of wear', [['usfd_wear', 'Tγ/A (Sheffield)'], ['archard_wear', 'Archard']])}</div>
@@ -253,10 +252,12 @@ function decisionText(answers, sides) {
     return one || two ? [`${body === 'rail' ? 'grinds' : 'turns'} ${number(one, 3)} (A) and ${number(two, 3)} (B) mm² off the ${body}`] : [];
   });
   const worn = BODIES.filter((body) => answers.some((answer) => wears(answer, body))).map((body) => {
-    const [one, two] = last.map((record) => number(record[body].worn_area_mm2, 3));
-    return `${one} (A) and ${two} (B) mm² off the ${body}`;
+    const [one, two] = last.map((record) => record[body].worn_area_mm2);
+    const errors = last.map((record) => record[body].worn_area_mm2 * numericalOf(record, body));
+    const less = Math.abs(one - two) > Math.hypot(...errors) ? `, ${number(100 * (1 - Math.min(one, two) / Math.max(one, two)), 2)} % less with ${one < two ? 'A' : 'B'}` : ', which do not differ by more than their errors';
+    return `${plusMinus(one, errors[0])} (A) and ${plusMinus(two, errors[1])} (B) mm² off the ${body}${less}`;
   });
-  return html`${better === null ? (ends[0].label ? 'Both reach their first limit at the same time.' : `Neither reaches a limit within ${number(distanceOf(last[0].progress), 3)} ${unit}. Until then traffic wears ${worn.join(', and ')}.`)
+  return html`${better === null ? (ends[0].label ? 'Both reach their first limit at the same time.' : `Neither reaches a limit within ${number(distanceOf(last[0].progress), 3)} ${unit}. Until then traffic wears ${worn.join('; and ')}.`)
     : html`${name(better)} goes on longer. Its first limit: ${end(better)}. That of ${name(better ? 0 : 1)}: ${end(better ? 0 : 1)}.
       ${sure ? 'The lowest and the highest wear coefficients say the same.' : html`<span class="warn">With other wear coefficients it may be the other way round.</span>`}`}
     ${removed.length ? ` Maintenance ${removed.join(', and ')}.` : nothing}`;
@@ -264,16 +265,23 @@ function decisionText(answers, sides) {
 
 const BODIES = /** @type {const} */ (['rail', 'wheel']);
 
+/** A loss with its numerical error. @param {WornRecord} record @param {typeof LOSSES[number]['key']} key @param {'rail' | 'wheel'} body */
+function lossText(record, key, body) {
+  const loss = record.losses[key] ?? NaN;
+  const error = loss * numericalOf(record, body);
+  return error >= 5e-4 ? plusMinus(loss, error) : fixed(loss, 3);
+}
+
 /** Numbers of the step. @param {readonly WornRecord[]} records @param {readonly ('rail' | 'wheel')[]} bodies Those that wear. @param {boolean} compared */
 function numbersPanel(records, bodies, compared) {
   /** @type {[string, (record: WornRecord) => unknown][]} */
   const rows = [
-    ...LOSSES.filter(({ body }) => bodies.includes(body)).map(({ key, label }) => /** @type {[string, (record: WornRecord) => unknown]} */ ([`${label} / mm`, ({ losses }) => fixed(losses[key] ?? NaN, 3)])),
+    ...LOSSES.filter(({ body }) => bodies.includes(body)).map(({ key, label, body }) => /** @type {[string, (record: WornRecord) => unknown]} */ ([`${label} / mm`, (record) => lossText(record, key, body)])),
     ...bodies.flatMap((body) => /** @type {[string, (record: WornRecord) => unknown][]} */ ([
-      [`largest depth on the ${body} / mm`, (record) => html`${number(deepest(record, body), 3)}<small> at y ${fixed(record[body].points_mm[record[body].depth_mm.indexOf(deepest(record, body))]?.[0] ?? NaN, 1)} mm</small>`],
+      [`largest depth on the ${body} / mm`, (record) => html`${plusMinus(deepest(record, body), deepest(record, body) * numericalOf(record, body))}<small> at y ${fixed(record[body].points_mm[record[body].depth_mm.indexOf(deepest(record, body))]?.[0] ?? NaN, 1)} mm</small>`],
       [`worn area of the ${body} / mm²`, (record) => {
         const { worn_area_mm2: area, uncertainty: { coefficients } } = record[body];
-        return html`${number(area, 3)} ± ${number(100 * numericalOf(record, body), 2)} %<small> coefficients: ${number(area * coefficients[0], 2)} … ${number(area * coefficients[1], 2)}</small>`;
+        return html`${plusMinus(area, area * numericalOf(record, body))}<small> coefficients: ${number(area * coefficients[0], 2)} … ${number(area * coefficients[1], 2)}</small>`;
       }],
       [`ground or turned off the ${body} / mm²`, (record) => number(record[body].machined_area_mm2, 3)],
       [`largest RCF damage of the ${body}`, (record) => number(worstDamage(record, body), 3)],

@@ -54,6 +54,12 @@ export function withError(value, error) {
   return { value: fixed(value, decimals), error: fixed(error, decimals) };
 }
 
+/** A value with its error in one text. @param {number} value @param {number | null | undefined} error */
+export function plusMinus(value, error) {
+  const text = withError(value, error);
+  return text.error ? `${text.value} ± ${text.error}` : text.value;
+}
+
 /** @param {number} value */
 export function seconds(value) {
   if (value < 1e-3) return `${number(value * 1e6, 3)} µs`;

@@ -1,7 +1,7 @@
 // The loads of each wheel on its rail, the margin to Nadal's limit, and the forces of every patch in its own and in track axes.
 
 import { html, nothing } from '../vendor/lit-html.js';
-import { degrees, fixed, number, withError } from './format.js';
+import { degrees, fixed, number, plusMinus } from './format.js';
 import { choose, frictionOf } from './result.js';
 import { inTrackAxes, nadal, outward, sideOf, wheelLoads } from './wheelloads.js';
 import { positionOf } from './wheelsetview.js';
@@ -30,18 +30,18 @@ export function loadsPanel(app, looked, answer) {
 }
 
 /** @param {Looked} looked @param {WheelLoad} load @param {boolean} named */
-function wheelTable(looked, { side, x_n, y_n, q_n, y_error_n }, named) {
+function wheelTable(looked, { side, x_n, y_n, q_n, x_error_n, y_error_n }, named) {
   const angle = looked.flange[side];
   const friction = frictionOf(looked);
   const limit = angle === undefined ? NaN : nadal(angle, friction);
   const ratio = y_n / q_n;
-  const y = withError(y_n / 1000, y_error_n && y_error_n / 1000);
+  const error = y_error_n && y_error_n / q_n;
   const row = (/** @type {unknown} */ label, /** @type {unknown} */ value) => html`<div><dt>${label}</dt><dd>${value}</dd></div>`;
   return html`<dl class="table" data-wheel=${side}>${named ? row(html`<b>${side} wheel</b>`, '') : nothing}
     ${row('Q, vertical', `${number(q_n / 1000)} kN`)}
-    ${row('Y, lateral', `${y.value}${y.error ? ` ± ${y.error}` : ''} kN`)}
-    ${row(html`F<sub>x</sub>, longitudinal`, `${fixed(x_n / 1000, 2)} kN`)}
-    ${row('Y/Q', fixed(ratio, 3))}
+    ${row('Y, lateral', `${y_error_n ? plusMinus(y_n / 1000, y_error_n / 1000) : fixed(y_n / 1000, 2)} kN`)}
+    ${row(html`F<sub>x</sub>, longitudinal`, `${x_error_n ? plusMinus(x_n / 1000, x_error_n / 1000) : fixed(x_n / 1000, 2)} kN`)}
+    ${row('Y/Q', error ? plusMinus(ratio, error) : fixed(ratio, 3))}
     ${Number.isFinite(limit) ? html`${row(`Nadal's limit, flange ${degrees(angle ?? 0)}, μ ${number(friction, 2)}`, fixed(limit, 2))}
       ${row('margin to the limit', html`<span class=${ratio > limit ? 'warn' : ''}>${fixed(limit - ratio, 2)} (${fixed(Math.max(0, (100 * ratio) / limit), 0)} % used)</span>`)}` : nothing}</dl>`;
 }

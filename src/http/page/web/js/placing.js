@@ -98,6 +98,16 @@ export function unfolded(line, from) {
 }
 
 /**
+ * The y of a cross-section, positive to the field side, of places in track axes.
+ * @param {Place} from A place in track axes,
+ * @param {number} fromY its y on the cross-section,
+ * @param {import('./wheelloads.js').Side} side
+ * @param {number} cant Turn of the cross-section with its top toward the track centre, in rad.
+ * @returns {(place: Place) => number}
+ */
+const onSection = (from, fromY, side, cant) => ([y, z]) => fromY + outward(side, y - from[0]) * Math.cos(cant) + (z - from[1]) * Math.sin(cant);
+
+/**
  * The place on a line whose coordinate of the cross-section, y to the field side, is given.
  * @param {readonly Place[]} line In track axes.
  * @param {Place} from A place of the line in track axes,
@@ -107,8 +117,7 @@ export function unfolded(line, from) {
  * @returns {(y: number) => Place}
  */
 export function placeOn(line, from, fromY, side, cant) {
-  const own = (/** @type {Place} */ [y, z]) => fromY + outward(side, y - from[0]) * Math.cos(cant) + (z - from[1]) * Math.sin(cant);
-  const ys = line.map(own);
+  const ys = line.map(onSection(from, fromY, side, cant));
   return (wanted) => {
     /** @type {Place | null} */
     let highest = null;
@@ -135,6 +144,24 @@ export function surfaceOf({ position }, rail, bent) {
   if (bent) return unfolded(rail, [y0, z0]);
   const [cos, sin] = [Math.cos(position.contact_angle_rad), Math.sin(position.contact_angle_rad)];
   return (across, height) => [y0 + across * cos - height * sin, z0 + across * sin + height * cos];
+}
+
+/**
+ * The y on a cross-section, positive to the field side, by the coordinate across a patch on it.
+ * @param {import('./api.js').Patch} patch
+ * @param {'rail' | 'wheel'} body
+ * @param {import('./wheelloads.js').Side} side
+ * @param {import('./result.js').Standing | undefined} standing The wheel on its rail, once it is known; a plane is taken before.
+ * @param {boolean} bent
+ * @returns {(across: number) => number}
+ */
+export function acrossSection(patch, body, side, standing, bent) {
+  const { position } = patch;
+  const surface = surfaceOf(patch, standing?.placed.rail ?? [], bent && standing !== undefined);
+  if (!position || !surface) return (across) => across;
+  const [, y, z] = position.track_mm;
+  const own = body === 'rail' ? onSection([y, z], position.rail_mm[0], side, standing?.cant ?? 0) : onSection([y, z], position.wheel_mm[0], side, 0);
+  return (across) => own(surface(across, 0));
 }
 
 /** @typedef {Pick<import('./compare.js').Side, 'result' | 'patch' | 'document' | 'sections' | 'field'>} OnRail A patch of a result. */
@@ -174,7 +201,7 @@ function onRail({ result, patch, document, sections }) {
   const [x, y0, z0] = position.origin_track_mm;
   const hand = y0 > 0 ? 'left' : 'right';
   /** @type {readonly Place[]} */
-  const rail = isSolvedBent(document, result) && sections ? sections.rail : [];
+  const rail = isSolvedBent(document, result, patch) && sections ? sections.rail : [];
   // The rail on the left is that on the right, mirrored.
   const own = sideOf(document) === hand ? rail : rail.map(([y, z]) => /** @type {Place} */ ([-y, z]));
   const surface = surfaceOf(result.patches[patch], own, own.length > 0);

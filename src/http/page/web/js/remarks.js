@@ -1,6 +1,7 @@
 // Remarks of the service: warnings first, notes folded, and what is said several times said once.
 
 import { html, nothing } from '../vendor/lit-html.js';
+import { wordsOf } from './words.js';
 
 /** @typedef {import('./api.js').Remark} Remark */
 /** @typedef {{ remark: Remark, patches: number[], points: number[] }} Group */
@@ -38,6 +39,12 @@ export function remarkList(remarks, go) {
     ${notes.length ? html`<details class="notes"><summary>${notes.length === 1 ? '1 note' : `${notes.length} notes`}</summary>${notes.map((group) => entry(group, go))}</details>` : nothing}</div>`;
 }
 
+/** The name of a value of the case; its pointer where it has none. @param {string} pointer */
+export function inWords(pointer) {
+  const { label, known } = wordsOf(pointer);
+  return known ? html`<span title=${pointer}>${label}</span>` : html`<code>${pointer}</code>`;
+}
+
 /** @param {Group} group @param {((place: Place) => void) | undefined} go */
 function entry({ remark, patches, points }, go) {
   const places = [
@@ -46,5 +53,5 @@ function entry({ remark, patches, points }, go) {
   ];
   return html`<p class=${`remark ${remark.severity}`} data-code=${remark.code}>
     ${go ? places.map(({ label, place }) => html`<button class="small" @click=${() => go(place)}>${label}</button> `) : nothing}
-    ${remark.pointer ? html`<code>${remark.pointer}</code> ` : nothing}${remark.detail}</p>`;
+    ${remark.pointer ? html`<b>${inWords(remark.pointer)}</b> ` : nothing}${remark.detail}</p>`;
 }

@@ -159,7 +159,7 @@ async function followJob(app) {
 function show(app, result) {
   if (!looked) return;
   looked.result = result;
-  looked.near = isSolvedBent(looked.document, result);
+  looked.near = isSolvedBent(looked.document, result, 0);
   placeProfiles(app).catch(app.refused);
   if (looked.patch < 0) looked.patch = firstPatch(result);
   looked.patch = Math.min(looked.patch, result.patches.length - 1);

@@ -9,7 +9,7 @@ import { downloads } from './downloads.js';
 import { drawProfiles } from './drawing/profiles.js';
 import { editDocument, solve } from './editing.js';
 import { loadsPanel } from './loadsview.js';
-import { remarkList } from './remarks.js';
+import { inWords, remarkList } from './remarks.js';
 import { inOrder, isSolvedBent, standardSection, withEverything, withFields, withSpeed } from './starts.js';
 import { indexOf } from './field/cells.js';
 import { combOf } from './field/comb.js';
@@ -17,7 +17,7 @@ import { hasFields } from './fields.js';
 import { chooseAmounts, chosenAmounts } from './field/palette.js';
 import { offered, quantityOf } from './field/quantities.js';
 import { FieldMap } from './fieldmap.js';
-import { count, degrees, number, seconds, withError } from './format.js';
+import { count, degrees, fixed, number, plusMinus, seconds, withError } from './format.js';
 import { choose, frictionOf, lookedAt, rememberView, rangeShown } from './result.js';
 import { formatRoute } from './routes.js';
 import { wheelsetPanel } from './wheelsetview.js';
@@ -95,7 +95,7 @@ function waiting(app, looked) {
     case 'cancelled':
       return html`<section class="panel wait"><p class="fault big">${job.state === 'failed' ? (job.error?.title ?? 'Failed') : 'Cancelled'}</p>
         <p>${job.error?.detail ?? ''}</p>
-        ${(job.error?.errors ?? []).filter(({ detail }) => detail !== job.error?.detail).map((fault) => html`<p><code>${fault.pointer}</code> ${fault.detail}</p>`)}
+        ${(job.error?.errors ?? []).filter(({ detail }) => detail !== job.error?.detail).map((fault) => html`<p><b>${inWords(fault.pointer ?? '')}</b> ${fault.detail}</p>`)}
         <div class="actions"><button @click=${() => edit(app, looked)}>Open the case</button>
         ${job.error?.detail?.includes('accept_rough_profiles') ? html`<button @click=${() => allTheSame(app, looked)}>Solve it all the same</button>` : nothing}</div></section>`;
     default:
@@ -164,18 +164,21 @@ function figures(looked, patch, point) {
       ? html`<span class="err" title="estimated error"> ± ${text.error}</span>` : nothing}<span class="unit"> ${unit}</span></dd></div>`;
   };
   const share = typeof point.stick_area_mm2 === 'number' ? point.stick_area_mm2 / region.area_mm2 : NaN;
-  const used = (100 * Math.hypot(point.force_x_n, point.force_y_n)) / (friction * region.normal_force_n);
+  const bound = (friction * region.normal_force_n) / 100;
+  const used = Math.hypot(point.force_x_n, point.force_y_n) / bound;
+  const power = point.damage?.t_gamma?.with_spin_n;
   return html`<dl class="figures" tabindex="0" aria-label="Numbers of the chosen patch and motion; forces on the rail">
+    ${looked.result && looked.result.patches.length > 1 ? html`<div class="figure-of"><dt>patch</dt><dd><b>${looked.patch}</b></dd></div>` : nothing}
     ${figure(html`F<sub>x</sub>`, point.force_x_n / 1000, 'kN', errors && errors.force_x_n / 1000)}
     ${figure(html`F<sub>y</sub>`, point.force_y_n / 1000, 'kN', errors && errors.force_y_n / 1000)}
     ${figure(html`M<sub>z</sub>`, point.moment_z_n_mm / 1000, 'N·m', errors && errors.moment_z_n_mm / 1000)}
     ${figure(html`N`, region.normal_force_n / 1000, 'kN', undefined)}
     ${figure(html`p<sub>max</sub>`, region.pressure_max_mpa, 'MPa', point.profile_uncertainty?.pressure_max_mpa ?? undefined)}
     ${figure('area', region.area_mm2, 'mm²', undefined)}
-    ${Number.isFinite(used) ? html`<div class="figure-of"><dt>friction used</dt><dd><b>${number(used, 3)}</b><span class="unit"> % of μN</span></dd></div>` : nothing}
+    ${Number.isFinite(used) ? figure('friction used', used, '% of μN', errors && Math.hypot(errors.force_x_n, errors.force_y_n) / bound) : nothing}
     ${Number.isFinite(share) ? html`<div class="figure-of"><dt>stick</dt><dd><b>${number(100 * share, 3)}</b><span class="unit"> % of the area</span></dd>
       <svg class="share" viewBox="0 0 100 5" preserveAspectRatio="none" aria-hidden="true"><rect class="slip" width="100" height="5"/><rect class="stick" width=${100 * share} height="5"/></svg></div>` : nothing}
-    ${figure('Tγ, friction power', point.friction_power_n, 'J/m', undefined)}
+    ${figure('Tγ, friction power', point.friction_power_n, 'J/m', power && ((power.high ?? power.value) - (power.low ?? power.value)) / 2)}
   </dl>`;
 }
 
@@ -187,7 +190,7 @@ function fieldPanel(app, looked, answer) {
   const toggles = /** @type {const} */ ([['border', 'stick–slip line'], ['arrows', 'arrows'], ['mesh', 'cells']]);
   const shown = field && quantity && all.includes(quantity) ? {
     field, quantity, range: rangeShown(looked, quantity), friction: frictionOf(looked), border: looked.border, arrows: looked.arrows,
-    mesh: looked.mesh, held: looked.held, bent: isSolvedBent(looked.document, answer), name: `${quantity.heading} of patch ${looked.patch}`,
+    mesh: looked.mesh, held: looked.held, bent: isSolvedBent(looked.document, answer, looked.patch), name: `${quantity.heading} of patch ${looked.patch}`,
   } : null;
   const moved = (/** @type {CrosshairEvent} */ { detail: { x, y, held } }) => {
     looked.held = held ? { x, y } : null;
@@ -237,8 +240,14 @@ function thumbnails(app, looked, answer) {
     return html`<label class="seg thumb"><input type="radio" name="patch" .checked=${looked.patch === at} @change=${() => choose(app, { patch: at })}>
       <span>${shown ? html`<field-map class="small" .shown=${shown}></field-map>` : nothing}
         <b>Patch ${at}${warned ? html` <abbr class="warn" title="There is a remark on this patch">▲</abbr>` : nothing}</b>
-        <small>${number(patch.normal_force_n / 1000, 3)} kN${angle}</small></span></label>`;
+        <small>${number(patch.normal_force_n / 1000, 3)} kN${angle}</small>${wheelOf(answer, at)}</span></label>`;
   })}</div>`;
+}
+
+/** The wheel and the shift that a patch of a wheelset belongs to. @param {JobResult} answer @param {number} patch */
+function wheelOf({ wheelset }, patch) {
+  const position = wheelset?.positions.find(({ left, right }) => left.patches.includes(patch) || right.patches.includes(patch));
+  return position ? html`<small>${position.left.patches.includes(patch) ? 'left' : 'right'}, shift ${fixed(position.lateral_shift_mm, 1)} mm</small>` : nothing;
 }
 
 /** The field as a table, for those who read rather than look. @param {import('./fields.js').Field} field */
@@ -267,7 +276,7 @@ function cellTable({ cells }) {
 function profilePanel(app, looked, answer) {
   const standing = {
     patches: answer.patches, combs: answer.patches.map((_, at) => combOf(looked.fields[at])), chosen: looked.patch,
-    choose: (/** @type {number} */ patch) => choose(app, { patch }), bent: isSolvedBent(looked.document, answer), near: looked.near,
+    choose: (/** @type {number} */ patch) => choose(app, { patch }), bent: isSolvedBent(looked.document, answer, looked.patch), near: looked.near,
   };
   const parts = /** @type {const} */ ([[false, 'Whole head'], [true, 'Contact']]);
   return html`<section class="panel" aria-labelledby="h-profiles"><header class="bar"><h2 id="h-profiles">On the profiles</h2>
@@ -313,10 +322,7 @@ function totalPanel(answer, point) {
   const total = answer.total[point];
   if (!total) return nothing;
   const errors = total.error_estimate;
-  const force = (/** @type {number} */ value, /** @type {number | undefined} */ error) => {
-    const text = withError(value / 1000, error && error / 1000);
-    return text.error ? `${text.value} ± ${text.error}` : text.value;
-  };
+  const force = (/** @type {number} */ value, /** @type {number | undefined} */ error) => plusMinus(value / 1000, error && error / 1000);
   return html`<section class="panel" aria-labelledby="h-total"><header class="bar"><h2 id="h-total">All patches together</h2></header><dl class="table">
     ${row(html`F<sub>x</sub>`, `${force(total.force_x_n, errors?.force_x_n)} kN`)}${row(html`F<sub>y</sub>`, `${force(total.force_y_n, errors?.force_y_n)} kN`)}
     ${row(html`M<sub>z</sub>`, `${force(total.moment_z_n_mm, errors?.moment_z_n_mm)} N·m`)}</dl></section>`;

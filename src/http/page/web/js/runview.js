@@ -50,7 +50,7 @@ function strips(of) {
     x: made.x, xLabel: of.by, strips: made.strips, limits: of.limits, zoom: of.zoom, open: () => {}, zoomed: (/** @type {RunLine['zoom']} */ zoom) => { of.zoom = zoom; },
   };
   return html`<line-strips tabindex="0" role="group" aria-label="Strips along the track; arrow keys move the cursor" .shown=${shown}></line-strips>
-    <p class="pad hint">Filled: largest size of each interval of ${number(of.step, 3)}; line: its median. Drag to zoom, Escape shows all.</p>`;
+    <p class="pad hint">Line: median of each interval of ${number(of.step, 3)} in ${of.by}; filled: up to its largest value. Drag to zoom, Escape shows all.</p>`;
 }
 
 /** @param {App} app @param {RunLine} of */
@@ -108,7 +108,7 @@ function sectionPanel(app, of) {
     ${of.sections ? html`<div class="scroll" tabindex="0" role="region" aria-labelledby="h-sections"><table class="sections">
       <thead><tr><th rowspan="2" scope="col">${of.part}</th><th rowspan="2" scope="col">rows</th><th rowspan="2" scope="col">no answer</th>${QUANTITIES.map(({ short, unit }) => html`<th colspan="3" scope="colgroup">${short} / ${unit}</th>`)}
         ${limited.map(({ short }) => html`<th rowspan="2" scope="col">over limit of ${short}</th>`)}</tr>
-        <tr>${QUANTITIES.map(() => html`<th scope="col">50 %</th><th scope="col">99 %</th><th scope="col">max</th>`)}</tr></thead>
+        <tr>${QUANTITIES.map(() => html`<th scope="col">median</th><th scope="col">99 %</th><th scope="col">largest</th>`)}</tr></thead>
       <tbody>${[...(of.sections.sections ?? []), of.sections.all].map((section, at, all) => html`<tr><th scope="row">${at === all.length - 1 ? 'all' : text ? section.value : `${number(section.from ?? 0, 5)} …`}</th>
         <td>${count(section.rows)}</td><td>${count(section.rows - (section.statuses.ok ?? 0) - (section.statuses.target_missed ?? 0))}</td>
         ${QUANTITIES.map(({ key, factor }) => html`${cell(section, key, factor, '50')}${cell(section, key, factor, '99')}${cell(section, key, factor, '100')}`)}

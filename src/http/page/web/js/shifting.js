@@ -137,7 +137,7 @@ async function solveWheel(document, side) {
         normal_n: sum((patch) => patch.normal_force_n), y_n: outward(side, total.force_y_n), x_n: total.force_x_n, area_mm2: sum((patch) => patch.area_mm2),
         pressure_mpa: Math.max(...patches.map((patch) => patch.pressure_max_mpa)), power_n: sum(({ points: [point] }) => point.friction_power_n),
       },
-      pressed: patches.map((patch, at) => ({ patch, comb: combOf(fields[at]), bent: isSolvedBent(document, result) })),
+      pressed: patches.map((patch, at) => ({ patch, comb: combOf(fields[at]), bent: isSolvedBent(document, result, at) })),
     };
   } finally {
     if (job.state === 'queued' || job.state === 'running') await cancel('jobs', job.id).catch(() => {});

@@ -136,8 +136,17 @@ export const withEverything = (document) => withExtras({ ...document, outputs: w
 export const isBent = (document) => ['profiles', 'wheelset'].includes(String(at(document ?? undefined, '/contact/type')))
   && at(document ?? undefined, '/contact/reference_surface') !== 'plane';
 
-/** Was it solved there? @param {JsonObject | null} document @param {{ remarks?: readonly { code: string }[] }} result */
-export const isSolvedBent = (document, { remarks = [] }) => isBent(document) && remarks.every(({ code }) => code !== 'on-planes');
+/**
+ * Was a patch solved there? The remark on planes is on all patches, or on the first of a wheel of a wheelset.
+ * @param {JsonObject | null} document
+ * @param {Pick<import('./api.js').JobResult, 'remarks' | 'wheelset'>} result
+ * @param {number} patch
+ */
+export function isSolvedBent(document, { remarks, wheelset }, patch) {
+  const wheels = wheelset?.positions.flatMap(({ left, right }) => [left.patches, right.patches]) ?? [];
+  const here = wheels.find((patches) => patches.includes(patch)) ?? [patch];
+  return isBent(document) && !remarks?.some((remark) => remark.code === 'on-planes' && (typeof remark.patch !== 'number' || here.includes(remark.patch)));
+}
 
 /** A case with a speed, which temperature and Archard's wear need; lists of motions have theirs. @param {JsonObject} document @returns {JsonObject} */
 export function withSpeed(document) {
@@ -176,9 +185,8 @@ export function standardSection(examples, body) {
  */
 export function withoutNameOf(document, example) {
   const own = { ...document };
-  for (const member of ['name', 'labels']) {
-    if (example && JSON.stringify(own[member]) === JSON.stringify(example[member])) delete own[member];
-  }
+  if (example?.name && String(own.name ?? '').startsWith(String(example.name))) delete own.name;
+  if (example && JSON.stringify(own.labels) === JSON.stringify(example.labels)) delete own.labels;
   return own;
 }
 

@@ -14,7 +14,8 @@ import { at, numberAt, put } from './document.js';
  * @property {number} x_n Longitudinal force on the rail.
  * @property {number} y_n Lateral force on the rail, positive to the field side.
  * @property {number} q_n Vertical force on the rail, positive down.
- * @property {number | undefined} y_error_n
+ * @property {number | undefined} [y_error_n]
+ * @property {number | undefined} [x_error_n]
  */
 
 /** Length of a chord of the flank by which its angle is measured, in mm. */
@@ -42,13 +43,13 @@ export function wheelLoads(result, document, at) {
   if (position) {
     return /** @type {const} */ (['left', 'right']).map((side) => {
       const { force_x_n, force_y_n, force_z_n } = position[side];
-      return { side, x_n: force_x_n, y_n: outward(side, force_y_n), q_n: -force_z_n, y_error_n: undefined };
+      return { side, x_n: force_x_n, y_n: outward(side, force_y_n), q_n: -force_z_n };
     });
   }
   const total = result.total[at];
   if (typeof total?.force_z_n !== 'number') return [];
   const side = sideOf(document);
-  return [{ side, x_n: total.force_x_n, y_n: outward(side, total.force_y_n), q_n: -total.force_z_n, y_error_n: total.error_estimate?.force_y_n }];
+  return [{ side, x_n: total.force_x_n, y_n: outward(side, total.force_y_n), q_n: -total.force_z_n, y_error_n: total.error_estimate?.force_y_n, x_error_n: total.error_estimate?.force_x_n }];
 }
 
 /**

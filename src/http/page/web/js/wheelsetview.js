@@ -126,8 +126,8 @@ function carriedTable({ kinematics, at, carried, failure }) {
     ['largest pressure / MPa', (side) => number(carried[side]?.pressure_mpa ?? NaN, 4)],
     ['contact area / mm²', (side) => number(carried[side]?.area_mm2 ?? NaN, 3)],
     ['normal force / kN', (side) => number((carried[side]?.normal_n ?? NaN) / 1000, 3)],
-    ['Y, outward / kN', (side) => number((carried[side]?.y_n ?? NaN) / 1000, 3)],
-    ['longitudinal force / kN', (side) => number((carried[side]?.x_n ?? NaN) / 1000, 3)],
+    ['Y, outward / kN', (side) => fixed((carried[side]?.y_n ?? NaN) / 1000, 2)],
+    ['longitudinal force / kN', (side) => fixed((carried[side]?.x_n ?? NaN) / 1000, 2)],
     ['Tγ / (J/m)', (side) => number(carried[side]?.power_n ?? NaN, 3)],
   ];
   return html`<table class="carried"><thead><tr><th></th>${SIDES.map((side) => html`<th scope="col">${side}</th>`)}</tr></thead>
@@ -171,13 +171,13 @@ const choosePosition = (app, { left, right }) => choose(app, { patch: [...left.p
 
 /** @param {App} app @param {Wheelset['positions']} positions @param {number} chosen */
 function positionTable(app, positions, chosen) {
-  const kilonewtons = (/** @type {number} */ force) => number(force / 1000, 3);
-  const degrees = (/** @type {number | null | undefined} */ angle) => number((Math.abs(angle ?? NaN) * 180) / Math.PI, 3);
+  const kilonewtons = (/** @type {number} */ force) => fixed(force / 1000, 2);
+  const degrees = (/** @type {number | null | undefined} */ angle) => fixed((Math.abs(angle ?? NaN) * 180) / Math.PI, 2);
   return html`<div class="scroll" tabindex="0" role="region" aria-label="Positions of the wheelset"><table class="positions">
-    <thead><tr>${['shift / mm', 'yaw / mrad', 'roll / mrad', 'Δr / mm', 'left F x, F y / kN', 'right F x, F y / kN', 'angles / °'].map((name) => html`<th scope="col">${name}</th>`)}</tr></thead>
+    <thead><tr>${['shift / mm', 'yaw / mrad', 'roll / mrad', 'Δr / mm', html`left F<sub>x</sub>, F<sub>y</sub> / kN`, html`right F<sub>x</sub>, F<sub>y</sub> / kN`, 'angles / °'].map((name) => html`<th scope="col">${name}</th>`)}</tr></thead>
     <tbody>${positions.map((position, at) => html`<tr aria-current=${at === chosen ? 'true' : nothing}>
-      <td><button class="link" @click=${() => choosePosition(app, position)}>${number(position.lateral_shift_mm, 3)}</button></td>
-      <td>${number(1000 * position.yaw_rad, 3)}</td><td>${number(1000 * position.roll_rad, 3)}</td><td>${number(position.radius_difference_mm, 3)}</td>
+      <td><button class="link" @click=${() => choosePosition(app, position)}>${fixed(position.lateral_shift_mm, 2)}</button></td>
+      <td>${fixed(1000 * position.yaw_rad, 2)}</td><td>${fixed(1000 * position.roll_rad, 3)}</td><td>${fixed(position.radius_difference_mm, 3)}</td>
       ${[position.left, position.right].map(({ force_x_n: x, force_y_n: y }) => html`<td>${kilonewtons(x)}, ${kilonewtons(y)}</td>`)}
       <td>${degrees(position.left.contact_angle_rad)}, ${degrees(position.right.contact_angle_rad)}</td></tr>`)}</tbody></table></div>`;
 }

@@ -1,6 +1,7 @@
 // What drawings share: paths, and lines of a grid with their numbers.
 
 import { nothing, svg } from '../../vendor/lit-html.js';
+import { smoothLine } from '../field/cells.js';
 import { tickLabel, ticks } from '../format.js';
 
 /** @typedef {readonly [number, number]} Point */
@@ -55,6 +56,7 @@ export function grid(axes, labels) {
  * @property {string} label
  * @property {string} look Its class: `one`, `two`, `three` or `limit`; with `solid` or `dashed`.
  * @property {readonly Point[]} points
+ * @property {boolean} [smooth] They are few points of a smooth curve.
  * @property {readonly (number | null)[]} [errors] Of the points: half the length of their bars.
  * @property {readonly [readonly Point[], readonly Point[]]} [band] Its edges.
  */
@@ -99,7 +101,7 @@ export function drawChart({ name, x, y, lines, xRange, yRange, marks = [], chose
     <svg x=${axes.left} y=${axes.top} width=${axes.right - axes.left} height=${axes.bottom - axes.top} viewBox=${box}>
       ${lines.map(({ look, band }) => (band ? svg`<path class=${`band ${look}`} d=${`${path(band[0].map(T))}${path([...band[1]].reverse().map(T)).replace('M', 'L')}Z`}/>` : nothing))}
       ${chosen ? svg`<path class="chosen" d=${`M${T([chosen.x, 0])[0]} ${axes.top}V${axes.bottom}`}/>` : nothing}
-      ${lines.map(({ look, points, errors }) => svg`<path class=${`line ${look}`} d=${path(points.map(T))}/>${errors ? svg`<path class=${`line bars ${look}`} d=${bars(points, errors, T)}/>` : nothing}`)}
+      ${lines.map(({ look, points, errors, smooth }) => svg`<path class=${`line ${look}`} d=${path(smooth ? smoothLine(points.map((point) => [...T(point)])) : points.map(T))}/>${errors ? svg`<path class=${`line bars ${look}`} d=${bars(points, errors, T)}/>` : nothing}`)}
     </svg>
     ${marks.map(({ at, label }, order) => {
       const [px, py] = T(at);

@@ -3,6 +3,7 @@
 import { html, nothing, svg } from '../../vendor/lit-html.js';
 import { degrees, number, tickLabel, ticks } from '../format.js';
 import { surfaceOf } from '../placing.js';
+import { combShape } from '../field/comb.js';
 import { grid, path, scaleOf } from './axes.js';
 
 /** @typedef {import('../placing.js').Placed} Placed */
@@ -142,7 +143,7 @@ function latticeNumbers([y0, y1], [low, high], T, height) {
   return svg`
     <g>
       ${ys.slice(1, -1).map((y) => svg`<text x=${T([y, 0])[0]} y=${height - 6} text-anchor="middle">${tickLabel(y, ys)}</text>`)}
-      ${zs.slice(1).map((z) => svg`<text x="6" y=${T([0, z])[1] + 4}>${tickLabel(z, zs)}</text>`)}
+      ${zs.slice(1).filter((z) => T([0, z])[1] > 30).map((z) => svg`<text x="6" y=${T([0, z])[1] + 4}>${tickLabel(z, zs)}</text>`)}
       <text x="6" y="14" class="strong">z up / mm</text>
       <text x=${WIDTH - 6} y=${height - 22} text-anchor="end" class="strong">y to the left / mm</text>
     </g>`;
@@ -163,7 +164,7 @@ function standPatches({ patches, combs, chosen, choose, bent, near }, rail, widt
     const angle = patch.position.contact_angle_rad;
     const [, y, z] = patch.position.track_mm;
     const comb = combs[at];
-    const shape = comb && [...comb.y.map((across) => surface(across, 0)), ...comb.y.map((across, i) => surface(across, comb.pressure[i] * scale)).reverse()].map(T);
+    const shape = comb && combShape(comb, surface, scale, T);
     const [x, top] = T([y - TAG * width * Math.sin(angle), z + TAG * width * Math.cos(angle)]);
     const [cx, cy] = T([y, z]);
     return svg`<g class=${`patch ${at === chosen ? 'chosen' : ''}`} data-patch=${at} @click=${() => choose(at)}>

@@ -2,6 +2,7 @@
 
 import { html, nothing, svg } from '../../vendor/lit-html.js';
 import { fixed, number } from '../format.js';
+import { combShape } from '../field/comb.js';
 import { surfaceOf } from '../placing.js';
 import { path } from './axes.js';
 
@@ -21,7 +22,9 @@ import { path } from './axes.js';
  */
 
 const WIDTH = 900;
-const MARGIN_MM = 12;
+/** What is drawn beside the rail: to the field side, and to the track centre, where the flange is. */
+const FIELD_MM = 12;
+const FLANGE_MM = 40;
 const BETWEEN = 26;
 /** Height of a wheel over its rail when they are drawn apart. */
 export const APART_MM = 30;
@@ -33,9 +36,13 @@ const APART_PX = 30;
 export function drawWheelset(sides, apart, shift) {
   const all = Object.values(sides);
   if (!all.length) return html`<p class="pad quiet">Loading the cross-sections …</p>`;
-  const spans = all.map(({ rail }) => /** @type {const} */ ([Math.min(...rail.map(([y]) => y)) - MARGIN_MM, Math.max(...rail.map(([y]) => y)) + MARGIN_MM]));
+  const spans = all.map(({ rail }) => {
+    const ys = rail.map(([y]) => y);
+    const left = ys[0] > 0;
+    return /** @type {const} */ ([Math.min(...ys) - (left ? FLANGE_MM : FIELD_MM), Math.max(...ys) + (left ? FIELD_MM : FLANGE_MM)]);
+  });
   const scale = (WIDTH - BETWEEN * (all.length - 1)) / spans.reduce((sum, [from, to]) => sum + to - from, 0);
-  const [top, low] = [24 + (apart ? APART_MM : 0), -30];
+  const [top, low] = [24 + (apart ? APART_MM : 0), -34];
   const height = (top - low) * scale;
   const most = Math.max(1, ...all.flatMap(({ pressed }) => pressed.map(({ patch }) => patch.pressure_max_mpa)));
   let left = 0;
@@ -73,7 +80,5 @@ function contactLines({ lines, touch }, T) {
 /** @param {import('../api.js').Patch} patch @param {import('../field/comb.js').Comb | null} comb @param {ReturnType<typeof surfaceOf>} surface @param {number} size Of the largest pressure, in mm. @param {(point: Point) => Point} T */
 function pressure(patch, comb, surface, size, T) {
   if (!surface || !comb) return nothing;
-  const scale = size / patch.pressure_max_mpa;
-  const shape = [...comb.y.map((y) => surface(y, 0)), ...comb.y.map((y, i) => surface(y, comb.pressure[i] * scale)).reverse()];
-  return svg`<path class="comb" d=${`${path(shape.map(T))}Z`}/>`;
+  return svg`<path class="comb" d=${`${path(combShape(comb, surface, size / patch.pressure_max_mpa, T))}Z`}/>`;
 }

@@ -1,6 +1,6 @@
 // The largest pressure of every strip of a patch, as it is drawn on the profiles.
 
-import { indexOf } from './cells.js';
+import { indexOf, smoothLine } from './cells.js';
 
 /** @typedef {{ y: number[], pressure: number[] }} Comb The largest pressure of every strip, across the patch. */
 
@@ -11,4 +11,18 @@ export function combOf(field) {
   const pressure = field.cells.pressure_mpa;
   const largest = strips.map(({ first, end }) => pressure.slice(first, end).reduce((most, value) => Math.max(most, value), 0));
   return { y: [strips[0].low, ...strips.map(({ y }) => y), strips[strips.length - 1].high], pressure: [0, ...largest, 0] };
+}
+
+/** @typedef {[number, number]} Place */
+
+/**
+ * The outline of a comb over the surface of its patch.
+ * @param {Comb} comb
+ * @param {(across: number, height: number) => Place} surface
+ * @param {number} scale Height of a MPa, in mm.
+ * @param {(place: Place) => readonly [number, number]} T To pixels.
+ */
+export function combShape({ y, pressure }, surface, scale, T) {
+  const pixels = (/** @type {number} */ across, /** @type {number} */ height) => /** @type {Place} */ ([...T(surface(across, height))]);
+  return [...y.map((across) => pixels(across, 0)), ...smoothLine(y.map((across, at) => pixels(across, pressure[at] * scale))).reverse()];
 }

@@ -1,6 +1,6 @@
 // The picture of a field: colours inside the border, the border of the stick zone, arrows, axes and the colour bar.
 
-import { number, tickLabel, ticks } from '../format.js';
+import { fixed, number, tickLabel, ticks } from '../format.js';
 import { colourise, hex, mapOf } from './palette.js';
 import { rasterCells, rasterSmooth, rasterZones } from './raster.js';
 import { smoothLine } from './cells.js';
@@ -441,9 +441,9 @@ export function inkOf(element) {
  * @param {number} cell -1 outside.
  * @returns {[string, string][]}
  */
-export function tell({ index, friction, quantity, values }, place, cell) {
+export function tell({ index, friction, quantity, values, bent }, place, cell) {
   /** @type {[string, string][]} */
-  const told = [['x', `${number(place.x)} mm`], ['y', `${number(place.y)} mm`]];
+  const told = [['x', `${fixed(place.x, 3)} mm`], [bent ? 's' : 'y', `${fixed(place.y, 3)} mm`]];
   if (cell < 0) return [...told, ['', 'outside the patch']];
   const { pressure_mpa, traction_x_mpa, traction_y_mpa, slip_x, slip_y, temperature_c, zone } = index.cells;
   if (quantity.key === 'difference') return [...told, [quantity.heading, `${number(values[cell])} ${quantity.unit}`]];

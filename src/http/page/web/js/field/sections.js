@@ -1,6 +1,6 @@
 // The two sections of a field at the crosshair: along rolling below the map, across on its right. They share its axes.
 
-import { number, tickLabel, ticks } from '../format.js';
+import { fixed, tickLabel, ticks } from '../format.js';
 import { sectionSmooth } from './raster.js';
 
 /** @typedef {import('./layout.js').Layout} Layout */
@@ -75,7 +75,7 @@ function sectionOf({ index, quantity, range, friction }, layout, box, along, cel
  */
 function drawSection(pen, scene, section, layout, place, here, ink) {
   const { values, quantity, friction, index } = scene;
-  drawScale(pen, section, quantity.scale === 'signed' ? 5 : 3, ink);
+  drawScale(pen, section, Math.min(quantity.scale === 'signed' ? 5 : 3, section.along ? Infinity : section.box.width / 45), ink);
   shadeStick(pen, section, index.cells.zone, ink);
   if (section.bounded) {
     const pressure = index.cells.pressure_mpa ?? [];
@@ -92,7 +92,7 @@ function drawSection(pen, scene, section, layout, place, here, ink) {
   const { box } = section;
   const legend = section.bounded && !layout.narrow ? '   (dashed: μp, shaded: stick)' : '';
   const what = quantity.unit ? `${quantity.label.toLowerCase()} / ${quantity.unit}` : quantity.label.toLowerCase();
-  const title = section.along ? `${what} along rolling, y = ${number(place.y, 3)} mm${legend}` : `across, x = ${number(place.x, 3)} mm`;
+  const title = section.along ? `${what} along rolling, ${scene.bent ? 's' : 'y'} = ${fixed(place.y, 2)} mm${legend}` : `across, x = ${fixed(place.x, 2)} mm`;
   pen.fillText(title, box.left, box.top - 7);
   if (section.along || !quantity.unit) return;
   pen.textAlign = 'right';
