@@ -118,7 +118,7 @@ test('a worn rail lies over a new one: difference, worn area, numbers of all pat
   assert.equal(parsed((await row('patches'))[1]), result.patches.length);
   assert.ok(Math.abs(parsed((await row('Q / kN'))[1]) + result.total[0].force_z_n / 1000) < 0.01);
   for (const name of ['Y, outward', 'Y/Q', 'largest pressure', 'area', 'Tγ', 'wear depth', 'N / kN']) assert.ok((await row(name)).length >= 3, name);
-  await page.getByLabel('aligned').selectOption('fit');
+  await page.getByLabel('aligned').selectOption('place');
   await page.locator('section[aria-labelledby="h-overlay"]').getByText('Worn area').waitFor();
   await page.getByRole('radio', { name: 'wheel' }).check();
   await page.getByText('Both cases have the same wheel.').waitFor();

@@ -16,7 +16,7 @@ async function fill(page, name) {
   await page.getByLabel('Name').fill(name);
   await page.getByLabel('What wears').selectOption('the rail');
   await page.getByLabel('Traffic over the rail').fill('4');
-  await page.getByLabel('Steps to keep').fill('4');
+  await page.getByLabel('Steps shown').fill('4');
   await page.getByLabel('rail height, W1').fill('0,05');
 }
 

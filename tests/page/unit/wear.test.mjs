@@ -25,10 +25,24 @@ test('a groove in the head is worn by its area and its depth, in whichever sense
   assert.ok(Math.abs(wearBetween(wheel(head), wheel(worn), 'wheel', [0, 0]).area - 10) < 0.1);
 });
 
-test('the best fit finds a shift of a shape that is worn in part', () => {
-  const moved = head.map(([y, z]) => /** @type {[number, number]} */ ([y + 1.3, (y > 12 && y < 25 ? z - 0.8 : z) - 0.7]));
-  const [y, z] = bestFit(head, moved);
+test('a fit finds the shift of a rail whose whole gauge side is worn', () => {
+  // The gauge face lies 1 mm further back, and the head up to its middle is 0.8 mm lower.
+  const worn = head.map(([y, z]) => /** @type {[number, number]} */ ([y === -30 ? -29 : y, y < 2 ? z - 0.8 : z]));
+  const moved = worn.map(([y, z]) => /** @type {[number, number]} */ ([y + 1.3, z - 0.7]));
+  const [y, z] = bestFit(head, moved, 'rail');
   assert.ok(Math.abs(y + 1.3) < 0.1 && Math.abs(z - 0.7) < 0.03, `${y}, ${z}`);
+});
+
+test('a fit finds the shift of a hollow wheel by the back of its flange, and of a wheel without a back by all of it', () => {
+  // Back, tip of a flange as half a circle, flank and a tread of 1:20.
+  const tip = Array.from({ length: 31 }, (_, i) => (i / 30) * Math.PI).map((angle) => /** @type {[number, number]} */ ([-55 - 14 * Math.cos(angle), -14 - 14 * Math.sin(angle)]));
+  const wheel = /** @type {[number, number][]} */ ([[-69, 10], [-69, -2], ...tip, [-38, -2], ...Array.from({ length: 90 }, (_, i) => /** @type {[number, number]} */ ([-36 + i, i / 20]))]);
+  const hollow = wheel.map(([y, z]) => /** @type {[number, number]} */ ([y + 0.6, (y > -36 ? z + 1 : z) + 0.4]));
+  const [y, z] = bestFit(wheel, hollow, 'wheel');
+  assert.ok(Math.abs(y + 0.6) < 0.05 && Math.abs(z + 0.4) < 0.05, `${y}, ${z}`);
+  const bare = wheel.slice(20);
+  const [y1, z1] = bestFit(bare, bare.map(([a, b]) => /** @type {[number, number]} */ ([a + 0.6, b + 0.4])), 'wheel');
+  assert.ok(Math.abs(y1 + 0.6) < 0.05 && Math.abs(z1 + 0.4) < 0.05, `${y1}, ${z1}`);
 });
 
 test('the angle of a flange is that of its flank, and Nadal\'s limit follows from it', () => {

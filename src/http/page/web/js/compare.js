@@ -32,7 +32,7 @@ import { firstPatch, oneWheel, outward, sideOf } from './wheelloads.js';
  * @property {string} quantity
  * @property {number} other Which side the first is compared with.
  * @property {Body} body Which cross-sections are laid over each other.
- * @property {boolean} fitted They are aligned by best fit, not as they lie in the track and on the axle.
+ * @property {boolean} fitted They are aligned by a best fit of what is not worn, not as they lie in the track and on the axle.
  * @property {boolean} sameRail Fields are subtracted at the same place on the rail, not of the patch.
  */
 
@@ -101,7 +101,7 @@ export function wearOf({ sides, other, body, fitted }) {
   if (wearBefore?.key !== key) {
     const moved = shapeOf(two, two.sections, body);
     const first = shapeOf(one, one.sections, body);
-    wearBefore = { key, wear: wearBetween(first, moved, body, fitted ? bestFit(first, moved) : [0, 0]) };
+    wearBefore = { key, wear: wearBetween(first, moved, body, fitted ? bestFit(first, moved, body) : [0, 0]) };
   }
   return wearBefore.wear;
 }

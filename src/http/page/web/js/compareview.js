@@ -161,7 +161,7 @@ function numbersPanel({ sides, other }) {
     if (one === undefined || two === undefined || !Number.isFinite(one) || !Number.isFinite(two)) return nothing;
     const error = Math.hypot(errors[0] ?? 0, errors[other] ?? 0);
     return html`<tr><th scope="row">${label}${unit ? ` / ${unit}` : ''}</th>${values.map((value, at) => html`<td>${Number.isInteger(value) ? value : plusMinus(value ?? NaN, errors[at])}</td>`)}
-      <td>${number(two - one, 3)}</td><td class="quiet wrapped">${apart(two - one, error)}</td></tr>`;
+      <td>${number(two - one, 3)}</td><td class="quiet">${apart(two - one, error)}</td></tr>`;
   };
   return html`<section class="panel" aria-labelledby="h-numbers"><header class="bar"><h2 id="h-numbers">Numbers</h2></header><div class="scroll" tabindex="0" role="region" aria-labelledby="h-numbers">
     <table><thead><tr><th></th>${points.map((_, place) => html`<th scope="col">${LETTERS[place]}</th>`)}<th scope="col">${letter} − A</th><th></th></tr></thead>
@@ -192,7 +192,7 @@ function profilesPanel(app, of) {
       <div class="segs" role="group" aria-label="Cross-section">${/** @type {const} */ (['rail', 'wheel']).map((body) => html`<label class="seg">
         <input type="radio" name="body" .checked=${of.body === body} @change=${() => chooseCompared(app, { body })}><span>${body}</span></label>`)}</div>
       <label class="inline">aligned <select class="slim" @change=${align}><option value="place" ?selected=${!of.fitted}>${of.body === 'rail' ? 'at gauge and top' : 'at flange back and running circle'}</option>
-        <option value="fit" ?selected=${of.fitted}>by best fit</option></select></label></header>
+        <option value="fit" ?selected=${of.fitted}>${of.body === 'rail' ? 'by the field side' : 'by the flange back'}</option></select></label></header>
     <div class="cards"><div class="card">${drawShapes({
       name: `Cross-section of the ${of.body} of ${letter} over that of A`, shapes, mark: most && { at: most.at, label: `${fixed(most.depth, 2)} mm` },
     })}</div>

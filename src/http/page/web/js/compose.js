@@ -123,7 +123,7 @@ export function verdict(app, state, timed = true) {
   if (!checked) return html`<p class="quiet">Checking …</p>`;
   const motions = checked.motions > 1 ? `${count(checked.motions)} motions, about` : 'About';
   const warnings = checked.remarks.filter(({ severity }) => severity === 'warning').length;
-  const told = warnings === 0 ? 'Ready to solve' : warnings === 1 ? '1 warning' : `${warnings} warnings`;
+  const told = warnings === 0 ? (timed ? 'Ready to solve' : 'Rail and wheel can be solved') : warnings === 1 ? '1 warning' : `${warnings} warnings`;
   return html`<p class=${warnings ? 'checked warn' : 'checked good'}>${told}.${timed ? ` ${motions} ${seconds(checked.estimate.seconds)}.` : ''}</p>
     ${adviceOf(app)}${remarkList(checked.remarks)}`;
 }

@@ -58,7 +58,7 @@ function formPanel(app, forecast) {
       <div>
         <fieldset><legend>How far</legend><div class="pair">${form.wearing === 'wheel' ? nothing : entry('mgt', 'Traffic over the rail', 'MGT')}${form.wearing === 'rail' ? nothing : entry('km', 'Distance of the wheel', 'km')}</div>
           <div class="pair">${select('wearing', 'What wears', [['both', 'rail and wheel'], ['rail', 'the rail'], ['wheel', 'the wheel']])}${select('law', 'Law of wear', [['usfd_wear', 'Tγ/A (Sheffield)'], ['archard_wear', 'Archard']])}</div>
-          <div class="pair">${select('states', 'Condensed traffic', [['24', 'quick look: 24 states'], ['', '100 states'], ['200', 'fine: 200 states']])}${entry('records', 'Steps to keep', '')}</div>
+          <div class="pair">${select('states', 'Traffic condensed to', [['24', 'quick look: 24 states'], ['', '100 states'], ['200', 'fine: 200 states']])}${entry('records', 'Steps shown', '')}</div>
           ${entry('name', 'Name', '', nameOf(form))}</fieldset>
         <fieldset><legend>Limits</legend><div class="triple">${LOSSES.filter(({ body }) => form.wearing === 'both' || form.wearing === body).map(({ key, label }) => html`<div class="field"><label for=${`f-${key}`}>${label}</label>
           <span class="input"><input id=${`f-${key}`} inputmode="decimal" autocomplete="off" placeholder="none" .value=${form.limits[key] ?? ''} @input=${(/** @type {Event} */ event) => writeForm(app, { limits: { ...form.limits, [key]: valueOf(event) } })}><span class="unit">mm</span></span></div>`)}</div></fieldset>

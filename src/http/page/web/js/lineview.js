@@ -87,6 +87,6 @@ function worstPanel(app, line) {
     ${limit === undefined ? nothing : html`<p class="pad">${count(over)} of ${count(line.rows.length)} over the limit of ${number(limit)} ${strip.unit}</p>`}
     <div class="scroll" tabindex="0" role="region" aria-labelledby="h-worst"><table>
       <thead><tr><th scope="col">${line.by || 'case'}</th>${STRIPS.map(({ short, unit }) => html`<th scope="col">${short} / ${unit.split(' ')[0]}</th>`)}<th></th></tr></thead>
-      <tbody>${rows.map((row) => html`<tr><th scope="row">${number(placeOf(row, line.by), 6)}</th>${STRIPS.map(({ key }) => html`<td class=${over && key === strip.key && row[key] > (limit ?? Infinity) ? 'warn' : ''}>${number(row[key])}</td>`)}
+      <tbody>${rows.map((row) => html`<tr><th scope="row">${String(Number(placeOf(row, line.by).toPrecision(7)))}</th>${STRIPS.map(({ key }) => html`<td class=${over && key === strip.key && row[key] > (limit ?? Infinity) ? 'warn' : ''}>${number(row[key])}</td>`)}
         <td><a href=${formatRoute('result', [row.id])}>open<span class="visually-hidden"> the contact at ${number(placeOf(row, line.by), 6)}</span></a></td></tr>`)}</tbody></table></div></section>`;
 }

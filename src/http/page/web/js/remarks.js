@@ -53,5 +53,5 @@ function entry({ remark, patches, points }, go) {
   ];
   return html`<p class=${`remark ${remark.severity}`} data-code=${remark.code}>
     ${go ? places.map(({ label, place }) => html`<button class="small" @click=${() => go(place)}>${label}</button> `) : nothing}
-    ${remark.pointer ? html`<b>${inWords(remark.pointer)}</b> ` : nothing}${remark.detail}</p>`;
+    ${remark.pointer && !remark.detail.startsWith(`${wordsOf(remark.pointer).label}:`) ? html`<b>${inWords(remark.pointer)}</b> ` : nothing}${remark.detail}</p>`;
 }

@@ -176,9 +176,9 @@ function figures(looked, patch, point) {
     ${figure(html`p<sub>max</sub>`, region.pressure_max_mpa, 'MPa', point.profile_uncertainty?.pressure_max_mpa ?? undefined)}
     ${figure('area', region.area_mm2, 'mm²', undefined)}
     ${Number.isFinite(used) ? figure('friction used', used, '% of μN', errors && Math.hypot(errors.force_x_n, errors.force_y_n) / bound) : nothing}
-    ${Number.isFinite(share) ? html`<div class="figure-of"><dt>stick</dt><dd><b>${number(100 * share, 3)}</b><span class="unit"> % of the area</span></dd>
+    ${Number.isFinite(share) ? html`<div class="figure-of"><dt>stick</dt><dd><b>${number(100 * share, 3)}</b><span class="unit"> % of area</span></dd>
       <svg class="share" viewBox="0 0 100 5" preserveAspectRatio="none" aria-hidden="true"><rect class="slip" width="100" height="5"/><rect class="stick" width=${100 * share} height="5"/></svg></div>` : nothing}
-    ${figure('Tγ, friction power', point.friction_power_n, 'J/m', power && ((power.high ?? power.value) - (power.low ?? power.value)) / 2)}
+    ${figure('Tγ', point.friction_power_n, 'J/m', power && ((power.high ?? power.value) - (power.low ?? power.value)) / 2)}
   </dl>`;
 }
 
@@ -300,13 +300,14 @@ function curvePanel(app, looked, patch) {
   const pick = (/** @type {number} */ point) => choose(app, { point });
   const at = curve.order.indexOf(looked.point);
   const slide = (/** @type {Event} */ event) => pick(curve.order[Number(/** @type {HTMLInputElement} */ (event.target).value)]);
+  const [what, unit = ''] = curve.xLabel.split(' / ');
   const rolled = isHistory(patch);
   const kinds = /** @type {const} */ ([['forces', 'Forces'], ['moment', 'Moment'], ...(rolled ? [/** @type {const} */ (['creepages', 'Creepages'])] : [])]);
   return html`<section class="panel" aria-labelledby="h-curve"><header class="bar"><h2 id="h-curve">${rolled ? 'While it rolls' : 'Creep curve'}</h2>
     <div class="segs" role="group" aria-label="Curve">${kinds.map(([kind, label]) => html`<label class="seg">
       <input type="radio" name="curve" .checked=${looked.curve === kind} @change=${() => choose(app, { curve: kind })}><span>${label}</span></label>`)}</div></header>
     <creep-curve .shown=${{ curve, chosen: looked.point, pick }}></creep-curve>
-    <label class="slide"><span>Motion <output>${at + 1} of ${curve.order.length}: ${curve.xLabel.split(' /')[0]} ${number(curve.x[at])}</output></span>
+    <label class="slide"><span>Motion <output>${at + 1} of ${curve.order.length}: ${what} ${number(curve.x[at], 3)} ${unit.replace(/[()]/g, '')}</output></span>
       <input type="range" aria-label="Motion" min="0" max=${curve.order.length - 1} .value=${String(at)} @input=${slide}></label>
     <details class="as-table"><summary>As a table</summary><div class="scroll" tabindex="0" role="region" aria-label="Values of the curve"><table>
       <thead><tr><th scope="col">${curve.xLabel}</th>${curve.lines.map((line) => html`<th scope="col">${line.label} / ${line.unit}</th><th scope="col">±</th>`)}</tr></thead>

@@ -76,7 +76,7 @@ function worstPanel(app, of) {
     ${limit === undefined ? nothing : html`<p class="pad">${exceeding(of.sections?.all, quantity, limit)}</p>`}
     ${of.rows ? html`<div class="scroll" tabindex="0" role="region" aria-labelledby="h-worst"><table>
       <thead><tr><th scope="col">${of.by}</th>${QUANTITIES.map(({ short, unit }) => html`<th scope="col">${short} / ${unit}</th>`)}<th></th></tr></thead>
-      <tbody>${of.rows.map(({ row, place, values }) => html`<tr><th scope="row">${number(Number(place), 6)}</th>${QUANTITIES.map(({ key, factor }) => html`<td>${number(values[key] / factor)}</td>`)}
+      <tbody>${of.rows.map(({ row, place, values }) => html`<tr><th scope="row">${String(Number(Number(place).toPrecision(7)))}</th>${QUANTITIES.map(({ key, factor }) => html`<td>${number(values[key] / factor, 3)}</td>`)}
         <td><button class="small" aria-label=${`Open the contact of row ${row}`} @click=${() => openRow(app, row)}>open</button></td></tr>`)}</tbody></table></div>`
     : html`<div class="pad"><button class="small" @click=${search}>Search all ${count(of.run.rows)} rows</button></div>`}</section>`;
 }

@@ -63,20 +63,37 @@ function normalAt(line, at) {
   return [-dz / length, dy / length];
 }
 
+/** Least mean product of the normals' spread over which a part of a cross-section fixes both shifts. Chosen by judgement. */
+const SPREAD_MIN = 0.01;
+
+/** The part that traffic does not wear: the field side of a rail, the back of a wheel's flange up to its tip. @param {readonly Place[]} line @param {Body} body */
+function unworn(line, body) {
+  const ys = line.map(([y]) => y);
+  const middle = (Math.min(...ys) + Math.max(...ys)) / 2;
+  const tip = line.reduce((lowest, point) => (point[1] < lowest[1] ? point : lowest));
+  return (/** @type {Place} */ [y]) => (body === 'rail' ? y > middle : y < tip[0]);
+}
+
 /**
- * The shift of the second line that brings most of it onto the first: least squares of the distances along its normals, first of all points, then of
- * those that lie nearest.
- * @param {readonly Place[]} one
+ * The shift of the second line that brings what traffic does not wear of it onto the first: least squares of the distances along its normals, first
+ * of all points, then of those that lie nearest. All of the line counts where that part does not fix both shifts.
+ * @param {readonly Place[]} one With y to the field side, as the second.
  * @param {readonly Place[]} two
+ * @param {Body} body
  * @returns {Place} In mm.
  */
-export function bestFit(one, two) {
-  const [fixed, free] = [resampled(one, 0.5), resampled(two, 1)];
+export function bestFit(one, two, body) {
+  const fixed = resampled(one, 0.5);
+  const whole = resampled(two, 1).map((point, at, line) => ({ point, normal: normalAt(line, at) }));
+  const isUnworn = unworn(two, body);
+  const part = whole.filter(({ point }) => isUnworn(point));
+  const mean = (/** @type {(normal: Place) => number} */ of) => part.reduce((sum, { normal }) => sum + of(normal), 0) / part.length;
+  const spread = mean(([ny]) => ny * ny) * mean(([, nz]) => nz * nz) - mean(([ny, nz]) => ny * nz) ** 2;
+  const free = spread > SPREAD_MIN ? part : whole;
   let [sy, sz] = [0, 0];
   for (let round = 0; round < ROUNDS; round += 1) {
-    const pairs = free.flatMap(([y, z], at) => {
+    const pairs = free.flatMap(({ point: [y, z], normal: [ny, nz] }) => {
       const found = nearestOn(fixed, [y + sy, z + sz]);
-      const [ny, nz] = normalAt(free, at);
       return found.end ? [] : [{ ny, nz, rest: ny * (found.place[0] - y - sy) + nz * (found.place[1] - z - sz) }];
     }).sort((a, b) => Math.abs(a.rest) - Math.abs(b.rest));
     const near = round < WHOLE_ROUNDS ? pairs : pairs.slice(0, Math.ceil(FITTED * pairs.length));

@@ -117,7 +117,7 @@ function samplesOf(index, values, vanishes) {
 }
 
 /** Points of a section. */
-const SECTION_POINTS = 80;
+const SECTION_POINTS = 160;
 
 /**
  * Interpolated values on a line through the patch, from border to border.

@@ -1,6 +1,7 @@
 // The two sections of a field at the crosshair: along rolling below the map, across on its right. They share its axes.
 
 import { fixed, tickLabel, ticks } from '../format.js';
+import { smoothLine } from './cells.js';
 import { sectionSmooth } from './raster.js';
 
 /** @typedef {import('./layout.js').Layout} Layout */
@@ -109,9 +110,16 @@ function drawSection(pen, scene, section, layout, place, here, ink) {
  * @returns {[number, number][]}
  */
 function lineOf({ index, mesh }, { along, cells }, values, vanishes, place) {
-  if (index.whole && !mesh) return sectionSmooth(index, values, along, place, vanishes);
+  if (index.whole && !mesh) return atCells(sectionSmooth(index, values, along, place, vanishes), cells.length);
   const { x_mm, y_mm } = index.cells;
   return cells.map((cell) => [along ? x_mm[cell] : y_mm[cell], values[cell]]);
+}
+
+/** A section at its ends and about the middles of its cells, between which a curve is drawn. @param {[number, number][]} line @param {number} cells */
+function atCells(line, cells) {
+  const inner = line.length - 2;
+  if (cells < 3 || cells >= inner) return line;
+  return [line[0], ...Array.from({ length: cells }, (_, cell) => line[1 + Math.floor(((cell + 0.5) / cells) * inner)]), line[line.length - 1]];
 }
 
 /**
@@ -172,9 +180,8 @@ function drawLine(pen, { along, box, value }, layout, line, colour, width, dash)
   pen.rect(box.left - 2, box.top - 2, box.width + 4, box.height + 4);
   pen.clip();
   pen.beginPath();
-  line.forEach(([at, amount], order) => {
-    const x = along ? layout.X(at) : value(amount);
-    const y = along ? value(amount) : layout.Y(at);
+  const pixels = line.map(([at, amount]) => /** @type {[number, number]} */ (along ? [layout.X(at), value(amount)] : [value(amount), layout.Y(at)]));
+  smoothLine(pixels).forEach(([x, y], order) => {
     if (order) pen.lineTo(x, y);
     else pen.moveTo(x, y);
   });
