@@ -148,7 +148,7 @@ function readingFields(app, body) {
   const pointer = `/contact/${body}`;
   const remarks = (checked?.remarks ?? []).filter((remark) => remark.pointer === pointer || remark.pointer?.startsWith(`${pointer}/`));
   const mirrored = (/** @type {'y' | 'z'} */ axis) => remarks.find(({ code }) => code === `profile-${axis}-mirrored`);
-  const found = (/** @type {'y' | 'z'} */ axis) => !checked ? 'found from the shape' : mirrored(axis) ? 'found: not the usual sense' : 'found: the usual sense of the format';
+  const found = (/** @type {'y' | 'z'} */ axis) => !checked ? 'found from the shape' : mirrored(axis) ? 'found: mirrored' : 'found: as usual';
   const quality = checked?.quality?.[body];
   const smoothing = at(document ?? undefined, `${pointer}/smoothing_mm`);
   const advised = quality?.smoothing_suggested_mm ?? 0;

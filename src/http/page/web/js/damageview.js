@@ -121,7 +121,7 @@ function wearCard(app, looked, answer, shown) {
       name: `Wear depth of one pass across the ${placed ? body : 'patch'}`, lines: all, y: 'depth of one pass / nm',
       x: placed ? `y on the ${body}, to the field side / mm` : 'y in the patch, to the left / mm', xRange: [Math.min(...ys) - margin, Math.max(...ys) + margin],
     })}
-    <p class="hint">${placed && body === 'wheel' ? 'At the places of the wheel where the rail wears; both laws are those of a rail passed once, and of a wheel once per turn.' : `Archard: middle of the range of its coefficient.${answer.wheelset ? ' Lines of both wheels.' : ''}`}</p></div>`;
+    <p class="hint">${placed && body === 'wheel' ? 'At the places of the wheel where the rail wears; both laws are those of a rail passed once, and of a wheel once per turn.' : `Each cell has a regime of its own; the table has that of the mean over the patch. Archard: middle of the range of its coefficient.${answer.wheelset ? ' Lines of both wheels.' : ''}`}</p></div>`;
 }
 
 /** @param {JobResult} answer @param {number} patch */

@@ -136,16 +136,18 @@ export function drawShapes({ name, shapes, mark }) {
   const all = shapes.flatMap(({ points }) => points);
   const [ys, zs] = [all.map(([y]) => y), all.map(([, z]) => z)];
   const [y0, y1, z0, z1] = [Math.min(...ys) - 4, Math.max(...ys) + 4, Math.min(...zs) - 4, Math.max(...zs) + 4];
-  const width = 640;
+  // Text keeps its size: on a narrow screen the picture is smaller.
+  const width = Math.min(640, Math.max(380, innerWidth - 60));
   const scale = (width - 60) / (y1 - y0);
   const bottom = 26 + (z1 - z0) * scale;
   const axes = { left: 50, right: width - 10, top: 26, bottom, x: /** @type {const} */ ([y0, y1]), y: /** @type {const} */ ([z0, z1]) };
   const T = scaleOf(axes);
-  return svg`<svg class="drawing chart" viewBox=${`0 0 ${width} ${(bottom + 40 + 18 * shapes.length).toFixed(0)}`} role="img" aria-label=${name}>
+  const room = Math.floor((width - 90) / LEGEND.character);
+  return svg`<svg class="drawing chart shapes" viewBox=${`0 0 ${width} ${(bottom + 40 + 18 * shapes.length).toFixed(0)}`} role="img" aria-label=${name}>
     ${grid(axes, { x: 'y from the track centre, to the field side / mm', y: 'z up / mm', columns: 8, rows: 4 })}
     ${shapes.map(({ look, points }) => svg`<path class=${`line ${look}`} d=${path(points.map(T))}/>`)}
     ${mark ? svg`<g class="mark"><circle cx=${T(mark.at)[0]} cy=${T(mark.at)[1]} r="5"/><text
       x=${T(mark.at)[0] + (T(mark.at)[0] > 0.8 * width ? -9 : 9)} y=${T(mark.at)[1] + 18} text-anchor=${T(mark.at)[0] > 0.8 * width ? 'end' : 'start'}>${mark.label}</text></g>` : ''}
-    ${shapes.map(({ label, look }, order) => svg`<g class="legend"><path class=${`line ${look}`} d=${`M50 ${bottom + 46 + 18 * order}h22`}/><text x="80" y=${bottom + 50 + 18 * order}>${label}</text></g>`)}
+    ${shapes.map(({ label, look }, order) => svg`<g class="legend"><path class=${`line ${look}`} d=${`M50 ${bottom + 46 + 18 * order}h22`}/><text x="80" y=${bottom + 50 + 18 * order}>${label.length > room ? `${label.slice(0, room - 1)}…` : label}</text></g>`)}
   </svg>`;
 }

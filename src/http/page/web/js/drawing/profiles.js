@@ -27,6 +27,8 @@ const TOP_MM = 27;
 /** Heights of the largest pressure and of the number of a patch, as parts of the width that is drawn. */
 const COMB = 0.12;
 const TAG = 0.17;
+/** The width of a pressure beside the number of a patch, in pixels. */
+const LABEL = 84;
 /** Surroundings of the patches, as a part of their width. */
 const NEAR = 0.3;
 
@@ -167,13 +169,15 @@ function standPatches({ patches, combs, chosen, choose, bent, near }, rail, widt
     const shape = comb && combShape(comb, surface, scale, T);
     const [x, top] = T([y - TAG * width * Math.sin(angle), z + TAG * width * Math.cos(angle)]);
     const [cx, cy] = T([y, z]);
+    // The pressure is written away from the patch, where there is room for it.
+    const beside = x < cx && x > LABEL;
     return svg`<g class=${`patch ${at === chosen ? 'chosen' : ''}`} data-patch=${at} @click=${() => choose(at)}>
       ${shape ? svg`<path class="comb" d=${`${path(shape)}Z`}/>` : nothing}
       <line x1=${cx} y1=${cy} x2=${x} y2=${top}/>
       <circle class="dot" cx=${cx} cy=${cy} r="4"/>
       <circle class="tag" cx=${x} cy=${top} r="12"/>
       <text class="tag" x=${x} y=${top + 4.5} text-anchor="middle">${at}</text>
-      ${near ? svg`<text class="strong" x=${x < cx ? x - 18 : x + 18} y=${top + 4.5} text-anchor=${x < cx ? 'end' : 'start'}>${number(patch.pressure_max_mpa, 4)} MPa</text>` : nothing}
+      ${near ? svg`<text class="strong" x=${beside ? x - 18 : x + 18} y=${top + 4.5} text-anchor=${beside ? 'end' : 'start'}>${number(patch.pressure_max_mpa, 4)} MPa</text>` : nothing}
     </g>`;
   });
 }

@@ -110,16 +110,17 @@ function drawSection(pen, scene, section, layout, place, here, ink) {
  * @returns {[number, number][]}
  */
 function lineOf({ index, mesh }, { along, cells }, values, vanishes, place) {
-  if (index.whole && !mesh) return atCells(sectionSmooth(index, values, along, place, vanishes), cells.length);
-  const { x_mm, y_mm } = index.cells;
-  return cells.map((cell) => [along ? x_mm[cell] : y_mm[cell], values[cell]]);
+  const middle = along ? index.cells.x_mm : index.cells.y_mm;
+  if (index.whole && !mesh) return atCells(sectionSmooth(index, values, along, place, vanishes), cells.map((cell) => middle[cell]));
+  return cells.map((cell) => [middle[cell], values[cell]]);
 }
 
-/** A section at its ends and about the middles of its cells, between which a curve is drawn. @param {[number, number][]} line @param {number} cells */
-function atCells(line, cells) {
-  const inner = line.length - 2;
-  if (cells < 3 || cells >= inner) return line;
-  return [line[0], ...Array.from({ length: cells }, (_, cell) => line[1 + Math.floor(((cell + 0.5) / cells) * inner)]), line[line.length - 1]];
+/** A section at its ends and at the middles of its cells, between which a curve is drawn. @param {[number, number][]} line @param {readonly number[]} middles */
+function atCells(line, middles) {
+  const last = line.length - 1;
+  if (middles.length < 3 || middles.length >= last) return line;
+  const nearest = middles.map((middle) => line.reduce((best, [at], place) => (Math.abs(at - middle) < Math.abs(line[best][0] - middle) ? place : best), 1));
+  return [...new Set([0, ...nearest, last])].sort((one, two) => one - two).map((place) => line[place]);
 }
 
 /**
