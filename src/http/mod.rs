@@ -6,7 +6,7 @@
 //! 1. [`server::serve`] accepts the connection and passes its requests on. [`server::connections`] limits the number of connections,
 //!    and closes those whose client sends no request or does not read its answer.
 //! 2. The [`layers`] around all routes, from the outside inward: [`security_headers`], the client behind a trusted proxy
-//!    ([`client_address`]), [`drain_body`], [`request_id`], [`request_log`], [`otel`], [`metrics`], [`etag::complete`], [`compression`], [`final_newline`], the path in problems
+//!    ([`client_address`]), [`drain_body`], [`request_id`], [`request_log`], `otel` (feature `otlp`), [`metrics`], [`etag::complete`], [`compression`], [`final_newline`], the path in problems
 //!    ([`error::name_instance`]), [`origin_guard`], what is left of the rate ([`rate_limit::tell_left`]), what the request holds
 //!    until its answer is sent ([`holding_body`]), [`catch_panic`], [`admission`] of compressed bodies and their decompression.
 //! 3. The layers of a group of routes: whether JSON is accepted ([`accept::require_json`]) and what clients may keep

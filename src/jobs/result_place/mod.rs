@@ -3,9 +3,9 @@
 //! | to find | look in |
 //! |---|---|
 //! | the URL, and the store that it names | [`url`] |
-//! | how requests to an object store are sent, and how long they are waited for | [`client`] |
+//! | how requests to an object store are sent, and how long they are waited for | `client` |
 //! | what ties a database and the place of its results together | [`settle`] |
-//! | how all results go to another place | [`change`] |
+//! | how all results go to another place | `change` |
 
 #[cfg(feature = "cluster")]
 pub mod change;
