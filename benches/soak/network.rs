@@ -300,7 +300,7 @@ impl Network {
         })
         .await;
         let ready = back.elapsed().as_secs_f64();
-        // Hears of the cancellation at another node by the bell, or looks.
+        // Hears of the cancellation at another node by the notification, or looks.
         let cancel = format!("/v1/jobs/{running}/cancel");
         let cancelled = self.api.request(Method::POST, &cancel).send().await;
         assert_eq!(cancelled.expect("an answer").status(), 202);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args};
 
-use crate::jobs::options::{Bells, Database};
+use crate::jobs::options::{Database, NotifyMode};
 use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
 
 /// The variable of the data folder.
@@ -92,10 +92,10 @@ impl DatabaseArgs {
         Some(Database {
             url: self.database_url.clone()?,
             connections: self.database_connections,
-            bells: match self.database_direct_url.as_deref() {
-                None => Bells::There,
-                Some("none") => Bells::Unheard,
-                Some(url) => Bells::Direct(url.to_owned()),
+            notify_mode: match self.database_direct_url.as_deref() {
+                None => NotifyMode::Database,
+                Some("none") => NotifyMode::Off,
+                Some(url) => NotifyMode::Direct(url.to_owned()),
             },
         })
     }

@@ -7,7 +7,7 @@
 //!    and closes those whose client sends no request or does not read its answer.
 //! 2. The [`layers`] around all routes, from the outside inward: [`security_headers`], the client behind a trusted proxy
 //!    ([`client_address`]), [`drain_body`], [`request_id`], [`request_log`], `otel` (feature `otlp`), [`metrics`], [`etag::complete`], [`compression`], [`final_newline`], the path in problems
-//!    ([`error::name_instance`]), [`origin_guard`], what is left of the rate ([`rate_limit::tell_left`]), what the request holds
+//!    ([`error::name_instance`]), [`origin_guard`], what is left of the rate ([`rate_limit::add_rate_limit_headers`]), what the request holds
 //!    until its answer is sent ([`holding_body`]), [`catch_panic`], [`admission`] of compressed bodies and their decompression.
 //! 3. The layers of a group of routes: whether JSON is accepted ([`accept::require_json`]) and what clients may keep
 //!    ([`etag::immutable`], [`etag::revalidate`]).
@@ -148,7 +148,7 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
         .layer(Shared)
         .layer(from_fn({
             let per_second = options.requests_per_second;
-            move |request, next| rate_limit::tell_left(per_second, request, next)
+            move |request, next| rate_limit::add_rate_limit_headers(per_second, request, next)
         }))
         .layer(from_fn(origin_guard::admit))
         .layer(from_fn(error::name_instance))

@@ -17,7 +17,7 @@ pub struct AppState {
     pub unscoped: AnyTenant,
     pub access: Access,
     pub options: HttpOptions,
-    pub crowds: ConcurrencyLimits,
+    pub concurrency: ConcurrencyLimits,
     pub memory: Memory,
     pub metrics: Metrics,
     pub document: Document,
@@ -28,7 +28,7 @@ impl AppState {
     pub fn new(jobs: Jobs, options: HttpOptions, metrics: Metrics, document: Document) -> AppState {
         AppState {
             access: Access::new(&jobs, &options),
-            crowds: ConcurrencyLimits::new(&options),
+            concurrency: ConcurrencyLimits::new(&options),
             memory: Memory::new(&options),
             unscoped: AnyTenant(jobs),
             options,

@@ -114,7 +114,7 @@ impl Follower {
                 Kind::Rows => Kind::Rows,
                 _ => Kind::Cases,
             };
-            self.tell_batch(kind, batch, at).await?;
+            self.emit_batch(kind, batch, at).await?;
         }
         Ok(())
     }
@@ -129,7 +129,7 @@ impl Follower {
         Ok(())
     }
 
-    async fn tell_batch(&mut self, kind: Kind, id: Uuid, at: i64) -> Result<(), JobsError> {
+    async fn emit_batch(&mut self, kind: Kind, id: Uuid, at: i64) -> Result<(), JobsError> {
         // Not acknowledged yet, or gone.
         let gone = |error| match error {
             JobsError::BatchNotFound(_) | JobsError::Expired => Ok(()),

@@ -18,7 +18,7 @@ use crate::jobs::model::labels::Labels;
 use crate::jobs::options::Options;
 use crate::jobs::runtime_probe::{ProbedTime, probe};
 use crate::jobs::shared::Shared;
-use crate::jobs::store::cluster::Bell;
+use crate::jobs::store::cluster::Notification;
 use crate::jobs::store::retention::{Deleted, Usage};
 
 /// Longest list page.
@@ -190,7 +190,7 @@ impl Jobs {
             // A worker that lists its attempt later reads the request from the store.
             control.stop(StopReason::Cancel);
         } else {
-            self.shared.ring(Bell::Cancel(id));
+            self.shared.publish(Notification::Cancel(id));
         }
         Ok(self.dated(job))
     }

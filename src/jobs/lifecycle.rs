@@ -15,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Uuid};
 
-use crate::jobs::attempts::fair_turns::FairTurns;
+use crate::jobs::attempts::fair_scheduler::FairScheduler;
 use crate::jobs::attempts::lease::AllLeases;
 use crate::jobs::attempts::running::RunningAttempts;
 use crate::jobs::blobs::Blobs;
@@ -104,7 +104,7 @@ impl Jobs {
                 checks: Semaphore::new(available_parallelism().map_or(1, usize::from)),
                 staged: StagedBytes::default(),
                 batches: Mutex::new(unfinished_batches),
-                turns: FairTurns::default(),
+                turns: FairScheduler::default(),
                 recent_batches: RecentReads::default(),
                 recent_jobs: RecentReads::default(),
                 leaps: ClockSteps::default(),

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::jobs::disk_reserve;
 use crate::jobs::error::JobsError;
-use crate::jobs::options::{Bells, Database};
+use crate::jobs::options::{Database, NotifyMode};
 use crate::jobs::store::Store;
 #[cfg(feature = "cluster")]
 use crate::jobs::store::postgres::database::PostgresStore;
@@ -44,7 +44,7 @@ pub async fn open_for_service(
 #[cfg(feature = "cluster")]
 async fn open_database(database: &Database) -> Result<Arc<dyn Store>, JobsError> {
     let store = PostgresStore::open(&database.url, database.connections).await?;
-    Ok(Arc::new(store.hearing(&database.bells)?))
+    Ok(Arc::new(store.with_notify_mode(&database.notify_mode)?))
 }
 
 #[cfg(not(feature = "cluster"))]
@@ -88,7 +88,7 @@ pub async fn open_beside(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
 pub async fn open_shared(url: &str) -> Result<Arc<dyn Store>, JobsError> {
     open_database(&Database {
         connections: 1,
-        bells: Bells::There,
+        notify_mode: NotifyMode::Database,
         url: url.to_owned(),
     })
     .await

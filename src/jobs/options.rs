@@ -8,7 +8,7 @@ use crate::contact::case::limits::Limits;
 use crate::jobs::clock::Clock;
 use crate::jobs::result_place::url::ResultsPlace;
 use crate::jobs::staged_bytes::StagingBounds;
-pub use crate::jobs::store::cluster::Bells;
+pub use crate::jobs::store::cluster::NotifyMode;
 use crate::jobs::trace::Tracer;
 
 /// A database that several processes share.
@@ -18,8 +18,8 @@ pub struct Database {
     pub url: String,
     /// Most connections of this process, beside the one on which it listens.
     pub connections: u32,
-    /// Where nodes hear each other's bells.
-    pub bells: Bells,
+    /// Where nodes receive each other's notifications.
+    pub notify_mode: NotifyMode,
 }
 
 impl fmt::Debug for Database {

@@ -11,7 +11,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Timestamp, Uuid};
 
-use crate::jobs::attempts::fair_turns::FairTurns;
+use crate::jobs::attempts::fair_scheduler::FairScheduler;
 use crate::jobs::attempts::lease::AllLeases;
 use crate::jobs::attempts::running::RunningAttempts;
 use crate::jobs::blobs::Blobs;
@@ -27,7 +27,7 @@ use crate::jobs::staged_bytes::StagedBytes;
 use crate::jobs::storage_fault::StorageFaults;
 use crate::jobs::store::Store;
 use crate::jobs::store::claim::Lease;
-use crate::jobs::store::cluster::{Bell, Node};
+use crate::jobs::store::cluster::{Node, Notification};
 
 /// How often a waiting caller reads again although nothing was announced.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_secs(1);
@@ -76,7 +76,7 @@ pub(crate) struct Shared {
     /// Steps of the wall clock.
     pub(crate) leaps: ClockSteps,
     /// Whose turn it is, and solves that wait for theirs.
-    pub(crate) turns: FairTurns,
+    pub(crate) turns: FairScheduler,
     /// Held by all that is solved; alone by what may have killed a process.
     pub(crate) solo: Arc<tokio::sync::RwLock<()>>,
     /// Attempts that wait to be solved alone.
@@ -164,13 +164,13 @@ impl Shared {
     /// Wakes one worker for one job.
     pub(crate) fn wake_worker(&self) {
         self.wake.notify_one();
-        self.ring(Bell::Work);
+        self.publish(Notification::Work);
     }
 
     /// Tells workers that there is something to be claimed.
     pub(crate) fn wake_workers(&self) {
         self.wake_here();
-        self.ring(Bell::Work);
+        self.publish(Notification::Work);
     }
 
     /// The same, only those of this process.
@@ -180,16 +180,16 @@ impl Shared {
     }
 
     /// Rings at all nodes, if there are others.
-    pub(crate) fn ring(&self, bell: Bell) {
+    pub(crate) fn publish(&self, notification: Notification) {
         if let Some(cluster) = self.store.cluster() {
-            cluster.ring(bell);
+            cluster.publish(notification);
         }
     }
 
     /// Tells waiting callers, those of other nodes too, that a job has ended.
     pub(crate) fn announce(&self, id: Uuid) {
         self.announce_here(id);
-        self.ring(Bell::Ended(id));
+        self.publish(Notification::Ended(id));
     }
 
     /// The same, only those of this process.

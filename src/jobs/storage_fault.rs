@@ -16,7 +16,7 @@ impl JobsError {
     pub fn storage_fault(&self) -> Option<StorageFault> {
         match self {
             JobsError::Store(error) => error.storage_fault(),
-            JobsError::DataDir { source, .. } => of_io(source),
+            JobsError::DataDir { source, .. } => fault_of_io(source),
             JobsError::Blobs(object_store::Error::NotFound { .. }) => None,
             JobsError::Blobs(error) => {
                 let far =
@@ -28,7 +28,7 @@ impl JobsError {
                 let mut cause: Option<&(dyn Error + 'static)> = Some(error);
                 while let Some(error) = cause {
                     if let Some(error) = error.downcast_ref::<io::Error>() {
-                        return of_io(error).or(Some(StorageFault::Unwritable));
+                        return fault_of_io(error).or(Some(StorageFault::Unwritable));
                     }
                     cause = error.source();
                 }
@@ -39,7 +39,7 @@ impl JobsError {
     }
 }
 
-pub(crate) fn of_io(error: &io::Error) -> Option<StorageFault> {
+pub(crate) fn fault_of_io(error: &io::Error) -> Option<StorageFault> {
     use io::ErrorKind::{
         FileTooLarge, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem, StorageFull,
     };

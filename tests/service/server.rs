@@ -115,7 +115,7 @@ impl Server {
             setup.options.database = Some(railhead::jobs::options::Database {
                 url,
                 connections: 4,
-                bells: railhead::jobs::options::Bells::There,
+                notify_mode: railhead::jobs::options::NotifyMode::Database,
             });
             return vec![embedded, setup.start().await];
         }

@@ -80,7 +80,7 @@ async fn a_bystander_of_a_dead_process_counts_no_attempt(kind: StoreKind) {
             .attempt,
         0
     );
-    // One that waited at its gate is no suspect either.
+    // One that waited at its pause point is no suspect either.
     let other = claim_up_to(store, 4, 1000, 1).await;
     store.set_solving(&other, false).await.unwrap();
     assert_eq!(

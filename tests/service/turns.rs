@@ -111,7 +111,7 @@ async fn one_worker_never_has_two_solvers_at_work() {
     }
     let last = jobs.submit(small("short"), None).await.unwrap().id;
     jobs.start().unwrap();
-    // Beyond the gates there are, jobs that turn out to be long go back; the short one gets its turn all the same.
+    // Beyond the pause points there are, jobs that turn out to be long go back; the short one gets its turn all the same.
     let job = jobs.wait(last, AT_MOST).await.unwrap();
     assert_eq!(job.state, State::Succeeded);
     shop.let_go.store(true, Ordering::SeqCst);

@@ -1,8 +1,8 @@
 //! What a request contains, read strictly: caller, ids, query, body, and the formats that the client accepts.
 
 pub mod accept;
-pub mod arriving;
 pub mod batch;
+pub mod body_reader;
 pub mod caller;
 pub mod ids;
 pub mod json;

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::words::question::Case;
-use crate::http::extract::arriving::Arriving;
+use crate::http::extract::body_reader::BodyReader;
 use crate::http::extract::json::{essence, read_json, unreadable, weigh_case};
 use crate::http::extract::titles::faulty;
 use crate::http::limits::memory::Memory;
@@ -93,18 +93,18 @@ pub async fn separate_template(
     head.headers.remove(header::CONTENT_LENGTH);
     let mut parts = Multipart::new(body.into_data_stream(), boundary);
     let template = next_part(&mut parts, options, TEMPLATE).await?;
-    let mut arriving = Arriving::new(
+    let mut reader = BodyReader::new(
         options.body_timeout,
         options.body_max_bytes as u64,
         "one case",
         Request::new(Body::from_stream(template)),
     )?;
     let mut text = Vec::new();
-    while let Some(piece) = arriving.next().await? {
+    while let Some(piece) = reader.next().await? {
         text.extend_from_slice(&piece);
     }
     // The next part can be read once this one is gone.
-    drop(arriving);
+    drop(reader);
     let weight = weigh_case(&text, options.parsed_max_bytes)?;
     let share = memory.parsed(jobs.tenant(), weight).await?;
     let template = Template::Case(read_json(&text)?, share);

@@ -12,7 +12,7 @@ use serde::de::{
 use serde_json::Value;
 
 use crate::contact::evaluate::varied::Values;
-use crate::http::extract::arriving::Arriving;
+use crate::http::extract::body_reader::BodyReader;
 use crate::http::extract::json::Strict;
 use crate::http::extract::titles::require_few;
 use crate::http::options::HttpOptions;
@@ -37,7 +37,7 @@ pub fn declared_bytes(request: &Request, options: &HttpOptions) -> usize {
 pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes, ApiError> {
     let max_bytes = options.evaluate_max_bytes;
     let declared = declared_bytes(&request, options);
-    let mut arriving = Arriving::new(
+    let mut reader = BodyReader::new(
         options.body_timeout,
         max_bytes as u64,
         "rows (`--evaluate-max-mib`)",
@@ -45,7 +45,7 @@ pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes,
     )?;
     // A body that does not say its length grows.
     let mut text = Vec::with_capacity(if declared < max_bytes { declared } else { 0 });
-    while let Some(piece) = arriving.next().await? {
+    while let Some(piece) = reader.next().await? {
         text.extend_from_slice(&piece);
     }
     Ok(text.into())

@@ -8,7 +8,7 @@ use axum::extract::Request;
 use axum::http::HeaderMap;
 
 use crate::contact::evaluate::varied::Values;
-use crate::http::extract::arriving::Arriving;
+use crate::http::extract::body_reader::BodyReader;
 use crate::http::extract::json::essence;
 use crate::http::extract::multipart::{Template, template_missing};
 use crate::http::extract::rows::{declared_bytes, read_body, read_json_columns};
@@ -65,8 +65,8 @@ pub async fn read_run(
     };
     let (template, template_share) = template.case(&jobs).await?;
     let (timeout, most) = (options.body_timeout, options.run_max_bytes);
-    let arriving = Arriving::new(timeout, most, "one run", request)?;
-    let file = spool(&jobs, arriving).await?;
+    let reader = BodyReader::new(timeout, most, "one run", request)?;
+    let file = spool(&jobs, reader).await?;
     let bytes_max = options.evaluate_max_bytes;
     // An archive is read as a whole, once packed and once as numbers.
     let bytes = match form {
@@ -123,10 +123,10 @@ async fn from_json(
 ///
 /// # Errors
 /// The body is too large, too slow or broken, or the file cannot be written.
-pub async fn spool(jobs: &Jobs, mut arriving: Arriving) -> Result<File, ApiError> {
+pub async fn spool(jobs: &Jobs, mut reader: BodyReader) -> Result<File, ApiError> {
     let file = jobs.spool_file()?;
     let mut file = tokio::fs::File::from_std(file);
-    while let Some(piece) = arriving.next().await? {
+    while let Some(piece) = reader.next().await? {
         let written = tokio::io::AsyncWriteExt::write_all(&mut file, &piece).await;
         written.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
     }

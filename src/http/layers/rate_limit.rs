@@ -69,7 +69,11 @@ const LEFT: HeaderName = HeaderName::from_static("ratelimit");
 
 /// Layer in which answers say how many requests the sender may still make, as the fields `RateLimit-Policy` and `RateLimit` of
 /// draft-ietf-httpapi-ratelimit-headers-10 do. Without a limit, or for senders that are not counted, they are absent.
-pub(crate) async fn tell_left(per_second: u32, mut request: Request, next: Next) -> Response {
+pub(crate) async fn add_rate_limit_headers(
+    per_second: u32,
+    mut request: Request,
+    next: Next,
+) -> Response {
     let left = RateLeft::default();
     request.extensions_mut().insert(left.clone());
     let mut response = next.run(request).await;

@@ -33,7 +33,7 @@ pub(crate) struct EventRequest {
     pub jobs: Jobs,
     /// The event that it saw last.
     pub seen: Option<String>,
-    crowds: ConcurrencyLimits,
+    concurrency: ConcurrencyLimits,
     held: HeldShares,
     key: Option<Credential>,
 }
@@ -51,7 +51,7 @@ where
         Ok(EventRequest {
             jobs,
             seen: last_event_id(&parts.headers),
-            crowds: ConcurrencyLimits::from_ref(state),
+            concurrency: ConcurrencyLimits::from_ref(state),
             held: parts.extensions.get().cloned().unwrap_or_default(),
             key: parts.extensions.get().cloned(),
         })
@@ -67,7 +67,7 @@ impl EventRequest {
         self,
         events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static,
     ) -> Result<Response, ApiError> {
-        let place = self.crowds.stream(self.jobs.tenant())?;
+        let place = self.concurrency.stream(self.jobs.tenant())?;
         self.held.release();
         let events = events.take_until(revoked(self.jobs, self.key));
         let events = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE));

@@ -9,8 +9,8 @@ use crate::contact::solution::words::fields::PatchCells;
 use crate::http::extract::query::require_index;
 use crate::http::problem::error::ApiError;
 use crate::http::render::picture::curve::{self, Curve, CurveLine};
+use crate::http::render::picture::profile_view::{self, ProfileView, ProfileViewPatch};
 use crate::http::render::picture::section::{self, Sections};
-use crate::http::render::picture::standing::{self, Standing, StandingPatch};
 use crate::http::routes::part_request::PartRequest;
 use crate::http::routes::plot_words::{PlotOptions, View, counted, remarks, short};
 use crate::http::routes::stored_fields::stored;
@@ -166,7 +166,7 @@ async fn of_profiles(
             Err(JobsError::NoSuchPatch { .. }) => PatchCells::default(),
             fields => fields?.meshes.pop().unwrap_or_default(),
         };
-        patches.push(StandingPatch { position, cells });
+        patches.push(ProfileViewPatch { position, cells });
     }
     let case = jobs.case(id).await?;
     let jobs = jobs.clone();
@@ -189,7 +189,7 @@ async fn of_profiles(
             false => "without `pressure` among its outputs",
         };
         let count = patches.len();
-        let standing = Standing {
+        let view = ProfileView {
             title,
             remarks: vec![
                 format!(
@@ -214,6 +214,6 @@ async fn of_profiles(
             lowering: solution.wheel_lowering_mm.unwrap_or(0.0),
             patches,
         };
-        Ok(standing::draw(&standing, width))
+        Ok(profile_view::draw(&view, width))
     }))
 }

@@ -95,13 +95,17 @@ where
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
-        let crowds = ConcurrencyLimits::from_ref(state);
+        let concurrency = ConcurrencyLimits::from_ref(state);
         let tenant = parts.extensions.get::<Tenant>().cloned();
         let Tenant(tenant) = tenant.unwrap_or_else(|| Tenant("".into()));
         let (seconds, preferred, place) =
             match (wait_of(&parts.uri)?, preferred_wait(&parts.headers)) {
-                (Some(seconds), _) => (Some(seconds), false, Some(crowds.require_wait(&tenant)?)),
-                (None, Some(seconds)) => match crowds.wait(&tenant) {
+                (Some(seconds), _) => (
+                    Some(seconds),
+                    false,
+                    Some(concurrency.require_wait(&tenant)?),
+                ),
+                (None, Some(seconds)) => match concurrency.wait(&tenant) {
                     Some(place) => (Some(seconds), true, Some(place)),
                     None => (None, false, None),
                 },

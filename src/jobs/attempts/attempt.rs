@@ -1,6 +1,6 @@
 //! Jobs that were claimed together, on their way through one solver thread. A single job is a group of one.
 //!
-//! The phases of a member ([`Phase`]); [`judge`](crate::jobs::worker::judge) decides what follows from an outcome:
+//! The phases of a member ([`Phase`]); [`judge`](crate::jobs::worker::disposition) decides what follows from an outcome:
 //!
 //! ```text
 //! Solving ─┬─ Solved(outcome) ─┬─ Store, End ──── the end is written ──────▶ Done
@@ -22,9 +22,9 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt_control::{AttemptControl, StopReason};
-use crate::jobs::attempts::gate::Gate;
 use crate::jobs::attempts::lease::GroupLease;
 use crate::jobs::attempts::outcome::Outcome;
+use crate::jobs::attempts::pause_point::PausePoint;
 use crate::jobs::attempts::running::RunningEntry;
 use crate::jobs::attempts::slices::SlicedWork;
 use crate::jobs::attempts::solver_thread::SolverThread;
@@ -67,7 +67,7 @@ pub(crate) enum TimeSpentOn {
     New,
     /// A sweep that had been in the queue between two of its slices.
     Begun,
-    /// A solve that had waited at its gate.
+    /// A solve that had waited at its pause point.
     Parked,
 }
 
@@ -77,7 +77,7 @@ pub(crate) struct Attempt {
     pub(crate) queue: Queue,
     pub(crate) members: Vec<Member>,
     pub(crate) lease: GroupLease,
-    pub(crate) gate: Arc<Gate>,
+    pub(crate) pause_point: Arc<PausePoint>,
     /// It was running when a process died, and is solved while nothing else is.
     pub(crate) suspect: bool,
     /// What its time is spent on.
@@ -140,14 +140,14 @@ impl Attempt {
     }
 
     /// Nothing more is begun: what the thread has not taken up goes back to the queue. To be called while the thread waits
-    /// at the gate, has ended, or is left behind.
+    /// at the pause point, has ended, or is left behind.
     pub(crate) fn close(&mut self) {
         if let Some(solver) = &self.solver {
             solver.closed.store(true, Ordering::Release);
         }
         self.take_outcomes();
         for member in &mut self.members {
-            if matches!(member.phase, Phase::Solving) && !member.control.is_taken_up() {
+            if matches!(member.phase, Phase::Solving) && !member.control.is_started() {
                 member.phase = Phase::NotBegun;
             }
         }
@@ -178,7 +178,7 @@ impl Attempt {
             .filter(|member| matches!(member.phase, Phase::Solving));
         let waiting = solving
             .clone()
-            .filter(|member| !member.control.is_taken_up());
+            .filter(|member| !member.control.is_started());
         solving.count() > 1 && waiting.count() > 0
     }
 
@@ -188,7 +188,7 @@ impl Attempt {
             solver.closed.store(true, Ordering::Release);
         }
         for member in &self.members {
-            if matches!(member.phase, Phase::Solving) && member.control.is_taken_up() {
+            if matches!(member.phase, Phase::Solving) && member.control.is_started() {
                 member.control.stop(reason);
             }
         }
@@ -206,7 +206,7 @@ impl Attempt {
         self.members.iter().position(|member| {
             let reason = member.control.reason();
             matches!(member.phase, Phase::Solving)
-                && member.control.is_taken_up()
+                && member.control.is_started()
                 && matches!(reason, Some(StopReason::Cancel | StopReason::Deadline))
         })
     }
@@ -270,7 +270,7 @@ mod tests {
     use crate::jobs::model::kind::Kind;
 
     fn attempt(jobs: u32) -> Attempt {
-        let gate = Arc::new(Gate::default());
+        let pause_point = Arc::new(PausePoint::default());
         let claim = || Claim {
             id: Uuid::now_v7(),
             attempt: 1,
@@ -282,7 +282,7 @@ mod tests {
             slices: 0,
         };
         let member = |claim: Claim| {
-            let control = Arc::new(AttemptControl::new(gate.clone()));
+            let control = Arc::new(AttemptControl::new(pause_point.clone()));
             Member {
                 _listed: RunningAttempts::default().enter(claim.id, &control),
                 claim,
@@ -299,7 +299,7 @@ mod tests {
             },
             members: (0..jobs).map(|_| member(claim())).collect(),
             lease: GroupLease(Arc::new(HeldLeases::new(Vec::new(), 0))),
-            gate,
+            pause_point,
             suspect: false,
             on: TimeSpentOn::New,
             turn_began: Instant::now(),

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::jobs::attempts::gate::Gate;
+use crate::jobs::attempts::pause_point::PausePoint;
 
 /// Why a running solve was told to stop. The first reason given stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub enum StopReason {
     Lost = 3,
     /// The deadline of the job has passed.
     Deadline = 4,
-    /// It takes longer than was expected, and no gate is free to hold it; the job goes back to the queue.
+    /// It takes longer than was expected, and no pause point is free to hold it; the job goes back to the queue.
     TooLong = 5,
 }
 
@@ -33,7 +33,7 @@ pub struct AttemptControl {
     clock: Mutex<SolveClock>,
     taken_up: AtomicBool,
     memory_bytes: AtomicU64,
-    gate: Arc<Gate>,
+    pause_point: Arc<PausePoint>,
 }
 
 /// How long a solve has taken.
@@ -41,16 +41,16 @@ pub struct AttemptControl {
 struct SolveClock {
     /// Before it last went on.
     spent: Duration,
-    /// Since when it goes on, and how long it had waited at the gate by then.
+    /// Since when it goes on, and how long it had waited at the pause point by then.
     since: Option<(Instant, Duration)>,
 }
 
 impl AttemptControl {
-    /// The control of an attempt whose solver passes this gate.
+    /// The control of an attempt whose solver passes this pause point.
     #[must_use]
-    pub fn new(gate: Arc<Gate>) -> AttemptControl {
+    pub fn new(pause_point: Arc<PausePoint>) -> AttemptControl {
         AttemptControl {
-            gate,
+            pause_point,
             ..AttemptControl::default()
         }
     }
@@ -61,13 +61,13 @@ impl AttemptControl {
     }
 
     /// The solver's thread has not come to this job, or has yet to come again.
-    pub fn set_aside(&self) {
+    pub fn reset_started(&self) {
         self.taken_up.store(false, Ordering::Release);
     }
 
     /// Has the solver's thread come to this job?
     #[must_use]
-    pub fn is_taken_up(&self) -> bool {
+    pub fn is_started(&self) -> bool {
         self.taken_up.load(Ordering::Acquire)
     }
 
@@ -85,7 +85,7 @@ impl AttemptControl {
     /// Starts the clock of the solve, against which `contact` holds the time limit of the case, at the time that was spent
     /// before. It goes on until [`AttemptControl::pause`]; a clock that goes is left alone.
     pub fn begin(&self, spent: Duration) {
-        let waited = self.gate.waited();
+        let waited = self.pause_point.waited();
         let mut clock = self.clock();
         if clock.since.is_none() {
             *clock = SolveClock {
@@ -112,7 +112,7 @@ impl AttemptControl {
         let _ = self
             .reason
             .compare_exchange(0, reason as u8, Ordering::AcqRel, Ordering::Acquire);
-        self.gate.nudge();
+        self.pause_point.nudge();
     }
 
     /// Why the solver was told to stop, if it was.
@@ -148,7 +148,7 @@ impl Monitor for AttemptControl {
             self.progress
                 .store(progress.clamp(0.0, 1.0).to_bits(), Ordering::Release);
         }
-        self.gate.pass(|| self.reason().is_some());
+        self.pause_point.pass(|| self.reason().is_some());
         if self.reason().is_some() {
             return ControlFlow::Break(Stop::Cancelled);
         }
@@ -156,10 +156,10 @@ impl Monitor for AttemptControl {
     }
 
     fn elapsed(&self) -> Duration {
-        let waited = self.gate.waited();
+        let waited = self.pause_point.waited();
         let clock = self.clock();
         let since = clock.since.map_or(Duration::ZERO, |(since, before)| {
-            // Time at the gate belongs to others.
+            // Time at the pause point belongs to others.
             since.elapsed().saturating_sub(waited - before)
         });
         clock.spent + since

@@ -1,15 +1,15 @@
-//! An attempt at claimed jobs and all that belongs to it: its thread, its gate, its lease, its slices and its outcomes.
+//! An attempt at claimed jobs and all that belongs to it: its thread, its pause point, its lease, its slices and its outcomes.
 //!
 //! What a worker does with an attempt stands in [`worker`](crate::jobs::worker). The parts are here, because all of the room may stop an
-//! attempt, and those that wait for their turn ([`fair_turns`]) are shared by the workers.
+//! attempt, and those that wait for their turn ([`fair_scheduler`]) are shared by the workers.
 
 pub mod attempt;
 pub mod attempt_control;
-pub mod fair_turns;
-pub mod gate;
+pub mod fair_scheduler;
 pub mod heap;
 pub mod lease;
 pub mod outcome;
+pub mod pause_point;
 pub mod running;
 pub mod slices;
 pub mod solver_thread;

@@ -7,7 +7,7 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::kind::Kind;
-use crate::jobs::store::cluster::Bell;
+use crate::jobs::store::cluster::Notification;
 
 /// Jobs removed in one transaction.
 pub(crate) const DELETED_AT_ONCE: u32 = 500;
@@ -59,7 +59,7 @@ impl Jobs {
                 } else if let Some(control) = self.shared.running.get(*job) {
                     control.stop(StopReason::Cancel);
                 } else {
-                    self.shared.ring(Bell::Cancel(*job));
+                    self.shared.publish(Notification::Cancel(*job));
                 }
             }
             if changed.len() < CANCELLED_AT_ONCE as usize {

@@ -1,5 +1,5 @@
-//! What a node does because others use its store too: it shows itself, listens to the bells of the others, keeps the batches
-//! that it is filling, and looks for what the bells did not tell.
+//! What a node does because others use its store too: it shows itself, listens to the notifications of the others, keeps the batches
+//! that it is filling, and looks for what the notifications did not tell.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -11,7 +11,7 @@ use uuid::Uuid;
 use crate::jobs::attempts::attempt_control::StopReason;
 use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::cluster::{Bell, Cluster, ClusterView};
+use crate::jobs::store::cluster::{Cluster, ClusterView, Notification};
 use crate::jobs::store_error::StoreError;
 
 /// Time between two signs of life; the store counts a node as dead after four.
@@ -26,7 +26,7 @@ const FOLD_EVERY: Duration = Duration::from_secs(2);
 /// Time between two sweeps of results that no job refers to.
 const SWEEP_EVERY: Duration = Duration::from_secs(3600);
 
-/// Pause after a connection for bells has failed.
+/// Pause after a connection for notifications has failed.
 const LISTEN_AGAIN: Duration = Duration::from_secs(1);
 
 /// Longest round trip that tells the time of the store, in ms.
@@ -84,12 +84,12 @@ impl Shared {
         Ok(())
     }
 
-    /// Does what a bell asks for.
-    fn hear(&self, bell: Bell) {
-        match bell {
-            Bell::Work => self.wake_here(),
-            Bell::Ended(id) => self.announce_here(id),
-            Bell::Cancel(id) => self.stop_here(id),
+    /// Does what a notification asks for.
+    fn hear(&self, notification: Notification) {
+        match notification {
+            Notification::Work => self.wake_here(),
+            Notification::Ended(id) => self.announce_here(id),
+            Notification::Cancel(id) => self.stop_here(id),
         }
     }
 
@@ -202,11 +202,11 @@ async fn sweep_once(shared: &Shared, cluster: &dyn Cluster) -> Result<u64, JobsE
 
 async fn listen(shared: Arc<Shared>) {
     let draining = shared.draining.clone();
-    let hear = |bell| shared.hear(bell);
+    let hear = |notification| shared.hear(notification);
     let listening = async {
         while let Some(cluster) = shared.store.cluster() {
             if let Err(error) = cluster.listen(&hear).await {
-                tracing::warn!(%error, "the bells of other nodes cannot be heard; they are polled");
+                tracing::warn!(%error, "notifications of other nodes cannot be received; the table is polled");
             }
             sleep(LISTEN_AGAIN).await;
         }

@@ -6,7 +6,7 @@ use object_store::ObjectStore;
 use crate::jobs::blobs::Blobs;
 use crate::jobs::error::JobsError;
 use crate::jobs::metrics::StoreRequests;
-use crate::jobs::result_place::settle::{INSIDE, decide, mark, marker, on_this_machine_alone};
+use crate::jobs::result_place::settle::{IN_DATABASE, decide, mark, marker, on_this_machine_alone};
 use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
 use crate::jobs::store::cluster::{Cluster, Deployment};
 use crate::jobs::store::postgres::database::PostgresStore;
@@ -96,7 +96,7 @@ async fn move_within(
         return refused("a node has written results meanwhile; move them again".to_owned());
     }
     decide(database, &before, &place.url.to_string()).await?;
-    if from == INSIDE {
+    if from == IN_DATABASE {
         database.remove_objects().await?;
     }
     Ok(moved)
@@ -118,7 +118,7 @@ async fn open_old(
     deployment: &Deployment,
     from: &str,
 ) -> Result<Blobs, JobsError> {
-    if from == INSIDE {
+    if from == IN_DATABASE {
         return Ok(Blobs::at(database.objects(), None));
     }
     let url: ResultsUrl = from.parse().map_err(JobsError::ResultPlace)?;

@@ -23,7 +23,7 @@ const MARKER: &str = "railhead.json";
 const SETTLED_WITHIN: Duration = Duration::from_secs(60);
 
 /// What the database says if its results are in itself.
-pub(super) const INSIDE: &str = "";
+pub(super) const IN_DATABASE: &str = "";
 
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Marker {
@@ -67,13 +67,13 @@ pub(super) fn on_this_machine_alone(place: &ResultsPlace) -> Result<(), JobsErro
 async fn settle_inside(cluster: &dyn Cluster) -> Result<Blobs, JobsError> {
     let deployment = cluster.deployment().await?;
     match deployment.results_place.as_deref() {
-        Some(INSIDE) => {}
+        Some(IN_DATABASE) => {}
         Some(place) if deployment.in_use() => {
             return Err(JobsError::ResultPlace(format!(
                 "the results of this database are in {place}; start the node with --results-url {place}"
             )));
         }
-        _ => decide(cluster, &deployment, INSIDE).await?,
+        _ => decide(cluster, &deployment, IN_DATABASE).await?,
     }
     Ok(Blobs::at(cluster.objects(), None))
 }
@@ -93,7 +93,7 @@ async fn settle_outside(
         )),
         Some(_) if deployment.results_place.as_ref() == Some(&place) => Ok(()),
         // The same results under another name, or a place that was marked by a node that then failed.
-        Some(_) if deployment.results_place.as_deref() != Some(INSIDE) => {
+        Some(_) if deployment.results_place.as_deref() != Some(IN_DATABASE) => {
             if let Some(known) = &deployment.results_place
                 && is_another(objects, known, &deployment).await?
             {
@@ -106,7 +106,7 @@ async fn settle_outside(
         }
         Some(_) | None if deployment.in_use() => {
             let known = match deployment.results_place.as_deref() {
-                Some(INSIDE) => {
+                Some(IN_DATABASE) => {
                     "this database has its results in itself; start the node without --results-url"
                         .to_owned()
                 }
@@ -231,7 +231,7 @@ pub(crate) async fn examine(
     let Some(place) = place else {
         return Ok(match deployment.results_place.as_deref() {
             None => ("not decided: no node has been started".to_owned(), false),
-            Some(INSIDE) => ("in the database".to_owned(), false),
+            Some(IN_DATABASE) => ("in the database".to_owned(), false),
             Some(known) => (
                 format!("{known}; not examined without --results-url"),
                 false,
@@ -255,7 +255,11 @@ async fn probe(deployment: &Deployment, url: &ResultsUrl) -> Result<(), JobsErro
     let wrong = |why: String| Err(JobsError::ResultPlace(why));
     match &deployment.results_place {
         Some(known) if known != &url.to_string() => {
-            let known = if known == INSIDE { "itself" } else { known };
+            let known = if known == IN_DATABASE {
+                "itself"
+            } else {
+                known
+            };
             return wrong(format!("this database has its results in {known}"));
         }
         _ => {}

@@ -9,9 +9,9 @@ use uuid::Uuid;
 
 use crate::jobs::store_error::StoreError;
 
-/// A hint to other processes that something happened. Whoever misses one finds out a little later by looking.
+/// A hint to other processes that something happened. A process that misses one finds out by polling, a little later.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Bell {
+pub enum Notification {
     /// There is something to be claimed.
     Work,
     /// This job has ended.
@@ -20,16 +20,16 @@ pub enum Bell {
     Cancel(Uuid),
 }
 
-/// Where nodes hear each other's bells. What is not heard is found by looking, up to a second later.
+/// Where nodes receive each other's notifications. What is missed is found by polling, up to a second later.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum Bells {
+pub enum NotifyMode {
     /// At the URL of the database.
     #[default]
-    There,
+    Database,
     /// At another URL of the same database: a pooler that gives each transaction another session passes none on.
     Direct(String),
     /// Nowhere.
-    Unheard,
+    Off,
 }
 
 /// A node as it shows itself to the others.
@@ -110,8 +110,8 @@ pub trait Cluster: Send + Sync + Debug {
     fn objects(&self) -> Arc<dyn ObjectStore>;
 
     /// Rings soon, together with what else is to be rung. Never waits.
-    fn ring(&self, bell: Bell);
+    fn publish(&self, notification: Notification);
 
-    /// Listens to the bells of all nodes until the connection fails; for ever if none are to be heard.
-    async fn listen(&self, heard: &(dyn Fn(Bell) + Send + Sync)) -> Result<(), StoreError>;
+    /// Listens to the notifications of all nodes until the connection fails; for ever with [`NotifyMode::Off`].
+    async fn listen(&self, heard: &(dyn Fn(Notification) + Send + Sync)) -> Result<(), StoreError>;
 }

@@ -8,12 +8,12 @@ use rusqlite::ErrorCode;
 
 use crate::jobs::error::JobsError;
 #[cfg(feature = "cluster")]
-use crate::jobs::storage_fault::of_io;
+use crate::jobs::storage_fault::fault_of_io;
 use crate::jobs::store_error::{StorageFault, StoreError};
 
 impl From<rusqlite::Error> for StoreError {
     fn from(error: rusqlite::Error) -> Self {
-        match error.sqlite_error_code().and_then(of_code) {
+        match error.sqlite_error_code().and_then(fault_of_code) {
             Some(fault) => StoreError::Away(fault, Arc::new(error)),
             None => StoreError::Failed(Arc::new(error)),
         }
@@ -26,7 +26,7 @@ impl From<rusqlite::Error> for JobsError {
     }
 }
 
-fn of_code(code: ErrorCode) -> Option<StorageFault> {
+fn fault_of_code(code: ErrorCode) -> Option<StorageFault> {
     match code {
         ErrorCode::DiskFull => Some(StorageFault::Full),
         ErrorCode::DatabaseBusy
@@ -47,7 +47,7 @@ impl From<sqlx::Error> for StoreError {
             sqlx::Error::PoolTimedOut | sqlx::Error::PoolClosed | sqlx::Error::Tls(_) => {
                 Some(StorageFault::Unwritable)
             }
-            sqlx::Error::Io(source) => of_io(source).or_else(|| of_connection(source)),
+            sqlx::Error::Io(source) => fault_of_io(source).or_else(|| fault_of_connection(source)),
             _ => None,
         };
         match fault {
@@ -66,7 +66,7 @@ impl From<sqlx::Error> for JobsError {
 
 /// The server is away, or the way to it.
 #[cfg(feature = "cluster")]
-fn of_connection(error: &std::io::Error) -> Option<StorageFault> {
+fn fault_of_connection(error: &std::io::Error) -> Option<StorageFault> {
     match error.kind() {
         ErrorKind::ConnectionRefused
         | ErrorKind::ConnectionReset

@@ -8,8 +8,8 @@ use tokio_util::sync::CancellationToken;
 
 use crate::jobs::attempts::attempt::{Attempt, Member, Outcomes, Phase, Solver, TimeSpentOn};
 use crate::jobs::attempts::attempt_control::AttemptControl;
-use crate::jobs::attempts::gate::Gate;
 use crate::jobs::attempts::outcome::{Outcome, Work};
+use crate::jobs::attempts::pause_point::PausePoint;
 use crate::jobs::attempts::solver_thread::{SolverThread, Task};
 use crate::jobs::job_trace::JobTrace;
 use crate::jobs::model::job::{Failure, FailureKind};
@@ -24,7 +24,7 @@ const GROUP_TIME: Duration = Duration::from_millis(400);
 
 /// Lists claimed jobs as running and keeps their leases from now on.
 pub(crate) fn take_up(shared: &Arc<Shared>, queue: Queue, claims: Vec<Claim>) -> Attempt {
-    let gate = Arc::new(Gate::default());
+    let pause_point = Arc::new(PausePoint::default());
     let suspect = claims.iter().any(|claim| claim.suspect);
     let on = match claims.iter().any(|claim| claim.slices > 0) {
         true => TimeSpentOn::Begun,
@@ -33,7 +33,7 @@ pub(crate) fn take_up(shared: &Arc<Shared>, queue: Queue, claims: Vec<Claim>) ->
     let members: Vec<Member> = claims
         .into_iter()
         .map(|claim| {
-            let control = Arc::new(AttemptControl::new(gate.clone()));
+            let control = Arc::new(AttemptControl::new(pause_point.clone()));
             Member {
                 _listed: shared.running.enter(claim.id, &control),
                 claim,
@@ -51,7 +51,7 @@ pub(crate) fn take_up(shared: &Arc<Shared>, queue: Queue, claims: Vec<Claim>) ->
         queue,
         lease: heartbeat::keep(shared, held.collect()),
         members,
-        gate,
+        pause_point,
         suspect,
         on,
         turn_began: Instant::now(),
@@ -75,7 +75,7 @@ pub(crate) fn begin(
         .into_iter()
         .map(|(place, work)| {
             let member = &attempt.members[place];
-            member.control.set_aside();
+            member.control.reset_started();
             let traced = shared.job_trace(&member.claim);
             (place, member.control.clone(), work, traced)
         })

@@ -1,7 +1,7 @@
 //! What a worker does next: a new claim, or a solve that waits for its next turn.
 
 use crate::jobs::attempts::attempt::Attempt;
-use crate::jobs::attempts::fair_turns::LongSolve;
+use crate::jobs::attempts::fair_scheduler::LongSolve;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::{Claim, ClaimKind, ClaimRequest};
@@ -40,7 +40,7 @@ impl Worker {
         Ok(None)
     }
 
-    /// A solve of a queue that waits for its next turn, at its gate or in the queue.
+    /// A solve of a queue that waits for its next turn, at its pause point or in the queue.
     async fn next_long(&self, queue: &Queue) -> Result<Option<Attempt>, JobsError> {
         let shared = &self.shared;
         for long in shared.turns.long_ones(queue) {
@@ -72,7 +72,7 @@ impl Worker {
             kind,
             jobs: options.group_max.max(1),
             cost_us: GROUP_COST_US,
-            // With no gate free, only what should be done, or come to its next cut, within a slice.
+            // With no pause point free, only what should be done, or come to its next cut, within a slice.
             each_slice_us: full.then_some(slice_us),
             workers: shared.all_workers(),
             lease: shared.lease(),

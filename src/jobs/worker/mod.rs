@@ -2,9 +2,9 @@
 
 pub mod begin;
 pub mod claim_loop;
+pub mod disposition;
 pub mod evolution;
 pub mod heartbeat;
-pub mod judge;
 pub mod pool;
 pub mod record;
 pub mod rows;

@@ -43,7 +43,7 @@ pub struct StepReport {
 pub(crate) enum Turn {
     /// The solver is done, or was left behind.
     Over,
-    /// The solver waits at its gate.
+    /// The solver waits at its pause point.
     Held,
 }
 
@@ -56,7 +56,7 @@ impl Worker {
         })
     }
 
-    /// Steps until the service drains and nothing waits at a gate.
+    /// Steps until the service drains and nothing waits at a pause point.
     pub(crate) async fn run(mut self) {
         let shared = self.shared.clone();
         let recovered = shared.recovered.wait();

@@ -13,9 +13,9 @@ use crate::jobs::model::job::{Failure, FailureKind, State};
 use crate::jobs::storage_fault::StoragePlace;
 use crate::jobs::store::claim::{Claim, ReleaseReason};
 use crate::jobs::store::ending::{Ending, StoredResult};
-use crate::jobs::worker::judge::{Verdict, judge};
+use crate::jobs::worker::disposition::{Disposition, disposition_of};
 use crate::jobs::worker::pool::{StepReport, Worker};
-use crate::jobs::worker::slice_storage::SliceFate;
+use crate::jobs::worker::slice_storage::SliceOutcome;
 
 impl Worker {
     /// Reads the cases of the claimed jobs, and ends those whose result has been there since they were queued. To be called once the attempt
@@ -97,8 +97,13 @@ impl Worker {
             }
             if let Phase::Solved(outcome) = std::mem::replace(phase, Phase::Done) {
                 let reason = attempt.members[place].control.reason();
-                self.carry_out(attempt, place, judge(outcome, reason), &mut pending)
-                    .await;
+                self.apply(
+                    attempt,
+                    place,
+                    disposition_of(outcome, reason),
+                    &mut pending,
+                )
+                .await;
             }
         }
         attempt.done(&pending.lost);
@@ -120,26 +125,26 @@ impl Worker {
     }
 
     /// Stores the result or the slice that a verdict keeps, and notes what remains to be written for the member.
-    async fn carry_out(
+    async fn apply(
         &self,
         attempt: &mut Attempt,
         place: usize,
-        verdict: Verdict,
+        verdict: Disposition,
         pending: &mut PendingWrites,
     ) {
         let claim = attempt.members[place].claim.clone();
         let stored = match verdict {
-            Verdict::Discard => return pending.lost.push(claim.id),
-            Verdict::Release => return pending.back.push(claim),
-            Verdict::ReleaseAsLong => return pending.long.push(claim),
-            Verdict::End(ending) => Ok(ending),
-            Verdict::StoreSlice {
+            Disposition::Discard => return pending.lost.push(claim.id),
+            Disposition::Release => return pending.back.push(claim),
+            Disposition::ReleaseAsLong => return pending.long.push(claim),
+            Disposition::End(ending) => Ok(ending),
+            Disposition::StoreSlice {
                 sliced,
                 part,
                 stopped,
             } => match self.keep_slice(attempt, place, sliced, part).await {
-                Ok(SliceFate::Lost) => return pending.lost.push(claim.id),
-                Ok(SliceFate::Stored) => match stopped {
+                Ok(SliceOutcome::Lost) => return pending.lost.push(claim.id),
+                Ok(SliceOutcome::Stored) => match stopped {
                     Some(StopReason::TooLong) => return pending.long.push(claim),
                     Some(_) => return pending.back.push(claim),
                     None if self.makes_room(attempt).await => return pending.back.push(claim),
@@ -147,7 +152,7 @@ impl Worker {
                 },
                 Err(error) => Err(error),
             },
-            Verdict::Store {
+            Disposition::Store {
                 result,
                 remarks,
                 field_patches,

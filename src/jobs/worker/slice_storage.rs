@@ -13,7 +13,7 @@ use crate::jobs::submit::microseconds;
 use crate::jobs::worker::pool::Worker;
 
 /// What became of a slice that was to be stored.
-pub(crate) enum SliceFate {
+pub(crate) enum SliceOutcome {
     /// It is stored.
     Stored,
     /// The lease is gone.
@@ -28,7 +28,7 @@ impl Worker {
         place: usize,
         mut sliced: Box<SlicedWork>,
         part: Option<(SliceRecord, EncodedResult)>,
-    ) -> Result<SliceFate, JobsError> {
+    ) -> Result<SliceOutcome, JobsError> {
         let shared = &self.shared;
         let member = &mut attempt.members[place];
         if let Some((note, part)) = part {
@@ -62,14 +62,14 @@ impl Worker {
                 if let StoredResult::Blob(key, _) = &slice.result {
                     self.abandon_blob(key).await;
                 }
-                return Ok(SliceFate::Lost);
+                return Ok(SliceOutcome::Lost);
             }
             tracing::debug!(job = %claim.id, number, done, "slice stored");
             sliced.advance(slice.note.spent);
             member.claim.slices = number + 1;
         }
         member.sliced = Some(sliced);
-        Ok(SliceFate::Stored)
+        Ok(SliceOutcome::Stored)
     }
 
     /// What is to be done next for a sweep.

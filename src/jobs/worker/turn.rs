@@ -1,8 +1,8 @@
 //! One turn of a worker: solve for a slice of time, and record what became of the jobs.
 //!
-//! A turn is either a new claim, of a job or of a group of small ones, or a solve that waits at its gate. The async side
+//! A turn is either a new claim, of a job or of a group of small ones, or a solve that waits at its pause point. The async side
 //! claims and finishes; the arithmetic runs on a thread of the attempt's own, one at a time for each worker. When a slice
-//! is over and somebody else waits, the solver is held at its gate and the worker takes the next turn. A solver that does
+//! is over and somebody else waits, the solver is held at its pause point and the worker takes the next turn. A solver that does
 //! not stop when told to is left behind with its thread, and the worker goes on with a new one.
 
 use std::sync::Arc;
@@ -83,10 +83,10 @@ impl Worker {
         }
         // Shared by all that is solved, except by what may have killed a process before.
         let _alone = if attempt.suspect {
-            let _waits = SuspectWaits::new(&shared);
-            Solo::Alone(shared.solo.clone().write_owned().await)
+            let _waits = WaitingSuspect::new(&shared);
+            SolveGuard::Alone(shared.solo.clone().write_owned().await)
         } else {
-            Solo::Beside(shared.solo.clone().read_owned().await)
+            SolveGuard::Beside(shared.solo.clone().read_owned().await)
         };
         if attempt.begun() || attempt.suspect {
             let solving = attempt.claims(|phase| matches!(phase, Phase::Solving));
@@ -101,7 +101,7 @@ impl Worker {
         }
         let _working = shared.metrics.working();
         attempt.lease.solving(true);
-        attempt.gate.open();
+        attempt.pause_point.open();
         let turn = self.until_over(attempt).await;
         attempt.lease.solving(false);
         if matches!(turn, Turn::Held) {
@@ -151,7 +151,7 @@ impl Worker {
         Ok(())
     }
 
-    /// Waits until the solver is done or is held at its gate; stops or holds it when its time is up.
+    /// Waits until the solver is done or is held at its pause point; stops or holds it when its time is up.
     async fn until_over(&self, attempt: &mut Attempt) -> Turn {
         let shared = &self.shared;
         let spent = attempt.on;
@@ -164,17 +164,17 @@ impl Worker {
         // The member that was told to stop, and since when its solver has gone on all the same.
         let mut unwanted: Option<(usize, Instant)> = None;
         let mut closed = false;
-        let gate = attempt.gate.clone();
+        let pause_point = attempt.pause_point.clone();
         let lost = attempt.lease.lost().clone();
         let over = attempt.over();
         let turn = loop {
             tokio::select! {
                 biased;
                 () = over.cancelled() => break Turn::Over,
-                () = gate.reached(), if closed => break Turn::Held,
+                () = pause_point.reached(), if closed => break Turn::Held,
                 () = shared.stopping.cancelled(), if told.is_none() => {
                     attempt.stop(StopReason::Shutdown);
-                    gate.open();
+                    pause_point.open();
                     (told, closed) = (Some(Instant::now()), false);
                 }
                 () = lost.cancelled(), if told.is_none() => told = Some(Instant::now()),
@@ -213,7 +213,7 @@ impl Worker {
         attempt.turn_began.elapsed() >= slice / 2 && self.somebody_waits().await
     }
 
-    /// Closes the gate, if one more solver may wait. If not, the solver goes on, or, where all gates are taken, gives a job back that was
+    /// Closes the pause point, if one more solver may wait. If not, the solver goes on, or, where all pause points are taken, gives a job back that was
     /// claimed because it was expected to be short.
     fn hold(&self, attempt: &Attempt) -> bool {
         let options = &self.shared.options;
@@ -225,7 +225,7 @@ impl Worker {
         if bytes.saturating_add(attempt.memory_bytes()) > options.parked_bytes_max {
             return false;
         }
-        attempt.gate.close();
+        attempt.pause_point.close();
         true
     }
 
@@ -265,7 +265,7 @@ impl Worker {
     /// Releases what is still held after the store has failed.
     pub(crate) async fn give_up(&mut self, attempt: &mut Attempt) {
         attempt.stop(StopReason::Shutdown);
-        attempt.gate.open();
+        attempt.pause_point.open();
         if attempt.begun() {
             let over = attempt.over();
             let ended = tokio::time::timeout(STOP_TIMEOUT, over.cancelled()).await;
@@ -286,22 +286,22 @@ impl Worker {
 }
 
 /// The right to solve: beside others, or alone.
-enum Solo {
+enum SolveGuard {
     Beside(#[expect(dead_code, reason = "held")] tokio::sync::OwnedRwLockReadGuard<()>),
     Alone(#[expect(dead_code, reason = "held")] tokio::sync::OwnedRwLockWriteGuard<()>),
 }
 
 /// A suspect waits to be solved alone, so that the others make room.
-struct SuspectWaits(Arc<Shared>);
+struct WaitingSuspect(Arc<Shared>);
 
-impl SuspectWaits {
-    fn new(shared: &Arc<Shared>) -> SuspectWaits {
+impl WaitingSuspect {
+    fn new(shared: &Arc<Shared>) -> WaitingSuspect {
         shared.suspects_waiting.fetch_add(1, Ordering::AcqRel);
-        SuspectWaits(shared.clone())
+        WaitingSuspect(shared.clone())
     }
 }
 
-impl Drop for SuspectWaits {
+impl Drop for WaitingSuspect {
     fn drop(&mut self) {
         self.0.suspects_waiting.fetch_sub(1, Ordering::AcqRel);
     }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use railhead::contact::error::SolveError;
 use railhead::jobs::engine::Engine;
-use railhead::jobs::options::{Bells, Database};
+use railhead::jobs::options::{Database, NotifyMode};
 use railhead::jobs::{Jobs, Options};
 use sqlx::{Connection, PgConnection};
 
@@ -40,7 +40,7 @@ async fn node(url: &str, folder: &Path, spent: Arc<[AtomicU64; 3]>) -> Jobs {
         database: Some(Database {
             url: url.to_owned(),
             connections: 4,
-            bells: Bells::Unheard,
+            notify_mode: NotifyMode::Off,
         }),
         cache: false,
         ..Options::new(folder)

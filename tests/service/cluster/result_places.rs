@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
-use railhead::jobs::options::{Bells, Database};
+use railhead::jobs::options::{Database, NotifyMode};
 use railhead::jobs::result_place::examine_results;
 use railhead::jobs::result_place::url::ResultsPlace;
 use railhead::jobs::store::postgres::schema::migrate;
@@ -27,7 +27,7 @@ fn options(url: &str, data_dir: &Path, results: Option<ResultsPlace>) -> Options
         database: Some(Database {
             url: url.to_owned(),
             connections: 4,
-            bells: Bells::There,
+            notify_mode: NotifyMode::Database,
         }),
         results,
         small_result_max_bytes: 0,

@@ -6,10 +6,10 @@ use axum::http::HeaderMap;
 use serde_json::Value;
 
 use crate::contact::error::Fault;
-use crate::http::extract::arriving::Arriving;
 use crate::http::extract::batch::own_options;
 use crate::http::extract::batch::splitter::{Element, Layout, Splitter};
 use crate::http::extract::batch::table::{TableBody, columns_of, rows_of};
+use crate::http::extract::body_reader::BodyReader;
 use crate::http::extract::json::{essence, read_strict, weigh_case};
 use crate::http::extract::multipart::{Template, template_missing};
 use crate::http::extract::run_body::spool;
@@ -106,7 +106,7 @@ pub async fn read_draft(
     form: Form,
     request: Request<Body>,
 ) -> Result<BatchUpload, ApiError> {
-    let mut arriving = Arriving::new(
+    let mut reader = BodyReader::new(
         options.body_timeout,
         options.batch_max_bytes,
         "one batch",
@@ -117,7 +117,7 @@ pub async fn read_draft(
         Form::Cases(form) => form,
         Form::Rows(form, template) => {
             draft.set_row_template(template);
-            let source = TableSource::File(spool(jobs, arriving).await?);
+            let source = TableSource::File(spool(jobs, reader).await?);
             return read_rows((jobs, memory, options), draft, form, source).await;
         }
     };
@@ -132,7 +132,7 @@ pub async fn read_draft(
         computation: memory.computation(jobs.tenant()),
         parsed_max_bytes: options.parsed_max_bytes,
     };
-    while let Some(piece) = arriving.next().await? {
+    while let Some(piece) = reader.next().await? {
         held += piece.len();
         // Most cases are small; a large one is held until its end has come.
         if share.is_none() && splitter.held() + piece.len() > SMALL_BYTES.max(PORTION_BYTES) {

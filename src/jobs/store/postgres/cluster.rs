@@ -6,11 +6,11 @@ use async_trait::async_trait;
 use object_store::ObjectStore;
 use uuid::Uuid;
 
-use crate::jobs::store::cluster::{Bell, Cluster, ClusterView, Deployment, Node};
+use crate::jobs::store::cluster::{Cluster, ClusterView, Deployment, Node, Notification};
 use crate::jobs::store::postgres::answer::in_time;
-use crate::jobs::store::postgres::bell;
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::postgres::engine::fold_counts;
+use crate::jobs::store::postgres::notifier;
 use crate::jobs::store::postgres::objects::PgObjects;
 use crate::jobs::store::postgres::sql::rows::{count, read_id, read_small};
 use crate::jobs::store_error::StoreError;
@@ -79,15 +79,15 @@ impl Cluster for PostgresStore {
         Arc::new(PgObjects::new(self.writer.clone()))
     }
 
-    fn ring(&self, bell: Bell) {
-        if self.hears_at.is_some() {
-            self.bell.ring(bell);
+    fn publish(&self, notification: Notification) {
+        if self.listens_at.is_some() {
+            self.notifier.publish(notification);
         }
     }
 
-    async fn listen(&self, heard: &(dyn Fn(Bell) + Send + Sync)) -> Result<(), StoreError> {
-        match &self.hears_at {
-            Some(options) => bell::listen(options.clone(), heard).await,
+    async fn listen(&self, heard: &(dyn Fn(Notification) + Send + Sync)) -> Result<(), StoreError> {
+        match &self.listens_at {
+            Some(options) => notifier::listen(options.clone(), heard).await,
             None => std::future::pending().await,
         }
     }

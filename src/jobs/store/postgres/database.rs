@@ -5,10 +5,10 @@ use std::fmt;
 use sqlx::postgres::{PgConnectOptions, PgPool};
 
 use crate::jobs::error::JobsError;
-use crate::jobs::store::cluster::Bells;
-use crate::jobs::store::postgres::bell::BellRinger;
+use crate::jobs::store::cluster::NotifyMode;
 use crate::jobs::store::postgres::claim_memory::ClaimMemory;
 use crate::jobs::store::postgres::connection::{connect, session};
+use crate::jobs::store::postgres::notifier::Notifier;
 use crate::jobs::store::postgres::schema::require;
 use crate::jobs::store::postgres::sql::group_commit::GroupCommit;
 use crate::jobs::store_error::StoreError;
@@ -16,12 +16,12 @@ use crate::jobs::store_error::StoreError;
 /// The job table that several processes share.
 #[derive(Clone)]
 pub struct PostgresStore {
-    /// The way on which bells are heard.
-    pub(crate) hears_at: Option<PgConnectOptions>,
+    /// The connection on which notifications are received.
+    pub(crate) listens_at: Option<PgConnectOptions>,
     pub(crate) writer: PgPool,
     pub(crate) readers: PgPool,
     pub(crate) group_commit: GroupCommit,
-    pub(crate) bell: BellRinger,
+    pub(crate) notifier: Notifier,
     pub(crate) claim_memory: ClaimMemory,
     /// Leases are judged by the times that are given, not by the clock of the database.
     pub(crate) given_clock: bool,
@@ -44,27 +44,27 @@ impl PostgresStore {
         require(&writer).await?;
         let store = PostgresStore {
             group_commit: GroupCommit::start(writer.clone()),
-            bell: BellRinger::start(writer.clone()),
+            notifier: Notifier::start(writer.clone()),
             claim_memory: ClaimMemory::default(),
             readers: writer.clone(),
-            hears_at: Some(options),
+            listens_at: Some(options),
             writer,
             given_clock: false,
         };
         Ok(store)
     }
 
-    /// The same with bells that are heard elsewhere, or not at all.
+    /// Receives notifications by another connection, or not at all.
     ///
     /// # Errors
     /// [`JobsError::BadDatabaseUrl`].
-    pub fn hearing(self, bells: &Bells) -> Result<PostgresStore, JobsError> {
-        let hears_at = match bells {
-            Bells::There => return Ok(self),
-            Bells::Direct(url) => Some(session(url)?),
-            Bells::Unheard => None,
+    pub fn with_notify_mode(self, mode: &NotifyMode) -> Result<PostgresStore, JobsError> {
+        let listens_at = match mode {
+            NotifyMode::Database => return Ok(self),
+            NotifyMode::Direct(url) => Some(session(url)?),
+            NotifyMode::Off => None,
         };
-        Ok(PostgresStore { hears_at, ..self })
+        Ok(PostgresStore { listens_at, ..self })
     }
 
     /// The same with leases that are judged by the times that are given, so that tests need no clock.

@@ -57,12 +57,12 @@ pub(crate) async fn for_each(
 
 /// From here to the end of the transaction nobody else takes places in the queue or uses an idempotency key. What the one
 /// before did is seen by the next statement.
-pub(crate) async fn admit_alone(connection: &mut DbConnection) -> Result<(), StoreError> {
+pub(crate) async fn lock_admission(connection: &mut DbConnection) -> Result<(), StoreError> {
     lock(connection, ADMISSION).await
 }
 
 /// Keeps jobs from being removed until the end of the transaction: another job is about to refer to their results.
-pub(crate) async fn keep_jobs(
+pub(crate) async fn lock_jobs_for_share(
     connection: &mut DbConnection,
     ids: &[Uuid],
 ) -> Result<(), StoreError> {

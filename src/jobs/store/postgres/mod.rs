@@ -8,7 +8,6 @@
 mod tokens;
 
 pub(crate) mod answer;
-pub mod bell;
 mod claim_memory;
 pub mod cluster;
 pub mod connection;
@@ -17,6 +16,7 @@ mod deployment;
 pub mod doctor;
 pub mod engine;
 mod import;
+pub mod notifier;
 pub mod objects;
 pub mod schema;
 #[path = "../sql/mod.rs"]

@@ -48,7 +48,7 @@ impl Batches for SqlStore {
     ) -> Result<Result<u32, Refusal>, StoreError> {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
-            engine::admit_alone(&mut transaction).await?;
+            engine::lock_admission(&mut transaction).await?;
             let mut places = Places::of(&mut transaction, [tenant], bounds).await?;
             let taken = places
                 .store(tenant, 0)
@@ -93,7 +93,7 @@ impl Batches for SqlStore {
     ) -> Result<BatchBegun, StoreError> {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
-            engine::admit_alone(&mut transaction).await?;
+            engine::lock_admission(&mut transaction).await?;
             if let Some(begun) = by_key(&mut transaction, new, filled_here).await? {
                 return Ok(begun);
             }

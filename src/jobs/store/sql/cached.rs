@@ -51,7 +51,7 @@ pub(crate) async fn end_pairs(
         return Ok(Vec::new());
     }
     let sources: Vec<Uuid> = pairs.iter().map(|pair| pair.source).collect();
-    engine::keep_jobs(connection, &sources).await?;
+    engine::lock_jobs_for_share(connection, &sources).await?;
     let mut update = with_pairs(pairs);
     update.push(
         " UPDATE jobs SET state = 'succeeded', started_at = pairs.at, ended_at = pairs.at, updated_at = pairs.at, progress = 1.0, cached = 1, \

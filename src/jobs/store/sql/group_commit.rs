@@ -107,7 +107,7 @@ async fn store_together(
     bounds: QueueBounds,
 ) -> Result<Vec<Enqueued>, StoreError> {
     let mut transaction = engine::begin(writer).await?;
-    engine::admit_alone(&mut transaction).await?;
+    engine::lock_admission(&mut transaction).await?;
     let tenants: HashSet<&str> = jobs.iter().map(|job| &*job.tenant).collect();
     let mut places = Places::of(&mut transaction, tenants, bounds).await?;
     let sources: Vec<Uuid> = jobs.iter().filter_map(|job| Some(job.source?.0)).collect();

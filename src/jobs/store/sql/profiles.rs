@@ -20,7 +20,7 @@ impl Profiles for SqlStore {
     ) -> Result<ProfileKept, StoreError> {
         engine::again(|| async move {
             let mut transaction = engine::begin(&self.writer).await?;
-            engine::admit_alone(&mut transaction).await?;
+            engine::lock_admission(&mut transaction).await?;
             let known = query(
                 "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2",
             )

@@ -67,12 +67,15 @@ pub(crate) async fn for_each(
 
 /// From here to the end of the transaction nobody else takes places in the queue or uses an idempotency key: there is one
 /// writer.
-pub(crate) async fn admit_alone(_: &mut DbConnection) -> Result<(), StoreError> {
+pub(crate) async fn lock_admission(_: &mut DbConnection) -> Result<(), StoreError> {
     Ok(())
 }
 
 /// Keeps jobs from being removed until the end of the transaction: there is one writer.
-pub(crate) async fn keep_jobs(_: &mut DbConnection, _: &[Uuid]) -> Result<(), StoreError> {
+pub(crate) async fn lock_jobs_for_share(
+    _: &mut DbConnection,
+    _: &[Uuid],
+) -> Result<(), StoreError> {
     Ok(())
 }
 

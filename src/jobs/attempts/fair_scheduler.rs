@@ -15,9 +15,9 @@ const HALF_LIFE: Duration = Duration::from_secs(60);
 /// Less than this is forgotten, in s.
 const FORGOTTEN: f64 = 1e-6;
 
-/// Solver seconds of tenants and the attempts that wait at their gates.
+/// Solver seconds of tenants and the attempts that wait at their pause points.
 #[derive(Debug, Default)]
-pub(crate) struct FairTurns(Mutex<Inner>);
+pub(crate) struct FairScheduler(Mutex<Inner>);
 
 #[derive(Debug, Default)]
 struct Inner {
@@ -32,7 +32,7 @@ struct Used {
     at: Instant,
     /// Seconds that new jobs of the queue have had since one of its long solves had a turn.
     queue_since: f64,
-    /// That was one that had waited at its gate.
+    /// That was one that had waited at its pause point.
     parked_was_last: bool,
 }
 
@@ -47,13 +47,13 @@ impl Used {
 /// One of the two kinds of long solves that wait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum LongSolve {
-    /// At its gate, with all that it has in memory.
+    /// At its pause point, with all that it has in memory.
     Parked,
     /// In the queue, between two slices.
     Begun,
 }
 
-impl FairTurns {
+impl FairScheduler {
     /// Puts solver time on the account of a queue.
     pub(crate) fn charge(&self, queue: &Queue, time: Duration, spent: TimeSpentOn) {
         let mut inner = self.lock();
@@ -125,7 +125,7 @@ impl FairTurns {
         }
     }
 
-    /// An attempt waits at its gate from now on.
+    /// An attempt waits at its pause point from now on.
     pub(crate) fn park(&self, attempt: Attempt) {
         self.lock().parked.push(attempt);
     }
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn whoever_has_used_the_least_seconds_comes_first() {
-        let turns = FairTurns::default();
+        let turns = FairScheduler::default();
         let tenants = ["a", "b", "c"]
             .map(|tenant| queue(tenant, Kind::Case))
             .to_vec();
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn jobs_and_rows_of_a_tenant_share_its_turn() {
-        let turns = FairTurns::default();
+        let turns = FairScheduler::default();
         let queues = vec![
             queue("a", Kind::Case),
             queue("a", Kind::Rows),
@@ -221,14 +221,14 @@ mod tests {
 
     #[test]
     fn queue_and_long_solves_of_a_tenant_take_turns() {
-        let turns = FairTurns::default();
+        let turns = FairScheduler::default();
         let (queue, slice) = (queue("a", Kind::Case), Duration::from_secs(2));
         assert!(!turns.queue_had_its_share(&queue, slice));
         turns.charge(&queue, slice, TimeSpentOn::New);
         assert!(turns.queue_had_its_share(&queue, slice));
         turns.charge(&queue, slice, TimeSpentOn::Parked);
         assert!(!turns.queue_had_its_share(&queue, slice));
-        // So do those at a gate and those in the queue.
+        // So do those at a pause point and those in the queue.
         assert_eq!(
             turns.long_ones(&queue),
             [LongSolve::Begun, LongSolve::Parked]

@@ -17,7 +17,7 @@ use crate::http::problem::kinds::ProblemKind;
 /// one byte at a time could keep a connection and a file open for ever.
 const LOWEST_RATE: f64 = 1024.0;
 /// A body on its way, held to its limits of size and time.
-pub struct Arriving {
+pub struct BodyReader {
     timeout: Duration,
     max_bytes: u64,
     what: &'static str,
@@ -27,7 +27,7 @@ pub struct Arriving {
     begun: Instant,
 }
 
-impl Arriving {
+impl BodyReader {
     /// The body of a request: `what` it is, the time that a piece of it may take, and its largest size.
     ///
     /// # Errors
@@ -37,11 +37,11 @@ impl Arriving {
         max_bytes: u64,
         what: &'static str,
         request: Request<Body>,
-    ) -> Result<Arriving, ApiError> {
+    ) -> Result<BodyReader, ApiError> {
         let declared = request.headers().get(header::CONTENT_LENGTH);
         let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
         let packed = request.extensions().get::<PackedLength>().cloned();
-        let arriving = Arriving {
+        let reader = BodyReader {
             timeout,
             max_bytes,
             what,
@@ -51,9 +51,9 @@ impl Arriving {
             begun: Instant::now(),
         };
         if declared.is_some_and(|length| length > max_bytes) {
-            return Err(arriving.too_large());
+            return Err(reader.too_large());
         }
-        Ok(arriving)
+        Ok(reader)
     }
 
     /// The next piece, or nothing at the end.

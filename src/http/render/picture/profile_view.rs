@@ -21,7 +21,7 @@ const BELOW: f64 = 62.0;
 
 /// Wheel and rail with their patches.
 #[derive(Debug, Clone)]
-pub(crate) struct Standing {
+pub(crate) struct ProfileView {
     /// First line, a text of the client.
     pub title: String,
     /// Smaller lines below, two at most.
@@ -31,12 +31,12 @@ pub(crate) struct Standing {
     /// How far the wheel lies below first touch, in mm.
     pub lowering: f64,
     /// The patches.
-    pub patches: Vec<StandingPatch>,
+    pub patches: Vec<ProfileViewPatch>,
 }
 
 /// A patch on the rail.
 #[derive(Debug, Clone)]
-pub(crate) struct StandingPatch {
+pub(crate) struct ProfileViewPatch {
     /// Where it lies.
     pub position: Position,
     /// Its cells, with the pressure where the case asked for it.
@@ -45,8 +45,8 @@ pub(crate) struct StandingPatch {
 
 /// Draws wheel and rail as SVG, `width` pixels wide.
 #[must_use]
-pub(crate) fn draw(standing: &Standing, width: u32) -> String {
-    let rail = &standing.placed.rail_mm;
+pub(crate) fn draw(view: &ProfileView, width: u32) -> String {
+    let rail = &view.placed.rail_mm;
     let ends = rail
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], [y, _]| {
@@ -67,7 +67,7 @@ pub(crate) fn draw(standing: &Standing, width: u32) -> String {
         y: SHOWN_Z.map(|z| top + z),
     };
     let whole = TOP + height + BELOW;
-    let mut svg = open(&standing.title, &standing.remarks, width, whole);
+    let mut svg = open(&view.title, &view.remarks, width, whole);
     let [x, y, w, h] = chart.area.map(px);
     svg.raw(&format!(
         "<clipPath id=\"area\"><rect x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\"/></clipPath>\n<g clip-path=\"url(#area)\">\n"
@@ -81,16 +81,16 @@ pub(crate) fn draw(standing: &Standing, width: u32) -> String {
         chart.y[0],
         ["#cdd5db", "#5b6a76"],
     );
-    let wheel = &standing.placed.wheel_mm;
+    let wheel = &view.placed.wheel_mm;
     body(
         &mut svg,
         &chart,
         wheel,
-        -standing.lowering,
+        -view.lowering,
         chart.y[1],
         ["#e6ddcd", "#85704b"],
     );
-    combs(&mut svg, &chart, &standing.patches);
+    combs(&mut svg, &chart, &view.patches);
     svg.raw("</g>\n");
     chart.axes(&mut svg, ["y to the left in mm", "z up in mm"]);
     let (wheel_at, rail_at) = (TOP + 20.0, TOP + height - 12.0);
@@ -137,8 +137,8 @@ fn body(
 }
 
 /// The largest pressure of every strip, standing on the rail, and the number of each patch.
-fn combs(svg: &mut Svg, chart: &Chart, patches: &[StandingPatch]) {
-    let pressures = |patch: &StandingPatch| patch.cells.pressure_mpa.clone().unwrap_or_default();
+fn combs(svg: &mut Svg, chart: &Chart, patches: &[ProfileViewPatch]) {
+    let pressures = |patch: &ProfileViewPatch| patch.cells.pressure_mpa.clone().unwrap_or_default();
     let largest = patches.iter().flat_map(pressures).fold(0.0, f64::max);
     for (number, patch) in patches.iter().enumerate() {
         let (sin, cos) = patch.position.contact_angle_rad.sin_cos();

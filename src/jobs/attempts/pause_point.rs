@@ -1,7 +1,7 @@
-//! Where a solver waits while others have their turn.
+//! Where a solver is paused while others have their turn.
 //!
-//! The solver's thread passes the gate at every tick. A closed gate holds it there, with everything that it has in memory,
-//! until the gate is opened again; the time it waits is no time of its solve.
+//! The thread of the solver passes the pause point at every tick. A closed pause point holds it there, with everything that it has in memory,
+//! until it is opened again. The pause is no part of the solve time.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::Notify;
 
-/// A gate for the thread of one attempt.
+/// The pause point of one attempt.
 #[derive(Debug, Default)]
-pub struct Gate {
+pub struct PausePoint {
     closed: AtomicBool,
-    waiting: Mutex<GateWait>,
+    waiting: Mutex<PauseTime>,
     /// Wakes the solver.
     opened: Condvar,
     /// Tells the async side that the solver waits.
@@ -21,13 +21,13 @@ pub struct Gate {
 }
 
 #[derive(Debug, Default)]
-struct GateWait {
+struct PauseTime {
     since: Option<Instant>,
     /// Earlier waits, all together.
     before: Duration,
 }
 
-impl Gate {
+impl PausePoint {
     /// Holds the solver at its next tick.
     pub(crate) fn close(&self) {
         self.closed.store(true, Ordering::Release);
@@ -46,7 +46,7 @@ impl Gate {
         self.opened.notify_all();
     }
 
-    /// Called by the solver: waits while the gate is closed and the solver has not been told to stop.
+    /// Called by the solver: waits while the pause point is closed and the solver has not been told to stop.
     pub(crate) fn pass(&self, stopped: impl Fn() -> bool) {
         if !self.closed.load(Ordering::Acquire) {
             return;
@@ -86,7 +86,7 @@ impl Gate {
         waiting.before + now
     }
 
-    fn lock(&self) -> MutexGuard<'_, GateWait> {
+    fn lock(&self) -> MutexGuard<'_, PauseTime> {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -100,32 +100,32 @@ mod tests {
 
     #[tokio::test]
     async fn a_closed_gate_holds_the_solver_and_its_clock() {
-        let gate = Arc::new(Gate::default());
+        let pause_point = Arc::new(PausePoint::default());
         let passed = Arc::new(AtomicU32::new(0));
         let stop = Arc::new(AtomicBool::new(false));
-        gate.close();
+        pause_point.close();
         let solver = std::thread::spawn({
-            let (gate, passed, stop) = (gate.clone(), passed.clone(), stop.clone());
+            let (pause_point, passed, stop) = (pause_point.clone(), passed.clone(), stop.clone());
             move || {
                 while !stop.load(Ordering::SeqCst) {
-                    gate.pass(|| stop.load(Ordering::SeqCst));
+                    pause_point.pass(|| stop.load(Ordering::SeqCst));
                     passed.fetch_add(1, Ordering::SeqCst);
                 }
             }
         });
-        gate.reached().await;
+        pause_point.reached().await;
         assert_eq!(passed.load(Ordering::SeqCst), 0);
         std::thread::sleep(Duration::from_millis(5));
-        gate.open();
+        pause_point.open();
         while passed.load(Ordering::SeqCst) == 0 {
             std::thread::yield_now();
         }
-        assert!(gate.waited() >= Duration::from_millis(5));
+        assert!(pause_point.waited() >= Duration::from_millis(5));
         // A solver that is told to stop does not wait for its turn.
-        gate.close();
-        gate.reached().await;
+        pause_point.close();
+        pause_point.reached().await;
         stop.store(true, Ordering::SeqCst);
-        gate.nudge();
+        pause_point.nudge();
         solver.join().unwrap();
     }
 }

@@ -11,7 +11,7 @@ use crate::jobs::model::job::{Failure, FailureKind, too_late};
 use crate::jobs::store::ending::{Ending, SliceRecord};
 
 /// What follows from the outcome of an attempt.
-pub(crate) enum Verdict {
+pub(crate) enum Disposition {
     /// Store a solved slice, if there is one; the case is not solved whole. With a reason to stop it is released then, without
     /// one the next slice is solved.
     StoreSlice {
@@ -36,17 +36,17 @@ pub(crate) enum Verdict {
 }
 
 /// What follows from an outcome and the reason for which the solver was stopped, if it was.
-pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
+pub(crate) fn disposition_of(outcome: Outcome, reason: Option<StopReason>) -> Disposition {
     let failed = |reason: String| {
         tracing::error!(reason, "a job fails inside the service");
-        Verdict::End(Ending::Failed(Failure::new(
+        Disposition::End(Ending::Failed(Failure::new(
             FailureKind::Internal,
             INTERNAL,
         )))
     };
     match outcome {
         Outcome::Solved { .. } | Outcome::Slice { .. } if reason == Some(StopReason::Lost) => {
-            Verdict::Discard
+            Disposition::Discard
         }
         // A slice is kept like an answer as long as the whole is still wanted.
         Outcome::Slice { sliced, part }
@@ -55,7 +55,7 @@ pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
                 None | Some(StopReason::Shutdown | StopReason::TooLong)
             ) =>
         {
-            Verdict::StoreSlice {
+            Disposition::StoreSlice {
                 sliced,
                 part,
                 stopped: reason,
@@ -65,29 +65,29 @@ pub(crate) fn judge(outcome: Outcome, reason: Option<StopReason>) -> Verdict {
             result,
             remarks,
             field_patches,
-        } => Verdict::Store {
+        } => Disposition::Store {
             result,
             remarks,
             field_patches,
         },
         Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned | Outcome::Slice { .. } => {
             match reason {
-                Some(StopReason::Cancel) => Verdict::End(Ending::Cancelled),
-                Some(StopReason::Shutdown) => Verdict::Release,
-                Some(StopReason::TooLong) => Verdict::ReleaseAsLong,
-                Some(StopReason::Lost) => Verdict::Discard,
-                Some(StopReason::Deadline) => Verdict::End(Ending::Failed(too_late())),
+                Some(StopReason::Cancel) => Disposition::End(Ending::Cancelled),
+                Some(StopReason::Shutdown) => Disposition::Release,
+                Some(StopReason::TooLong) => Disposition::ReleaseAsLong,
+                Some(StopReason::Lost) => Disposition::Discard,
+                Some(StopReason::Deadline) => Disposition::End(Ending::Failed(too_late())),
                 None => failed("the solver stopped although nobody asked it to".to_owned()),
             }
         }
         Outcome::Unsolved(error) => match Failure::of_solve(&error) {
-            Some(failure) => Verdict::End(Ending::Failed(failure)),
+            Some(failure) => Disposition::End(Ending::Failed(failure)),
             None => failed(error.to_string()),
         },
         Outcome::Refused(error) => {
             failed(format!("the stored case is no longer accepted: {error}"))
         }
-        Outcome::Broken(failure) => Verdict::End(Ending::Failed(failure)),
+        Outcome::Broken(failure) => Disposition::End(Ending::Failed(failure)),
     }
 }
 
@@ -110,14 +110,14 @@ mod tests {
 
     /// What becomes of a job, as a word.
     fn fate(outcome: Outcome, reason: Option<StopReason>) -> &'static str {
-        match judge(outcome, reason) {
-            Verdict::Store { .. } => "kept",
-            Verdict::StoreSlice { stopped: None, .. } => "goes on",
-            Verdict::StoreSlice { .. } => "part kept",
-            Verdict::End(ending) => ending.state().name(),
-            Verdict::Release => "back",
-            Verdict::ReleaseAsLong => "back, long",
-            Verdict::Discard => "lost",
+        match disposition_of(outcome, reason) {
+            Disposition::Store { .. } => "kept",
+            Disposition::StoreSlice { stopped: None, .. } => "goes on",
+            Disposition::StoreSlice { .. } => "part kept",
+            Disposition::End(ending) => ending.state().name(),
+            Disposition::Release => "back",
+            Disposition::ReleaseAsLong => "back, long",
+            Disposition::Discard => "lost",
         }
     }
 
