@@ -15,8 +15,10 @@ pub(super) fn run(args: &DatabaseUrlArgs) -> anyhow::Result<ExitCode> {
     let made = runtime()?.block_on(migrate(&args.database_url))?;
     print(match made {
         Migrated::Made => "the job table was made",
-        Migrated::Advanced => "the job table was brought forward to the version of this program",
-        Migrated::WasThere => "the job table is there, in a version that this program can use",
+        Migrated::Upgraded => "the job table was brought forward to the version of this program",
+        Migrated::AlreadyCurrent => {
+            "the job table is there, in a version that this program can use"
+        }
     })
 }
 

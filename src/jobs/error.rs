@@ -144,7 +144,7 @@ pub enum JobsError {
         "the job table was written by another version of railhead that this one cannot go on with; use a new data folder or \
          database, or that version"
     )]
-    OtherForm,
+    UnsupportedSchema,
     /// What names the database is no such name.
     #[error(
         "the database URL cannot be read ({0}); it looks like postgres://user:password@host:5432/database"

@@ -12,7 +12,7 @@ use futures_util::stream::{Stream, TryStreamExt, try_unfold};
 
 use crate::http::layers::auth::{Access, bearer, unauthorized};
 use crate::http::limits::concurrency::ConcurrencyLimits;
-use crate::http::limits::holding_body::HeldShares;
+use crate::http::limits::holding_body::HeldPermits;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::Jobs;
@@ -91,7 +91,7 @@ where
             Some(key) => (key.tenant, key.labels),
             None => (ANONYMOUS.into(), Arc::default()),
         };
-        if let Some(held) = parts.extensions.get::<HeldShares>() {
+        if let Some(held) = parts.extensions.get::<HeldPermits>() {
             held.add(ConcurrencyLimits::from_ref(state).request(&tenant)?);
         }
         parts.extensions.insert(Tenant(tenant.clone()));

@@ -12,8 +12,8 @@ use serde_json::{Map, Number, Value};
 use crate::http::extract::caller::Tenant;
 use crate::http::extract::json_weight::{MEMBERS_MAX, weigh};
 use crate::http::layers::admission::too_long;
-use crate::http::limits::memory::{Memory, Room, SMALL_BYTES};
-use crate::http::limits::shares::Share;
+use crate::http::limits::memory::{Memory, MemoryPermit, SMALL_BYTES};
+use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
@@ -24,7 +24,7 @@ pub struct JsonBody {
     /// What was sent.
     pub value: Value,
     /// The memory that it takes, and the turn of a large one; to be held until it has been checked.
-    pub room: Room,
+    pub room: MemoryPermit,
 }
 
 impl<S> FromRequest<S> for JsonBody
@@ -48,12 +48,12 @@ where
             let value = read_json(&bytes)?;
             return Ok(JsonBody {
                 value,
-                room: Room { share, turn: None },
+                room: MemoryPermit { share, turn: None },
             });
         }
         // Off the threads that answer requests, few at a time.
         let turn = memory.turn(&tenant, weight).await?;
-        let room = Room {
+        let room = MemoryPermit {
             share,
             turn: Some(turn),
         };
@@ -181,7 +181,7 @@ async fn read_whole(
     memory: &Memory,
     tenant: &str,
     options: &HttpOptions,
-) -> Result<(Bytes, Option<Share>), ApiError> {
+) -> Result<(Bytes, Option<Permit>), ApiError> {
     let max_bytes = options.body_max_bytes;
     let too_large = || {
         ApiError::new(
@@ -236,7 +236,7 @@ async fn read_whole(
         }
     }
     if let Some(share) = &mut share {
-        share.keep(held.len());
+        share.shrink_to(held.len());
     }
     Ok((Bytes::from(held), share))
 }

@@ -14,7 +14,7 @@ use crate::http::extract::body_reader::BodyReader;
 use crate::http::extract::json::{essence, read_json, unreadable, weigh_case};
 use crate::http::extract::titles::faulty;
 use crate::http::limits::memory::Memory;
-use crate::http::limits::shares::Share;
+use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
@@ -31,7 +31,7 @@ pub enum Template {
     /// The case of a job.
     Job(Uuid),
     /// A case of this request, with the memory that it takes.
-    Case(Value, Option<Share>),
+    Case(Value, Option<Permit>),
 }
 
 impl Template {
@@ -39,7 +39,7 @@ impl Template {
     ///
     /// # Errors
     /// The job does not exist or has expired.
-    pub async fn case(self, jobs: &Jobs) -> Result<(Value, Option<Share>), ApiError> {
+    pub async fn case(self, jobs: &Jobs) -> Result<(Value, Option<Permit>), ApiError> {
         match self {
             Template::Case(case, share) => Ok((case, share)),
             Template::Job(id) => {

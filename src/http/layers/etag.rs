@@ -65,14 +65,14 @@ pub(crate) async fn complete(request: Request, next: Next) -> Response {
 
 /// The tag of a result or a part of it, or the answer if the client has it already.
 #[derive(Debug)]
-pub(crate) enum Known {
+pub(crate) enum Precondition {
     /// The client has it already; this is the answer.
-    Unchanged(Response),
+    NotModified(Response),
     /// It has to be computed, and gets this tag.
-    Tag(String),
+    Proceed(String),
 }
 
-impl Known {
+impl Precondition {
     /// Compares the tags that a client has with the tag of what it asks for, before anything is loaded or computed. Results never
     /// change, so job, path, query, format and the program that writes the answer determine the tag. `If-None-Match: *` is left to
     /// [`immutable`], since only the work itself shows whether there is an answer.
@@ -85,7 +85,7 @@ impl Known {
         uri: &Uri,
         headers: &HeaderMap,
         format: Format,
-    ) -> Result<Known, ApiError> {
+    ) -> Result<Precondition, ApiError> {
         let job = jobs.get(id).await?;
         let query = Pairs::<Vec<(String, String)>>::try_from_uri(uri);
         let mut query = query.map_or_else(|_| Vec::new(), |Pairs(pairs)| pairs);
@@ -94,17 +94,17 @@ impl Known {
         let text = format!("{} {parts:?}", program_digest().await);
         let digest = digest(text.as_bytes());
         if job.state != State::Succeeded {
-            return Ok(Known::Tag(digest));
+            return Ok(Precondition::Proceed(digest));
         }
         let Some(tag) = matching(headers, &digest).filter(|_| !asks_for_any(headers)) else {
-            return Ok(Known::Tag(digest));
+            return Ok(Precondition::Proceed(digest));
         };
         let head = [
             (header::ETAG, tag),
             (header::CACHE_CONTROL, IMMUTABLE),
             (header::VARY, HeaderValue::from_static("Accept")),
         ];
-        Ok(Known::Unchanged(
+        Ok(Precondition::NotModified(
             (StatusCode::NOT_MODIFIED, head).into_response(),
         ))
     }

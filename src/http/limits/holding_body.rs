@@ -10,7 +10,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 use hyper::body::{Frame, SizeHint};
 
-use crate::http::limits::shares::Share;
+use crate::http::limits::tenant_semaphore::Permit;
 
 /// A body and the resource that it holds.
 struct HoldingBody<T>(Body, T);
@@ -40,13 +40,13 @@ impl<T: Unpin> HttpBody for HoldingBody<T> {
     }
 }
 
-/// Shares that a request holds until its answer has been sent; in its extensions.
+/// Permits that a request holds until its answer has been sent; in its extensions.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct HeldShares(Arc<Mutex<Vec<Share>>>);
+pub(crate) struct HeldPermits(Arc<Mutex<Vec<Permit>>>);
 
-impl HeldShares {
+impl HeldPermits {
     /// Holds one more share.
-    pub(crate) fn add(&self, share: Share) {
+    pub(crate) fn add(&self, share: Permit) {
         self.0
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -64,7 +64,7 @@ impl HeldShares {
 
 /// Layer in which requests can hold shares.
 pub(crate) async fn hold(mut request: Request, next: Next) -> Response {
-    let held = HeldShares::default();
+    let held = HeldPermits::default();
     request.extensions_mut().insert(held.clone());
     hold_while_sent(next.run(request).await, held)
 }

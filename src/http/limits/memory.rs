@@ -4,7 +4,7 @@
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use crate::http::limits::shares::{Share, Shares};
+use crate::http::limits::tenant_semaphore::{Permit, TenantSemaphore};
 use crate::http::limits::turns::{Computation, Turn, Turns};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
@@ -22,9 +22,9 @@ const ANSWERS: &str = "answers that clients have not taken yet";
 /// Memory and turns to compute of all requests; clones share them.
 #[derive(Debug, Clone)]
 pub struct Memory {
-    bodies: Shares,
-    parsed: Shares,
-    answers: Shares,
+    bodies: TenantSemaphore,
+    parsed: TenantSemaphore,
+    answers: TenantSemaphore,
     /// Turns for large cases: half of the cores, so that small cases need not wait for large ones.
     large: Turns,
     small: Turns,
@@ -34,21 +34,21 @@ pub struct Memory {
     grids: Turns,
     /// Turns for pictures, small grids and tables, which therefore need not wait for large grids.
     renderings: Turns,
-    waiting: Shares,
+    waiting: TenantSemaphore,
     table_time: Duration,
 }
 
-impl Share {
-    /// Gives back what is held beyond so many bytes.
-    pub fn keep(&mut self, bytes: usize) {
-        self.keep_units(bytes.div_ceil(UNIT));
+impl Permit {
+    /// Releases what is held beyond `bytes`.
+    pub fn shrink_to(&mut self, bytes: usize) {
+        self.shrink_to_units(bytes.div_ceil(UNIT));
     }
 }
 
 /// A turn to compute an answer, and the memory for it.
 #[derive(Debug)]
 pub struct Rendering {
-    share: Option<Share>,
+    share: Option<Permit>,
     turn: Turn,
     memory: Memory,
     tenant: String,
@@ -56,9 +56,9 @@ pub struct Rendering {
 
 /// Memory and a turn to compute; given back on drop.
 #[derive(Debug, Default)]
-pub struct Room {
+pub struct MemoryPermit {
     /// The memory.
-    pub share: Option<Share>,
+    pub share: Option<Permit>,
     /// The turn.
     pub turn: Option<Turn>,
 }
@@ -69,7 +69,7 @@ impl Memory {
     pub fn new(options: &HttpOptions) -> Memory {
         let part = |eighths: usize| {
             let units = |bytes: usize| bytes / 8 * eighths / UNIT;
-            Shares::new(
+            TenantSemaphore::new(
                 units(options.memory_max_bytes),
                 units(options.tenant_memory_max_bytes),
             )
@@ -85,7 +85,7 @@ impl Memory {
             trials: Turns::new(cores / 2),
             grids: Turns::new(options.renderings),
             renderings: Turns::new(options.renderings),
-            waiting: Shares::new(waiting, waiting.div_ceil(2)),
+            waiting: TenantSemaphore::new(waiting, waiting.div_ceil(2)),
             table_time: options.table_time,
         }
     }
@@ -94,7 +94,7 @@ impl Memory {
     ///
     /// # Errors
     /// `overloaded`: it is not free in time.
-    pub async fn body(&self, tenant: &str, bytes: usize) -> Result<Option<Share>, ApiError> {
+    pub async fn body(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
         take(&self.bodies, tenant, bytes, "the bodies of requests").await
     }
 
@@ -102,7 +102,7 @@ impl Memory {
     ///
     /// # Errors
     /// As [`Memory::body`].
-    pub async fn parsed(&self, tenant: &str, bytes: usize) -> Result<Option<Share>, ApiError> {
+    pub async fn parsed(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
         take(&self.parsed, tenant, bytes, "cases that are read").await
     }
 
@@ -110,7 +110,7 @@ impl Memory {
     ///
     /// # Errors
     /// As [`Memory::body`].
-    pub async fn rows(&self, tenant: &str, bytes: usize) -> Result<Option<Share>, ApiError> {
+    pub async fn rows(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
         take(&self.answers, tenant, bytes, ANSWERS).await
     }
 
@@ -143,7 +143,7 @@ impl Memory {
     ///
     /// # Errors
     /// `overloaded`: it is not free.
-    pub fn ready_answer(&self, tenant: &str, bytes: usize) -> Result<Option<Share>, ApiError> {
+    pub fn ready_answer(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
         if bytes <= SMALL_BYTES {
             return Ok(None);
         }
@@ -191,7 +191,7 @@ impl Rendering {
         self,
         work: impl FnOnce() -> Result<T, ApiError> + Send + 'static,
         size: impl Fn(&T) -> usize,
-    ) -> Result<(T, Option<Share>), ApiError> {
+    ) -> Result<(T, Option<Permit>), ApiError> {
         let turn = self.turn;
         let work = tokio::task::spawn_blocking(move || {
             // The turn is held until the work ends, even if the client has gone away.
@@ -202,7 +202,7 @@ impl Rendering {
         let bytes = size(&done);
         let share = match self.share {
             Some(mut share) => {
-                share.keep(bytes);
+                share.shrink_to(bytes);
                 Some(share)
             }
             None => self.memory.ready_answer(&self.tenant, bytes)?,
@@ -212,11 +212,11 @@ impl Rendering {
 }
 
 async fn take(
-    shares: &Shares,
+    shares: &TenantSemaphore,
     tenant: &str,
     bytes: usize,
     what: &str,
-) -> Result<Option<Share>, ApiError> {
+) -> Result<Option<Permit>, ApiError> {
     if bytes <= SMALL_BYTES {
         return Ok(None);
     }

@@ -3,5 +3,5 @@
 pub(super) mod concurrency;
 pub(super) mod holding_body;
 pub(super) mod memory;
-pub(super) mod shares;
+pub(super) mod tenant_semaphore;
 pub(super) mod turns;

@@ -15,7 +15,7 @@ use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::Solution;
 use crate::http::dto::result::JobResult;
 use crate::http::limits::memory::Memory;
-use crate::http::limits::shares::Share;
+use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::problem::body::ProblemBody;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
@@ -193,7 +193,7 @@ impl Source {
         &self,
         needed: usize,
         (bytes, mut pieces): OpenedItem,
-    ) -> Result<Option<(Solution, Option<Share>)>, BoxError> {
+    ) -> Result<Option<(Solution, Option<Permit>)>, BoxError> {
         let refused = |error: ApiError| BoxError::from(error.detail().to_owned());
         let turn = self.memory.rendering(self.jobs.tenant(), needed).await;
         let turn = turn.map_err(refused)?;
@@ -232,7 +232,7 @@ fn table_of(
     columns: Arc<Columns>,
     item: BatchItem,
     solution: Solution,
-    share: Option<Share>,
+    share: Option<Permit>,
 ) -> Pieces {
     let held = (columns, item, solution, share);
     let lines = try_unfold((0, held), |(start, held)| async move {

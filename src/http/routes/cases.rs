@@ -14,7 +14,7 @@ use crate::contact::solution::words::profile_quality::PairQuality;
 use crate::contact::solution::words::understanding::Understanding;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
-use crate::http::limits::memory::{Memory, Room};
+use crate::http::limits::memory::{Memory, MemoryPermit};
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
@@ -85,7 +85,7 @@ pub(crate) async fn check(
         room.turn = Some(memory.turn(jobs.tenant(), 0).await?);
     }
     let value = jobs.with_profiles(value).await?;
-    let Room { share, turn } = room;
+    let MemoryPermit { share, turn } = room;
     // A large grid takes long enough to check that it must not hold up other requests.
     let checked = tokio::task::spawn_blocking(move || {
         // The turn is held until the work ends, even if the client has gone away.

@@ -226,7 +226,7 @@ pub(crate) async fn evaluate(
     let mut share = memory.rows(jobs.tenant(), 2 * bytes).await?;
     let text = read_body(request, &options).await?;
     if !packed && let Some(share) = &mut share {
-        share.keep(2 * text.len());
+        share.shrink_to(2 * text.len());
     }
     let mut computation = memory.computation(jobs.tenant());
     let bytes_max = options.evaluate_max_bytes;
@@ -269,7 +269,7 @@ pub(crate) async fn evaluate(
             }
         };
         if let Some(share) = &mut share {
-            share.keep(bytes);
+            share.shrink_to(bytes);
         }
         Ok((body, share))
     });

@@ -15,7 +15,7 @@ use crate::http::extract::accept::choose;
 use crate::http::extract::caller::{Caller, Credential, revoked};
 use crate::http::layers::auth::Access;
 use crate::http::limits::concurrency::ConcurrencyLimits;
-use crate::http::limits::holding_body::{HeldShares, hold_while_sent};
+use crate::http::limits::holding_body::{HeldPermits, hold_while_sent};
 use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
 use crate::jobs::Jobs;
@@ -34,7 +34,7 @@ pub(crate) struct EventRequest {
     /// The event that it saw last.
     pub seen: Option<String>,
     concurrency: ConcurrencyLimits,
-    held: HeldShares,
+    held: HeldPermits,
     key: Option<Credential>,
 }
 

@@ -17,7 +17,7 @@ use crate::http::extract::query::{Parameters, count, query, reader};
 use crate::http::extract::titles::place;
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
-use crate::http::limits::shares::Share;
+use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::format::Format;
@@ -321,7 +321,7 @@ async fn read(
     memory: &Memory,
     id: Uuid,
     make: impl FnOnce(&EvolutionAnswer) -> Result<Vec<u8>, ApiError> + Send + 'static,
-) -> Result<(Vec<u8>, Option<Share>), ApiError> {
+) -> Result<(Vec<u8>, Option<Permit>), ApiError> {
     let jobs = jobs.of_kind(Kind::Evolution);
     // Once as text, and about as much as numbers.
     let share = memory.ready_answer(jobs.tenant(), 2 * jobs.answer_bytes(id).await?)?;

@@ -8,7 +8,7 @@ use uuid::Uuid;
 
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
-use crate::http::layers::etag::{Known, tagged};
+use crate::http::layers::etag::{Precondition, tagged};
 use crate::http::limits::memory::Rendering;
 use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
@@ -55,9 +55,9 @@ impl PartRequest {
         format: Format,
         answer: impl Future<Output = Result<Response, ApiError>> + Send,
     ) -> Result<Response, ApiError> {
-        match Known::of(&self.jobs, self.id, &self.uri, &self.headers, format).await? {
-            Known::Unchanged(unchanged) => Ok(unchanged),
-            Known::Tag(tag) => Ok(tagged(&tag, answer.await?)),
+        match Precondition::of(&self.jobs, self.id, &self.uri, &self.headers, format).await? {
+            Precondition::NotModified(unchanged) => Ok(unchanged),
+            Precondition::Proceed(tag) => Ok(tagged(&tag, answer.await?)),
         }
     }
 

@@ -10,10 +10,10 @@ use uuid::Uuid;
 use crate::http::dto::result::JobResult;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
-use crate::http::layers::etag::{Known, tagged};
+use crate::http::layers::etag::{Precondition, tagged};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
-use crate::http::limits::shares::Share;
+use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
@@ -50,9 +50,9 @@ pub(crate) async fn result(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     await_end(&jobs, id, &wait).await?;
-    let tag = match Known::of(&jobs, id, &uri, &headers, Format::Json).await? {
-        Known::Unchanged(answer) => return Ok(answer),
-        Known::Tag(tag) => tag,
+    let tag = match Precondition::of(&jobs, id, &uri, &headers, Format::Json).await? {
+        Precondition::NotModified(answer) => return Ok(answer),
+        Precondition::Proceed(tag) => tag,
     };
     let (body, share) = result_text(&jobs, &memory, id, ["", ""]).await?;
     let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
@@ -70,7 +70,7 @@ pub(crate) async fn result_text(
     memory: &Memory,
     id: Uuid,
     around: [&str; 2],
-) -> Result<(Body, Option<Share>), ApiError> {
+) -> Result<(Body, Option<Permit>), ApiError> {
     let answer = jobs.open_answer(id).await?;
     let share = memory.ready_answer(jobs.tenant(), answer.held_bytes)?;
     let tail = JobResult::tail(id, answer.cached, &answer.outputs)?;

@@ -21,7 +21,7 @@ use crate::http::layers::auth::Access;
 use crate::http::limits::concurrency::ConcurrencyLimits;
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
-use crate::http::limits::shares::Share;
+use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::problem::body::Fault;
 use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
@@ -187,7 +187,7 @@ async fn text(
     work: Work,
     errors: Option<Vec<Fault>>,
     in_time: bool,
-) -> Result<(Body, Option<Share>), ApiError> {
+) -> Result<(Body, Option<Permit>), ApiError> {
     let solved = match &work {
         Work::Job(job) => in_time && job.kind == Kind::Case && job.state == JobState::Succeeded,
         _ => false,

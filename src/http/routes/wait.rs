@@ -10,8 +10,8 @@ use axum::response::Response;
 use crate::http::extract::caller::{Credential, Tenant, revoked, revoked_meanwhile};
 use crate::http::extract::query::{Parameters, Query, query, seconds};
 use crate::http::limits::concurrency::ConcurrencyLimits;
-use crate::http::limits::holding_body::HeldShares;
-use crate::http::limits::shares::Share;
+use crate::http::limits::holding_body::HeldPermits;
+use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::problem::error::ApiError;
 use crate::jobs::Jobs;
 
@@ -34,8 +34,8 @@ query! {
 pub(crate) struct Wait {
     seconds: Option<u32>,
     preferred: bool,
-    place: Option<Share>,
-    held: Option<HeldShares>,
+    place: Option<Permit>,
+    held: Option<HeldPermits>,
     key: Option<Credential>,
 }
 
@@ -47,7 +47,7 @@ impl Wait {
     }
 
     /// The place among the requests that wait, for an answer that waits while it is sent.
-    pub(crate) fn into_place(self) -> Option<Share> {
+    pub(crate) fn into_place(self) -> Option<Permit> {
         if let (Some(_), Some(held)) = (self.seconds, &self.held) {
             held.release();
         }

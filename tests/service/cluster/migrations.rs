@@ -86,7 +86,7 @@ async fn tables_are_made_once_and_old_ones_brought_forward_once_whoever_does_so_
     assert_eq!(
         (
             count(&said, Migrated::Made),
-            count(&said, Migrated::WasThere)
+            count(&said, Migrated::AlreadyCurrent)
         ),
         (1, 4)
     );
@@ -104,8 +104,8 @@ async fn tables_are_made_once_and_old_ones_brought_forward_once_whoever_does_so_
     let said = five(&old).await;
     assert_eq!(
         (
-            count(&said, Migrated::Advanced),
-            count(&said, Migrated::WasThere)
+            count(&said, Migrated::Upgraded),
+            count(&said, Migrated::AlreadyCurrent)
         ),
         (1, 4)
     );
@@ -136,7 +136,7 @@ async fn a_program_goes_on_beside_newer_tables_unless_they_say_that_it_cannot() 
     drop(before);
     let after = start();
     after.get(&format!("/v1/jobs/{job}/result")).await;
-    assert_eq!(migrate(&url).await.unwrap(), Migrated::WasThere);
+    assert_eq!(migrate(&url).await.unwrap(), Migrated::AlreadyCurrent);
 
     let contract = "UPDATE deployment SET readable_from = form";
     sqlx::raw_sql(contract)

@@ -15,7 +15,7 @@ use crate::http::extract::multipart::{Template, template_missing};
 use crate::http::extract::run_body::spool;
 use crate::http::extract::tables::{TableForm, TableRows, TableSource, unsupported};
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
-use crate::http::limits::shares::Share;
+use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::limits::turns::Computation;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
@@ -65,7 +65,7 @@ pub async fn form(
     jobs: &Jobs,
     headers: &HeaderMap,
     template: Option<Template>,
-) -> Result<(Form, Option<Share>), ApiError> {
+) -> Result<(Form, Option<Permit>), ApiError> {
     let essence = essence(headers);
     let table = TableForm::of(&essence);
     let (form, template) = match (table, template) {

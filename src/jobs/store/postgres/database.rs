@@ -38,7 +38,7 @@ impl PostgresStore {
     /// Opens the database, whose tables must be there, with at most so many connections beside two for wake-ups.
     ///
     /// # Errors
-    /// [`JobsError::BadDatabaseUrl`], [`JobsError::OtherForm`], [`JobsError::NotMigrated`], or it cannot be reached.
+    /// [`JobsError::BadDatabaseUrl`], [`JobsError::UnsupportedSchema`], [`JobsError::NotMigrated`], or it cannot be reached.
     pub async fn open(url: &str, connections: u32) -> Result<PostgresStore, JobsError> {
         let (options, writer) = connect(url, connections).await?;
         require(&writer).await?;

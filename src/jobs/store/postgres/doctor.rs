@@ -93,7 +93,7 @@ const NUMBERS: [Question; 10] = [
 /// Looks at a database with a job table; changes nothing.
 ///
 /// # Errors
-/// [`JobsError::NotMigrated`], [`JobsError::OtherForm`], or it cannot be reached.
+/// [`JobsError::NotMigrated`], [`JobsError::UnsupportedSchema`], or it cannot be reached.
 pub async fn examine(url: &str) -> Result<Vec<Finding>, JobsError> {
     let (_, pool) = connect(url, 1).await?;
     let findings = ask(&pool).await;

@@ -68,10 +68,10 @@ const STEPS: &[Step] = &[
 ];
 
 /// The form that is read and written.
-const FORM: i64 = STEPS[STEPS.len() - 1].form;
+const SCHEMA_VERSION: i64 = STEPS[STEPS.len() - 1].form;
 
 /// The form without a step.
-const FIRST_FORM: i64 = 1;
+const FIRST_SCHEMA_VERSION: i64 = 1;
 
 /// What [`migrate`] did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,16 +79,16 @@ pub enum Migrated {
     /// The tables were made.
     Made,
     /// They were there, in an earlier form.
-    Advanced,
+    Upgraded,
     /// They were there.
-    WasThere,
+    AlreadyCurrent,
 }
 
 /// Makes the tables in the first schema of the search path, or brings them forward to the form of this program. Several may do so
 /// at once.
 ///
 /// # Errors
-/// [`JobsError::OtherForm`] if there are tables that this program cannot use, or the database failed.
+/// [`JobsError::UnsupportedSchema`] if there are tables that this program cannot use, or the database failed.
 pub async fn migrate(url: &str) -> Result<Migrated, JobsError> {
     let (_, pool) = connect(url, 1).await?;
     let made = make(&pool).await;
@@ -105,18 +105,18 @@ async fn make(pool: &PgPool) -> Result<Migrated, JobsError> {
     // Ends with the transaction: a lock of the session would not pass a pooler.
     lock(&mut transaction, connection::SCHEMA).await?;
     let before = form(&mut transaction).await?;
-    if before.is_some_and(|form| form >= FORM) {
+    if before.is_some_and(|form| form >= SCHEMA_VERSION) {
         require_within(&mut transaction).await?;
-        return Ok(Migrated::WasThere);
+        return Ok(Migrated::AlreadyCurrent);
     }
     if before.is_none() {
         sqlx::raw_sql(SCHEMA).execute(&mut *transaction).await?;
         sqlx::query("INSERT INTO deployment (one, form) VALUES (1, $1)")
-            .bind(FIRST_FORM)
+            .bind(FIRST_SCHEMA_VERSION)
             .execute(&mut *transaction)
             .await?;
     }
-    let reached = before.unwrap_or(FIRST_FORM);
+    let reached = before.unwrap_or(FIRST_SCHEMA_VERSION);
     for step in STEPS.iter().filter(|step| step.form > reached) {
         sqlx::raw_sql(step.statements)
             .execute(&mut *transaction)
@@ -130,14 +130,14 @@ async fn make(pool: &PgPool) -> Result<Migrated, JobsError> {
     transaction.commit().await?;
     Ok(match before {
         None => Migrated::Made,
-        Some(_) => Migrated::Advanced,
+        Some(_) => Migrated::Upgraded,
     })
 }
 
 /// Requires tables that this program can use; changes nothing.
 ///
 /// # Errors
-/// [`JobsError::NotMigrated`], [`JobsError::OldTables`], [`JobsError::OtherForm`], or the database failed.
+/// [`JobsError::NotMigrated`], [`JobsError::OldTables`], [`JobsError::UnsupportedSchema`], or the database failed.
 pub(crate) async fn require(pool: &PgPool) -> Result<(), JobsError> {
     let mut connection = pool.acquire().await?;
     require_within(&mut connection).await
@@ -147,15 +147,15 @@ async fn require_within(connection: &mut PgConnection) -> Result<(), JobsError> 
     let Some(form) = form(&mut *connection).await? else {
         return Err(JobsError::NotMigrated);
     };
-    if form < FORM {
+    if form < SCHEMA_VERSION {
         return Err(JobsError::OldTables);
     }
     let readable_from: i64 = sqlx::query_scalar("SELECT readable_from FROM deployment")
         .fetch_one(connection)
         .await?;
-    match readable_from <= FORM {
+    match readable_from <= SCHEMA_VERSION {
         true => Ok(()),
-        false => Err(JobsError::OtherForm),
+        false => Err(JobsError::UnsupportedSchema),
     }
 }
 

@@ -38,7 +38,7 @@ impl SqliteStore {
     /// Opens the database file; makes it if there is none, and brings it forward if an earlier version made it.
     ///
     /// # Errors
-    /// The file cannot be opened, or [`JobsError::OtherForm`].
+    /// The file cannot be opened, or [`JobsError::UnsupportedSchema`].
     pub async fn open(file: &Path) -> Result<SqliteStore, JobsError> {
         make_private(file)?;
         let store = SqliteStore::connect(file)?;
@@ -49,7 +49,7 @@ impl SqliteStore {
     /// Opens the database file beside a service that may be using it; makes and changes nothing.
     ///
     /// # Errors
-    /// There is no such file, it cannot be opened, [`JobsError::OldFolder`] or [`JobsError::OtherForm`].
+    /// There is no such file, it cannot be opened, [`JobsError::OldFolder`] or [`JobsError::UnsupportedSchema`].
     pub async fn open_existing(file: &Path) -> Result<SqliteStore, JobsError> {
         std::fs::metadata(file).map_err(|source| JobsError::DataDir {
             path: file.to_owned(),

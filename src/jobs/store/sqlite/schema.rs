@@ -15,7 +15,7 @@ const SCHEMA: &str = include_str!("schema.sql");
 const APPLICATION: i64 = 0x7268_6a62;
 
 /// The form of `schema.sql`.
-const FIRST_FORM: i64 = 7;
+const FIRST_SCHEMA_VERSION: i64 = 7;
 
 /// What is done to tables of an earlier form, in this order: the form that each step leads to, and its statements. A step that has landed
 /// is never changed.
@@ -27,12 +27,12 @@ const STEPS: &[(i64, &str)] = &[
 ];
 
 /// The form that is read and written.
-const FORM: i64 = STEPS[STEPS.len() - 1].0;
+const SCHEMA_VERSION: i64 = STEPS[STEPS.len() - 1].0;
 
 /// Makes the tables in an empty file, or brings them forward to the form of this program.
 ///
 /// # Errors
-/// [`JobsError::OtherForm`] if the file holds something else or is of a later version, or the database failed.
+/// [`JobsError::UnsupportedSchema`] if the file holds something else or is of a later version, or the database failed.
 pub(crate) async fn migrate(writer: &Pool) -> Result<(), JobsError> {
     loop {
         let mut transaction = writer.begin().await?;
@@ -40,13 +40,13 @@ pub(crate) async fn migrate(writer: &Pool) -> Result<(), JobsError> {
             .fetch_one(&mut *transaction)
             .await?;
         let step = match tables {
-            0 => Some(&(FIRST_FORM, SCHEMA)),
+            0 => Some(&(FIRST_SCHEMA_VERSION, SCHEMA)),
             _ => match form(&mut transaction).await? {
-                FORM => return Ok(()),
+                SCHEMA_VERSION => return Ok(()),
                 form => STEPS.iter().find(|(reached, _)| *reached == form + 1),
             },
         };
-        let (reached, statements) = *step.ok_or(JobsError::OtherForm)?;
+        let (reached, statements) = *step.ok_or(JobsError::UnsupportedSchema)?;
         transaction.batch(statements)?;
         transaction.batch(&format!(
             "PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {reached}"
@@ -59,12 +59,12 @@ pub(crate) async fn migrate(writer: &Pool) -> Result<(), JobsError> {
 /// Requires that a file is a job table of this version; changes nothing.
 ///
 /// # Errors
-/// [`JobsError::OldFolder`], [`JobsError::OtherForm`], or the database failed.
+/// [`JobsError::OldFolder`], [`JobsError::UnsupportedSchema`], or the database failed.
 pub(crate) async fn require(pool: &Pool) -> Result<(), JobsError> {
     match form(&mut *pool.acquire().await?).await? {
-        FORM => Ok(()),
-        FIRST_FORM..FORM => Err(JobsError::OldFolder),
-        _ => Err(JobsError::OtherForm),
+        SCHEMA_VERSION => Ok(()),
+        FIRST_SCHEMA_VERSION..SCHEMA_VERSION => Err(JobsError::OldFolder),
+        _ => Err(JobsError::UnsupportedSchema),
     }
 }
 
@@ -74,7 +74,7 @@ async fn form(connection: &mut Connection) -> Result<i64, JobsError> {
         .fetch_one(&mut *connection)
         .await?;
     if application != APPLICATION {
-        return Err(JobsError::OtherForm);
+        return Err(JobsError::UnsupportedSchema);
     }
     let form = query_scalar("PRAGMA user_version");
     Ok(form.fetch_one(connection).await?)
@@ -82,7 +82,7 @@ async fn form(connection: &mut Connection) -> Result<i64, JobsError> {
 
 /// Writes the number of the version again: a page that stays as it was.
 pub(crate) async fn mark(writer: &Pool) -> Result<(), StoreError> {
-    query(format!("PRAGMA user_version = {FORM}"))
+    query(format!("PRAGMA user_version = {SCHEMA_VERSION}"))
         .execute(writer)
         .await?;
     Ok(())
