@@ -323,6 +323,16 @@ function numpyReads(path, length) {
   assert.equal(Number(sum.toString()), length);
 }
 
+/** The points of a line that is drawn. @param {import('playwright-core').Page} page @param {string} selector @returns {Promise<number[][]>} */
+const pixels = async (page, selector) => (await page.locator(selector).getAttribute('d') ?? '').split(/[MLZ]/).filter(Boolean).map((pair) => pair.split(' ').map(Number));
+
+/** @param {readonly number[][]} line @param {readonly number[]} place */
+const distanceTo = (line, [x, y]) => Math.min(...line.slice(1).map(([x1, y1], at) => {
+  const [x0, y0] = line[at];
+  const share = Math.min(1, Math.max(0, ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / ((x1 - x0) ** 2 + (y1 - y0) ** 2 || 1)));
+  return Math.hypot(x - x0 - share * (x1 - x0), y - y0 - share * (y1 - y0));
+}));
+
 test('on the curve of the rail the pressure stands along the rail', () => onPage('', async (page) => {
   const bent = withFields('wheel-rail');
   Object.assign(bent.contact, { reference_surface: 'curve', lateral_shift_mm: -6 });
@@ -332,18 +342,10 @@ test('on the curve of the rail the pressure stands along the rail', () => onPage
   await comb.waitFor();
   assert.ok(await page.getByRole('radio', { name: 'Contact', exact: true }).isChecked());
   await page.getByText('pressure along the curve of the rail').waitFor();
-  // The base of the pressure lies on the rail within a pixel.
-  const away = await page.evaluate(() => {
-    const [rail, base] = ['.drawing .rail', '.drawing .patch .comb'].map((name) => (document.querySelector(name)?.getAttribute('d') ?? '')
-      .split(/[MLZ]/).filter(Boolean).map((pair) => pair.split(' ').map(Number)));
-    // It ends where the line over it begins.
-    const end = base.findIndex(([x, y], at) => at > 0 && x === base[at - 1][0] && y === base[at - 1][1]);
-    return Math.max(...base.slice(0, end).map(([x, y]) => Math.min(...rail.slice(1).map(([x1, y1], at) => {
-      const [x0, y0] = rail[at];
-      const share = Math.min(1, Math.max(0, ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / ((x1 - x0) ** 2 + (y1 - y0) ** 2 || 1)));
-      return Math.hypot(x - x0 - share * (x1 - x0), y - y0 - share * (y1 - y0));
-    }))));
-  });
+  // The base of the pressure lies on the rail within a pixel. It ends where the line over it begins.
+  const [rail, line] = [await pixels(page, '.drawing .rail'), await pixels(page, '.drawing .patch .comb')];
+  const base = line.slice(0, line.findIndex(([x, y], at) => at > 0 && x === line[at - 1][0] && y === line[at - 1][1]));
+  const away = Math.max(...base.map((place) => distanceTo(rail, place)));
   assert.ok(away < 1, `${away}`);
   await page.getByRole('radio', { name: 'Whole head' }).check();
   await page.getByRole('button', { name: 'Solve again with damage' }).waitFor();
@@ -365,4 +367,38 @@ test('what the curve does not solve stands on planes, and says so', () => onPage
   await page.getByText('pressure on the rail').waitFor();
   await page.waitForFunction(() => document.querySelectorAll('field-map.main .readout dt')[1]?.textContent === 'y');
   assert.ok(await page.getByRole('radio', { name: 'Whole head' }).isChecked());
+}));
+
+/** A running rail with a guard rail beside it, 41 mm from its gauge face and 20 mm higher, as one section. @param {[number, number][]} rail */
+function guarded(rail) {
+  const face = -36.5 - 41;
+  const corner = Array.from({ length: 21 }, (_, i) => (i * Math.PI) / 40).map((angle) => [face - 8 + 8 * Math.sin(angle), -12 - 8 * Math.cos(angle)]);
+  const groove = Array.from({ length: 11 }, (_, i) => [face + 1 + 3.9 * i, 45]);
+  return [[face - 40, -20], [face - 26, -20], [face - 14, -20], ...corner, ...Array.from({ length: 18 }, (_, i) => [face, -10 + 2 * i]), ...groove, [-36.7, 28], ...rail].map((point) => point.map((value) => Number(value.toFixed(4))));
+}
+
+test('a wheel on its running rail and on a guard rail stands where it touches, with its wear there', () => onPage('', async (page) => {
+  const base = withFields('wheel-rail');
+  const { damage } = example('maintenance');
+  const solve = (/** @type {number} */ shift) => service.solved({
+    ...base, damage, outputs: [...base.outputs, 'damage'], contact: { ...base.contact, rail: { points_mm: guarded(base.contact.rail.points_mm) }, rail_origin_mm: 753.5, lateral_shift_mm: shift },
+  });
+  const [running, guard] = [await solve(3), await solve(6)];
+  for (const job of [running, guard]) assert.equal(job.state, 'succeeded', JSON.stringify(job.error));
+  const place = (/** @type {typeof guard} */ job) => job.result.patches[0].position.rail_mm[0];
+  assert.ok(Math.abs(place(running)) < 36 && place(guard) < -77, 'the second touches the guard rail with the back of its flange');
+  for (const job of [running, guard]) {
+    await page.goto(`${service.base}/#/jobs/${job.id}`);
+    await drawn(page);
+    await page.locator('.drawing .patch .comb').waitFor();
+    // The patch is in the picture, on the line of the rail.
+    const dot = await page.locator('.drawing .patch .dot').evaluate((mark) => ['cx', 'cy'].map((name) => Number(mark.getAttribute(name))));
+    const away = distanceTo(await pixels(page, '.drawing .rail'), dot);
+    assert.ok(away < 4, `${away}`);
+    const shown = await page.locator('.damage .chart').first().locator('text').allTextContents();
+    const ticks = shown.filter((text) => /\d/.test(text)).map(parsed).filter(Number.isFinite);
+    assert.ok(ticks.some((tick) => Math.abs(tick - place(job)) < 12), `${place(job)} among ${ticks}`);
+  }
+  await page.goto(`${service.base}/#/compare/${running.id}/${guard.id}`);
+  await page.getByText('Both cases have the same rail.').waitFor();
 }));
