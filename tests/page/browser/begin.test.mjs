@@ -134,8 +134,10 @@ test('a rail whose points jump says so, and is solved all the same on request', 
   await page.getByLabel('Shift to the left').fill('-1');
   await ready(page);
   await page.getByRole('button', { name: /^Solve/ }).click();
-  await page.getByText("the rail's points jump at y = ").waitFor({ timeout: 60_000 });
-  await page.getByRole('button', { name: 'Solve it all the same' }).click();
+  // A result while typing says so too, until the job has failed.
+  const failed = page.locator('.result');
+  await failed.getByText("the rail's points jump at y = ").waitFor({ timeout: 60_000 });
+  await failed.getByRole('button', { name: 'Solve it all the same' }).click();
   await until(async () => {
     const { jobs } = await service.ask('/v1/jobs?name=wheel+on+rail&fields=id');
     const cases = await Promise.all(jobs.map((/** @type {{ id: string }} */ job) => service.ask(`/v1/jobs/${job.id}/case`)));

@@ -180,3 +180,13 @@ test('without a key the line for it opens; a key works, and a revoked one says s
     await guarded.stop();
   }
 });
+
+test('an address whose job, batch, run or forecast is not there says so', () => onPage('#/compose', async (page) => {
+  const none = '01a00000-0000-7000-8000-000000000000';
+  for (const hash of [`#/jobs/${none}`, `#/compare/${none}/${none}`, `#/line/${none}`, `#/line/${none}?kind=run`, `#/forecast/${none}`]) {
+    await page.goto(`${service.base}/${hash}`);
+    await page.getByRole('heading', { name: 'Nothing is here' }).waitFor();
+    await page.getByRole('link', { name: 'To the jobs' }).click();
+    await page.getByRole('heading', { name: 'Jobs', exact: true }).first().waitFor();
+  }
+}));

@@ -60,7 +60,7 @@ export async function openComparison(app, ids, query) {
     if (one && two && equal(one, two, 'rail') && !equal(one, two, 'wheel')) mine.body = 'wheel';
     app.redraw();
   } catch (error) {
-    app.refused(error);
+    app.absent(error);
   }
 }
 

@@ -71,9 +71,11 @@ function intro(app, state) {
 function examplePicker(app) {
   const { example, examples } = app.store.get().compose;
   const open = (/** @type {Event} */ event) => openExample(app, /** @type {HTMLSelectElement} */ (event.target).value);
+  const others = (/** @type {typeof examples[number]} */ known) => Number(!hasSections(at(/** @type {JsonObject} */ (/** @type {unknown} */ (known.case)), '/contact/type')));
+  const ordered = [...examples].sort((one, two) => others(one) - others(two));
   return html`<label class="inline start">or start from an example <select @change=${open}>
     ${example ? nothing : html`<option value="" selected>–</option>`}
-    ${examples.map(({ name, summary }) => html`<option value=${name} ?selected=${example === name}>${summary}</option>`)}</select></label>`;
+    ${ordered.map(({ name, summary }) => html`<option value=${name} ?selected=${example === name}>${summary}</option>`)}</select></label>`;
 }
 
 /** @type {{ of: unknown, drawn: ReturnType<typeof placed> } | null} */

@@ -117,7 +117,7 @@ export async function openForecast(app, ids) {
     if (!wanted.length) await watchList(app);
     else if (!same || forecast.sides.some(({ answer }) => !answer)) await watchSides(app, wanted);
   } catch (error) {
-    app.refused(error);
+    app.absent(error);
   }
 }
 

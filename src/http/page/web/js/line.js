@@ -75,7 +75,7 @@ export async function openLine(app, id, query) {
     mine.done = true;
     app.redraw();
   } catch (error) {
-    app.refused(error);
+    app.absent(error);
   }
 }
 

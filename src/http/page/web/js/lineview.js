@@ -57,8 +57,8 @@ function choice(offered) {
     ${batches.length || runs.length ? html`<p>Choose a run or a batch of cases:</p>
       ${runs.map((run) => html`<a class="button" href=${formatRoute('line', [run.id], { kind: 'run' })}>${run.name || 'Run'}: ${count(run.rows)} rows of ${when(run.created_at)}</a>`)}
       ${batches.map((batch) => html`<a class="button" href=${formatRoute('line', [batch.id])}>${batch.name || 'Batch'}: ${count(batch.count)} cases of ${when(batch.created_at)}</a>`)}`
-    : html`<p>There is no run and no batch that has ended. Send a table of loads and creepages with a column such as <code>km</code> to <code>/v1/runs</code>,
-      or cases with a label that is a number, such as <code>"km": "37.2"</code>, to <code>/v1/batches</code>.</p>`}
+    : html`<p>There is no run yet, and no batch that has ended. Programs send them: a table of loads and creepages with a column such as <code>km</code> to <code>/v1/runs</code>,
+      or cases with a label that is a number to <code>/v1/batches</code> (<a href="/docs/">API</a>).</p>`}
     <a class="button" href="#/jobs">To the jobs</a></section>`;
 }
 

@@ -42,8 +42,9 @@ const app = {
     if (!(error instanceof Refused)) throw error;
     if (error.status === 401) store.set({ keyLine: true });
     if (error.status === 0) store.set({ health: { ready: false, version: store.get().health?.version ?? '' } });
-    app.say(isGone(error) ? `${error.message} It may have been deleted or have expired.` : error.message);
+    app.say(error.message);
   },
+  absent: (error) => (isGone(error) ? store.set({ absent: `${error.message[0].toUpperCase()}${error.message.slice(1)}.` }) : app.refused(error)),
   go(address) {
     if (location.hash === address) follow();
     else location.hash = address;
@@ -63,13 +64,13 @@ function follow() {
   clearTimeout(addressTimer);
   const before = store.get().route;
   const route = parseRoute(location.hash);
-  store.set({ route });
+  store.set({ route, absent: '' });
   if (route.view !== 'jobs') stopQueue();
   if (route.view === 'jobs') startQueue(app);
   if (route.view === 'result' || route.view === 'line') loadCurves();
   if (route.view === 'result') openJob(app, route.ids[0], route.query);
   if (route.view === 'compare') openComparison(app, route.ids, route.query);
-  if (route.view === 'line' && route.query.kind === 'run' && route.ids[0]) openRun(app, route.ids[0], route.query).catch(app.refused);
+  if (route.view === 'line' && route.query.kind === 'run' && route.ids[0]) openRun(app, route.ids[0], route.query).catch(app.absent);
   else leaveRun();
   if (route.view === 'line' && route.query.kind !== 'run') openLine(app, route.ids[0], route.query);
   if (route.view === 'forecast') openForecast(app, route.ids);

@@ -108,7 +108,7 @@ export async function openJob(app, id, query) {
     }
     app.redraw();
   } catch (error) {
-    app.refused(error);
+    app.absent(error);
   }
 }
 
@@ -259,5 +259,5 @@ export function rangeShown(of, quantity) {
   return rangeOf(quantity, cells, bound);
 }
 
-/** Was the job removed since? @param {unknown} error */
+/** Was the job removed since? @param {unknown} error @returns {error is Refused} */
 export const isGone = (error) => error instanceof Refused && (error.status === 404 || error.status === 410);

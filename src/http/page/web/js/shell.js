@@ -26,17 +26,21 @@ const TITLES = { compose: 'Contact', jobs: 'Jobs', result: 'Result', compare: 'C
 
 /** @param {App} app @param {HTMLElement} root */
 export function renderShell(app, root) {
-  const { route, toast, action, keyLine } = app.store.get();
+  const { route, toast, action, keyLine, absent } = app.store.get();
   const act = () => {
     app.say('');
     action?.act();
   };
   document.title = `${TITLES[route.view]} – railhead`;
   render(html`${topBar(app)}${keyLine ? keyForm(app) : nothing}
-    <main id="main" tabindex="-1">${VIEWS[route.view](app)}</main>
+    <main id="main" tabindex="-1">${absent ? absentPanel(absent) : VIEWS[route.view](app)}</main>
     <footer class="foot quiet"><a href="/docs/">API</a> · <a href="/openapi.json">contract</a> · <a href="#/licences">licences</a></footer>
     <div class=${toast ? 'toast on' : 'toast'} role="status" aria-live="polite">${toast}${action ? html` <button class="small" @click=${act}>${action.label}</button>` : nothing}</div>`, root);
 }
+
+/** @param {string} absent */
+const absentPanel = (absent) => html`<section class="panel wait" role="alert"><h1>Nothing is here</h1><p>${absent} It may have been deleted, or have expired.</p>
+  <a class="button primary" href="#/jobs">To the jobs</a></section>`;
 
 /** @param {App} app */
 function topBar(app) {

@@ -49,6 +49,7 @@
  * @property {boolean} keyLine Is the line for the API key open?
  * @property {string} toast
  * @property {Action | null} action What the toast offers.
+ * @property {string} absent Why what the address names is not there; empty where it is.
  * @property {Compose} compose
  * @property {number} turn Counts changes of what the views keep themselves.
  */
@@ -60,6 +61,7 @@
  * @property {() => void} redraw
  * @property {(text: string, action?: Action, duration?: number) => void} say Shows a short message, for some milliseconds.
  * @property {(error: unknown) => void} refused Shows why something failed; a missing key opens its line.
+ * @property {(error: unknown) => void} absent Shows why what the address names cannot be opened.
  * @property {(address: string) => void} go To an address of the page.
  * @property {(address: string) => void} remember Writes what is shown into the address, without a step in the history and some time later.
  */
@@ -70,6 +72,7 @@ export const initialState = () => ({
   health: null,
   keyLine: false,
   toast: '',
+  absent: '',
   action: null,
   turn: 0,
   compose: {
