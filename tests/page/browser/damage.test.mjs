@@ -25,6 +25,7 @@ test('from own files to their damage without reading: drop, solve, see', () => o
   const [patch] = result.patches;
   const [point] = patch.points;
 
+  await page.getByText("Nadal's limit").waitFor();
   const loads = await entries(page.locator('[data-wheel]'));
   const { force_y_n, force_z_n } = result.total[0];
   assert.ok(Math.abs(parsed(loads['Q, vertical']) + force_z_n / 1000) < 0.01, loads['Q, vertical']);

@@ -5,6 +5,7 @@ import { test } from 'node:test';
 import { at, differences, placeInText, pretty, put } from '../../../src/http/page/web/js/document.js';
 import { formatRoute, parseRoute } from '../../../src/http/page/web/js/routes.js';
 import { withContact } from '../../../src/http/page/web/js/starts.js';
+import { valueInWords, wordsOf } from '../../../src/http/page/web/js/words.js';
 
 const EXAMPLES = new URL('../../../api/examples/', import.meta.url);
 
@@ -73,4 +74,16 @@ test('one wheel becomes a wheelset with its cross-sections, and has loads and mo
   const back = withContact(one, 'profiles');
   assert.deepEqual(back.contact, { ...withContact(null, 'profiles').contact, rail, wheel });
   assert.deepEqual(withContact(back, 'radii').contact, withContact(null, 'radii').contact);
+});
+
+test('values of a case are told in the words and units of the form, a section as one, and what has no words by its pointer', () => {
+  const document = JSON.parse(readFileSync(new URL('wheel-rail.case.json', EXAMPLES), 'utf8'));
+  const told = (/** @type {string} */ pointer) => `${wordsOf(pointer).label}: ${valueInWords(document, wordsOf(pointer).pointer)}`;
+  assert.equal(told('/load/vertical_force_n'), 'wheel load Q: 75 kN');
+  assert.equal(told('/motion/wheelset/speed_mm_per_s'), 'speed: 72 km/h');
+  assert.equal(told('/contact/cant_rad'), 'rail inclination: 1:40');
+  assert.equal(told('/contact/rail/points_mm'), 'rail: 83 points');
+  assert.equal(told('/contact/wheel/text'), 'wheel: columns, 206 lines');
+  assert.equal(told('/contact/wheel/smoothing_mm'), 'wheel: smoothing: –');
+  assert.deepEqual(wordsOf('/solver/mesh'), { pointer: '/solver/mesh', label: '/solver/mesh', known: false });
 });

@@ -196,9 +196,12 @@ function temperatureCard(looked, { at, point }) {
     <p class="hint">Within 2 % where heat flows into the depth only (Péclet number ${number(heat.peclet, 2)}, to be well above 10); ${number(100 * heat.heat_share_lower, 2)} % of the heat flows into the rail.</p></div>`;
 }
 
+/** What the sources are of, by the names of the API. @type {Record<string, string>} */
+const SOURCES = { usfd: 'wear, Tγ/A law', archard: 'wear, Archard', wlrm: 'RCF damage', shear_yield_mpa: 'yield in shear', hardness_mpa: 'hardness' };
+
 /** @param {Schemas['DamageFiguresUsed']} figures */
 function sources(figures) {
   return html`<details class="as-table"><summary>Parameters and their sources</summary>
     <p>Set ${figures.set}: density ${number(figures.density_kg_per_m3)} kg/m³, yield in shear ${number(figures.shear_yield_mpa)} MPa, hardness ${number(figures.hardness_mpa)} MPa.</p>
-    <ul>${figures.sources.map((source) => html`<li>${source}</li>`)}</ul></details>`;
+    <ul>${figures.sources.map((source) => html`<li>${source.replace(/^\w+(?=:)/, (name) => SOURCES[name] ?? name)}</li>`)}</ul></details>`;
 }

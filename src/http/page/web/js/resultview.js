@@ -206,7 +206,7 @@ function fieldPanel(app, looked, answer) {
     </header>
     ${answer.patches.length > 1 ? thumbnails(app, looked, answer) : nothing}
     ${shown ? html`<field-map class="main" .shown=${shown} @crosshair=${moved}></field-map>` : html`<p class="pad quiet">Loading the field …</p>`}
-    ${field ? cellTable(field) : nothing}
+    ${field ? cellTable(field, isSolvedBent(looked.document, answer, looked.patch)) : nothing}
   </section>`;
 }
 
@@ -250,8 +250,11 @@ function wheelOf({ wheelset }, patch) {
   return position ? html`<small>${position.left.patches.includes(patch) ? 'left' : 'right'}, shift ${fixed(position.lateral_shift_mm, 1)} mm</small>` : nothing;
 }
 
-/** The field as a table, for those who read rather than look. @param {import('./fields.js').Field} field */
-function cellTable({ cells }) {
+/** The name of a column of cells, with its unit. @param {string} name @param {boolean} bent */
+const columnName = (name, bent) => (bent && name === 'y_mm' ? 's / mm' : name.replace(/_mm$/, ' / mm').replace(/_mpa$/, ' / MPa').replace(/_c$/, ' / °C').replaceAll('_', ' '));
+
+/** The field as a table, for those who read rather than look. @param {import('./fields.js').Field} field @param {boolean} bent */
+function cellTable({ cells }, bent) {
   const columns = /** @type {(keyof typeof cells)[]} */ (Object.keys(cells)).filter((name) => !['dx_mm', 'dy_mm', 'strip'].includes(name));
   const rows = Math.min(cells.x_mm.length, TABLE_ROWS);
   const fill = (/** @type {Event} */ event) => {
@@ -269,7 +272,7 @@ function cellTable({ cells }) {
     body.replaceChildren(...lines);
   };
   return html`<details class="as-table" @toggle=${fill}><summary>As a table${rows < cells.x_mm.length ? `, the first ${rows} of ${count(cells.x_mm.length)} cells` : ''}</summary>
-    <div class="scroll" tabindex="0" role="region" aria-label="Cells of the field"><table><thead><tr>${columns.map((name) => html`<th scope="col">${name}</th>`)}</tr></thead><tbody></tbody></table></div></details>`;
+    <div class="scroll" tabindex="0" role="region" aria-label="Cells of the field"><table><thead><tr>${columns.map((name) => html`<th scope="col">${columnName(name, bent)}</th>`)}</tr></thead><tbody></tbody></table></div></details>`;
 }
 
 /** @param {App} app @param {Looked} looked @param {JobResult} answer */
