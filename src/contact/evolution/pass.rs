@@ -5,10 +5,9 @@ use std::f64::consts::PI;
 use crate::contact;
 use crate::contact::case::words::damage::DamageModel;
 use crate::contact::error::SolveError;
-use crate::contact::evolution::section::{along, lengths};
-use crate::contact::evolution::task::{Evolution, SolveContext};
+use crate::contact::evolution::section::{along, lengths, smoothed};
+use crate::contact::evolution::task::{Evolution, SPACING, SolveContext};
 use crate::contact::geometry::profile::Body;
-use crate::contact::geometry::wheel_rail::Placement;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::ReferenceSurface;
@@ -49,6 +48,13 @@ impl BodyWear {
         add(&mut self.damage, &other.damage);
         add(&mut self.regimes, &other.regimes);
         self.open += share * other.open;
+    }
+
+    /// The same spread along the section by a kernel of this standard deviation in mm.
+    pub(crate) fn spread(mut self, deviation: f64) -> BodyWear {
+        self.area = smoothed(&self.area, SPACING, deviation);
+        self.damage = smoothed(&self.damage, SPACING, deviation);
+        self
     }
 }
 
@@ -125,13 +131,13 @@ pub(crate) fn pass(
             pressure_max_mpa: patch.pressure_max_mpa,
             t_gamma_n: t_gamma,
         });
-        let place = PatchPlace {
-            placement: &wheel.geometry.placement,
-            position: &position,
-            on_curve,
-        };
         for (body, wear) in [Body::Rail, Body::Wheel].into_iter().zip(&mut wear) {
             let points = on.points[usize::from(body == Body::Wheel)];
+            let place = PatchPlace {
+                position: &position,
+                on_curve,
+                to_left: wheel.geometry.placement.side.sign(),
+            };
             add_patch(task.plan.wear_model, patch, &place, body, points, wear);
         }
     }
@@ -151,9 +157,10 @@ pub(crate) fn pass(
 
 /// Where a patch lies.
 struct PatchPlace<'a> {
-    placement: &'a Placement,
     position: &'a Position,
     on_curve: bool,
+    /// Direction of the coordinate across the patch along the points of the sections: it runs to the left, they to the field side.
+    to_left: f64,
 }
 
 fn add_patch(
@@ -184,124 +191,78 @@ fn add_patch(
         (high - with_spin.value) / with_spin.value.max(f64::MIN_POSITIVE)
     });
     let fatigue = damage.wlrm.map_or(0.0, |wlrm| wlrm.damage_per_pass.value);
-    let cells = Cells::new(points, place, body);
+    let arc = PatchArc::new(points, place, body);
     let lengths = lengths(points);
     for ((y, dy), regimes) in across.y_mm.iter().zip(&across.dy_mm).zip(regimes) {
         let parts = regimes.map(|depth| over * depth * dy / NANOMETRES);
         let area: f64 = parts.iter().sum();
         wear.open += area * open.min(1.0);
         (0..3).for_each(|k| wear.regimes[k] += parts[k]);
-        cells.share_out([y - 0.5 * dy, y + 0.5 * dy], |point, share, width| {
+        arc.share_out([y - 0.5 * dy, y + 0.5 * dy], |point, share| {
             wear.area[point] += share * area;
-            wear.damage[point] += over * fatigue * (share * width / lengths[point]).min(1.0);
+            wear.damage[point] += over * fatigue * (share * dy / lengths[point]).min(1.0);
         });
     }
 }
 
-/// The parts of a section that its points stand for, in the coordinate across a patch.
-struct Cells {
-    /// The number of the first one, and the step to the next: points run to the field side, the coordinate to the left.
-    first: usize,
-    forward: bool,
-    /// Edges, ascending; one more than cells.
-    edges: Vec<f64>,
+/// The coordinate across a patch along the arc of a section.
+struct PatchArc {
+    /// Arc length at which the coordinate is 0.
+    zero: f64,
+    to_left: f64,
+    /// Arc length at which the part of the section ends that each point stands for; no end for the last one.
+    ends: Vec<f64>,
 }
 
-impl Cells {
-    fn new(points: &[[f64; 2]], place: &PatchPlace, body: Body) -> Cells {
-        let PatchPlace {
-            placement,
-            position,
-            on_curve,
-        } = place;
-        let sign = placement.side.sign();
-        let (sin, cos) = position.contact_angle_rad.sin_cos();
+impl PatchArc {
+    fn new(points: &[[f64; 2]], place: &PatchPlace, body: Body) -> PatchArc {
+        let position = place.position;
         let centre = match body {
             Body::Rail => position.rail_mm,
             Body::Wheel => position.wheel_mm,
         };
-        let off = |at: &[f64; 2]| (at[0] - centre[0]).hypot(at[1] - centre[1]);
-        let nearest =
-            (0..points.len()).min_by(|a, b| off(&points[*a]).total_cmp(&off(&points[*b])));
+        let from_centre = |at: &[f64; 2]| [0, 1].map(|k| centre[k] - at[k]);
+        let off = |k: &usize| from_centre(&points[*k]).iter().map(|d| d * d).sum::<f64>();
+        let nearest = (0..points.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
         let nearest = nearest.unwrap_or(0);
-        // The tangent of the patch on the section: mirrored on the right, turned back by cant or roll, z down.
-        let tangent = match body {
-            Body::Rail => {
-                let (turn, level) = placement.cant.sin_cos();
-                [
-                    level * sign * cos + turn * sin,
-                    turn * sign * cos - level * sin,
-                ]
-            }
-            Body::Wheel => {
-                let (turn, level) = placement.roll.sin_cos();
-                [sign * (cos * level + sin * turn), cos * turn - sin * level]
+        let along = along(points);
+        let [low, high] = [
+            nearest.saturating_sub(1),
+            (nearest + 1).min(points.len() - 1),
+        ];
+        let chord = [0, 1].map(|k| points[high][k] - points[low][k]);
+        let [y, z] = from_centre(&points[nearest]);
+        let of_centre = along[nearest] + (y * chord[0] + z * chord[1]) / chord[0].hypot(chord[1]);
+        // The coordinate of the load centre: on a curve it is counted from there.
+        let own = match place.on_curve {
+            true => 0.0,
+            false => {
+                let (sin, cos) = position.contact_angle_rad.sin_cos();
+                let [y, z] = [1, 2].map(|k| position.track_mm[k] - position.origin_track_mm[k]);
+                y * cos + z * sin
             }
         };
-        let in_plane =
-            |at: &[f64; 2]| (at[0] - centre[0]) * tangent[0] + (at[1] - centre[1]) * tangent[1];
-        let places: Vec<f64> = if *on_curve {
-            let along = along(points);
-            let near = &points[nearest];
-            let of_centre = along[nearest] - sign * in_plane(near);
-            along.iter().map(|s| sign * (s - of_centre)).collect()
-        } else {
-            let origin = [1, 2].map(|k| position.track_mm[k] - position.origin_track_mm[k]);
-            let own = origin[0] * cos + origin[1] * sin;
-            points.iter().map(|at| own + in_plane(at)).collect()
-        };
-        let forward = sign > 0.0;
-        let rises = |k: usize| (places[k + 1] > places[k]) == forward;
-        let (mut low, mut high) = (nearest, nearest);
-        while low > 0 && rises(low - 1) {
-            low -= 1;
-        }
-        while high + 1 < places.len() && rises(high) {
-            high += 1;
-        }
-        let middles = (low..high).map(|k| 0.5 * (places[k] + places[k + 1]));
-        let mut edges: Vec<f64> = std::iter::once(places[low])
-            .chain(middles)
-            .chain([places[high]])
-            .collect();
-        if !forward {
-            edges.reverse();
-        }
-        Cells {
-            first: if forward { low } else { high },
-            forward,
-            edges,
+        let middles = along.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
+        PatchArc {
+            zero: of_centre - place.to_left * own,
+            to_left: place.to_left,
+            ends: middles.chain([f64::INFINITY]).collect(),
         }
     }
 
-    /// Calls `take` with each point whose part meets an interval, the share of the interval there, and the interval's width. What lies beyond
-    /// the ends goes to the last points.
-    fn share_out(&self, [from, to]: [f64; 2], mut take: impl FnMut(usize, f64, f64)) {
-        let last = self.edges.len() - 2;
-        let mut cell = self
-            .edges
-            .partition_point(|edge| *edge <= from)
-            .saturating_sub(1)
-            .min(last);
+    /// Calls `take` with each point whose part meets an interval of the coordinate, and the share of the interval there. What lies beyond the ends
+    /// goes to the last points.
+    fn share_out(&self, interval: [f64; 2], mut take: impl FnMut(usize, f64)) {
+        let [from, to] = interval.map(|y| self.zero + self.to_left * y);
+        let (from, to) = (from.min(to), from.max(to));
         let mut begin = from;
-        loop {
-            let end = if cell == last {
-                to
-            } else {
-                self.edges[cell + 1].min(to)
-            };
-            if end > begin {
-                let point = match self.forward {
-                    true => self.first + cell,
-                    false => self.first - cell,
-                };
-                take(point, (end - begin) / (to - from), to - from);
-                begin = end;
-            }
-            if cell == last || begin >= to {
+        for point in self.ends.partition_point(|end| *end <= from)..self.ends.len() {
+            let end = self.ends[point].min(to);
+            take(point, (end - begin) / (to - from));
+            if end >= to {
                 return;
             }
-            cell += 1;
+            begin = end;
         }
     }
 }

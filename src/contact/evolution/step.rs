@@ -178,12 +178,8 @@ impl Evolution {
             let middle = [&half[0], &half[1]];
             let then = self.evaluate(context, &traffic, middle, state, monitor)?;
             state.solves += traffic.states.len() as u32;
-            let wearing = self.plan.wearing.flags();
-            let changes = [0, 1].map(|k| match wearing[k] {
-                true => 0.5 * change(&now.wear[k].area, &then.wear[k].area),
-                false => 0.0,
-            });
-            let error = changes[0].max(changes[1]);
+            let changes = [0, 1].map(|k| change(&now.wear[k].area, &then.wear[k].area));
+            let error = 0.5 * changes[0].max(changes[1]);
             let better = (0.8 * accuracy.step_tolerance / error.max(1e-6)).clamp(0.4, 2.0);
             if error > accuracy.step_tolerance && step > SHORTEST && attempt < ATTEMPTS {
                 state.rejected += 1;
@@ -234,17 +230,16 @@ impl Evolution {
         of: &EvolutionState,
         monitor: &(dyn Monitor + Sync),
     ) -> Result<Evaluation, SolveError> {
-        let radius = match self.plan.wearing.flags()[1] || bodies[1].worn.machined_area_mm2 > 0.0 {
-            true => radius_change(traffic, bodies[1], &of.wheel_y),
-            false => 0.0,
-        };
+        let radius = radius_change(traffic, bodies[1], &of.wheel_y);
         let on = sections(bodies, of.friction, radius);
         let mut wear = on.points.map(|points| BodyWear::none(points.len()));
         let mut states = Vec::with_capacity(traffic.states.len());
         let values: Vec<&[f64]> = traffic.states.iter().map(|state| &*state.values).collect();
         let passes = self.passes(context, on, &values, monitor)?;
         for (state, Pass { wear: own, contact }) in traffic.states.iter().zip(passes) {
-            (0..2).for_each(|k| wear[k].add(state.share, &own[k]));
+            for (k, own) in own.into_iter().enumerate() {
+                wear[k].add(state.share, &own.spread(state.spread_mm[k]));
+            }
             states.push(StateContact {
                 share: state.share,
                 ..contact
@@ -264,17 +259,10 @@ impl Evolution {
             );
             return Err(SolveError::NormalProblem { reason });
         }
-        let wearing = self.plan.wearing.flags();
-        for k in 0..2 {
-            if !wearing[k] {
-                wear[k] = BodyWear::none(on.points[k].len());
-                continue;
-            }
-            let amount = self.amounts[k];
-            let mut all = BodyWear::none(on.points[k].len());
-            all.add(amount, &wear[k]);
-            all.area = smoothed(&all.area, SPACING, self.plan.accuracy.smoothing_mm);
-            wear[k] = all;
+        for (wear, amount) in wear.iter_mut().zip(self.amounts) {
+            let own = std::mem::replace(wear, BodyWear::none(wear.area.len()));
+            wear.add(amount, &own);
+            wear.area = smoothed(&wear.area, SPACING, self.plan.accuracy.smoothing_mm);
         }
         Ok(Evaluation { wear, states })
     }
@@ -288,18 +276,16 @@ impl Evolution {
         monitor: &(dyn Monitor + Sync),
     ) -> Result<Vec<Pass>, SolveError> {
         let solve = |values: &&[f64]| pass(self, context, on, values, monitor);
-        if context.threads <= 1 {
-            return states.iter().map(solve).collect();
-        }
         let next = AtomicUsize::new(0);
-        let found: Vec<Mutex<Option<Result<Pass, SolveError>>>> =
-            states.iter().map(|_| Mutex::new(None)).collect();
+        let found = Mutex::new(vec![Err(SolveError::Cancelled); states.len()]);
         let work = || {
-            while let Some(k) =
-                Some(next.fetch_add(1, Ordering::Relaxed)).filter(|k| *k < states.len())
+            while let Some((k, values)) = states
+                .iter()
+                .enumerate()
+                .nth(next.fetch_add(1, Ordering::Relaxed))
             {
-                let pass = solve(&states[k]);
-                *found[k].lock().unwrap_or_else(PoisonError::into_inner) = Some(pass);
+                let pass = solve(values);
+                found.lock().unwrap_or_else(PoisonError::into_inner)[k] = pass;
             }
         };
         thread::scope(|scope| {
@@ -310,11 +296,8 @@ impl Evolution {
             }
             work();
         });
-        let found = found.into_iter().map(|pass| {
-            let pass = pass.into_inner().unwrap_or_else(PoisonError::into_inner);
-            pass.unwrap_or(Err(SolveError::Cancelled))
-        });
-        found.collect()
+        let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+        found.into_iter().collect()
     }
 
     fn happen(&self, event: usize, state: &mut EvolutionState) {

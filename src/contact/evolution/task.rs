@@ -8,8 +8,8 @@ use crate::contact;
 use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::read::evolution::EvolutionDraft;
+use crate::contact::case::read::object::join;
 use crate::contact::case::wheel_task::profile_at;
-use crate::contact::case::words::damage::DamageWords;
 use crate::contact::case::words::evolution::EvolutionWords;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::many::task::several_answers;
@@ -18,7 +18,6 @@ use crate::contact::evolution::section::sampled;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::post::damage::figures::DamageTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::damage::DamageFiguresUsed;
@@ -83,41 +82,42 @@ impl Evolution {
         let draft = EvolutionDraft::read(value)?;
         let template = template(&draft)?;
         let (pointers, columns): (Vec<String>, Vec<Vec<f64>>) = draft.columns.into_iter().unzip();
-        let all: f64 = draft.passes.iter().sum();
-        let mut evolution = Evolution {
-            template,
-            pointers,
-            columns,
-            shares: draft.passes.iter().map(|passes| passes / all).collect(),
-            plan: draft.plan,
-            machined: Vec::new(),
-            geometry: first_geometry(&draft.template, limits)?,
-            figures: DamageTask::new(&DamageWords {
-                models: Vec::new(),
-                parameters: None,
-                across: true,
-            })
-            .used(),
-            amounts: [0.0; 2],
-            mgt: 0.0,
-            limits: *limits,
-            digest: String::new(),
-            memory_bytes: 0,
-            state_seconds: 0.0,
+        let values: Vec<f64> = columns.iter().map(|column| column[0]).collect();
+        let first = filled(&template, &pointers, &values, None)
+            .and_then(|case| contact::check(&case, limits))
+            .map_err(|error| located(error, &pointers, 0))?;
+        let (NormalTask::Wheel(wheel), Some(damage)) =
+            (&first.problem.task, &first.run.after.damage)
+        else {
+            return Err(CaseError(vec![Fault::new(
+                "/template/contact/type",
+                "\"profiles\" is needed",
+            )]));
         };
-        evolution.place_rail();
-        let first = evolution.check_rows(limits)?;
-        if let Some(damage) = &first.run.after.damage {
-            evolution.figures = damage.used();
-        }
         let cost = first.cost();
-        (evolution.memory_bytes, evolution.state_seconds) = (cost.own_bytes(), cost.seconds);
         // That of the case contains the revision of the solver.
         let mut digest = blake3::Hasher::new();
         digest.update(first.label.digest.as_bytes());
         digest.update(value.to_string().as_bytes());
-        evolution.digest = digest.finalize().to_hex().to_string();
-        evolution.read_events()?;
+        let all: f64 = draft.passes.iter().sum();
+        let mut evolution = Evolution {
+            shares: draft.passes.iter().map(|passes| passes / all).collect(),
+            machined: machined(&draft.plan)?,
+            geometry: wheel.geometry.clone(),
+            figures: damage.used(),
+            amounts: [0.0; 2],
+            mgt: 0.0,
+            limits: *limits,
+            digest: digest.finalize().to_hex().to_string(),
+            memory_bytes: cost.own_bytes(),
+            state_seconds: cost.seconds,
+            template,
+            pointers,
+            columns,
+            plan: draft.plan,
+        };
+        evolution.place_rail();
+        evolution.check_rows()?;
         evolution.weigh()?;
         Ok(evolution)
     }
@@ -133,89 +133,31 @@ impl Evolution {
         contact["flange_back_position_mm"] = self.geometry.placement.flange_back_position.into();
     }
 
-    /// Checks the first row, and of each column the rows with the least and the largest value.
-    fn check_rows(&self, limits: &Limits) -> Result<CheckedCase, CaseError> {
+    /// Checks of each column the rows with the least and the largest value, and the first row with the friction of each event.
+    fn check_rows(&self) -> Result<(), CaseError> {
         let known = KnownPair::default();
         let [rail, wheel] = self.start();
-        let mut rows = vec![0];
-        for column in &self.columns {
-            let by = |a: &usize, b: &usize| column[*a].total_cmp(&column[*b]);
-            rows.extend((0..column.len()).min_by(by));
-            rows.extend((0..column.len()).max_by(by));
-        }
-        let mut first = None;
         let friction = self
             .plan
             .events
             .iter()
-            .map(|event| event.friction_coefficient);
-        let rows = rows.into_iter().map(|row| (row, None));
-        let rows = rows.chain(friction.flatten().map(|friction| (0, Some(friction))));
-        for (row, friction) in rows {
+            .map(|event| (0, event.friction_coefficient));
+        let ends = self.columns.iter().flat_map(|column| {
+            let by = |a: &usize, b: &usize| column[*a].total_cmp(&column[*b]);
+            let rows = 0..column.len();
+            [rows.clone().min_by(by), rows.max_by(by)]
+        });
+        for (row, friction) in ends.flatten().map(|row| (row, None)).chain(friction) {
             let values: Vec<f64> = self.columns.iter().map(|column| column[row]).collect();
-            let case = self.case([&rail, &wheel], &values, friction, 0.0);
-            let checked = case.and_then(|case| contact::check_with(&known, &case, limits));
-            let checked = checked.map_err(|CaseError(faults)| {
-                let own = |fault: &Fault| self.pointers.iter().position(|p| *p == fault.pointer);
-                let moved = faults.into_iter().map(|fault| {
-                    let pointer = match own(&fault) {
-                        Some(k) => {
-                            let name = self.pointers[k].replace('~', "~0").replace('/', "~1");
-                            format!("/traffic/columns/{name}/{row}")
-                        }
-                        None => format!("/template{}", fault.pointer),
-                    };
-                    Fault { pointer, ..fault }
-                });
-                CaseError(moved.collect())
-            })?;
-            if let Some(fault) = several_answers(&checked) {
-                let pointer = format!("/template{}", fault.pointer);
-                return Err(CaseError(vec![Fault { pointer, ..fault }]));
-            }
-            first.get_or_insert(checked);
+            self.case([&rail, &wheel], &values, friction, 0.0)
+                .and_then(|case| contact::check_with(&known, &case, &self.limits))
+                .and_then(|checked| match several_answers(&checked) {
+                    Some(fault) => Err(CaseError(vec![fault])),
+                    None => Ok(()),
+                })
+                .map_err(|error| located(error, &self.pointers, row))?;
         }
-        first.ok_or_else(|| CaseError(vec![Fault::new("/traffic/columns", "there are no rows")]))
-    }
-
-    fn read_events(&mut self) -> Result<(), CaseError> {
-        let (mut faults, mut machined) = (Vec::new(), Vec::new());
-        let end = self.end();
-        for (k, event) in self.plan.events.iter().enumerate() {
-            if event.at > end {
-                let detail = format!(
-                    "{} given; at most {end}, where the extent ends, is allowed",
-                    event.at
-                );
-                faults.push(Fault::new(format!("/events/{k}/at"), detail));
-            }
-            let bodies = [
-                (Body::Rail, &event.grind, "grind"),
-                (Body::Wheel, &event.reprofile, "reprofile"),
-            ];
-            machined.push(bodies.map(|(body, section, name)| {
-                let section = section.as_ref()?;
-                match profile_at(&format!("/events/{k}/{name}"), body, section) {
-                    Ok(profile) => Some(sampled(&profile, SPACING)),
-                    Err(fault) => {
-                        faults.push(fault);
-                        None
-                    }
-                }
-            }));
-        }
-        self.machined = machined;
-        match faults.is_empty() {
-            true => Ok(()),
-            false => Err(CaseError(faults)),
-        }
-    }
-
-    /// The extent in the unit that events are given in.
-    fn end(&self) -> f64 {
-        let extent = &self.plan.extent;
-        let rail = extent.mgt.or(extent.axle_passes);
-        rail.or(extent.wheel_distance_km).unwrap_or(0.0)
+        Ok(())
     }
 
     /// Axles and tonnes over the extent.
@@ -240,7 +182,12 @@ impl Evolution {
             (None, axles, _) => axles.unwrap_or(0.0),
         };
         self.mgt = axles * mean.unwrap_or(0.0) / NEWTONS_PER_MGT;
-        self.amounts = [axles, extent.wheel_distance_km.unwrap_or(0.0) * 1e6];
+        let distance = extent.wheel_distance_km.unwrap_or(0.0) * 1e6;
+        let [rail, wheel] = self.plan.wearing.flags();
+        self.amounts = [
+            if rail { axles } else { 0.0 },
+            if wheel { distance } else { 0.0 },
+        ];
         Ok(())
     }
 
@@ -277,7 +224,7 @@ impl Evolution {
     /// Share of the extent at which an event happens.
     #[must_use]
     pub fn share_of_event(&self, event: usize) -> f64 {
-        self.plan.events[event].at / self.end()
+        self.plan.events[event].at / self.plan.end()
     }
 
     /// How far an evolution has come at a share of its extent.
@@ -303,18 +250,10 @@ impl Evolution {
         friction: Option<f64>,
         radius: f64,
     ) -> Result<Value, CaseError> {
-        let mut case = self.template.clone();
-        let section = |points: &[[f64; 2]]| json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
-        case["contact"]["rail"] = section(rail);
-        case["contact"]["wheel"] = section(wheel);
-        let columns = self
-            .pointers
-            .iter()
-            .map(String::as_str)
-            .zip(values.iter().copied());
-        for (pointer, value) in columns.chain(friction.map(|mu| ("/friction/coefficient", mu))) {
-            put(&mut case, &members(pointer), value.into())
-                .map_err(|reason| CaseError(vec![Fault::new(pointer, reason)]))?;
+        let mut case = filled(&self.template, &self.pointers, values, friction)?;
+        for (body, points) in [("rail", rail), ("wheel", wheel)] {
+            case["contact"][body] =
+                json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
         }
         let free = "/motion/wheelset/free_rolling_radius_mm";
         if let Some(value) = case.pointer_mut(free)
@@ -337,26 +276,25 @@ impl Evolution {
 /// The template with the outputs that wear needs.
 fn template(draft: &EvolutionDraft) -> Result<Value, CaseError> {
     let mut template = draft.template.clone();
-    let fault = |pointer: &str, detail: String| Err(CaseError(vec![Fault::new(pointer, detail)]));
-    if !template.is_object() {
-        return fault("/template", "an object is needed".to_owned());
-    }
-    let kind = template
+    let fault = |place: &str, detail: &str| {
+        Err(CaseError(vec![Fault::new(
+            format!("/template{place}"),
+            detail,
+        )]))
+    };
+    if template
         .pointer("/contact/type")
-        .cloned()
-        .unwrap_or_default();
-    if kind != "profiles" {
+        .is_none_or(|kind| kind != "profiles")
+    {
         return fault(
-            "/template/contact/type",
-            format!("{kind} given; \"profiles\" is needed, whose sections wear"),
+            "/contact/type",
+            "\"profiles\" is needed, whose sections wear",
         );
     }
     for body in ["rail", "wheel"] {
         if template["contact"][body]["smoothing_mm"].is_string() {
-            return fault(
-                &format!("/template/contact/{body}/smoothing_mm"),
-                "\"auto\" given; a length in mm is needed, since the sections change".to_owned(),
-            );
+            let detail = "\"auto\" given; a length in mm is needed, since the sections change";
+            return fault(&format!("/contact/{body}/smoothing_mm"), detail);
         }
     }
     let mut damage =
@@ -374,31 +312,62 @@ fn template(draft: &EvolutionDraft) -> Result<Value, CaseError> {
     Ok(template)
 }
 
-/// Rail and wheel as the template has them.
-fn first_geometry(template: &Value, limits: &Limits) -> Result<WheelRail, CaseError> {
+/// The template with the values of a row and another coefficient of friction.
+fn filled(
+    template: &Value,
+    pointers: &[String],
+    values: &[f64],
+    friction: Option<f64>,
+) -> Result<Value, CaseError> {
     let mut case = template.clone();
-    for (pointer, value) in [
-        ("/motion", json!({ "creepage_x": 0.0 })),
-        ("/load", json!({ "vertical_force_n": 1e3 })),
-    ] {
-        put(&mut case, &members(pointer), value)
+    let columns = pointers
+        .iter()
+        .map(String::as_str)
+        .zip(values.iter().copied());
+    for (pointer, value) in columns.chain(friction.map(|mu| ("/friction/coefficient", mu))) {
+        put(&mut case, &members(pointer), value.into())
             .map_err(|reason| CaseError(vec![Fault::new(pointer, reason)]))?;
     }
-    for name in ["outputs", "damage", "solver", "thermal", "subsurface"] {
-        case.as_object_mut().map(|case| case.remove(name));
-    }
-    let checked = contact::check(&case, limits).map_err(|CaseError(faults)| {
-        let moved = faults.into_iter().map(|fault| Fault {
-            pointer: format!("/template{}", fault.pointer),
-            ..fault
-        });
-        CaseError(moved.collect())
-    })?;
-    match &checked.problem.task {
-        NormalTask::Wheel(task) => Ok(task.geometry.clone()),
-        _ => Err(CaseError(vec![Fault::new(
-            "/template/contact/type",
-            "\"profiles\" is needed",
-        )])),
+    Ok(case)
+}
+
+/// Faults of the case of a row, with pointers into the evolution.
+fn located(CaseError(faults): CaseError, pointers: &[String], row: usize) -> CaseError {
+    let moved = faults.into_iter().map(|fault| {
+        let pointer = match pointers.contains(&fault.pointer) {
+            true => format!("{}/{row}", join("/traffic/columns", &fault.pointer)),
+            false => format!("/template{}", fault.pointer),
+        };
+        Fault { pointer, ..fault }
+    });
+    CaseError(moved.collect())
+}
+
+/// Sections that the events leave, rail and wheel.
+fn machined(plan: &EvolutionWords) -> Result<Vec<[Option<Vec<[f64; 2]>>; 2]>, CaseError> {
+    let mut faults = Vec::new();
+    let events = plan.events.iter().enumerate().map(|(k, event)| {
+        if event.at > plan.end() {
+            let detail = format!(
+                "{} given; at most {}, where the extent ends, is allowed",
+                event.at,
+                plan.end()
+            );
+            faults.push(Fault::new(format!("/events/{k}/at"), detail));
+        }
+        let bodies = [
+            (Body::Rail, &event.grind, "grind"),
+            (Body::Wheel, &event.reprofile, "reprofile"),
+        ];
+        bodies.map(|(body, section, name)| {
+            let found = profile_at(&format!("/events/{k}/{name}"), body, section.as_ref()?);
+            let found = found.map_err(|fault| faults.push(fault)).ok()?;
+            Some(sampled(&found, SPACING))
+        })
+    });
+    let machined = events.collect();
+    match faults.is_empty() {
+        true => Ok(machined),
+        false => Err(CaseError(faults)),
     }
 }

@@ -1,38 +1,41 @@
 //! Condenses a traffic to a few representative states.
 //!
-//! Rows are parted into groups, each represented by the mean of its rows. The error is measured: every group is parted once more along each column
-//! in which its rows differ, the halves are solved, and the sum of all changes of the wear is the error of the groups. Until it meets the tolerance,
-//! the groups that change most are replaced by the halves that change most.
+//! Rows are parted into groups, each represented by the mean of its rows. Both halves of every group along each column in which its rows differ are
+//! solved too. Halves touch at different places, so that their wear reaches further than that of their mean: the wear of a state is spread by the
+//! variance along the section that its halves add. The change of the wear that is left, summed over the columns, is the error of the groups. Until it
+//! meets the tolerance, the groups that change most are replaced by the halves that change most.
 
 use crate::contact::error::SolveError;
-use crate::contact::evolution::pass::{BodyWear, Pass};
-use crate::contact::evolution::task::Evolution;
+use crate::contact::evolution::pass::Pass;
+use crate::contact::evolution::section::smoothed;
+use crate::contact::evolution::task::{Evolution, SPACING};
 use crate::contact::solution::words::evolution::{CondensedTraffic, TrafficState};
 
-/// Groups to begin with.
-const GROUPS_FIRST: usize = 4;
 /// In each round the groups that change most are parted, this share of all.
 const PARTED: f64 = 0.25;
-
 /// A column in which the rows of a group differ by less than this part of the variance of the widest one is not parted.
 const VARIANCE_SMALL: f64 = 0.01;
 
 /// Rows with the wear of their mean.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 struct Group {
     rows: Vec<usize>,
     share: f64,
     values: Vec<f64>,
-    pass: Pass,
+    /// Area that one pass of all rows removes at each point of rail and wheel; nothing of a body that does not wear.
+    area: [Vec<f64>; 2],
+    parted: Option<Parted>,
 }
 
-/// Effect of dividing a group.
-#[derive(Debug, Clone)]
+/// Effect of halving a group.
+#[derive(Debug)]
 struct Parted {
-    /// The wear of both bodies, summed over the columns.
-    change: [BodyWear; 2],
-    /// The halves that change most; nothing where the rows are alike.
-    halves: Option<[Group; 2]>,
+    /// Change of the areas after spreading, summed over the columns.
+    change: [Vec<f64>; 2],
+    /// Variance in mm² along rail and wheel that the rows add to the wear of their mean.
+    variance: [f64; 2],
+    /// The halves that change most; none where the rows are alike.
+    halves: Vec<Group>,
 }
 
 /// Solves the states of these values, one pass for each.
@@ -46,66 +49,37 @@ pub(crate) fn condensed(
     task: &Evolution,
     solve: &mut SolveStates,
 ) -> Result<CondensedTraffic, SolveError> {
-    let scales = scales(task);
-    let rows: Vec<usize> = (0..task.shares.len())
-        .filter(|row| task.shares[*row] > 0.0)
-        .collect();
-    let mut parts = vec![rows];
-    while parts.len() < GROUPS_FIRST {
-        let spread = |rows: &Vec<usize>| {
-            spreads(task, &scales, rows)
-                .first()
-                .map_or(0.0, |(_, spread)| *spread)
-        };
-        let next =
-            (0..parts.len()).max_by(|a, b| spread(&parts[*a]).total_cmp(&spread(&parts[*b])));
-        let Some(next) = next else { break };
-        let column = spreads(task, &scales, &parts[next]).first().copied();
-        let Some([low, high]) = column.and_then(|(k, _)| halves(task, k, &parts[next])) else {
-            break;
-        };
-        parts.splice(next..=next, [low, high]);
-    }
+    let rows = (0..task.shares.len()).filter(|row| task.shares[*row] > 0.0);
+    let mut groups = groups_of(task, vec![rows.collect()], solve)?;
+    let columns = 0..task.columns.len();
+    let scales: Vec<f64> = columns.map(|k| variance(task, k, &groups[0])).collect();
     let most = task.plan.accuracy.states_max as usize;
-    let mut groups = groups_of(task, parts, solve)?;
-    let mut known: Vec<Option<Parted>> = vec![None; groups.len()];
     loop {
-        let total = [0, 1].map(|body| {
-            let mut all = BodyWear::none(groups[0].pass.wear[body].area.len());
-            groups
-                .iter()
-                .for_each(|group| all.add(group.share, &group.pass.wear[body]));
-            size(&all).max(f64::MIN_POSITIVE)
-        });
-        let wearing = task.plan.wearing.flags();
-        let part = |wear: &[BodyWear; 2]| -> f64 {
-            let bodies = (0..2).filter(|body| wearing[*body]);
-            bodies.map(|body| size(&wear[body]) / total[body]).sum()
-        };
-        let new: Vec<usize> = (0..groups.len()).filter(|k| known[*k].is_none()).collect();
-        let parents: Vec<&Group> = new.iter().map(|k| &groups[*k]).collect();
-        let found = parted(task, &scales, &parents, &part, solve)?;
-        for (k, parted) in new.into_iter().zip(found) {
-            known[k] = Some(parted);
-        }
-        let changes: Vec<&[BodyWear; 2]> = known
+        part(task, &scales, &mut groups, solve)?;
+        let changes: Vec<&[Vec<f64>; 2]> = groups
             .iter()
-            .flatten()
+            .flat_map(|group| &group.parted)
             .map(|parted| &parted.change)
             .collect();
+        let total = [0, 1].map(|body| {
+            let all: f64 = groups.iter().map(|group| size(&group.area[body])).sum();
+            all.max(f64::MIN_POSITIVE)
+        });
         let error = [0, 1].map(|body| {
-            let mut all = BodyWear::none(changes[0][body].area.len());
+            let mut all = vec![0.0; changes[0][body].len()];
             changes
                 .iter()
-                .for_each(|change| all.add(1.0, &change[body]));
+                .for_each(|change| add(&mut all, 1.0, &change[body]));
             size(&all) / total[body]
         });
-        let error = [0, 1].map(|body| if wearing[body] { error[body] } else { 0.0 });
         if error[0].max(error[1]) <= task.plan.accuracy.states_tolerance || groups.len() >= most {
             let states = groups.into_iter().map(|group| TrafficState {
                 share: group.share,
                 rows: group.rows.len() as u32,
                 values: group.values,
+                spread_mm: group
+                    .parted
+                    .map_or([0.0; 2], |parted| parted.variance.map(f64::sqrt)),
             });
             return Ok(CondensedTraffic {
                 rows: task.shares.len() as u32,
@@ -114,76 +88,98 @@ pub(crate) fn condensed(
                 error,
             });
         }
-        let weights: Vec<f64> = changes.iter().map(|change| part(change)).collect();
-        let divisible = |k: &usize| {
-            known[*k]
-                .as_ref()
-                .is_some_and(|group| group.halves.is_some())
-        };
-        let mut order: Vec<usize> = (0..groups.len()).filter(divisible).collect();
+        let weight =
+            |change: &[Vec<f64>; 2]| size(&change[0]) / total[0] + size(&change[1]) / total[1];
+        let weights: Vec<f64> = changes.into_iter().map(weight).collect();
+        let halves = |k: usize| groups[k].parted.as_ref().map(|parted| &parted.halves);
+        let mut order: Vec<usize> = (0..groups.len())
+            .filter(|k| halves(*k).is_some_and(|halves| !halves.is_empty()))
+            .collect();
         order.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]).then(a.cmp(b)));
         let count = (PARTED * groups.len() as f64).ceil() as usize;
         order.truncate(count.min(most - groups.len()));
         order.sort_unstable();
         for k in order.into_iter().rev() {
-            if let Some([low, high]) = known[k].take().and_then(|parted| parted.halves) {
-                groups.splice(k..=k, [low, high]);
-                known.splice(k..=k, [None, None]);
+            if let Some(parted) = groups[k].parted.take() {
+                groups.splice(k..=k, parted.halves);
             }
         }
     }
 }
 
-/// Sum of the sizes of the areas.
-fn size(wear: &BodyWear) -> f64 {
-    wear.area.iter().map(|area| area.abs()).sum()
-}
-
-/// Parts groups along each column in which their rows differ; `part` is the size of wear relative to that of the traffic.
-fn parted(
+/// Solves the halves of the groups that have not been parted yet.
+fn part(
     task: &Evolution,
     scales: &[f64],
-    parents: &[&Group],
-    part: &dyn Fn(&[BodyWear; 2]) -> f64,
+    groups: &mut [Group],
     solve: &mut SolveStates,
-) -> Result<Vec<Parted>, SolveError> {
-    // Two halves of the rows of `parents[owner]` each.
+) -> Result<(), SolveError> {
     let (mut owners, mut rows) = (Vec::new(), Vec::new());
-    for (k, group) in parents.iter().enumerate() {
-        for (column, _) in spreads(task, scales, &group.rows) {
-            if let Some(halves) = halves(task, column, &group.rows) {
-                owners.push(k);
-                rows.extend(halves);
+    for (k, group) in groups.iter_mut().enumerate() {
+        if group.parted.is_some() {
+            continue;
+        }
+        group.parted = Some(Parted {
+            change: [0, 1].map(|body| vec![0.0; group.area[body].len()]),
+            variance: [0.0; 2],
+            halves: Vec::new(),
+        });
+        let relative = |column: usize| match scales[column] > 0.0 {
+            true => variance(task, column, group) / scales[column],
+            false => 0.0,
+        };
+        let spreads: Vec<f64> = (0..scales.len()).map(relative).collect();
+        let least = VARIANCE_SMALL * spreads.iter().copied().fold(0.0, f64::max);
+        for column in (0..scales.len()).filter(|column| spreads[*column] > least) {
+            let below = |row: &usize| task.columns[column][*row] < group.values[column];
+            let (low, high): (Vec<usize>, Vec<usize>) =
+                group.rows.iter().partition(|row| below(row));
+            if !low.is_empty() && !high.is_empty() {
+                owners.push((k, column));
+                rows.extend([low, high]);
             }
         }
     }
     let mut solved = groups_of(task, rows, solve)?.into_iter();
-    let unchanged = |group: &&Group| Parted {
-        change: [0, 1].map(|body| BodyWear::none(group.pass.wear[body].area.len())),
-        halves: None,
-    };
-    let mut all: Vec<Parted> = parents.iter().map(unchanged).collect();
-    let mut largest = vec![f64::NEG_INFINITY; parents.len()];
-    for k in owners {
-        let (Some(low), Some(high)) = (solved.next(), solved.next()) else {
-            break;
+    let mut largest = vec![f64::NEG_INFINITY; groups.len()];
+    for (k, column) in owners {
+        let halves: Vec<Group> = solved.by_ref().take(2).collect();
+        let group = &mut groups[k];
+        // Halves along a column have a part of the variance of its values, and of that along the sections.
+        let between = halves
+            .iter()
+            .map(|half| half.share * (half.values[column] - group.values[column]).powi(2));
+        let factor = variance(task, column, group) / between.sum::<f64>();
+        let Some(parted) = &mut group.parted else {
+            continue;
         };
-        let group = parents[k];
-        let own = [0, 1].map(|body| {
-            let mut own = BodyWear::none(group.pass.wear[body].area.len());
-            own.add(-group.share, &group.pass.wear[body]);
-            own.add(low.share, &low.pass.wear[body]);
-            own.add(high.share, &high.pass.wear[body]);
-            all[k].change[body].add(1.0, &own);
-            own
-        });
-        let own = part(&own);
+        let mut own = 0.0;
+        for (body, mean) in group.area.iter().enumerate() {
+            let mut both = halves[0].area[body].clone();
+            add(&mut both, 1.0, &halves[1].area[body]);
+            let added = (along_variance(&both) - along_variance(mean)).max(0.0);
+            let change = |mean: &[f64]| {
+                let mut change = both.clone();
+                add(&mut change, -1.0, mean);
+                change
+            };
+            let (unspread, spread) = (change(mean), change(&smoothed(mean, SPACING, added.sqrt())));
+            // Halves that touch at two places far apart have little in between.
+            let change = if size(&spread) < size(&unspread) {
+                parted.variance[body] += factor * added;
+                spread
+            } else {
+                unspread
+            };
+            add(&mut parted.change[body], 1.0, &change);
+            own += size(&change) / size(mean).max(f64::MIN_POSITIVE);
+        }
         if own > largest[k] {
             largest[k] = own;
-            all[k].halves = Some([low, high]);
+            parted.halves = halves;
         }
     }
-    Ok(all)
+    Ok(())
 }
 
 fn groups_of(
@@ -198,14 +194,48 @@ fn groups_of(
     let means: Vec<Vec<f64>> = parts.iter().map(mean_of).collect();
     let states: Vec<&[f64]> = means.iter().map(Vec::as_slice).collect();
     let passes = solve(&states)?;
+    let wearing = task.plan.wearing.flags();
     let groups = parts.into_iter().zip(means).zip(passes);
-    let groups = groups.map(|((rows, values), pass)| Group {
-        share: rows.iter().map(|row| task.shares[*row]).sum(),
-        rows,
-        values,
-        pass,
+    let groups = groups.map(|((rows, values), pass)| {
+        let share = rows.iter().map(|row| task.shares[*row]).sum();
+        let mut wear = pass.wear.into_iter().zip(wearing);
+        let mut area = || match wear.next() {
+            Some((wear, true)) => wear.area.iter().map(|area| share * area).collect(),
+            _ => Vec::new(),
+        };
+        Group {
+            area: [area(), area()],
+            rows,
+            share,
+            values,
+            parted: None,
+        }
     });
     Ok(groups.collect())
+}
+
+/// Sum of the sizes.
+fn size(areas: &[f64]) -> f64 {
+    areas.iter().map(|area| area.abs()).sum()
+}
+
+fn add(to: &mut [f64], factor: f64, from: &[f64]) {
+    to.iter_mut()
+        .zip(from)
+        .for_each(|(to, from)| *to += factor * from);
+}
+
+/// Variance in mm² of the place along the section at which areas lie; 0 where there are none.
+fn along_variance(areas: &[f64]) -> f64 {
+    let moments = areas.iter().enumerate().fold([0.0; 3], |sums, (k, area)| {
+        let s = SPACING * k as f64;
+        [sums[0] + area, sums[1] + area * s, sums[2] + area * s * s]
+    });
+    let [all, first, second] = moments;
+    match all > 0.0 {
+        true => second / all - (first / all).powi(2),
+        false => 0.0,
+    }
 }
 
 /// Mean of a column over rows.
@@ -222,42 +252,9 @@ fn mean(task: &Evolution, rows: &[usize], column: &[f64]) -> f64 {
     first + sum / share
 }
 
-/// Standard deviation of each column.
-fn scales(task: &Evolution) -> Vec<f64> {
-    let rows: Vec<usize> = (0..task.shares.len()).collect();
-    task.columns
-        .iter()
-        .map(|column| variance(task, &rows, column).sqrt())
-        .collect()
-}
-
-/// Sum over rows of share times squared distance from the mean.
-fn variance(task: &Evolution, rows: &[usize], column: &[f64]) -> f64 {
-    let mean = mean(task, rows, column);
-    rows.iter()
-        .map(|row| task.shares[*row] * (column[*row] - mean).powi(2))
-        .sum()
-}
-
-/// The columns in which rows differ, the widest first, each with the variance of the rows relative to that of the traffic.
-fn spreads(task: &Evolution, scales: &[f64], rows: &[usize]) -> Vec<(usize, f64)> {
-    let columns = task.columns.iter().zip(scales).enumerate();
-    let columns = columns.filter(|(_, (_, scale))| **scale > 0.0);
-    let mut spreads: Vec<(usize, f64)> = columns
-        .map(|(k, (column, scale))| (k, variance(task, rows, column) / scale.powi(2)))
-        .collect();
-    spreads.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let least = spreads
-        .first()
-        .map_or(0.0, |(_, most)| VARIANCE_SMALL * most);
-    spreads.retain(|(_, spread)| *spread > least);
-    spreads
-}
-
-/// Rows below and above the mean of a column; nothing where they are alike.
-fn halves(task: &Evolution, column: usize, rows: &[usize]) -> Option<[Vec<usize>; 2]> {
-    let column = &task.columns[column];
-    let mean = mean(task, rows, column);
-    let (low, high): (Vec<usize>, Vec<usize>) = rows.iter().partition(|row| column[**row] < mean);
-    (!low.is_empty() && !high.is_empty()).then_some([low, high])
+/// Sum over the rows of a group of share times squared distance from the mean of a column.
+fn variance(task: &Evolution, column: usize, group: &Group) -> f64 {
+    let off = |row: &usize| task.columns[column][*row] - group.values[column];
+    let rows = group.rows.iter();
+    rows.map(|row| task.shares[*row] * off(row).powi(2)).sum()
 }

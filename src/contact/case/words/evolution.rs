@@ -49,6 +49,16 @@ pub enum WearingBodies {
     Both,
 }
 
+impl EvolutionWords {
+    /// The extent in the unit that events are given in.
+    #[must_use]
+    pub fn end(&self) -> f64 {
+        let extent = &self.extent;
+        let rail = extent.mgt.or(extent.axle_passes);
+        rail.or(extent.wheel_distance_km).unwrap_or(0.0)
+    }
+}
+
 impl WearingBodies {
     /// Whether the rail and the wheel wear.
     #[must_use]

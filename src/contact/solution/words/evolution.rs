@@ -181,7 +181,7 @@ pub struct CondensedTraffic {
     pub pointers: Vec<String>,
     /// The states.
     pub states: Vec<TrafficState>,
-    /// Change of the distribution of wear of rail and wheel when every group of rows is halved, relative to the worn area.
+    /// Change of the distribution of wear of rail and wheel when every group of rows is halved, relative to the worn area; after spreading.
     pub error: [f64; 2],
 }
 
@@ -194,6 +194,8 @@ pub struct TrafficState {
     pub rows: u32,
     /// Their means, in the order of `pointers`.
     pub values: Vec<f64>,
+    /// Standard deviation in mm by which the wear of the state is spread along rail and wheel, for the places at which its rows touch.
+    pub spread_mm: [f64; 2],
 }
 
 /// When a limit is reached.
