@@ -1,6 +1,9 @@
 //! What is answered of an evolution: records, losses, uncertainties, limits.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use crate::contact::case::words::damage::DamageModel;
+use crate::contact::case::words::evolution::WearLosses;
 use crate::contact::evolution::pass::Evaluation;
 use crate::contact::evolution::section::{distance, lengths};
 use crate::contact::evolution::task::Evolution;
@@ -13,7 +16,7 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::evolution::{
     BodyState, ContactRange, EvolutionAnswer, EvolutionRecord, EvolutionState, LimitReached,
-    StateContact, WearLosses, WearUncertainty, WornBody,
+    StateContact, WearUncertainty, WornBody,
 };
 
 /// Depth of W2 below the top of the rail in mm.
@@ -96,21 +99,18 @@ fn losses(state: &EvolutionState) -> WearLosses {
         let now = distance(&body.worn.points_mm, from, direction);
         Some(now? - distance(&body.start_mm, from, direction)?)
     };
-    let top = rail
-        .start_mm
-        .iter()
-        .map(|at| at[1])
-        .fold(f64::INFINITY, f64::min);
-    let face = distance(&rail.start_mm, [-1e3, top + GAUGE_DEPTH], [1.0, 0.0]);
-    let tread = distance(&wheel.start_mm, [0.0, 1e3], [0.0, -1.0]).map(|off| 1e3 - off);
-    let slant = std::f64::consts::FRAC_1_SQRT_2;
-    WearLosses {
-        height_mm: loss(rail, [0.0, top - 1e3], [0.0, 1.0]),
-        gauge_face_mm: loss(rail, [-1e3, top + GAUGE_DEPTH], [1.0, 0.0]),
-        gauge_corner_mm: face.and_then(|face| loss(rail, [face - 1e3, top], [slant, slant])),
-        tread_mm: loss(wheel, [0.0, 1e3], [0.0, -1.0]),
-        flange_mm: tread.and_then(|tread| loss(wheel, [0.0, tread + FLANGE_DEPTH], [-1.0, 0.0])),
-    }
+    let heights = rail.start_mm.iter().map(|at| at[1]);
+    let top = heights.fold(f64::INFINITY, f64::min);
+    let gauge = [-1e3, top + GAUGE_DEPTH];
+    let face = distance(&rail.start_mm, gauge, [1.0, 0.0]);
+    let tread = distance(&wheel.start_mm, [0.0, 1e3], [0.0, -1.0]);
+    WearLosses::from([
+        loss(rail, [0.0, top - 1e3], [0.0, 1.0]),
+        loss(rail, gauge, [1.0, 0.0]),
+        face.and_then(|face| loss(rail, [face - 1e3, top], [FRAC_1_SQRT_2; 2])),
+        loss(wheel, [0.0, 1e3], [0.0, -1.0]),
+        tread.and_then(|off| loss(wheel, [0.0, 1e3 - off + FLANGE_DEPTH], [-1.0, 0.0])),
+    ])
 }
 
 fn conicity(task: &Evolution, state: &EvolutionState) -> Option<f64> {
@@ -226,35 +226,15 @@ impl Evolution {
     }
 
     fn limits_reached(&self, records: &[EvolutionRecord]) -> Vec<LimitReached> {
-        type Of = fn(&WearLosses) -> Option<f64>;
-        let limits = &self.plan.limits;
-        let all: [(&str, Option<f64>, Of, bool); 5] = [
-            ("height_mm", limits.height_mm, |l| l.height_mm, true),
-            (
-                "gauge_face_mm",
-                limits.gauge_face_mm,
-                |l| l.gauge_face_mm,
-                true,
-            ),
-            (
-                "gauge_corner_mm",
-                limits.gauge_corner_mm,
-                |l| l.gauge_corner_mm,
-                true,
-            ),
-            ("tread_mm", limits.tread_mm, |l| l.tread_mm, false),
-            ("flange_mm", limits.flange_mm, |l| l.flange_mm, false),
-        ];
-        let asked = all
-            .into_iter()
-            .filter_map(|(name, limit, of, rail)| Some((name, limit?, of, rail)));
-        let reached = asked.map(|(loss, limit_mm, of, rail)| {
+        let limits = self.plan.limits.values().into_iter().enumerate();
+        let reached = limits.filter_map(|(k, limit)| {
+            let limit_mm = limit?;
             let at = |factor: &dyn Fn(&WearUncertainty) -> f64| {
                 // Between two records at one time maintenance removes material, whose depth is not uncertain.
                 let (mut machined, mut last) = (0.0, None);
                 let losses = records.iter().filter_map(|record| {
-                    let body = if rail { &record.rail } else { &record.wheel };
-                    let loss = of(&record.losses)?;
+                    let body = if k < 3 { &record.rail } else { &record.wheel };
+                    let loss = record.losses.values()[k]?;
                     let share = record.progress.share;
                     if let Some((at, before)) = last.replace((share, loss))
                         && at == share
@@ -270,13 +250,13 @@ impl Evolution {
                 crossing(&losses, limit_mm).map(|share| self.progress(share))
             };
             let open = |own: &WearUncertainty| own.steps.hypot(own.states).hypot(own.contact);
-            LimitReached {
-                loss: loss.to_owned(),
+            Some(LimitReached {
+                loss: WearLosses::NAMES[k].to_owned(),
                 limit_mm,
                 reached: at(&|_| 1.0),
                 earliest: at(&|own| own.coefficients[1] * (1.0 + open(own))),
                 latest: at(&|own| own.coefficients[0] * (1.0 - open(own)).max(0.0)),
-            }
+            })
         });
         reached.collect()
     }

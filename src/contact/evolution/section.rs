@@ -132,10 +132,12 @@ pub fn smoothed(areas: &[f64], spacing: f64, deviation: f64) -> Vec<f64> {
     areas
 }
 
-/// Cuts a section down to another one, which is moved into the body until it lies nowhere outside, and by `depth` mm more.
+/// Deepest cut along a normal in mm.
+const CUT_MAX: f64 = 20.0;
+
+/// Cuts a section down to another one, which is moved in z into the body until it lies nowhere outside, and by `depth` mm more.
 ///
-/// Depths are compared in z where the present section is less steep than 70° and the other one has points; steeper parts follow where the
-/// other section lies inside.
+/// That distance is measured where the present section is less steep than 70°. Every point that is then outside is cut along its normal.
 #[must_use]
 pub fn machined(body: Body, points: &[[f64; 2]], target: &[[f64; 2]], depth: f64) -> Vec<[f64; 2]> {
     let sign = match body {
@@ -143,19 +145,25 @@ pub fn machined(body: Body, points: &[[f64; 2]], target: &[[f64; 2]], depth: f64
         Body::Wheel => -1.0,
     };
     let normals = normals(body, points);
-    let over = |k: usize| {
-        let steep = normals[k][1].abs() < 70_f64.to_radians().cos();
-        height_at(target, points[k][0]).filter(|_| !steep)
-    };
-    let targets: Vec<Option<f64>> = (0..points.len()).map(over).collect();
-    let outside = points.iter().zip(&targets);
-    let outside = outside.filter_map(|(at, z)| z.map(|z| sign * (at[1] - z)));
+    let steep = 70_f64.to_radians().cos();
+    let flat = points
+        .iter()
+        .zip(&normals)
+        .filter(|(_, normal)| normal[1].abs() >= steep);
+    let outside = flat.filter_map(|(at, _)| Some(sign * (at[1] - height_at(target, at[0])?)));
     let by = outside.fold(f64::NEG_INFINITY, f64::max) + depth;
-    let cut = |(at, z): (&[f64; 2], &Option<f64>)| match z {
-        Some(z) if sign * z + by > sign * at[1] => [at[0], z + sign * by],
-        _ => *at,
+    if by == f64::NEG_INFINITY {
+        return points.to_vec();
+    }
+    let target: Vec<[f64; 2]> = target.iter().map(|[y, z]| [*y, z + sign * by]).collect();
+    let cut = |(at, normal): (&[f64; 2], &[f64; 2])| {
+        let along = |by: f64| [0, 1].map(|k| at[k] + by * normal[k]);
+        let found = distance(&target, along(-CUT_MAX), *normal).map(|ahead| ahead - CUT_MAX);
+        found
+            .filter(|cut| (0.0..CUT_MAX).contains(cut))
+            .map_or(*at, along)
     };
-    points.iter().zip(&targets).map(cut).collect()
+    points.iter().zip(&normals).map(cut).collect()
 }
 
 /// z of a section at y: the first place that has it.
@@ -255,6 +263,24 @@ mod tests {
             "{:?}",
             ground[middle]
         );
+    }
+
+    #[test]
+    fn a_cut_runs_out_on_steep_faces_without_a_step() {
+        let angles = (0..400).map(|k| -1.5 + 3.0 * f64::from(k) / 399.0);
+        let points: Vec<[f64; 2]> = angles
+            .map(|angle| [30.0 * angle.sin(), 30.0 * (1.0 - angle.cos())])
+            .collect();
+        let ground = machined(Body::Rail, &points, &points, 0.3);
+        let cut = |k: usize| (ground[k][0] - points[k][0]).hypot(ground[k][1] - points[k][1]);
+        assert!((cut(200) - 0.3).abs() < 1e-3, "{}", cut(200));
+        for (k, at) in points.iter().enumerate().take(395).skip(5) {
+            let (before, here) = (cut(k - 1), cut(k));
+            assert!(
+                (here - before).abs() < 0.01,
+                "{at:?}: {here} after {before}"
+            );
+        }
     }
 
     #[test]

@@ -32,6 +32,9 @@ const TARGET: f64 = 0.02;
 /// Wheel load in N of a million gross tonnes on an axle with one wheel of that load on each rail.
 const NEWTONS_PER_MGT: f64 = 1e9 * 9.80665 / 2.0;
 
+/// Sections that an event leaves, rail and wheel.
+pub type Machined = [Option<Vec<[f64; 2]>>; 2];
+
 /// State shared by the solves of an evolution.
 #[derive(Debug, Default)]
 pub struct SolveContext {
@@ -57,7 +60,7 @@ pub struct Evolution {
     /// The plan.
     pub plan: EvolutionWords,
     /// Sections that events leave, rail and wheel, in the order of the events.
-    pub machined: Vec<[Option<Vec<[f64; 2]>>; 2]>,
+    pub machined: Vec<Machined>,
     /// Rail and wheel at the start.
     pub geometry: WheelRail,
     /// Figures of wear and damage.
@@ -344,7 +347,7 @@ fn located(CaseError(faults): CaseError, pointers: &[String], row: usize) -> Cas
 }
 
 /// Sections that the events leave, rail and wheel.
-fn machined(plan: &EvolutionWords) -> Result<Vec<[Option<Vec<[f64; 2]>>; 2]>, CaseError> {
+fn machined(plan: &EvolutionWords) -> Result<Vec<Machined>, CaseError> {
     let mut faults = Vec::new();
     let events = plan.events.iter().enumerate().map(|(k, event)| {
         if event.at > plan.end() {

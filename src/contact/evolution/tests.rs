@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::contact::case::limits::Limits;
 use crate::contact::evolution::pass::{Sections, pass};
-use crate::contact::evolution::section::area_between;
+use crate::contact::evolution::section::{area_between, distance};
 use crate::contact::evolution::task::{Evolution, SolveContext};
 use crate::contact::geometry::profile::Body;
 use crate::contact::monitor::Unmonitored;
@@ -205,6 +205,42 @@ fn the_error_of_a_condensed_traffic_covers_what_all_rows_wear() {
     assert!(last < 0.05, "{last}");
 }
 
+/// A wheel that rolls about its axle's end touches the round head at R sin(roll): the wear of few states is spread by R times the standard
+/// deviation of the roll of their rows, and differs from that of all rows by no more than the error says.
+#[test]
+fn the_wear_of_a_state_is_spread_over_the_places_of_its_rows() {
+    let rolls: Vec<f64> = (0..25).map(|k| 1e-3 * f64::from(k - 12)).collect();
+    let mut asked = symmetric(1, 2e3);
+    asked["traffic"] = json!({ "columns": { "/contact/roll_rad": rolls } });
+    let run_with = |states: u32| {
+        let mut asked = asked.clone();
+        asked["accuracy"]["states_max"] = json!(states);
+        asked["accuracy"]["states_tolerance"] = json!(1e-12);
+        let (state, _) = run(&checked(&asked));
+        (state.rail.worn.depth_mm, state.traffic.expect("a traffic"))
+    };
+    let (all, _) = run_with(25);
+    for states in [1, 2, 4] {
+        let (few, traffic) = run_with(states);
+        let off: f64 = all.iter().zip(&few).map(|(a, b)| (a - b).abs()).sum();
+        let off = off / all.iter().sum::<f64>();
+        assert!(
+            off < 1.2 * traffic.error[0],
+            "{states}: {off}, {} told",
+            traffic.error[0]
+        );
+        for state in &traffic.states {
+            let rows = f64::from(state.rows);
+            let wanted = 300e-3 * ((rows * rows - 1.0) / 12.0).sqrt();
+            let spread = state.spread_mm[0];
+            assert!(
+                (spread / wanted - 1.0).abs() < 0.15,
+                "{states}: {spread} {wanted}"
+            );
+        }
+    }
+}
+
 /// Left after any step and continued from its text by other threads, an evolution gives the same bits.
 #[test]
 fn an_evolution_is_continued_to_the_same_bits() {
@@ -237,6 +273,34 @@ fn an_evolution_is_continued_to_the_same_bits() {
         "{}",
         ground.machined_area_mm2
     );
+}
+
+/// An evolution of half the extent, and another one that starts from its sections, wear as one of the whole.
+#[test]
+fn an_evolution_in_two_parts_wears_as_a_whole() {
+    let (whole, _) = run(&checked(&symmetric(2, 4e4)));
+    let (first, _) = run(&checked(&symmetric(1, 2e4)));
+    let mut rest = symmetric(1, 2e4);
+    rest["template"]["contact"]["rail"]["points_mm"] = json!(first.rail.worn.points_mm);
+    let (second, _) = run(&checked(&rest));
+    let [one, parts] = [
+        whole.rail.worn.worn_area_mm2,
+        first.rail.worn.worn_area_mm2 + second.rail.worn.worn_area_mm2,
+    ];
+    assert!((parts / one - 1.0).abs() < 2e-3, "{parts} {one}");
+    for y in [-4.0, 0.0, 2.5] {
+        let height = |points: &[[f64; 2]]| distance(points, [y, -1e2], [0.0, 1.0]).expect("below");
+        let [start, one, parts] = [
+            &whole.rail.start_mm,
+            &whole.rail.worn.points_mm,
+            &second.rail.worn.points_mm,
+        ]
+        .map(|points| height(points));
+        assert!(
+            (parts - one).abs() < 0.01 * (one - start),
+            "{y}: {start} {one} {parts}"
+        );
+    }
 }
 
 /// The wear of a pass across both sections is the friction power of the strips by the map's mild slope.
@@ -343,7 +407,7 @@ fn faults_of_distributions_name_what_is_allowed() {
         (
             json!({ "columns": { "/contact/lateral_shift_mm": { "min": 2, "max": 1 } } }),
             "/traffic/columns/~1contact~1lateral_shift_mm/max",
-            "at least min",
+            "from 2 to",
         ),
         (
             json!({ "columns": { "/contact/lateral_shift_mm": { "min": 0, "max": 1, "mean": 0.5 } } }),
@@ -351,9 +415,9 @@ fn faults_of_distributions_name_what_is_allowed() {
             "missing",
         ),
         (
-            json!({ "columns": { "/contact/lateral_shift_mm": [0, 1], "/load/vertical_force_n": good } }),
-            "/traffic/columns/~1contact~1lateral_shift_mm",
-            "an object",
+            json!({ "columns": { "/contact/lateral_shift_mm": [0, 1], "/load/vertical_force_n": [7e4] } }),
+            "/traffic/columns/~1load~1vertical_force_n",
+            "2 rows",
         ),
         (
             json!({ "columns": { "/contact/lateral_shift_mm": good }, "samples": 0 }),
@@ -363,12 +427,12 @@ fn faults_of_distributions_name_what_is_allowed() {
         (
             json!({ "columns": { "/contact/lateral_shift_mm": good }, "passes": [1] }),
             "/traffic/passes",
-            "columns of numbers",
+            "4096 rows",
         ),
         (
             json!({ "columns": { "/contact/lateral_shift_mm": [0, 1] }, "samples": 5 }),
-            "/traffic/samples",
-            "distributions",
+            "/traffic/columns/~1contact~1lateral_shift_mm",
+            "5 rows",
         ),
     ] {
         let mut bad = request(&[0.0], &[1.0], 1);
@@ -402,7 +466,7 @@ fn faults_name_the_place_the_value_and_what_is_allowed() {
             "/traffic/passes",
             json!([1.0]),
             "/traffic/passes",
-            "1 values",
+            "of length 1",
         ),
         (
             "/traffic/columns/~1contact~1lateral_shift_mm/1",

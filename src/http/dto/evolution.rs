@@ -22,16 +22,17 @@ pub(crate) struct EvolutionRequest {
     plan: EvolutionWords,
 }
 
-/// States of a traffic: a table, or distributions that the service samples.
+/// States of a traffic: a table, distributions that the service samples, or both.
 #[derive(Debug, Serialize, ToSchema)]
 #[allow(dead_code, reason = "the contract; bodies are read by `contact`")]
 pub(crate) struct Traffic {
-    /// Columns named as those of a run: all of them numbers, as many in each, or all of them distributions, which are independent of each other.
+    /// Columns named as those of a run: a number for each row, or a distribution that is sampled once for each row. Distributions are independent of
+    /// each other.
     columns: BTreeMap<String, TrafficColumn>,
-    /// Relative numbers of passes of the rows of a table; 1 for each when left out.
+    /// Relative numbers of passes of the rows; 1 for each when left out.
     #[schema(required = false)]
     passes: Vec<f64>,
-    /// Samples of distributions; 4096 when left out.
+    /// Rows of a traffic whose columns are all distributions; 4096 when left out.
     #[schema(required = false, minimum = 1, maximum = 200_000)]
     samples: u32,
 }

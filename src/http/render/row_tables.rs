@@ -41,6 +41,19 @@ impl RowWriter {
         })
     }
 
+    /// A table that is written as a whole.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub(crate) fn whole(format: Format, table: RowTable) -> Result<Vec<u8>, WriteError> {
+        let columns = table.columns.iter();
+        let columns: Vec<_> = columns
+            .map(|(name, column)| (name.clone(), column.kind()))
+            .collect();
+        let mut writer = RowWriter::new(format, &columns)?;
+        Ok([writer.head()?, writer.write(table)?, writer.finish()?].concat())
+    }
+
     /// What comes before the first table.
     ///
     /// # Errors

@@ -7,11 +7,12 @@ use serde_json::{Map, Value};
 use uuid::Uuid;
 
 use crate::contact::error::{CaseError, Fault};
+use crate::contact::evaluate::request_faults::column_pointer;
 use crate::contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord, WornBody};
 use crate::http::dto::evolution::EvolutionRequest;
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::Caller;
-use crate::http::extract::ids::JobId;
+use crate::http::extract::ids::{JobId, parsed};
 use crate::http::extract::json::JsonBody;
 use crate::http::extract::query::{Parameters, count, query, reader};
 use crate::http::extract::titles::place;
@@ -21,11 +22,11 @@ use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::format::Format;
-use crate::http::render::row_tables::{RowWriter, WriteError};
+use crate::http::render::row_tables::RowWriter;
 use crate::http::routes::jobs::{GetProblems, SubmitProblems};
 use crate::http::routes::results::ResultProblems;
 use crate::http::routes::submission::{JobAccepted, NamedQuery, Submission, SubmitParameters};
-use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::model::kind::Kind;
 use crate::jobs::{Jobs, JobsError};
 
@@ -75,38 +76,37 @@ fn name_columns(request: &mut Value) -> Result<(), ApiError> {
     };
     let (mut named, mut faults) = (Map::new(), Vec::new());
     for (title, mut values) in std::mem::take(columns) {
-        let fault = |detail: String| {
-            let title = title.replace('~', "~0").replace('/', "~1");
-            Fault::new(format!("/traffic/columns/{title}"), detail)
-        };
-        match place(&title, None) {
-            Ok(Some(found)) => {
-                let numbers: Box<dyn Iterator<Item = &mut Value>> = match &mut values {
-                    Value::Array(numbers) => Box::new(numbers.iter_mut()),
-                    Value::Object(distribution) => Box::new(distribution.values_mut()),
-                    _ => Box::new(std::iter::empty()),
-                };
-                for value in numbers {
-                    if let Some(number) = value.as_f64().filter(|_| found.factor != 1.0) {
-                        *value = (found.factor * number).into();
-                    }
-                }
-                if named.insert(found.pointer.clone(), values).is_some() {
-                    faults.push(fault(format!("a second column for `{}`", found.pointer)));
-                }
+        let found = place(&title, None).and_then(|found| {
+            found.ok_or_else(|| {
+                "names nothing in the case; allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs".to_owned()
+            })
+        });
+        let added = found.and_then(|found| {
+            scale(&mut values, found.factor);
+            match named.insert(found.pointer.clone(), values) {
+                Some(_) => Err(format!("a second column for `{}`", found.pointer)),
+                None => Ok(()),
             }
-            Ok(None) => faults.push(fault(
-                "names nothing in the case; allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs".to_owned(),
-            )),
-            Err(detail) => faults.push(fault(detail)),
-        }
+        });
+        let pointer = format!("/traffic{}", column_pointer(&title));
+        faults.extend(added.err().map(|detail| Fault::new(pointer, detail)));
     }
+    *columns = named;
     match faults.is_empty() {
-        true => {
-            *columns = named;
-            Ok(())
-        }
+        true => Ok(()),
         false => Err(JobsError::from(CaseError(faults)).into()),
+    }
+}
+
+/// Multiplies the numbers of a column, or of its distribution.
+fn scale(values: &mut Value, factor: f64) {
+    match values {
+        Value::Array(values) => values.iter_mut().for_each(|value| scale(value, factor)),
+        Value::Object(values) => values.values_mut().for_each(|value| scale(value, factor)),
+        Value::Number(number) if factor != 1.0 => {
+            *values = number.as_f64().map(|number| factor * number).into();
+        }
+        _ => {}
     }
 }
 
@@ -198,25 +198,7 @@ pub(crate) async fn table(
             Some(TableOf::Points) => points_table(evolution),
             _ => records_table(evolution),
         };
-        let columns = table.columns.iter();
-        let columns: Vec<(String, TableKind)> = columns
-            .map(|(name, column)| {
-                let kind = match column {
-                    TableColumn::Integers(_) => TableKind::Integers,
-                    TableColumn::Numbers(_) => TableKind::Numbers,
-                    TableColumn::Texts(_) => TableKind::Texts,
-                };
-                (name.clone(), kind)
-            })
-            .collect();
-        let write = || {
-            let mut writer = RowWriter::new(format, &columns)?;
-            let mut text = writer.head()?;
-            text.extend(writer.write(table)?);
-            text.extend(writer.finish()?);
-            Ok::<_, WriteError>(text)
-        };
-        write().map_err(|error| ApiError::internal(&error))
+        RowWriter::whole(format, table).map_err(|error| ApiError::internal(&error))
     });
     let (text, share) = found.await?;
     let head = [
@@ -237,25 +219,19 @@ query! {
         record: u32 as u32 = count(0, 100_000);
         /// `columns` (when left out), `miniprof` or `simpack`
         #[param(pattern = "^(columns|miniprof|simpack)$", example = "miniprof")]
-        format: SectionForm as String = reader("`columns`, `miniprof` or `simpack`", |text| match text {
-            "columns" => Some(SectionForm::Columns),
-            "miniprof" => Some(SectionForm::Miniprof),
-            "simpack" => Some(SectionForm::Simpack),
-            _ => None,
+        format: SectionForm as String = reader("`columns`, `miniprof` or `simpack`", |text| {
+            FORMS.into_iter().find(|(name, _)| *name == text)
         });
     }
 }
 
-/// The forms of a file with a section.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum SectionForm {
-    /// Columns of y and z.
-    Columns,
-    /// MiniProf.
-    Miniprof,
-    /// As Simpack reads it.
-    Simpack,
-}
+/// A form of a file with a section: its name, and the extensions for a rail and a wheel.
+type SectionForm = (&'static str, [&'static str; 2]);
+const FORMS: [SectionForm; 3] = [
+    ("columns", ["txt", "txt"]),
+    ("miniprof", ["ban", "whl"]),
+    ("simpack", ["prr", "prw"]),
+];
 
 /// A section of a succeeded evolution as a file for other programs.
 #[utoipa::path(
@@ -277,19 +253,13 @@ pub(crate) async fn section(
     State(memory): State<Memory>,
 ) -> Result<Response, ApiError> {
     let query = SectionQuery::read(&uri, &())?;
-    let unknown = |detail: String| ApiError::new(ProblemKind::JobNotFound, detail);
-    let id = Uuid::try_parse(&id)
-        .map_err(|_| unknown(format!("`{id}` is no id of an evolution; ids are UUIDs")))?;
-    let wheel = match body.as_str() {
-        "rail" => false,
-        "wheel" => true,
-        _ => {
-            return Err(unknown(format!(
-                "`{body}` is no body; allowed: rail, wheel"
-            )));
-        }
-    };
-    let form = query.format.unwrap_or(SectionForm::Columns);
+    let id = parsed(&id, ProblemKind::JobNotFound, "evolution")?;
+    if !["rail", "wheel"].contains(&body.as_str()) {
+        let detail = format!("`{body}` is no body; allowed: rail, wheel");
+        return Err(ApiError::new(ProblemKind::JobNotFound, detail));
+    }
+    let wheel = body == "wheel";
+    let (form, extensions) = query.format.unwrap_or(FORMS[0]);
     let found = read(jobs, &memory, id, move |evolution| {
         let last = evolution.records.len().saturating_sub(1);
         let number = query.record.map_or(last, |number| number as usize);
@@ -300,13 +270,7 @@ pub(crate) async fn section(
         Ok(file(worn, wheel, form).into_bytes())
     });
     let (text, share) = found.await?;
-    let extension = match (form, wheel) {
-        (SectionForm::Columns, _) => "txt",
-        (SectionForm::Miniprof, false) => "ban",
-        (SectionForm::Miniprof, true) => "whl",
-        (SectionForm::Simpack, false) => "prr",
-        (SectionForm::Simpack, true) => "prw",
-    };
+    let extension = extensions[usize::from(wheel)];
     let name = format!("attachment; filename=\"{body}-{id}.{extension}\"");
     let head = [
         (header::CONTENT_TYPE, "text/plain; charset=utf-8".to_owned()),
@@ -418,23 +382,24 @@ fn points_table(evolution: &EvolutionAnswer) -> RowTable {
 }
 
 /// The text of a file with a section, in mm.
-fn file(worn: &WornBody, wheel: bool, form: SectionForm) -> String {
+fn file(worn: &WornBody, wheel: bool, form: &str) -> String {
     let points = worn.points_mm.iter();
-    // MiniProf's X points to the track centre.
-    let row = |[y, z]: &[f64; 2]| match form {
-        SectionForm::Miniprof => format!("{:.6}\t{z:.6}\n", 0.0 - y),
-        _ => format!("{y:.6} {z:.6}\n"),
-    };
-    let rows: String = points.map(row).collect();
+    let kind = u8::from(wheel);
     match form {
-        SectionForm::Columns => rows,
-        SectionForm::Miniprof => format!(
-            "ProgramName=railhead\nXYPoints={}\nColumnDef=X,Y\n\n{rows}",
-            worn.points_mm.len()
-        ),
-        SectionForm::Simpack => format!(
-            "header.begin\n  version = 1\n  type = {}\nheader.end\nspline.begin\n  type = 0\n  units.len.f = 1000\n  point.begin\n{rows}  point.end\nspline.end\n",
-            u8::from(wheel)
-        ),
+        "miniprof" => {
+            // MiniProf's X points to the track centre.
+            let rows = points.map(|[y, z]| format!("{:.6}\t{z:.6}\n", 0.0 - y));
+            let (count, rows) = (worn.points_mm.len(), rows.collect::<String>());
+            format!("ProgramName=railhead\nXYPoints={count}\nColumnDef=X,Y\n\n{rows}")
+        }
+        _ => {
+            let rows: String = points.map(|[y, z]| format!("{y:.6} {z:.6}\n")).collect();
+            match form {
+                "simpack" => format!(
+                    "header.begin\n  version = 1\n  type = {kind}\nheader.end\nspline.begin\n  type = 0\n  units.len.f = 1000\n  point.begin\n{rows}  point.end\nspline.end\n"
+                ),
+                _ => rows,
+            }
+        }
     }
 }

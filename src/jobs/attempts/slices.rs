@@ -100,28 +100,21 @@ pub(crate) struct SlicedEvolution {
     pub(crate) state: Option<EvolutionState>,
     /// Slices stored.
     done: u32,
-    /// Tells this evolution and its solver.
-    digest: String,
     /// Solver time up to the end of what is stored.
     pub(crate) spent: Duration,
 }
 
 impl SlicedEvolution {
     /// An evolution of which this is stored. What another solver stored is left aside.
-    pub(crate) fn new(task: Evolution, digest: String, stored: &[SliceRecord]) -> SlicedEvolution {
-        let fits = |note: &SliceRecord| note.digest == digest;
-        let done = if stored.iter().all(fits) {
-            stored.len()
-        } else {
-            0
-        };
+    pub(crate) fn new(task: Evolution, stored: &[SliceRecord]) -> SlicedEvolution {
+        let fit = stored.iter().all(|note| note.digest == task.digest());
+        let done = if fit { stored.len() } else { 0 };
         let last = done.checked_sub(1).and_then(|last| stored.get(last));
         SlicedEvolution {
             state: last.is_none().then(|| task.begin()),
             done: u32::try_from(done).unwrap_or(u32::MAX),
             spent: last.map_or(Duration::ZERO, |note| note.spent),
             task,
-            digest,
         }
     }
 
@@ -153,7 +146,7 @@ impl SlicedEvolution {
         SliceRecord {
             number: self.done,
             motions: self.state.as_ref().map_or(0, |state| state.steps),
-            digest: self.digest.clone(),
+            digest: self.task.digest(),
             spent,
         }
     }

@@ -3,20 +3,19 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use serde_json::Value;
 
 use crate::contact::error::SolveError;
 use crate::contact::evolution::task::{Evolution, SolveContext};
 use crate::contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
 use crate::jobs::attempts::attempt_control::AttemptControl;
-use crate::jobs::attempts::outcome::{INTERNAL, Outcome};
+use crate::jobs::attempts::outcome::Outcome;
 use crate::jobs::attempts::slices::{SlicedEvolution, SlicedWork};
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
-use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
+use crate::jobs::worker::solve::internal;
 
 /// Checks an evolution, of which this is stored, and takes its next steps.
 pub(crate) fn begin(
@@ -25,7 +24,7 @@ pub(crate) fn begin(
     stored: &StoredCase,
     notes: &[SliceRecord],
 ) -> Outcome {
-    let request: Value = match stored.value() {
+    let request = match stored.value() {
         Ok(request) => request,
         Err(error) => return internal(&error.to_string()),
     };
@@ -34,8 +33,7 @@ pub(crate) fn begin(
         Err(error) => return Outcome::Refused(error),
     };
     control.set_memory_bytes(task.memory_bytes());
-    let digest = task.digest();
-    advance(shared, control, SlicedEvolution::new(task, digest, notes))
+    advance(shared, control, SlicedEvolution::new(task, notes))
 }
 
 /// Takes the next steps, if it is known where to go on; otherwise the stored parts are wanted.
@@ -67,12 +65,11 @@ pub(crate) fn advance(
         Ok(record) => record,
         Err(error) => return Outcome::Unsolved(error),
     };
-    let texts = (
-        serde_json::to_vec(&record),
-        serde_json::to_vec(&evolution.state),
-    );
-    let (Ok(record), Ok(state)) = texts else {
-        return internal("a step of an evolution cannot be written as JSON");
+    let texts = serde_json::to_vec(&record)
+        .and_then(|record| Ok((record, serde_json::to_vec(&evolution.state)?)));
+    let (record, state) = match texts {
+        Ok(texts) => texts,
+        Err(error) => return internal(&format!("a step cannot be written as JSON: {error}")),
     };
     Outcome::Slice {
         part: Some((
@@ -124,11 +121,6 @@ pub(crate) fn join(
         },
         Err(error) => internal(&format!("an evolution cannot be written as JSON: {error}")),
     }
-}
-
-fn internal(reason: &str) -> Outcome {
-    tracing::error!(reason, "an evolution fails inside the service");
-    Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
 }
 
 /// The state after the last of stored parts, and all their records.

@@ -44,7 +44,8 @@ pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Wor
     })
 }
 
-fn internal(reason: &str) -> Outcome {
+/// The outcome of work that a defect of the service ended.
+pub(crate) fn internal(reason: &str) -> Outcome {
     tracing::error!(reason, "a job fails inside the service");
     Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
 }

@@ -1,13 +1,14 @@
 //! Reads what is asked of an evolution: its plan, and its traffic as columns of numbers.
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::object::{Object, join, number, shown};
+use crate::contact::case::read::subsurface::optional;
 use crate::contact::case::read::wheel_rail::section;
 use crate::contact::case::words::damage::DamageModel;
 use crate::contact::case::words::evolution::{
-    EvolutionAccuracy, EvolutionEvent, EvolutionExtent, EvolutionWords, WearLimits, WearingBodies,
+    EvolutionAccuracy, EvolutionEvent, EvolutionExtent, EvolutionWords, WearLosses, WearingBodies,
 };
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::numerics::sampling::{PRIMES, halton, normal_probability, normal_quantile};
@@ -34,6 +35,7 @@ const MEMBERS: [&str; 10] = [
     "coefficient_factor",
 ];
 const AMOUNT: AllowedRange = AllowedRange::positive(1e12, "");
+const ANY: AllowedRange = AllowedRange::closed(-1e12, 1e12, "");
 const LOSS: AllowedRange = AllowedRange::positive(100.0, "mm");
 const SHARE: AllowedRange = AllowedRange::positive(1.0, "");
 /// Events of one evolution.
@@ -41,7 +43,7 @@ const EVENTS_MAX: usize = 100;
 /// Rows of a traffic.
 pub const ROWS_MAX: usize = 200_000;
 /// Samples of a traffic whose columns are distributions.
-const SAMPLES_DEFAULT: u32 = 4096;
+const SAMPLES_DEFAULT: usize = 4096;
 
 /// An evolution as it was sent, without faults of the text.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,22 +80,26 @@ fn draft(all: &mut Object) -> Option<EvolutionDraft> {
     all.only(&MEMBERS, &[]);
     let template = all.required("template", "a case of one motion").cloned();
     let traffic = traffic(&mut all.child("traffic")?);
-    let wearing = word_or(all, "wearing", &BODIES, WearingBodies::Both);
-    let wear_model = word_or(all, "wear_model", &MODELS, DamageModel::UsfdWear);
+    let wearing = or(all, "wearing", WearingBodies::Both, |all, name| {
+        all.word(name, &BODIES, &[])
+    });
+    let model = DamageModel::UsfdWear;
+    let wear_model = or(all, "wear_model", model, |all, name| {
+        all.word(name, &MODELS, &[])
+    });
     let extent = extent(&mut all.child("extent")?, wearing.unwrap_or_default());
-    let records = match all.has("records") {
-        true => all.required_count("records", 1, 500),
-        false => Some(10),
-    };
-    let accuracy = match all.has("accuracy") {
-        true => accuracy(&mut all.child("accuracy")?),
-        false => Some(EvolutionAccuracy::default()),
-    };
-    let limits = match all.has("limits") {
-        true => limits(&mut all.child("limits")?),
-        false => Some(WearLimits::default()),
-    };
-    let events = events(all);
+    let records = or(all, "records", 10, |all, name| {
+        all.required_count(name, 1, 500)
+    });
+    let usual = EvolutionAccuracy::default();
+    let accuracy = or(all, "accuracy", usual, |all, name| {
+        accuracy(&mut all.child(name)?)
+    });
+    let none = WearLosses::default();
+    let limits = or(all, "limits", none, |all, name| {
+        limits(&mut all.child(name)?)
+    });
+    let events = or(all, "events", Vec::new(), events);
     let factor = AllowedRange::closed(1.0, 100.0, "");
     let coefficient_factor = number_or(all, "coefficient_factor", factor, 2.0);
     let (columns, passes) = traffic?;
@@ -114,18 +120,20 @@ fn draft(all: &mut Object) -> Option<EvolutionDraft> {
     })
 }
 
-fn word_or<T: Copy>(block: &mut Object, name: &str, table: &[(&str, T)], or: T) -> Option<T> {
-    match block.has(name) {
-        true => block.word(name, table, &[]),
-        false => Some(or),
-    }
+/// A member that has a value where it is left out.
+fn or<T>(
+    block: &mut Object,
+    name: &str,
+    or: T,
+    read: impl FnOnce(&mut Object, &str) -> Option<T>,
+) -> Option<T> {
+    optional(block, name, read).map(|found| found.unwrap_or(or))
 }
 
-fn number_or(block: &mut Object, name: &str, allowed: AllowedRange, or: f64) -> Option<f64> {
-    match block.has(name) {
-        true => block.number(name, allowed),
-        false => Some(or),
-    }
+fn number_or(block: &mut Object, name: &str, allowed: AllowedRange, usual: f64) -> Option<f64> {
+    or(block, name, usual, |block, name| {
+        block.number(name, allowed)
+    })
 }
 
 fn extent(block: &mut Object, wearing: WearingBodies) -> Option<EvolutionExtent> {
@@ -160,19 +168,20 @@ fn accuracy(block: &mut Object) -> Option<EvolutionAccuracy> {
         "smoothing_mm",
     ];
     block.only(&names, &[]);
-    let or = EvolutionAccuracy::default();
-    let count_or = |block: &mut Object, name: &str, most: u32, or: u32| match block.has(name) {
-        true => block.required_count(name, 1, most),
-        false => Some(or),
+    let usual = EvolutionAccuracy::default();
+    let count_or = |block: &mut Object, name: &str, most: u32, usual: u32| {
+        or(block, name, usual, |block, name| {
+            block.required_count(name, 1, most)
+        })
     };
-    let states_max = count_or(block, "states_max", 2000, or.states_max);
-    let states_tolerance = number_or(block, "states_tolerance", SHARE, or.states_tolerance);
-    let step_tolerance = number_or(block, "step_tolerance", SHARE, or.step_tolerance);
     let depth = AllowedRange::positive(1.0, "mm");
-    let step_depth_mm = number_or(block, "step_depth_mm", depth, or.step_depth_mm);
-    let steps_max = count_or(block, "steps_max", 100_000, or.steps_max);
     let kernel = AllowedRange::closed(0.0, 5.0, "mm");
-    let smoothing_mm = number_or(block, "smoothing_mm", kernel, or.smoothing_mm);
+    let states_max = count_or(block, "states_max", 2000, usual.states_max);
+    let states_tolerance = number_or(block, "states_tolerance", SHARE, usual.states_tolerance);
+    let step_tolerance = number_or(block, "step_tolerance", SHARE, usual.step_tolerance);
+    let step_depth_mm = number_or(block, "step_depth_mm", depth, usual.step_depth_mm);
+    let steps_max = count_or(block, "steps_max", 100_000, usual.steps_max);
+    let smoothing_mm = number_or(block, "smoothing_mm", kernel, usual.smoothing_mm);
     Some(EvolutionAccuracy {
         states_max: states_max?,
         states_tolerance: states_tolerance?,
@@ -183,49 +192,27 @@ fn accuracy(block: &mut Object) -> Option<EvolutionAccuracy> {
     })
 }
 
-fn limits(block: &mut Object) -> Option<WearLimits> {
-    let names = [
-        "height_mm",
-        "gauge_face_mm",
-        "gauge_corner_mm",
-        "tread_mm",
-        "flange_mm",
-    ];
-    block.only(&names, &[]);
-    let [
-        height_mm,
-        gauge_face_mm,
-        gauge_corner_mm,
-        tread_mm,
-        flange_mm,
-    ] = names.map(|name| block.number(name, LOSS));
-    Some(WearLimits {
-        height_mm,
-        gauge_face_mm,
-        gauge_corner_mm,
-        tread_mm,
-        flange_mm,
-    })
+fn limits(block: &mut Object) -> Option<WearLosses> {
+    block.only(&WearLosses::NAMES, &[]);
+    Some(WearLosses::from(
+        WearLosses::NAMES.map(|name| block.number(name, LOSS)),
+    ))
 }
 
-fn events(all: &mut Object) -> Option<Vec<EvolutionEvent>> {
-    let Some(value) = all.value("events") else {
-        return Some(Vec::new());
-    };
-    let pointer = all.pointer_to("events");
+fn events(all: &mut Object, name: &str) -> Option<Vec<EvolutionEvent>> {
+    let value = all.value(name)?;
+    let pointer = all.pointer_to(name);
     let Some(elements) = value.as_array().filter(|list| list.len() <= EVENTS_MAX) else {
-        let detail = format!(
-            "{} given; an array of at most {EVENTS_MAX} events is needed",
-            shown(value)
-        );
-        all.fault("events", detail);
+        let given = shown(value);
+        let detail = format!("{given} given; an array of at most {EVENTS_MAX} events is needed");
+        all.fault(name, detail);
         return None;
     };
     let faults = all.faults();
-    let read = elements.iter().enumerate().map(|(k, element)| {
-        let mut block = Object::open(element, join(&pointer, k), faults)?;
-        event(&mut block)
-    });
+    let read = elements
+        .iter()
+        .enumerate()
+        .map(|(k, element)| event(&mut Object::open(element, join(&pointer, k), faults)?));
     let read: Vec<Option<EvolutionEvent>> = read.collect();
     let mut events = read.into_iter().collect::<Option<Vec<EvolutionEvent>>>()?;
     events.sort_by(|a, b| a.at.total_cmp(&b.at));
@@ -235,17 +222,13 @@ fn events(all: &mut Object) -> Option<Vec<EvolutionEvent>> {
 fn event(block: &mut Object) -> Option<EvolutionEvent> {
     let kinds = ["grind", "reprofile", "friction_coefficient"];
     block.only(&["at", kinds[0], kinds[1], kinds[2], "depth_mm"], &[]);
+    let boxed = |block: &mut Object, name: &str| section(block, name).map(Box::new);
     let at = block.required_number("at", AllowedRange::closed(0.0, 1e12, ""));
-    let grind = section_or(block, "grind");
-    let reprofile = section_or(block, "reprofile");
-    let depth_mm = number_or(
-        block,
-        "depth_mm",
-        AllowedRange::closed(0.0, 20.0, "mm"),
-        0.0,
-    );
-    let friction_coefficient =
-        block.number("friction_coefficient", AllowedRange::closed(0.0, 2.0, ""));
+    let grind = optional(block, kinds[0], boxed);
+    let reprofile = optional(block, kinds[1], boxed);
+    let depth = AllowedRange::closed(0.0, 20.0, "mm");
+    let depth_mm = number_or(block, "depth_mm", depth, 0.0);
+    let friction_coefficient = block.number(kinds[2], AllowedRange::closed(0.0, 2.0, ""));
     if kinds.iter().all(|kind| !block.has(kind)) {
         block.fault_here(format!("nothing happens; give one of {}", kinds.join(", ")));
     }
@@ -258,188 +241,106 @@ fn event(block: &mut Object) -> Option<EvolutionEvent> {
     })
 }
 
-fn section_or(
-    block: &mut Object,
-    name: &str,
-) -> Option<Option<Box<crate::contact::case::words::contact::CrossSection>>> {
-    match block.has(name) {
-        true => section(block, name).map(|section| Some(Box::new(section))),
-        false => Some(None),
-    }
-}
-
 type Traffic = (Vec<(String, Vec<f64>)>, Vec<f64>);
 
+/// Columns and passes. A distribution is sampled once for each row.
 fn traffic(block: &mut Object) -> Option<Traffic> {
     block.only(&["columns", "passes", "samples"], &[]);
+    let most = ROWS_MAX as u32;
+    let samples = optional(block, "samples", |block, name| {
+        block.required_count(name, 1, most)
+    })?;
     let value = block.required("columns", "an object of columns")?;
-    let pointer = block.pointer_to("columns");
-    let Value::Object(members) = value else {
+    let Some(members) = value.as_object().filter(|members| !members.is_empty()) else {
+        let given = shown(value);
         block.fault(
             "columns",
-            format!("{} given; an object of columns is needed", shown(value)),
+            format!("{given} given; an object with at least one column is needed"),
         );
         return None;
     };
-    if members.values().any(Value::is_object) {
-        return sampled_traffic(block, members, &pointer);
-    }
-    if block.has("samples") {
+    let first = members.values().find_map(Value::as_array).map(Vec::len);
+    let rows = samples.map(|samples| samples as usize).or(first);
+    let rows = rows.unwrap_or(SAMPLES_DEFAULT);
+    if !(1..=ROWS_MAX).contains(&rows) {
         block.fault(
-            "samples",
-            "given for columns of numbers; it belongs to distributions",
+            "columns",
+            format!("{rows} rows given; 1 to {ROWS_MAX} are allowed"),
         );
+        return None;
     }
+    let pointer = block.pointer_to("columns");
     let faults = block.faults();
-    let any = AllowedRange::closed(-1e12, 1e12, "");
-    let read = members.iter().map(|(name, values)| {
-        let values = numbers(values, &join(&pointer, name), any, faults)?;
-        Some((name.clone(), values))
+    let mut dimensions = PRIMES.into_iter();
+    let read = members.iter().map(|(name, value)| {
+        let pointer = join(&pointer, name);
+        let values = match value {
+            Value::Object(_) => {
+                let mut block = Object::open(value, pointer, faults)?;
+                sampled(&mut block, rows, dimensions.next())
+            }
+            _ => numbers(value, &pointer, (ANY, rows), faults),
+        };
+        Some((name.clone(), values?))
     });
     let read: Vec<Option<(String, Vec<f64>)>> = read.collect();
-    let columns = read.into_iter().collect::<Option<Vec<_>>>()?;
-    let Some(rows) = columns.first().map(|(_, values)| values.len()) else {
-        block.fault("columns", "no columns given; at least one is needed");
-        return None;
-    };
-    for (name, values) in &columns {
-        if values.len() != rows {
-            let detail = format!(
-                "{} values given, the first column has {rows}; all columns need as many",
-                values.len()
-            );
-            block.faults().add(join(&pointer, name), detail);
-        }
-    }
-    let Some(passes) = block.value("passes") else {
-        return Some((columns, vec![1.0; rows]));
-    };
-    let pointer = block.pointer_to("passes");
     let weight = AllowedRange::closed(0.0, 1e12, "");
-    let passes = numbers(passes, &pointer, weight, block.faults())?;
-    if passes.len() != rows {
-        let detail = format!(
-            "{} values given; one for each of the {rows} rows is needed",
-            passes.len()
-        );
-        block.fault("passes", detail);
-    } else if passes.iter().sum::<f64>() <= 0.0 {
+    let passes = or(block, "passes", vec![1.0; rows], |block, name| {
+        let pointer = block.pointer_to(name);
+        numbers(block.value(name)?, &pointer, (weight, rows), block.faults())
+    })?;
+    if passes.iter().sum::<f64>() <= 0.0 {
         block.fault("passes", "all are 0; at least one more than 0 is needed");
     }
-    Some((columns, passes))
+    Some((read.into_iter().collect::<Option<_>>()?, passes))
 }
 
-/// A traffic whose columns are distributions, at the points of Halton's sequence: one dimension for each column, all independent.
-fn sampled_traffic(
-    block: &mut Object,
-    members: &Map<String, Value>,
-    pointer: &str,
-) -> Option<Traffic> {
-    if block.has("passes") {
-        block.fault(
-            "passes",
-            "given for distributions; it belongs to columns of numbers",
-        );
-    }
-    let samples = match block.has("samples") {
-        true => block.required_count("samples", 1, ROWS_MAX as u32),
-        false => Some(SAMPLES_DEFAULT),
-    };
-    if members.len() > PRIMES.len() {
-        let detail = format!(
-            "{} distributions given; at most {} are allowed",
-            members.len(),
-            PRIMES.len()
-        );
-        block.fault("columns", detail);
-        return None;
-    }
-    let faults = block.faults();
-    let read = members.iter().map(|(name, value)| {
-        let mut block = Object::open(value, join(pointer, name), faults)?;
-        Some((name.clone(), distribution(&mut block)?))
-    });
-    let read: Vec<Option<(String, Distribution)>> = read.collect();
-    let samples = samples?;
-    let columns = read.into_iter().zip(PRIMES).map(|(read, base)| {
-        let (name, distribution) = read?;
-        let values = (1..=samples).map(|k| distribution.value_at(halton(k, base)));
-        Some((name, values.collect()))
-    });
-    let columns = columns.collect::<Option<Vec<_>>>()?;
-    Some((columns, vec![1.0; samples as usize]))
-}
-
-/// A distribution of a column between two values: uniform, or normal where it has a mean and a standard deviation.
-struct Distribution {
-    range: [f64; 2],
-    normal: Option<[f64; 2]>,
-}
-
-impl Distribution {
-    /// The value below which this share of the traffic lies.
-    fn value_at(&self, share: f64) -> f64 {
-        let [low, high] = self.range;
-        let Some([mean, deviation]) = self.normal else {
-            return low + share * (high - low);
-        };
-        let [from, to] = self
-            .range
-            .map(|end| normal_probability((end - mean) / deviation));
-        (mean + deviation * normal_quantile(from + share * (to - from))).clamp(low, high)
-    }
-}
-
-fn distribution(block: &mut Object) -> Option<Distribution> {
+/// Samples of a distribution at the points of one dimension of Halton's sequence: uniform between two values, or normal where it has a mean and a
+/// standard deviation.
+fn sampled(block: &mut Object, rows: usize, dimension: Option<u32>) -> Option<Vec<f64>> {
     block.only(&["min", "max", "mean", "standard_deviation"], &[]);
-    let any = AllowedRange::closed(-1e12, 1e12, "");
-    let low = block.required_number("min", any);
-    let high = block.required_number("max", any);
-    let is_normal = block.has("mean") || block.has("standard_deviation");
-    let normal = match is_normal {
+    let Some(base) = dimension else {
+        block.fault_here(format!(
+            "at most {} distributions are allowed",
+            PRIMES.len()
+        ));
+        return None;
+    };
+    let low = block.required_number("min", ANY);
+    let high = block.required_number("max", AllowedRange::closed(low.unwrap_or(-1e12), 1e12, ""));
+    let normal = match block.has("mean") || block.has("standard_deviation") {
         true => {
-            let mean = block.required_number("mean", any);
+            let between = AllowedRange::closed(low?, high?, "");
+            let mean = block.required_number("mean", between);
             let spread = AllowedRange::positive(1e12, "");
             let deviation = block.required_number("standard_deviation", spread);
             Some([mean?, deviation?])
         }
         false => None,
     };
-    let range = [low?, high?];
-    if range[0] > range[1] {
-        block.fault(
-            "max",
-            format!("{} given; at least min, {}, is needed", range[1], range[0]),
-        );
-        return None;
-    }
-    if let Some([mean, _]) = normal
-        && !(range[0]..=range[1]).contains(&mean)
-    {
-        block.fault(
-            "mean",
-            format!(
-                "{mean} given; {} to {} is allowed, min to max",
-                range[0], range[1]
-            ),
-        );
-        return None;
-    }
-    Some(Distribution { range, normal })
+    let (low, high) = (low?, high?);
+    // The value below which this share of the traffic lies.
+    let value = |share: f64| match normal {
+        Some([mean, deviation]) => {
+            let below = |value: f64| normal_probability((value - mean) / deviation);
+            let probability = below(low) + share * (below(high) - below(low));
+            (mean + deviation * normal_quantile(probability)).clamp(low, high)
+        }
+        None => low + share * (high - low),
+    };
+    Some((1..=rows).map(|k| value(halton(k as u32, base))).collect())
 }
 
+/// As many numbers as there are rows.
 fn numbers(
     value: &Value,
     pointer: &str,
-    allowed: AllowedRange,
+    (allowed, rows): (AllowedRange, usize),
     faults: &mut Faults,
 ) -> Option<Vec<f64>> {
-    let Some(elements) = value
-        .as_array()
-        .filter(|all| (1..=ROWS_MAX).contains(&all.len()))
-    else {
+    let Some(elements) = value.as_array().filter(|all| all.len() == rows) else {
         let detail = format!(
-            "{} given; an array of 1 to {ROWS_MAX} numbers is needed",
+            "{} given; one number for each of {rows} rows is needed",
             shown(value)
         );
         faults.add(pointer, detail);

@@ -1,6 +1,6 @@
 //! Request of an evolution: the bodies that wear, the wear model, the extent, events and limits.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::contact::case::words::contact::CrossSection;
@@ -26,7 +26,7 @@ pub struct EvolutionWords {
     pub accuracy: EvolutionAccuracy,
     /// Losses for which the time is reported.
     #[schema(required = false)]
-    pub limits: WearLimits,
+    pub limits: WearLosses,
     /// Maintenance, in any order.
     #[schema(required = false)]
     pub events: Vec<EvolutionEvent>,
@@ -120,29 +120,71 @@ impl Default for EvolutionAccuracy {
     }
 }
 
-/// Losses in mm at which a profile has to be maintained. One that is left out is not checked.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema)]
-pub struct WearLimits {
-    /// W1: height of the rail in its middle.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+/// Losses of the sections in mm, or limits of them; absent where a section has no such place, and where no limit is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct WearLosses {
+    /// W1: height of the rail at y = 0.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
     pub height_mm: Option<f64>,
-    /// W2: gauge face, 14 mm below the top of the new rail.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    /// W2: gauge face of the rail, 14 mm below its top at the start.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
     pub gauge_face_mm: Option<f64>,
-    /// W3: gauge corner, at 45°.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    /// W3: gauge corner of the rail, at 45°.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
     pub gauge_corner_mm: Option<f64>,
-    /// Tread of the wheel, at y = 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    /// Tread of the wheel at y = 0.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
     pub tread_mm: Option<f64>,
-    /// Flange of the wheel, 10 mm below its tread at y = 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    /// Flange of the wheel, 10 mm below its tread at the start.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = false)]
     pub flange_mm: Option<f64>,
+}
+
+impl WearLosses {
+    /// The names; the first three are those of the rail.
+    pub const NAMES: [&str; 5] = [
+        "height_mm",
+        "gauge_face_mm",
+        "gauge_corner_mm",
+        "tread_mm",
+        "flange_mm",
+    ];
+
+    /// The values, in the order of the names.
+    #[must_use]
+    pub fn values(&self) -> [Option<f64>; 5] {
+        [
+            self.height_mm,
+            self.gauge_face_mm,
+            self.gauge_corner_mm,
+            self.tread_mm,
+            self.flange_mm,
+        ]
+    }
+}
+
+impl From<[Option<f64>; 5]> for WearLosses {
+    fn from(values: [Option<f64>; 5]) -> WearLosses {
+        let [
+            height_mm,
+            gauge_face_mm,
+            gauge_corner_mm,
+            tread_mm,
+            flange_mm,
+        ] = values;
+        WearLosses {
+            height_mm,
+            gauge_face_mm,
+            gauge_corner_mm,
+            tread_mm,
+            flange_mm,
+        }
+    }
 }
 
 /// Maintenance at one time.

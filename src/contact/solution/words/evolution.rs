@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::contact::case::words::evolution::WearLosses;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::words::damage::DamageFiguresUsed;
 
@@ -98,31 +99,6 @@ pub struct WearUncertainty {
     pub contact: f64,
     /// Of the wear coefficients: the factors on worn areas that bound 90 % of the sampled coefficients.
     pub coefficients: [f64; 2],
-}
-
-/// Losses of the sections in mm; absent where a section has no such place.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
-pub struct WearLosses {
-    /// W1: height of the rail at y = 0.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
-    pub height_mm: Option<f64>,
-    /// W2: gauge face of the rail, 14 mm below its top at the start.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
-    pub gauge_face_mm: Option<f64>,
-    /// W3: gauge corner of the rail, at 45°.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
-    pub gauge_corner_mm: Option<f64>,
-    /// Tread of the wheel at y = 0.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
-    pub tread_mm: Option<f64>,
-    /// Flange of the wheel, 10 mm below its tread at the start.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
-    pub flange_mm: Option<f64>,
 }
 
 /// The contact over all states.
