@@ -117,7 +117,7 @@ function samplesOf(index, values, vanishes) {
 }
 
 /** Points of a section. */
-const SECTION_POINTS = 160;
+const SECTION_POINTS = 80;
 
 /**
  * Interpolated values on a line through the patch, from border to border.
@@ -126,17 +126,18 @@ const SECTION_POINTS = 160;
  * @param {boolean} along The line is along rolling, else across.
  * @param {{ x: number, y: number }} place Where the line passes.
  * @param {boolean} vanishes The value is 0 at the border.
+ * @param {number} [points]
  * @returns {[number, number][]} Places on the line in mm, with their values.
  */
-export function sectionSmooth(index, values, along, place, vanishes) {
+export function sectionSmooth(index, values, along, place, vanishes, points = SECTION_POINTS) {
   const [loop] = index.border;
   const span = along ? spanAt(loop, place.y) : spanAt(loop.map(([x, y]) => /** @type {const} */ ([y, x])), place.x);
   if (!span) return [];
   const [low, high] = span;
-  const step = (high - low) / SECTION_POINTS;
+  const step = (high - low) / points;
   const frame = along
-    ? { width: SECTION_POINTS, height: 1, x0: low, y1: place.y + step / 2, step }
-    : { width: 1, height: SECTION_POINTS, x0: place.x - step / 2, y1: high, step };
+    ? { width: points, height: 1, x0: low, y1: place.y + step / 2, step }
+    : { width: 1, height: points, x0: place.x - step / 2, y1: high, step };
   const raster = rasterSmooth(index, values, frame, vanishes);
   const inner = Array.from(raster, (value, at) => /** @type {[number, number]} */ ([along ? low + (at + 0.5) * step : high - (at + 0.5) * step, value]))
     .filter(([, value]) => Number.isFinite(value));

@@ -10,6 +10,10 @@ import { sectionSmooth } from './raster.js';
 /** @typedef {import('./picture.js').Ink} Ink */
 /** @typedef {import('./picture.js').Pen} Pen */
 
+/** Cells of a section up to which a curve is drawn between their middles, and the points among which these are found. More cells are smooth by themselves. */
+const FEW = 60;
+const FINE = 160;
+
 /**
  * @typedef {object} Section
  * @property {boolean} along
@@ -111,14 +115,16 @@ function drawSection(pen, scene, section, layout, place, here, ink) {
  */
 function lineOf({ index, mesh }, { along, cells }, values, vanishes, place) {
   const middle = along ? index.cells.x_mm : index.cells.y_mm;
-  if (index.whole && !mesh) return atCells(sectionSmooth(index, values, along, place, vanishes), cells.map((cell) => middle[cell]));
+  if (index.whole && !mesh) {
+    return cells.length > FEW ? sectionSmooth(index, values, along, place, vanishes) : atCells(sectionSmooth(index, values, along, place, vanishes, FINE), cells.map((cell) => middle[cell]));
+  }
   return cells.map((cell) => [middle[cell], values[cell]]);
 }
 
 /** A section at its ends and at the middles of its cells, between which a curve is drawn. @param {[number, number][]} line @param {readonly number[]} middles */
 function atCells(line, middles) {
   const last = line.length - 1;
-  if (middles.length < 3 || middles.length >= last) return line;
+  if (middles.length < 3 || last < 1) return line;
   const nearest = middles.map((middle) => line.reduce((best, [at], place) => (Math.abs(at - middle) < Math.abs(line[best][0] - middle) ? place : best), 1));
   return [...new Set([0, ...nearest, last])].sort((one, two) => one - two).map((place) => line[place]);
 }
@@ -182,7 +188,7 @@ function drawLine(pen, { along, box, value }, layout, line, colour, width, dash)
   pen.clip();
   pen.beginPath();
   const pixels = line.map(([at, amount]) => /** @type {[number, number]} */ (along ? [layout.X(at), value(amount)] : [value(amount), layout.Y(at)]));
-  smoothLine(pixels).forEach(([x, y], order) => {
+  (pixels.length > FEW + 2 ? pixels : smoothLine(pixels)).forEach(([x, y], order) => {
     if (order) pen.lineTo(x, y);
     else pen.moveTo(x, y);
   });
