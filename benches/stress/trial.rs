@@ -23,7 +23,7 @@ const TWINS: f64 = 2e-5;
 /// The same where region and pressure are found first, as exactly as a mesh needs them.
 const TWINS_OF_GAPS: f64 = 3e-3;
 /// The same where a remark says that patches are coarse or the gap is rough: the last bit decides which grid of some hundred cells is the
-/// last one, and by that whether neighbouring summits of the roughness are one patch.
+/// last one, and by that whether neighbouring asperities of the roughness are one patch.
 const TWINS_OF_ROUGH_GAPS: f64 = 3e-2;
 const ROUGH: [&str; 2] = ["patch-coarse", "gap-rough"];
 /// Lengths of a twin are so many times those of the case, and none beyond what a case may have, in mm.

@@ -37,21 +37,20 @@ pub mod evaluate;
 pub mod evolution;
 pub mod facade;
 pub mod forecast;
+pub(crate) mod free_rolling;
 pub mod friction;
 pub mod geometry;
 pub mod half_space;
+pub mod lazy_field;
 pub mod mesh;
 pub mod method;
 pub mod monitor;
 pub mod normal;
 pub mod normal_stage;
 pub mod numerics;
-pub mod once;
 pub mod post;
 pub mod problem;
 pub mod profile_trust;
-pub(crate) mod pulled_rolling;
-pub(crate) mod pulled_wheel;
 pub mod remark;
 pub mod rolling;
 pub mod rolling_stage;
@@ -61,7 +60,8 @@ pub(crate) mod surface_fallback;
 pub mod time_limit;
 pub mod unlike_bodies;
 pub(crate) mod unlike_motions;
-pub(crate) mod wheel_balance;
+pub(crate) mod vertical_equilibrium;
+pub(crate) mod wheel_force_control;
 pub(crate) mod wheel_on_curve;
 pub mod wheel_on_rail;
 pub mod wheelset;
@@ -181,7 +181,9 @@ fn solve_motions(
             let solved = surface_fallback::solve_wheel(case, wheel, monitor, |case, wheel| {
                 match case.problem.pull() {
                     None => trust::solve(operators, case, wheel, monitor),
-                    Some(forces) => pulled_wheel::solve(operators, case, wheel, forces, monitor),
+                    Some(forces) => {
+                        wheel_force_control::solve(operators, case, wheel, forces, monitor)
+                    }
                 }
             });
             let ((mut solution, fields), remark) = solved?;

@@ -14,7 +14,7 @@ use crate::contact::half_space::unlike_bodies::opening;
 use crate::contact::mesh::size::MeshSize;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::grid::GridFineness;
-use crate::contact::normal::gap::seen::GapSeen;
+use crate::contact::normal::gap::preview::PreviewCache;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
@@ -135,7 +135,7 @@ impl UnlikeGap {
             before = Some(force);
             let task = GapTask {
                 gap,
-                seen: GapSeen::default(),
+                seen: PreviewCache::default(),
                 ..self.task.clone()
             };
             found = Some(normal_stage::solve_gap(
@@ -237,7 +237,7 @@ fn gap_task(case: &CheckedCase) -> GapTask {
         gap: paraboloid(&ellipse, modulus),
         loading,
         contact_modulus: modulus,
-        seen: GapSeen::default(),
+        seen: PreviewCache::default(),
     }
 }
 

@@ -45,7 +45,7 @@ use crate::contact::solution::words::damage::Damage;
 use crate::contact::solution::words::fields::{Fields, PatchFields};
 use crate::contact::time_limit::TimeLimit;
 use crate::contact::unlike_motions::tell_region;
-use crate::contact::wheel_balance::next_share;
+use crate::contact::vertical_equilibrium::next_share;
 
 /// Allowed error of the resultants relative to μN on the coarse grid: that of the coarsest meshes, whatever the few cells of a small patch leave open.
 const TARGET_ROUGH: f64 = 0.2;

@@ -32,7 +32,9 @@ use crate::contact::solution::words::fields::Fields;
 use crate::contact::time_limit::TimeLimit;
 use crate::contact::unlike_bodies::{KeptLoad, UnlikeGap};
 use crate::contact::unlike_motions;
-use crate::contact::wheel_balance::{BALANCE, BalanceExit, ROUNDS_MAX, next_share, tolerance};
+use crate::contact::vertical_equilibrium::{
+    BALANCE, EquilibriumExit, ROUNDS_MAX, next_share, tolerance,
+};
 use crate::contact::wheel_on_curve;
 
 /// Least fraction of the vertical part of its normal forces that a wheel carries; on a steep flange friction may take away all of it. Chosen by
@@ -302,11 +304,11 @@ impl<'a> WheelSolve<'a> {
         let mut share = counted;
         let mut previous = None;
         let tolerance = tolerance(case.run.resolution);
-        let mut exit = BalanceExit::NothingCarried;
+        let mut exit = EquilibriumExit::NothingCarried;
         let mut last = None;
         for _ in 0..ROUNDS_MAX {
             if 1.0 + counted < CARRIED_MIN {
-                exit = BalanceExit::NothingCarried;
+                exit = EquilibriumExit::NothingCarried;
                 break;
             }
             if !exact {
@@ -320,9 +322,9 @@ impl<'a> WheelSolve<'a> {
             let before = previous.replace((counted, share));
             last = Some(answers);
             let change = ((1.0 + share) / (1.0 + counted) - 1.0).abs();
-            exit = BalanceExit::RoundsUsedUp { change };
+            exit = EquilibriumExit::RoundsUsedUp { change };
             if change <= tolerance {
-                exit = BalanceExit::Balanced;
+                exit = EquilibriumExit::Balanced;
                 break;
             }
             counted = next_share((counted, share), before);

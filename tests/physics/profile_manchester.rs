@@ -57,5 +57,5 @@ fn patches_jump_from_tread_to_gauge_corner_to_flange_where_the_benchmark_says() 
             failures.push(format!("shift {shift}: {angle} rad is not the {region}"));
         }
     }
-    assert_none("misplaced", &failures);
+    assert_none("load_mismatch", &failures);
 }

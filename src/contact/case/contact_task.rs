@@ -2,7 +2,7 @@
 
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::error::Fault;
-use crate::contact::normal::gap::seen::GapSeen;
+use crate::contact::normal::gap::preview::PreviewCache;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
@@ -114,7 +114,7 @@ pub(crate) fn gap(
         gap,
         loading: loading(load),
         contact_modulus,
-        seen: GapSeen::default(),
+        seen: PreviewCache::default(),
     };
     contact
         .check()

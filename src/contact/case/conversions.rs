@@ -9,10 +9,10 @@ use crate::contact::case::words::solver::{
 use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::friction::across::{AcrossLaw, AcrossPlace};
 use crate::contact::friction::along::AlongLaw;
-use crate::contact::friction::falling::{FallForm, FallTerm, FallingLaw};
 use crate::contact::friction::interface::{Interface, LayerYield};
 use crate::contact::friction::law::FrictionLaw;
-use crate::contact::friction::passage::HeatedLaw;
+use crate::contact::friction::path_dependent::HeatedLaw;
+use crate::contact::friction::velocity_weakening::{FallForm, FallingLaw, SofteningTerm};
 use crate::contact::geometry::formats::format::Format;
 use crate::contact::geometry::length_unit::LengthUnit;
 use crate::contact::geometry::wheel_rail::Side;
@@ -107,11 +107,11 @@ impl FrictionLaw {
             return FrictionLaw::Constant(words.coefficient.unwrap_or(0.0));
         };
         let term = |k: usize| match words.terms.get(k) {
-            Some(term) => FallTerm {
+            Some(term) => SofteningTerm {
                 coefficient: term.coefficient,
                 half_speed: term.half_speed_mm_per_s,
             },
-            None => FallTerm::NONE,
+            None => SofteningTerm::NONE,
         };
         FrictionLaw::Falling(FallingLaw {
             form: law.into(),

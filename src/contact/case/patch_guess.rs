@@ -2,8 +2,8 @@
 //! numbers come from.
 
 use crate::contact::half_space::elasticity::Elasticity;
-use crate::contact::normal::gap::pilot::PilotPatch;
-use crate::contact::normal::gap::seen::GapOutlook;
+use crate::contact::normal::gap::coarse_solution::CoarsePatch;
+use crate::contact::normal::gap::preview::GapPreview;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::patch::Patch;
@@ -177,25 +177,25 @@ impl PatchGuess {
     }
 
     /// One of so many like patches of a gap.
-    pub(crate) fn of_gap(task: &GapTask, outlook: &GapOutlook, count: usize) -> PatchGuess {
-        let area = std::f64::consts::PI * outlook.half[0] * outlook.half[1];
+    pub(crate) fn of_gap(task: &GapTask, preview: &GapPreview, count: usize) -> PatchGuess {
+        let area = std::f64::consts::PI * preview.half[0] * preview.half[1];
         let force = match task.loading {
             NormalLoad::Force(force) => force,
             // A paraboloid's, see `search_box`.
             NormalLoad::Approach(_) => {
                 let radius = (area / std::f64::consts::PI).sqrt();
-                4.0 / 3.0 * task.contact_modulus * radius * outlook.depth
+                4.0 / 3.0 * task.contact_modulus * radius * preview.depth
             }
         };
         let count = count as f64;
         PatchGuess {
-            half: outlook.half.map(|half| half / count.sqrt()),
+            half: preview.half.map(|half| half / count.sqrt()),
             force: force / count,
             times: 1.0,
         }
     }
 
-    pub(crate) fn of_pilot(patch: &PilotPatch) -> PatchGuess {
+    pub(crate) fn of_pilot(patch: &CoarsePatch) -> PatchGuess {
         PatchGuess {
             half: patch.half,
             force: patch.force,

@@ -59,7 +59,7 @@ const JUMP_TIMES: f64 = 4.0;
 const JUMP_TARGET: f64 = 0.02;
 /// See [`JUMP_TIMES`].
 const JUMP_POWER: f64 = 0.5;
-/// The surprise (see `GridPressure::surprise`) from which on a sample may be anything; half of the jumping pressures have 1.
+/// The discontinuity (see `GridPressure::discontinuity`) from which on a sample may be anything; half of the jumping pressures have 1.
 const JUMP_SURPRISE: f64 = 0.95;
 /// Time of a product in double precision over that in single precision.
 const DOUBLE_TIMES: f64 = 2.5;
@@ -96,8 +96,8 @@ const GAP_MANY: f64 = 0.027;
 const PATCHES_FEW: usize = 6;
 /// The same in s for a patch that is one on a coarse grid and falls apart on finer ones.
 const GAP_ROUGH: f64 = 0.3;
-/// Of the summits that the samples of a rough line show and the patches that the coarse grid shows, the patches of the answer are the
-/// geometric mean with this weight of the summits: 30 gaps have 3 to 16 patches where the grid shows 3 to 8 and the samples 6 to 24.
+/// Of the asperities that the samples of a rough line show and the patches that the coarse grid shows, the patches of the answer are the
+/// geometric mean with this weight of the asperities: 30 gaps have 3 to 16 patches where the grid shows 3 to 8 and the samples 6 to 24.
 const SUMMITS_WEIGHT: f64 = 0.4;
 /// Most cells of a grid along an axis.
 const GRID_CELLS_MAX: f64 = 200.0;
@@ -122,7 +122,9 @@ fn guesses(task: &NormalTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
         NormalTask::Given(field) => {
             let finer = (JUMP_TARGET / target.unwrap_or(JUMP_TARGET).max(TARGET_LEAST)).max(1.0);
             let times = match field.jump() {
-                Some(_) if field.surprise() > JUMP_SURPRISE => JUMP_TIMES * finer.powf(JUMP_POWER),
+                Some(_) if field.discontinuity() > JUMP_SURPRISE => {
+                    JUMP_TIMES * finer.powf(JUMP_POWER)
+                }
                 Some(_) => JUMP_TIMES,
                 None => 1.0,
             };
@@ -150,27 +152,34 @@ fn guesses(task: &NormalTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
 /// The patches of a gap, and the time to find them: from a solution on a coarse grid, or from the samples where these are rougher than
 /// that grid can show.
 fn gap_guesses(task: &GapTask, target: Option<f64>) -> (Vec<PatchGuess>, f64) {
-    let outlook = task.outlook();
-    let by_samples = |count: usize| vec![PatchGuess::of_gap(task, &outlook, count); count];
+    let preview = task.preview();
+    let by_samples = |count: usize| vec![PatchGuess::of_gap(task, &preview, count); count];
     let growth = task.growth(target);
-    let Some(pilot) = task.pilot() else {
-        return (by_samples(outlook.summits), GAP_ROUGH * growth);
+    let Some(coarse_solution) = task.coarse_solution() else {
+        return (by_samples(preview.asperities), GAP_ROUGH * growth);
     };
-    let rough = outlook.turns > TURNS_ROUGH && outlook.teeth > TEETH_ROUGH;
-    let needed = pilot.cells_needed.map(|cells| cells as f64 * growth.sqrt());
+    let rough = preview.turns > TURNS_ROUGH && preview.teeth > TEETH_ROUGH;
+    let needed = coarse_solution
+        .cells_needed
+        .map(|cells| cells as f64 * growth.sqrt());
     let cells = needed.map(|cells| cells.min(GRID_CELLS_MAX));
-    let seconds = match pilot.patches.len() {
+    let seconds = match coarse_solution.patches.len() {
         1 if rough => GAP_ROUGH,
         1 | 2 if needed == cells => GAP_CELL * cells[0] * cells[1],
         1 | 2 => GAP_TWO * (needed[0].max(needed[1]) / CELLS_TWO).powf(TWO_POWER),
         count if count <= PATCHES_FEW => GAP_FEW,
         _ => GAP_MANY,
     };
-    let patches = if rough && outlook.summits > pilot.patches.len() {
-        let [seen, summits] = [pilot.patches.len(), outlook.summits].map(|count| count as f64);
-        by_samples((seen * (summits / seen).powf(SUMMITS_WEIGHT)).round() as usize)
+    let patches = if rough && preview.asperities > coarse_solution.patches.len() {
+        let [seen, asperities] =
+            [coarse_solution.patches.len(), preview.asperities].map(|count| count as f64);
+        by_samples((seen * (asperities / seen).powf(SUMMITS_WEIGHT)).round() as usize)
     } else {
-        pilot.patches.iter().map(PatchGuess::of_pilot).collect()
+        coarse_solution
+            .patches
+            .iter()
+            .map(PatchGuess::of_pilot)
+            .collect()
     };
     (patches, seconds)
 }

@@ -47,8 +47,8 @@ pub(crate) fn task(
     let mut remarks = geometry.remarks();
     remarks.extend(flange_back);
     let [rail, wheel] = geometry.profiles();
-    remarks.extend(profile_points::misplaced(rail, Body::Rail));
-    remarks.extend(profile_points::misplaced(wheel, Body::Wheel));
+    remarks.extend(profile_points::load_mismatch(rail, Body::Rail));
+    remarks.extend(profile_points::load_mismatch(wheel, Body::Wheel));
     let loading = load.and_then(loading);
     let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
         return Ok(None);
@@ -233,19 +233,19 @@ pub(crate) fn both(
     read: (Result<Profile, Fault>, Result<Profile, Fault>),
     pointers: [&str; 2],
 ) -> Result<[Profile; 2], Vec<Fault>> {
-    let misplaced = |profile: &Profile, body: Body, pointer: &str| {
-        let remark = profile_points::misplaced(profile, body)?;
+    let load_mismatch = |profile: &Profile, body: Body, pointer: &str| {
+        let remark = profile_points::load_mismatch(profile, body)?;
         Some(fault(pointer.to_owned(), remark.detail))
     };
     let faults = match read {
         (Ok(rail), Ok(wheel)) => return Ok([rail, wheel]),
         (Err(rail), Err(wheel)) => vec![rail, wheel],
         (Ok(rail), Err(own)) => {
-            let other = misplaced(&rail, Body::Rail, pointers[0]);
+            let other = load_mismatch(&rail, Body::Rail, pointers[0]);
             other.into_iter().chain([own]).collect()
         }
         (Err(own), Ok(wheel)) => {
-            let other = misplaced(&wheel, Body::Wheel, pointers[1]);
+            let other = load_mismatch(&wheel, Body::Wheel, pointers[1]);
             [own].into_iter().chain(other).collect()
         }
     };
@@ -266,8 +266,8 @@ pub(crate) fn exchanged(
     [rail, wheel]: [&Profile; 2],
     pointers: [&str; 2],
 ) -> Result<(), Vec<Fault>> {
-    let both = profile_points::misplaced(rail, Body::Rail)
-        .zip(profile_points::misplaced(wheel, Body::Wheel));
+    let both = profile_points::load_mismatch(rail, Body::Rail)
+        .zip(profile_points::load_mismatch(wheel, Body::Wheel));
     let Some((rail, wheel)) = both else {
         return Ok(());
     };

@@ -265,12 +265,12 @@ fn remarks_of(geometry: &WheelRail, pointers: [&str; 2]) -> Vec<RemarkEntry> {
         .flat_map(|((profile, body), pointer)| {
             let own = profile.remarks.iter().cloned();
             let own = own.map(|remark| remark.at_pointer(pointer));
-            let misplaced = profile_points::misplaced(profile, body);
-            let misplaced = misplaced.map(|remark| RemarkEntry {
+            let load_mismatch = profile_points::load_mismatch(profile, body);
+            let load_mismatch = load_mismatch.map(|remark| RemarkEntry {
                 pointer: Some(pointer.to_owned()),
                 ..remark
             });
-            own.chain(misplaced).collect::<Vec<_>>()
+            own.chain(load_mismatch).collect::<Vec<_>>()
         })
         .collect()
 }

@@ -9,8 +9,8 @@ use std::borrow::Borrow;
 
 use crate::contact::friction::across::AcrossLaw;
 use crate::contact::friction::along::AlongLaw;
-use crate::contact::friction::falling::{BoundFall, FallingLaw};
-use crate::contact::friction::passage::HeatedLaw;
+use crate::contact::friction::path_dependent::HeatedLaw;
+use crate::contact::friction::velocity_weakening::{FallingLaw, Softening};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::load_across::LoadAcross;
 use crate::contact::normal::patch::Patch;
@@ -53,7 +53,7 @@ impl FrictionLaw {
     /// How the bounds of cells fall with their slip at a rolling speed in mm/s, for slips counted in `slip_unit`; nothing where they
     /// do not.
     #[must_use]
-    pub fn bound_fall(&self, rolling_speed: Option<f64>, slip_unit: f64) -> Option<BoundFall> {
+    pub fn bound_fall(&self, rolling_speed: Option<f64>, slip_unit: f64) -> Option<Softening> {
         match self {
             FrictionLaw::Constant(_)
             | FrictionLaw::Across(_)

@@ -3,8 +3,8 @@
 pub mod across;
 pub mod along;
 pub mod coefficient_table;
-pub mod falling;
 pub mod interface;
 pub mod law;
 pub(crate) mod on_rail;
-pub mod passage;
+pub mod path_dependent;
+pub mod velocity_weakening;

@@ -15,7 +15,7 @@ use crate::contact::geometry::grouping::{Grouping, Overlap};
 use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
 use crate::contact::geometry::locus_lines::{Inclination, LocusLines, LocusPoint, RailEdge};
 use crate::contact::geometry::wheel_rail::{WheelCircle, WheelRail};
-use crate::contact::once::Once;
+use crate::contact::lazy_field::LazyField;
 
 /// Spacing of the search across the track, in mm. It decides where frames and windows lie, not what the gap is in them: with 0.02 mm forces differ by
 /// 0.00003 of μN in the median and 0.0012 at most at a target of 0.002, on 200 of the rows of `cargo bench --bench wheels -- rows`, as with any other
@@ -81,7 +81,7 @@ fn edge_of(geometry: &WheelRail) -> &RailEdge {
         let [rail, _] = geometry.parameters(CURVE_STEP);
         let edge = envelope(&rail_points(geometry, rail), STEP);
         RailEdge {
-            inclinations: vec![Once::default(); edge.points.len()],
+            inclinations: vec![LazyField::default(); edge.points.len()],
             edge,
         }
     })

@@ -1,7 +1,7 @@
 //! The lines along x at which a wheel and a rail are above each other, kept with their geometry.
 
 use crate::contact::geometry::envelope::Envelope;
-use crate::contact::once::Once;
+use crate::contact::lazy_field::LazyField;
 
 /// One line along x: its y, the upper edge of the rail, and the clearance above first touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +26,7 @@ pub(crate) struct Inclination {
 pub(crate) struct RailEdge {
     pub(crate) edge: Envelope,
     /// Its inclinations, each found when it is first asked for.
-    pub(crate) inclinations: Vec<Once<Inclination>>,
+    pub(crate) inclinations: Vec<LazyField<Inclination>>,
 }
 
 /// The lines and the height of first touch in mm.

@@ -14,7 +14,7 @@ use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead};
 use crate::contact::geometry::profile_quality::samples::{KnownPoints, Points};
 use crate::contact::geometry::profile_quality::{noise, shape};
-use crate::contact::once::Once;
+use crate::contact::lazy_field::LazyField;
 use crate::contact::remark::list::Remark;
 
 /// Length of the whole curve in mm that a profile may have; anything else is in another unit.
@@ -91,7 +91,7 @@ struct MeasuredCurve {
     /// Step of which all given coordinates are multiples, in mm.
     digits: f64,
     flange: Option<Flange>,
-    sure_body: Once<Option<SureBody>>,
+    sure_body: LazyField<Option<SureBody>>,
     known: KnownPoints,
 }
 
@@ -180,7 +180,7 @@ impl Profile {
             rounding,
             digits,
             flange,
-            sure_body: Once::default(),
+            sure_body: LazyField::default(),
         };
         Ok(Profile::of(measured, remarks))
     }

@@ -13,7 +13,7 @@ use crate::contact::geometry::curve_place::CurvePlace;
 use crate::contact::geometry::locus_lines::{LocusLines, RailEdge};
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile::Profile;
-use crate::contact::once::Once;
+use crate::contact::lazy_field::LazyField;
 use crate::contact::remark::entry::RemarkEntry;
 
 /// Left or right rail, seen along rolling.
@@ -135,15 +135,15 @@ pub struct WheelRail {
     wheel: Arc<Profile>,
     axes: AxleAxes,
     /// The rail's upper edge.
-    pub(crate) rail_edge: Arc<Once<RailEdge>>,
+    pub(crate) rail_edge: Arc<LazyField<RailEdge>>,
     /// Places along the rail's curve, the same for every place of the wheelset.
-    pub(crate) rail_places: Arc<Once<Vec<CurvePlace>>>,
+    pub(crate) rail_places: Arc<LazyField<Vec<CurvePlace>>>,
     /// Circles of the wheel, which are the same for every place of the wheelset.
-    pub(crate) circles: Arc<Once<Vec<WheelCircle>>>,
+    pub(crate) circles: Arc<LazyField<Vec<WheelCircle>>>,
     /// The same pair with other smoothings, somewhere over the rail, which are the same for every place of the wheelset too.
     readings: Arc<OtherReadings>,
     /// Rail and wheel line by line, or why there are no lines.
-    pub(crate) locus: Once<Arc<Result<LocusLines, String>>>,
+    pub(crate) locus: LazyField<Arc<Result<LocusLines, String>>>,
 }
 
 /// Unit vectors of the wheelset in track axes.
@@ -279,7 +279,7 @@ impl WheelRail {
             rail_places: Arc::default(),
             circles: Arc::default(),
             readings: Arc::default(),
-            locus: Once::default(),
+            locus: LazyField::default(),
         }
     }
 
@@ -316,7 +316,7 @@ impl WheelRail {
         WheelRail {
             axes: AxleAxes::new(&placement),
             placement,
-            locus: Once::default(),
+            locus: LazyField::default(),
             ..self.clone()
         }
     }
@@ -327,7 +327,7 @@ impl WheelRail {
         self.placement.yaw = yaw;
         self.placement.roll = roll;
         self.axes = AxleAxes::new(&self.placement);
-        self.locus = Once::default();
+        self.locus = LazyField::default();
     }
 
     /// The profiles of rail (before cant) and wheel.

@@ -3,13 +3,13 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use crate::contact::lazy_field::LazyField;
 use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::load_across::LoadAcross;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::surface_slip::SurfaceSlip;
-use crate::contact::once::Once;
 
 /// The patches of one frame with their pressures; never empty. It answers where the patches are, how long their chords are,
 /// and what pressure acts on them, and nothing else.
@@ -21,7 +21,7 @@ pub struct Footprint {
     slip: Option<Arc<SurfaceSlip>>,
     /// Of each patch of a curved surface, the origin `[x, y]` in mm of the coordinates that its places are given in.
     origins: Vec<[f64; 2]>,
-    loads: Once<Vec<LoadAcross>>,
+    loads: LazyField<Vec<LoadAcross>>,
 }
 
 /// Where the pressure comes from.
@@ -77,7 +77,7 @@ impl Footprint {
             uncertainty: None,
             slip: None,
             origins: Vec::new(),
-            loads: Once::default(),
+            loads: LazyField::default(),
         }
     }
 
@@ -90,7 +90,7 @@ impl Footprint {
             uncertainty: None,
             slip: None,
             origins: Vec::new(),
-            loads: Once::default(),
+            loads: LazyField::default(),
         }
     }
 
@@ -179,12 +179,14 @@ impl Footprint {
         matches!(&self.shape, FootprintShape::Sampled(field) if field.jump().is_some())
     }
 
-    /// By how much samples of a given pressure differ from what their neighbours let expect, see [`PressureField::surprise`]; nothing for
+    /// By how much samples of a given pressure differ from what their neighbours let expect, see [`PressureField::discontinuity`]; nothing for
     /// pressures that were computed or are known in closed form.
     #[must_use]
-    pub fn surprise(&self) -> Option<f64> {
+    pub fn discontinuity(&self) -> Option<f64> {
         match &self.shape {
-            FootprintShape::Sampled(field) if self.uncertainty.is_none() => Some(field.surprise()),
+            FootprintShape::Sampled(field) if self.uncertainty.is_none() => {
+                Some(field.discontinuity())
+            }
             _ => None,
         }
     }

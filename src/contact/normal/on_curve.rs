@@ -9,6 +9,7 @@ use crate::contact::half_space::bent_surface::{
     BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
 };
 use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::lazy_field::LazyField;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::{NormalError, NormalWork, no_touch};
 use crate::contact::normal::gap::cell_sums::{CellWeights, LANES};
@@ -23,7 +24,6 @@ use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::wheel_height::task::WheelLoad;
 use crate::contact::numerics::flood_fill::groups;
-use crate::contact::once::Once;
 
 /// Spacing of the strips that are looked at for overlaps, in mm.
 const LOOK: f64 = 0.1;
@@ -124,7 +124,7 @@ pub(crate) struct CurveContact {
     /// Strips whose deformed surfaces nearly touch.
     near: Vec<bool>,
     /// The pressures of the patches with their first strips.
-    patches: Once<Vec<(usize, GridPressure)>>,
+    patches: LazyField<Vec<(usize, GridPressure)>>,
 }
 
 /// What friction does to a contact.
@@ -779,7 +779,7 @@ impl CurveTask<'_> {
                 let rows = found.distance.chunks_exact(nx);
                 let near = rows.map(|row| row.iter().any(|distance| *distance < NEAR * depth));
                 return Ok(CurveContact {
-                    patches: Once::default(),
+                    patches: LazyField::default(),
                     opened: None,
                     near: near.collect(),
                     gap: over.at(centre),

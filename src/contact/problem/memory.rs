@@ -71,7 +71,7 @@ pub(crate) struct SizeInput {
 /// Segments per strip of every patch; of a gap, whose patches are not known yet, one for every summit.
 pub(crate) fn segments(task: &NormalTask) -> Vec<f64> {
     match task {
-        NormalTask::Gap(contact) => vec![1.0; contact.outlook().summits],
+        NormalTask::Gap(contact) => vec![1.0; contact.preview().asperities],
         NormalTask::Given(field) => field.segments_per_strip(),
         NormalTask::Hertz(_) | NormalTask::Wheel(_) => vec![1.0],
         // Both wheels of one position; the answers of all are kept.

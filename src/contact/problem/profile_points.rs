@@ -79,7 +79,7 @@ pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
 
 /// The remark on a profile whose shape can only be that of the other body.
 #[must_use]
-pub fn misplaced(profile: &Profile, body: Body) -> Option<RemarkEntry> {
+pub fn load_mismatch(profile: &Profile, body: Body) -> Option<RemarkEntry> {
     let (looks, like, pointer) = match body {
         Body::Rail => (SureBody::Wheel, "a wheel with its flange", "/contact/rail"),
         Body::Wheel => (SureBody::Rail, "the head of a rail", "/contact/wheel"),

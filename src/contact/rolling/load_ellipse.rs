@@ -9,7 +9,7 @@ use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::pressure_field::field::PressureField;
 
-/// Strips over a patch, and parts of each chord: moments and misplaced load change by less than 0.002 with twice as many.
+/// Strips over a patch, and parts of each chord: moments and load_mismatch load change by less than 0.002 with twice as many.
 const STRIPS: usize = 48;
 const PARTS: usize = 48;
 
@@ -21,7 +21,7 @@ pub struct LoadEllipse {
     /// Semi-axes along and across rolling in mm.
     pub semi_axes: [f64; 2],
     /// Share of the load that Hertz's pressure on the ellipse has in another place, `½ ∫ |p − p_ellipse| / N`; 0 for an ellipse.
-    pub misplaced: f64,
+    pub load_mismatch: f64,
 }
 
 /// A part of a patch.
@@ -41,7 +41,7 @@ impl LoadEllipse {
             return LoadEllipse {
                 centre: [0.0; 2],
                 semi_axes,
-                misplaced: 0.0,
+                load_mismatch: 0.0,
             };
         }
         let parts = parts(footprint, patch);
@@ -64,17 +64,17 @@ impl LoadEllipse {
         LoadEllipse {
             centre,
             semi_axes,
-            misplaced: misplaced(&parts, load, centre, semi_axes),
+            load_mismatch: load_mismatch(&parts, load, centre, semi_axes),
         }
     }
 
-    /// The ellipse of one patch of a pressure from its samples alone, for a forecast: misplaced load is not counted.
+    /// The ellipse of one patch of a pressure from its samples alone, for a forecast: load_mismatch load is not counted.
     #[must_use]
     pub(crate) fn of_samples(field: &PressureField, patch: usize) -> LoadEllipse {
         LoadEllipse {
             centre: field.load_centre(Some(patch)),
             semi_axes: field.load_spread(patch).map(|spread| (5.0 * spread).sqrt()),
-            misplaced: 0.0,
+            load_mismatch: 0.0,
         }
     }
 
@@ -115,7 +115,7 @@ fn parts(footprint: &Footprint, patch: usize) -> Vec<EllipsePart> {
 }
 
 /// The share of the load that is elsewhere than on the ellipse.
-fn misplaced(parts: &[EllipsePart], load: f64, centre: [f64; 2], [a, b]: [f64; 2]) -> f64 {
+fn load_mismatch(parts: &[EllipsePart], load: f64, centre: [f64; 2], [a, b]: [f64; 2]) -> f64 {
     let ellipse = Ellipse::of_semi_axes(a, b, NormalLoad::Force(load), 1.0);
     let (mut apart, mut inside) = (0.0, 0.0);
     for part in parts {
@@ -132,7 +132,7 @@ fn misplaced(parts: &[EllipsePart], load: f64, centre: [f64; 2], [a, b]: [f64; 2
         apart += (part.load - own).abs();
         inside += own;
     }
-    // Where the patch is not, all of the ellipse's load is misplaced.
+    // Where the patch is not, all of the ellipse's load is load_mismatch.
     0.5 * (apart + (load - inside).max(0.0)) / load
 }
 
@@ -166,7 +166,7 @@ mod tests {
         for (found, known) in all.iter().zip(known) {
             assert!((found - known).abs() < 0.02, "{found} {known}");
         }
-        assert!(found.misplaced < 0.015, "{found:?}");
+        assert!(found.load_mismatch < 0.015, "{found:?}");
         let rough = LoadEllipse::of_samples(&field_of(hertz), 0);
         for (rough, fine) in [rough.centre, rough.semi_axes].concat().iter().zip(&all) {
             assert!((rough - fine).abs() < 0.01, "{rough} {fine}");
@@ -180,6 +180,9 @@ mod tests {
             700.0 * (lobe(-1.9) + lobe(1.9))
         };
         let found = LoadEllipse::of(&on_grid(lobes), 0);
-        assert!(found.misplaced > 0.15 && found.misplaced < 0.4, "{found:?}");
+        assert!(
+            found.load_mismatch > 0.15 && found.load_mismatch < 0.4,
+            "{found:?}"
+        );
     }
 }

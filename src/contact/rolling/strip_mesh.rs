@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
-use crate::contact::friction::passage::{Passage, PassageLaws};
+use crate::contact::friction::path_dependent::{PathDependentFriction, PathDependentLaws};
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
 use crate::contact::half_space::unlike_bodies::pressure_slips;
@@ -53,7 +53,7 @@ impl Scale {
 
     /// What changes bounds on the way through the contact, in these units.
     #[must_use]
-    pub fn passage<'a>(&self, laws: &PassageLaws<'a>) -> Passage<'a> {
+    pub fn passage<'a>(&self, laws: &PathDependentLaws<'a>) -> PathDependentFriction<'a> {
         laws.on_level(self.slip(), self.length, self.traction)
     }
 

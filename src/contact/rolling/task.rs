@@ -1,9 +1,9 @@
 //! What the tangential problem of one footprint asks: physics, method and accuracy.
 
-use crate::contact::friction::falling::BoundFall;
 use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
-use crate::contact::friction::passage::PassageLaws;
+use crate::contact::friction::path_dependent::PathDependentLaws;
+use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::method::{Method, TractionBound};
@@ -86,16 +86,16 @@ impl RollingTask<'_> {
 
     /// How the bounds of the cells fall with their slip in motion `index`, where they do; slips are counted in `slip_unit`.
     #[must_use]
-    pub fn bound_fall(&self, index: usize, slip_unit: f64) -> Option<BoundFall> {
+    pub fn bound_fall(&self, index: usize, slip_unit: f64) -> Option<Softening> {
         let speed = self.speeds.get(index).copied().flatten();
         self.friction.bound_fall(speed, slip_unit)
     }
 
     /// What changes the bounds of motion `index` on the way through the contact, if anything does.
     #[must_use]
-    pub fn passage(&self, index: usize) -> Option<PassageLaws<'_>> {
+    pub fn passage(&self, index: usize) -> Option<PathDependentLaws<'_>> {
         let speed = self.speeds.get(index).copied().flatten();
-        let laws = PassageLaws {
+        let laws = PathDependentLaws {
             heated: self.friction.heated().zip(speed),
             yielding: self.interface.yielding,
         };

@@ -2,11 +2,11 @@
 
 pub mod assemble;
 pub mod cell_values;
+pub mod conformality_error;
 pub mod finish;
 pub mod finite;
 pub(crate) mod history_point;
 pub mod maintain;
 pub(crate) mod moved;
-pub mod plane_error;
 pub mod track_axes;
 pub mod words;

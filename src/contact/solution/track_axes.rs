@@ -7,7 +7,7 @@ use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelConta
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
-use crate::contact::solution::plane_error;
+use crate::contact::solution::conformality_error;
 use crate::contact::solution::words::answer::{
     ErrorEstimate, NormalReport, Origin, Position, Solution, Total,
 };
@@ -38,7 +38,7 @@ pub fn in_track(
 ) -> Result<(Solution, Fields), SurfaceMissed> {
     let parts: Vec<FramedLoad> = wheel.patches.iter().map(FramedLoad::new).collect();
     let origin = load_centre(&parts);
-    let plane = plane_error::of_wheel(case, geometry, wheel, &answers);
+    let plane = conformality_error::of_wheel(case, geometry, wheel, &answers);
     let total = totals(&parts, origin, &answers);
     let mut remarks = case.remarks.clone();
     remarks.extend_from_slice(&wheel.remarks);

@@ -1,6 +1,6 @@
 //! The points of a profile as heights over their arc length, and what each tells with its neighbours.
 
-use crate::contact::once::Once;
+use crate::contact::lazy_field::LazyField;
 
 /// Points of a profile with their distance along it, both in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,11 +21,11 @@ pub struct KnownPoints(Vec<KnownPoint>);
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct KnownPoint {
     /// Height in mm above the cubic of its six neighbours, if there are as many near.
-    pub(crate) off: Once<Option<f64>>,
+    pub(crate) off: LazyField<Option<f64>>,
     /// Length of the chord over it and the next four in mm, and their normalised fourth divided difference in mm.
-    pub(crate) difference: Once<Option<(f64, f64)>>,
+    pub(crate) difference: LazyField<Option<(f64, f64)>>,
     /// The angle in rad between the chords before and after it, positive to the left.
-    pub(crate) turn: Once<f64>,
+    pub(crate) turn: LazyField<f64>,
 }
 
 impl KnownPoints {
@@ -61,7 +61,7 @@ impl<'a> Points<'a> {
     pub(crate) fn known<T: Copy>(
         &self,
         point: usize,
-        choose: impl Fn(&KnownPoint) -> &Once<T>,
+        choose: impl Fn(&KnownPoint) -> &LazyField<T>,
         make: impl FnOnce() -> T,
     ) -> T {
         match self.known {

@@ -1,7 +1,10 @@
 //! Region and pressure of a given gap.
 
 pub mod answer;
+pub mod asperities;
 pub mod cell_sums;
+pub mod coarse_solution;
+pub mod coarse_solve;
 pub mod conjugate_gradients;
 pub mod constants;
 pub mod coupling;
@@ -9,16 +12,13 @@ pub mod edges;
 pub mod grid;
 pub mod near_cells;
 pub mod outcome;
-pub mod pilot;
-pub mod pilot_solve;
+pub mod patch_grid;
+pub mod patch_grid_influence;
+pub mod patch_grids;
+pub mod preview;
 pub mod search_box;
-pub mod seen;
 pub mod solve;
 pub mod solve_from;
 pub mod start;
-pub mod summits;
 pub mod surface;
 pub mod task;
-pub mod tile;
-pub mod tiles;
-pub mod tiles_influence;

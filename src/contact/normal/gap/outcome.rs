@@ -2,9 +2,9 @@
 
 use crate::contact::normal::gap::answer::{NormalAnswer, NormalError, NormalWork};
 use crate::contact::normal::gap::edges::squares;
+use crate::contact::normal::gap::patch_grid::{GapOutcome, PatchGrid};
 use crate::contact::normal::gap::start::GapStart;
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::gap::tile::{GapOutcome, Tile};
 use crate::contact::normal::pressure_field::computed::Edges;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
@@ -37,23 +37,23 @@ impl GapTask {
         outcome: GapOutcome,
         edges: Edges,
     ) -> Result<NormalAnswer, NormalError> {
-        let loads = outcome.tiles.iter().map(Tile::load);
+        let loads = outcome.patch_grids.iter().map(PatchGrid::load);
         let heaviest = loads
-            .zip(&outcome.tiles)
+            .zip(&outcome.patch_grids)
             .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, tile)| tile);
-        let Some(Tile { grid, pressed }) = heaviest else {
+            .map(|(_, patch_grid)| patch_grid);
+        let Some(PatchGrid { grid, pressed }) = heaviest else {
             unreachable!("at least one grid is tried")
         };
         let report = NormalWork {
             cells: grid.cells,
-            grids: outcome.tiles.len(),
+            grids: outcome.patch_grids.len(),
             iterations: outcome.iterations,
             residual: pressed.residual,
             pressure_change: outcome.pressure_change,
         };
-        let field = field(&outcome.tiles, edges).map_err(NormalError::NoAnswer)?;
-        let coarse = coarse(&outcome.tiles);
+        let field = field(&outcome.patch_grids, edges).map_err(NormalError::NoAnswer)?;
+        let coarse = coarse(&outcome.patch_grids);
         let mut remarks = Vec::new();
         for Coarse {
             middle,
@@ -76,7 +76,7 @@ impl GapTask {
         remarks.extend(self.remarks(&field, pressed.approach - outcome.least));
         let depth = pressed.approach - outcome.least;
         let centre = field.load_centre(None);
-        let start = Some(GapStart::new(outcome.tiles, depth, centre));
+        let start = Some(GapStart::new(outcome.patch_grids, depth, centre));
         Ok(NormalAnswer {
             field,
             report,
@@ -119,10 +119,10 @@ impl GapTask {
 }
 
 /// Patches that should be resolved and are not, the heaviest first.
-fn coarse(tiles: &[Tile]) -> Vec<Coarse> {
-    let total: f64 = tiles.iter().map(Tile::load).sum();
+fn coarse(patch_grids: &[PatchGrid]) -> Vec<Coarse> {
+    let total: f64 = patch_grids.iter().map(PatchGrid::load).sum();
     let mut found = Vec::new();
-    for Tile { grid, pressed } in tiles {
+    for PatchGrid { grid, pressed } in patch_grids {
         let area = grid.step[0] * grid.step[1];
         for patch in grid.patches(&pressed.pressure) {
             let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
@@ -144,9 +144,11 @@ fn coarse(tiles: &[Tile]) -> Vec<Coarse> {
 }
 
 /// The pressures of the grids as a field with edges between their cells.
-fn field(tiles: &[Tile], edges: Edges) -> Result<PressureField, String> {
-    let loaded = tiles.iter().filter(|tile| tile.largest() > 0.0);
-    let grids = loaded.map(|Tile { grid, pressed }| {
+fn field(patch_grids: &[PatchGrid], edges: Edges) -> Result<PressureField, String> {
+    let loaded = patch_grids
+        .iter()
+        .filter(|patch_grid| patch_grid.largest() > 0.0);
+    let grids = loaded.map(|PatchGrid { grid, pressed }| {
         GridPressure::of_solution(
             &grid.centres(0),
             &grid.centres(1),

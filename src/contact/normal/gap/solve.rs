@@ -2,7 +2,7 @@
 //!
 //! A box that holds the contact is found by evaluating the gap, then the pressure by conjugate gradients on ever finer grids of that
 //! box. Each grid starts from the solution on the one before and is shrunk to the contact. Where one grid cannot resolve all
-//! patches, each gets a grid of its own (see `tiles.rs`). At the end the edges are placed between the cells.
+//! patches, each gets a grid of its own (see `patch_grids.rs`). At the end the edges are placed between the cells.
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
@@ -16,9 +16,9 @@ use crate::contact::normal::gap::constants::{
     RESOLUTION_COARSE_LOOSE, TARGET_POWER, TARGET_USUAL, TARGETS_LOOSE, TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
+use crate::contact::normal::gap::patch_grid::{GapOutcome, GridsExit, PatchGrid};
 use crate::contact::normal::gap::search_box::{SearchBox, reach_of_level};
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
 use crate::contact::normal::hertz::NormalLoad;
 use crate::contact::normal::pressure_field::computed::Edges;
 
@@ -82,7 +82,7 @@ impl GapTask {
     /// The solution from a start of any number of grids, if it has one there.
     pub(crate) fn solve_near(
         &self,
-        mut start: Vec<Tile>,
+        mut start: Vec<PatchGrid>,
         resolution: GridFineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
@@ -149,7 +149,7 @@ impl GapTask {
         let Some((grid, pressed)) = solved else {
             unreachable!("at least one grid is tried")
         };
-        let whole = Tile { grid, pressed };
+        let whole = PatchGrid { grid, pressed };
         if capped
             && let Some(found) =
                 self.solve_on_tiles(whole.clone(), reach.least, resolution, workspace, monitor)?
@@ -161,7 +161,7 @@ impl GapTask {
             });
         }
         Ok(GapOutcome {
-            tiles: vec![whole],
+            patch_grids: vec![whole],
             iterations,
             exit,
             pressure_change,

@@ -8,12 +8,12 @@ use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
 use crate::contact::normal::gap::constants::{NEAR, REFINEMENT, RESOLUTION};
 use crate::contact::normal::gap::grid::{GridFineness, PressureGrid, within};
+use crate::contact::normal::gap::patch_grid::{GapOutcome, GridsExit, PatchGrid};
+use crate::contact::normal::gap::patch_grids::merged;
 use crate::contact::normal::gap::search_box::SearchBox;
 use crate::contact::normal::gap::solve::{GridStart, NextStep};
 use crate::contact::normal::gap::surface::Window;
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
-use crate::contact::normal::gap::tiles::merged;
 use crate::contact::normal::hertz::NormalLoad;
 
 /// Grids that are tried from a start; each is larger or finer than the one before. Numeric safety.
@@ -47,7 +47,7 @@ impl GapTask {
     /// The monitor stopped the work.
     pub(crate) fn solve_from(
         &self,
-        start: Tile,
+        start: PatchGrid,
         resolution: GridFineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
@@ -146,7 +146,7 @@ impl GapTask {
     /// The monitor stopped the work.
     pub(crate) fn solve_from_tiles(
         &self,
-        start: Vec<Tile>,
+        start: Vec<PatchGrid>,
         resolution: GridFineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
@@ -155,7 +155,7 @@ impl GapTask {
             return Ok(None);
         }
         let (limits, mirrored) = (self.gap.window(), self.gap.is_mirrored());
-        let inside = |Tile { grid, .. }: &Tile| {
+        let inside = |PatchGrid { grid, .. }: &PatchGrid| {
             let window = within([0, 1].map(|axis| grid.range(axis)), limits);
             let mirrored = [0, 1].map(|axis| grid.mirrored[axis] && mirrored[axis]);
             PressureGrid::new(window, grid.cells, mirrored)
@@ -170,7 +170,7 @@ impl GapTask {
         }
         let [least, _] = self.gap.extremes();
         let from = GapOutcome {
-            tiles: start,
+            patch_grids: start,
             iterations: 0,
             exit: GridsExit::GridsUsedUp,
             pressure_change: 0.0,
@@ -219,7 +219,7 @@ fn settled_outcome(
         exit: GridsExit::Settled,
         pressure_change: before.largest() / pressed.largest() - 1.0,
         least,
-        tiles: vec![Tile { grid, pressed }],
+        patch_grids: vec![PatchGrid { grid, pressed }],
     }
 }
 
@@ -278,7 +278,7 @@ mod tests {
     use super::*;
     use crate::contact::monitor::Unmonitored;
     use crate::contact::normal::gap::answer::NormalAnswer;
-    use crate::contact::normal::gap::seen::GapSeen;
+    use crate::contact::normal::gap::preview::PreviewCache;
     use crate::contact::normal::gap::surface::GapSurface;
     use crate::contact::normal::pressure_field::computed::Edges;
     use crate::contact::normal::pressure_field::field::PressureField;
@@ -301,7 +301,7 @@ mod tests {
             gap: GapSurface::grid(&x, &y, &gap),
             loading: NormalLoad::Approach(approach),
             contact_modulus: 115_000.0,
-            seen: GapSeen::default(),
+            seen: PreviewCache::default(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! What is asked of a gap: the surfaces, and how hard they are pressed together.
 
-use crate::contact::normal::gap::seen::GapSeen;
+use crate::contact::normal::gap::preview::PreviewCache;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::hertz::NormalLoad;
 
@@ -14,5 +14,5 @@ pub struct GapTask {
     /// Contact modulus `E* = G/(1−ν)` in MPa.
     pub contact_modulus: f64,
     /// First looks at the contact, kept once they were taken; starts empty.
-    pub seen: GapSeen,
+    pub seen: PreviewCache,
 }

@@ -82,10 +82,10 @@ impl PressureField {
         self.grids.iter().find_map(GridPressure::jump)
     }
 
-    /// How far a given pressure is from smooth, see [`GridPressure::surprise`].
+    /// How far a given pressure is from smooth, see [`GridPressure::discontinuity`].
     #[must_use]
-    pub fn surprise(&self) -> f64 {
-        let each = self.grids.iter().map(GridPressure::surprise);
+    pub fn discontinuity(&self) -> f64 {
+        let each = self.grids.iter().map(GridPressure::discontinuity);
         each.fold(0.0, f64::max)
     }
 

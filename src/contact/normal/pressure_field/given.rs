@@ -78,7 +78,7 @@ impl GridPressure {
         }
         let (mut field, samples) = GridPressure::from_squares(grid, q, pressure_max)?;
         let mut remarks = field.remarks(&samples, &field.shapes);
-        (field.surprise, field.jump) = field.find_jump();
+        (field.discontinuity, field.jump) = field.find_jump();
         if let Some(jump) = field.jump {
             let remark = Remark::PressureJumps {
                 x_mm: jump.at[0],
@@ -113,7 +113,7 @@ impl GridPressure {
             shapes: Vec::new(),
             images: Vec::new(),
             jump: None,
-            surprise: 0.0,
+            discontinuity: 0.0,
         };
         field.shapes = field.shapes_from_samples(&samples, count);
         field.find_loads();

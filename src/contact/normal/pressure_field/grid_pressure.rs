@@ -26,5 +26,5 @@ pub struct GridPressure {
     pub(crate) images: Vec<usize>,
     /// The largest jump from one given sample to the next.
     pub(crate) jump: Option<Jump>,
-    pub(crate) surprise: f64,
+    pub(crate) discontinuity: f64,
 }

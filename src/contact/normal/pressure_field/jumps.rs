@@ -40,20 +40,20 @@ impl GridPressure {
                     };
                     let [before, here, next] = [-1, 0, 1].map(|steps| self.q[index(steps)]);
                     // The value extrapolated from the two samples before, less the sample itself.
-                    let surprise = 2.0 * here - before.max(here) - next;
-                    if here > 0.0 && surprise > largest.0 {
+                    let discontinuity = 2.0 * here - before.max(here) - next;
+                    if here > 0.0 && discontinuity > largest.0 {
                         let middle = |axis: &[f64], k: usize, d: isize| {
                             0.5 * (axis[k] + axis[(k as isize + d) as usize])
                         };
                         let at = [middle(&self.grid.x, i, di), middle(&self.grid.y, j, dj)];
                         let fall = here.sqrt() - next.max(0.0).sqrt();
-                        largest = (surprise, Some(Jump { at, fall }));
+                        largest = (discontinuity, Some(Jump { at, fall }));
                     }
                 }
             }
         }
-        let (surprise, jump) = largest;
-        (surprise, jump.filter(|_| surprise > JUMP))
+        let (discontinuity, jump) = largest;
+        (discontinuity, jump.filter(|_| discontinuity > JUMP))
     }
 
     /// The largest jump of the pressure, if it has any.
@@ -65,7 +65,7 @@ impl GridPressure {
     /// The largest fall of the squared pressure over one interval beyond that extrapolated from the interval before, relative to the
     /// largest squared pressure: up to 0.2 for smooth pressures.
     #[must_use]
-    pub fn surprise(&self) -> f64 {
-        self.surprise
+    pub fn discontinuity(&self) -> f64 {
+        self.discontinuity
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
-use crate::contact::normal::gap::seen::GapSeen;
+use crate::contact::normal::gap::preview::PreviewCache;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::NormalLoad;
@@ -47,7 +47,7 @@ impl WheelTask {
             gap: GapSurface::grid(&moved(&gap.x, along), &moved(&gap.y, across), &above),
             loading: NormalLoad::Force(contact.normal_force()),
             contact_modulus: self.contact_modulus,
-            seen: GapSeen::default(),
+            seen: PreviewCache::default(),
         }
     }
 }

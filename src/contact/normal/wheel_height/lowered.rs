@@ -6,10 +6,10 @@ use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::gap::grid::GridFineness;
-use crate::contact::normal::gap::seen::GapSeen;
+use crate::contact::normal::gap::patch_grid::PatchGrid;
+use crate::contact::normal::gap::preview::PreviewCache;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::gap::tile::Tile;
 use crate::contact::normal::hertz::NormalLoad;
 use crate::contact::normal::pressure_field::computed::Edges;
 use crate::contact::normal::wheel_height::gap_remarks::{cut_patches, missed_beside};
@@ -84,7 +84,7 @@ pub(crate) struct LoweredGap<'a> {
     /// Height of the wheel's centre in mm.
     centre: f64,
     /// What it is solved from; empty if nothing is known.
-    start: Vec<Tile>,
+    start: Vec<PatchGrid>,
 }
 
 impl WheelTask {
@@ -171,7 +171,7 @@ impl WheelTask {
             gap: surface,
             loading: NormalLoad::Approach(depth),
             contact_modulus: self.contact_modulus,
-            seen: GapSeen::default(),
+            seen: PreviewCache::default(),
         };
         let resolution = fineness.of_grids();
         let found = contact.solve_near(start, resolution, workspace, monitor)?;

@@ -6,8 +6,8 @@ use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::local_gap::LocalGap;
 use crate::contact::mesh::chord::Chord;
 use crate::contact::normal::gap::answer::NormalWork;
+use crate::contact::normal::gap::patch_grid::PatchGrid;
 use crate::contact::normal::gap::start::GapStart;
-use crate::contact::normal::gap::tile::Tile;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::wheel_height::bracket::HeightExit;
@@ -71,7 +71,7 @@ pub struct GapContact {
 
 impl GapContact {
     /// The start for a gap of the same contact at another height, whose deepest overlap is given in mm; nothing if it is another contact.
-    pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Vec<Tile>> {
+    pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Vec<PatchGrid>> {
         let from = [1, 2].map(|k| self.frame.origin[k]);
         let along = self.frame.origin[0] - gap.frame.origin[0];
         let [across, _] = gap.frame.plane().across(from);
@@ -196,7 +196,7 @@ impl WheelContact {
     }
 
     /// The start for a gap at another height of the wheel.
-    pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Vec<Tile>> {
+    pub(crate) fn start_for(&self, gap: &LocalGap, depth: f64) -> Option<Vec<PatchGrid>> {
         let apart = |known: &&GapContact| (known.frame.rail - gap.frame.rail).abs();
         self.patches
             .iter()

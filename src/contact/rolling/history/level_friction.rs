@@ -1,6 +1,6 @@
 //! How the steps of a run take part in friction that falls with slip.
 
-use crate::contact::friction::falling::BoundFall;
+use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan::StepKind;
 use crate::contact::rolling::history::step_equations::StepEquations;
@@ -9,7 +9,7 @@ use crate::contact::rolling::slip_equations::SlipEquations;
 
 impl LevelRun<'_> {
     /// The fall that a step follows at once.
-    pub(super) fn fall(&self, kind: StepKind) -> Option<BoundFall> {
+    pub(super) fn fall(&self, kind: StepKind) -> Option<Softening> {
         self.slip_friction.as_ref()?.at_once(kind)
     }
 

@@ -10,7 +10,7 @@ use crate::contact::half_space::unlike_bodies::displacement;
 use crate::contact::rolling::answer::LevelFailure;
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan::PRESS_WEIGHTS;
-use crate::contact::rolling::history::smaller_self::{PressedPair, PressedState, SmallerSelf};
+use crate::contact::rolling::history::self_similar::{PressedPair, PressedState, SelfSimilarState};
 use crate::contact::rolling::history::step_equations::StepEquations;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_equations::SlipScratch;
@@ -51,7 +51,7 @@ impl LevelRun<'_> {
         };
         let centre = level.scale.origin.map(|x| -x / level.scale.length);
         let smaller = [GROWTH, GROWTH * GROWTH]
-            .map(|factor| SmallerSelf::new(mesh, &pair, centre, factor, cells));
+            .map(|factor| SelfSimilarState::new(mesh, &pair, centre, factor, cells));
         let rows = mesh.segments.iter().flat_map(|s| {
             let y = s.chord.y;
             s.cells.clone().map(move |i| [mesh.node[i], y])

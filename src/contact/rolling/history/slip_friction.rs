@@ -4,7 +4,7 @@
 //! grows, the faster the shorter it is (Rice, Lapusta and Ranjith 2001), and steps short enough have several solutions each. Here the bound g
 //! of a cell follows `dg/dq = (μ(s) p − g)/D` in the distance q rolled, with the least D that damps disturbances. What is steady has s and g of the law.
 
-use crate::contact::friction::falling::BoundFall;
+use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::rolling::history::plan::StepKind;
 
 /// Distance in which bounds follow slips, over that above which disturbances die away; the weight of a step's own displacements, 1.5, counts
@@ -14,7 +14,7 @@ const DAMPING: f64 = 4.0;
 
 /// Bounds of the cells with unknowns.
 pub(super) struct SlipFriction {
-    fall: BoundFall,
+    fall: Softening,
     /// Without slip.
     rest: Vec<f64>,
     /// Of the next step of rolling.
@@ -25,7 +25,7 @@ pub(super) struct SlipFriction {
 
 impl SlipFriction {
     /// Bodies that have not slipped yet, with these bounds at rest.
-    pub(super) fn new(fall: BoundFall, rest: &[f64]) -> SlipFriction {
+    pub(super) fn new(fall: Softening, rest: &[f64]) -> SlipFriction {
         SlipFriction {
             fall,
             rest: rest.to_vec(),
@@ -35,7 +35,7 @@ impl SlipFriction {
     }
 
     /// The fall that a step follows at once, which only steady rolling does.
-    pub(super) fn at_once(&self, kind: StepKind) -> Option<BoundFall> {
+    pub(super) fn at_once(&self, kind: StepKind) -> Option<Softening> {
         (kind == StepKind::Steady).then_some(self.fall)
     }
 

@@ -7,7 +7,7 @@ use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan;
 use crate::contact::rolling::history::record::PointRecord;
-use crate::contact::rolling::history::smaller_self::SmallerSelf;
+use crate::contact::rolling::history::self_similar::SelfSimilarState;
 use crate::contact::rolling::history::task::{HistoryStart, HistoryTask};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::motion_answer::{HistoryAnswer, MotionAnswer, SolvedFields};
@@ -132,7 +132,7 @@ pub fn pressed_cells_max() -> f64 {
 /// Bytes that a pressing keeps on a mesh of so many cells.
 #[must_use]
 pub fn pressed_bytes(cells: f64) -> f64 {
-    SmallerSelf::bytes(cells)
+    SelfSimilarState::bytes(cells)
 }
 
 /// Half the length of the shortest patch.

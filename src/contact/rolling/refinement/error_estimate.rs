@@ -16,7 +16,7 @@ use crate::contact::rolling::task::RollingTask;
 const SAFETY: f64 = 1.1;
 /// The factor where the pressure jumps (80 grids of the same bench).
 const SAFETY_JUMPING: f64 = 1.5;
-/// Surprises (see `GridPressure::surprise`) up to which a pressure counts as smooth and from which it jumps; the factor is linear between.
+/// Surprises (see `GridPressure::discontinuity`) up to which a pressure counts as smooth and from which it jumps; the factor is linear between.
 const SURPRISES: [f64; 2] = [0.06, 0.31];
 /// Share of the error of the finest mesh that extrapolation takes off. 0 leaves errors 1.3 times as large, ½ is alike.
 const EXTRAPOLATED: f64 = 1.0 / 3.0;
@@ -153,11 +153,11 @@ pub(crate) fn coarser(solved: &[DiscreteSolution], fine: usize) -> Option<usize>
 }
 
 fn safety(task: &RollingTask) -> f64 {
-    let Some(surprise) = task.footprint.surprise() else {
+    let Some(discontinuity) = task.footprint.discontinuity() else {
         return SAFETY;
     };
     let [smooth, jumping] = SURPRISES;
-    let share = ((surprise - smooth) / (jumping - smooth)).clamp(0.0, 1.0);
+    let share = ((discontinuity - smooth) / (jumping - smooth)).clamp(0.0, 1.0);
     SAFETY + share * (SAFETY_JUMPING - SAFETY)
 }
 

@@ -1,6 +1,6 @@
 //! The rows of cells that slip under a bound that falls with their slip: both components of their traction are unknown.
 
-use crate::contact::friction::falling::Slipping;
+use crate::contact::friction::velocity_weakening::Slipping;
 
 /// The law of such a cell linearised at `z = T + r s`, `d = z/|z|` and `t ⟂ d`: `t·δs − D t·δT = D t·T − t·s` turns the traction with
 /// the slip, and `d·(T + δT) = g + g′ (d·(s + δs) − σ)` keeps its size on the bound, σ being the slip of the resolvent. The second is

@@ -1,6 +1,6 @@
 //! A fixed point for the tractions where the rigid slip is large everywhere.
 
-use crate::contact::friction::falling::BoundFall;
+use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::length::length;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
@@ -61,7 +61,7 @@ pub fn fixed_point(
 }
 
 /// Tractions of these cells at their bounds, along slips, both components one after the other.
-pub(crate) fn slide_along(slip: &[f64], bound: &[f64], fall: Option<&BoundFall>, t: &mut [f64]) {
+pub(crate) fn slide_along(slip: &[f64], bound: &[f64], fall: Option<&Softening>, t: &mut [f64]) {
     let padded = t.len() / 2;
     for (i, rest) in bound.iter().enumerate() {
         let size = length(slip[i], slip[padded + i]);

@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use crate::contact::friction::falling::BoundFall;
+use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::length::length;
 use crate::contact::rolling::methods::boundary_element::falling_rows::FallingRow;
@@ -88,7 +88,7 @@ impl<'a> Newton<'a> {
     /// The same for bounds that fall with the slip from those at rest: r is at least twice the steepest fall of each cell, so that its
     /// resolvent is unique.
     #[must_use]
-    pub fn falling(mut self, bound: &[f64], fall: &BoundFall) -> Newton<'a> {
+    pub fn falling(mut self, bound: &[f64], fall: &Softening) -> Newton<'a> {
         let steepest = fall.steepest();
         for (r, bound) in self.parameter.iter_mut().zip(bound) {
             self.stability = self.stability.max(steepest * bound * PROJECTION / *r);
@@ -231,7 +231,7 @@ impl<'a> Newton<'a> {
 
     /// The bounds of all cells at the slips of an iterate that solves the law: those at rest where they stick.
     #[must_use]
-    pub fn bounds(&self, rest: &[f64], fall: &BoundFall, t: &[f64], slip: &[f64]) -> Vec<f64> {
+    pub fn bounds(&self, rest: &[f64], fall: &Softening, t: &[f64], slip: &[f64]) -> Vec<f64> {
         let mut bounds = rest.to_vec();
         for (i, bound) in bounds.iter_mut().enumerate().take(self.equations.cells()) {
             let (_, length) = self.projected(t, slip, i);

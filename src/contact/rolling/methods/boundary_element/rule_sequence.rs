@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use crate::contact::friction::falling::{BoundFall, CONTINUATION};
-use crate::contact::friction::passage::Passage;
+use crate::contact::friction::path_dependent::PathDependentFriction;
+use crate::contact::friction::velocity_weakening::{CONTINUATION, Softening};
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::length::length;
@@ -57,8 +57,8 @@ pub(super) struct Control<'a> {
 pub(super) struct RuleSequence<'a> {
     level: &'a StripMesh,
     motion: &'a Motion,
-    fall: Option<BoundFall>,
-    passage: Option<Passage<'a>>,
+    fall: Option<Softening>,
+    passage: Option<PathDependentFriction<'a>>,
     tolerance: f64,
     /// Newton steps of a rule at most.
     steps_max: u32,
@@ -279,7 +279,7 @@ impl<'a> RuleSequence<'a> {
         &mut self,
         newton: &Newton,
         rigid: &[f64],
-        passage: Passage,
+        passage: PathDependentFriction,
         t: &mut [f64],
     ) -> Result<(), LevelFailure> {
         let (cells, rest) = (newton.cells(), self.bound.clone());

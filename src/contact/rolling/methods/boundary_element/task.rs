@@ -1,7 +1,7 @@
 //! What a level and the iteration on it are asked, and how the iteration ended.
 
-use crate::contact::friction::falling::BoundFall;
-use crate::contact::friction::passage::Passage;
+use crate::contact::friction::path_dependent::PathDependentFriction;
+use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::numerics::gmres::GmresExit;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
 use crate::contact::rolling::methods::full_slip;
@@ -16,9 +16,9 @@ pub struct LevelTask<'a> {
     /// The motion, dimensionless, about the level's origin.
     pub motion: &'a Motion,
     /// How the bounds of the cells fall with their slip, where they do.
-    pub fall: Option<BoundFall>,
+    pub fall: Option<Softening>,
     /// What changes the bounds on the way through the contact, if anything does.
-    pub passage: Option<Passage<'a>>,
+    pub passage: Option<PathDependentFriction<'a>>,
     /// Residual to reach.
     pub tolerance: f64,
 }
@@ -44,7 +44,7 @@ pub struct NewtonTask<'a> {
     /// Friction bound g = μp; at rest where it falls with the slip.
     pub bound: &'a [f64],
     /// How the bounds fall with the slip, where they do.
-    pub fall: Option<BoundFall>,
+    pub fall: Option<Softening>,
     /// Area of every cell, the weight of its residual.
     pub area: &'a [f64],
     /// Traction scale of the case: residuals are relative to it.

@@ -106,13 +106,13 @@ pub fn run(
             attempt.exit = ZonesExit::NewtonDiverged;
             break;
         }
-        let misplaced = misplaced(task, &system, &division.tractions);
-        if misplaced.is_empty() {
+        let load_mismatch = load_mismatch(task, &system, &division.tractions);
+        if load_mismatch.is_empty() {
             attempt.exit = ZonesExit::Converged;
             break;
         }
         let mut next = division.slips.clone();
-        for cell in misplaced {
+        for cell in load_mismatch {
             next[cell] = !next[cell];
         }
         // A division that comes back means that the iteration cycles.
@@ -254,7 +254,7 @@ fn start_tractions(
 }
 
 /// The cells whose tractions or slips contradict their zones.
-fn misplaced(task: &DenseProblem, system: &SlipSystem, t: &[f64]) -> Vec<usize> {
+fn load_mismatch(task: &DenseProblem, system: &SlipSystem, t: &[f64]) -> Vec<usize> {
     let n = task.cells;
     let mut found: Vec<usize> = system
         .stick_cells

@@ -22,7 +22,7 @@ use crate::contact::rolling::task::RollingTask;
 pub const RATIO_MIN: f64 = 0.1;
 /// The largest one.
 pub const RATIO_MAX: f64 = 10.0;
-/// Largest share of misplaced load of a patch that an ellipse may stand for: above it errors reach 0.08 μN.
+/// Largest share of load_mismatch load of a patch that an ellipse may stand for: above it errors reach 0.08 μN.
 const MISPLACED_MAX: f64 = 0.1;
 /// Error of the ellipse that stands for another shape, relative to μN: `0.3 D + 0.006` holds for 27 patches with D up to 0.9.
 const PER_MISPLACED: f64 = 0.3;
@@ -54,12 +54,12 @@ pub fn solve(
             Some(hertz) => TableEllipse::of_hertz(hertz, task.elasticity),
             None => TableEllipse::of_load(ellipse),
         };
-        covers(number, ellipse.misplaced, place.ratio)?;
+        covers(number, ellipse.load_mismatch, place.ratio)?;
         let limit = task.friction.limit(task.footprint, number);
         let answer = on_ellipse(task, &place, limit, motion);
         let mut error = answer.error;
-        if ellipse.misplaced > 0.0 {
-            error += PER_MISPLACED * ellipse.misplaced + ANY_SHAPE;
+        if ellipse.load_mismatch > 0.0 {
+            error += PER_MISPLACED * ellipse.load_mismatch + ANY_SHAPE;
         }
         if patches.len() > 1 {
             error += NEIGHBOURS;
@@ -112,11 +112,11 @@ pub fn outside(ratio: f64) -> Option<String> {
     })
 }
 
-fn covers(number: usize, misplaced: f64, ratio: f64) -> Result<(), SolveError> {
-    let reason = if misplaced > MISPLACED_MAX {
+fn covers(number: usize, load_mismatch: f64, ratio: f64) -> Result<(), SolveError> {
+    let reason = if load_mismatch > MISPLACED_MAX {
         Some(format!(
             "{:.0} % of the load of patch {number} is elsewhere than on the best ellipse; at most {:.0} % may be, use boundary_element",
-            100.0 * misplaced,
+            100.0 * load_mismatch,
             100.0 * MISPLACED_MAX
         ))
     } else {

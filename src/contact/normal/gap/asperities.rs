@@ -1,8 +1,8 @@
 //! What will the contact of a gap be like? A look at the samples, before anything is solved.
 
 use crate::contact::normal::gap::constants::{TARGET_POWER, TARGET_USUAL};
+use crate::contact::normal::gap::preview::GapPreview;
 use crate::contact::normal::gap::search_box::{SearchBox, reach};
-use crate::contact::normal::gap::seen::GapOutlook;
 use crate::contact::normal::gap::task::GapTask;
 
 /// Valleys less deep than this part of the approach are pressed flat.
@@ -16,10 +16,10 @@ const CONTACT_OVER_BOX: f64 = 0.62;
 const TURNS_SMOOTH: f64 = 8.0;
 
 impl GapTask {
-    /// What the contact will be like: its size, and how many summits touch, with valleys between them that are not pressed flat.
+    /// What the contact will be like: its size, and how many asperities touch, with valleys between them that are not pressed flat.
     #[must_use]
-    pub fn outlook(&self) -> GapOutlook {
-        *self.seen.outlook.get_or_make(|| self.look())
+    pub fn preview(&self) -> GapPreview {
+        *self.seen.preview.get_or_make(|| self.look())
     }
 
     /// The box in which contact can be.
@@ -28,7 +28,7 @@ impl GapTask {
         *self.seen.reach.get_or_make(found)
     }
 
-    fn look(&self) -> GapOutlook {
+    fn look(&self) -> GapPreview {
         let reach = self.reach();
         let depth = reach.level - reach.least;
         let samples = self.gap.samples();
@@ -41,23 +41,23 @@ impl GapTask {
         // Along the middle line of either axis.
         let (x, y) = (within(0), within(1));
         let lines = [self.gap.on(&x, &middle(1)), self.gap.on(&middle(0), &y)];
-        let summits = lines
+        let asperities = lines
             .iter()
             .map(|line| valleys(line, reach.level, DEPTH * depth))
             .max();
         let bends = lines[1]
             .windows(3)
             .map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
-        // A ridge between two summits is one sharp bend, and no roughness.
+        // A ridge between two asperities is one sharp bend, and no roughness.
         let (all, sharpest) = bends.fold((0.0, 0.0_f64), |(all, sharpest), bend| {
             (all + bend, sharpest.max(bend))
         });
-        GapOutlook {
+        GapPreview {
             half: reach
                 .window
                 .map(|[low, high]| 0.5 * CONTACT_OVER_BOX * (high - low)),
             depth,
-            summits: summits.unwrap_or(1).clamp(1, SUMMITS_MAX),
+            asperities: asperities.unwrap_or(1).clamp(1, SUMMITS_MAX),
             teeth: (all - sharpest) / depth / (4.0 * y.len() as f64),
             turns: (all - sharpest) / depth * y.len() as f64 / TURNS_SMOOTH,
         }

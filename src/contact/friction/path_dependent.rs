@@ -5,8 +5,8 @@
 
 use std::sync::Arc;
 
-use crate::contact::friction::falling::SLIP_OF_CELL;
 use crate::contact::friction::interface::LayerYield;
+use crate::contact::friction::velocity_weakening::SLIP_OF_CELL;
 use crate::contact::mesh::strips::Mesh;
 use crate::contact::numerics::monotone_root::{self, CloseEnough, Course};
 
@@ -101,18 +101,18 @@ impl HeatedLaw {
 
 /// What changes the bounds of one motion.
 #[derive(Debug, Clone, Copy)]
-pub struct PassageLaws<'a> {
+pub struct PathDependentLaws<'a> {
     /// A coefficient that falls with temperature, and the rolling speed in mm/s.
     pub heated: Option<(&'a HeatedLaw, f64)>,
     /// The yield of the layer between the bodies.
     pub yielding: Option<LayerYield>,
 }
 
-impl<'a> PassageLaws<'a> {
+impl<'a> PathDependentLaws<'a> {
     /// The laws in the units of a level: of slip, of length in mm and of traction in MPa.
     #[must_use]
-    pub fn on_level(&self, slip: f64, length: f64, traction: f64) -> Passage<'a> {
-        Passage {
+    pub fn on_level(&self, slip: f64, length: f64, traction: f64) -> PathDependentFriction<'a> {
+        PathDependentFriction {
             heated: self.heated.map(|(law, speed)| CellHeat {
                 law,
                 rise: law.rise_at(speed) * traction * slip * length.sqrt(),
@@ -127,7 +127,7 @@ impl<'a> PassageLaws<'a> {
 
 /// The same for dimensionless bounds and slips.
 #[derive(Debug, Clone, Copy)]
-pub struct Passage<'a> {
+pub struct PathDependentFriction<'a> {
     heated: Option<CellHeat<'a>>,
     yielding: Option<LayerYield>,
 }
@@ -156,7 +156,7 @@ impl Heated {
     }
 }
 
-impl Passage<'_> {
+impl PathDependentFriction<'_> {
     /// The bounds of the first cells of a mesh, as many as there are slips, that belong to these slips. `rest` are the bounds of a cold
     /// contact whose layer does not yield; cells that stick have the slip 0.
     #[must_use]
@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn uniform_slip_heats_as_abels_equation_says() {
         let law = HeatedLaw::new(&[0.0, 1000.0], &[1.0, 0.0], 0.0, 1.0);
-        let laws = PassageLaws {
+        let laws = PathDependentLaws {
             heated: Some((&law, 1.0)),
             yielding: None,
         };
@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_layer_hardens_by_the_slip_ahead_until_friction_holds_less() {
-        let laws = PassageLaws {
+        let laws = PathDependentLaws {
             heated: None,
             yielding: Some(LayerYield {
                 stress: 0.5,

@@ -3,14 +3,14 @@
 use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
 use crate::contact::normal::gap::grid::PressureGrid;
 
-/// A grid with its part of the solution: distances and pressures are its own, the rest is common to all tiles.
+/// A grid with its part of the solution: distances and pressures are its own, the rest is common to all grids.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Tile {
+pub(crate) struct PatchGrid {
     pub(crate) grid: PressureGrid,
     pub(crate) pressed: PressureAnswer,
 }
 
-impl Tile {
+impl PatchGrid {
     /// Load over the area of a cell of 1 mm².
     pub(crate) fn load(&self) -> f64 {
         self.pressed.pressure.iter().sum::<f64>() * self.grid.step[0] * self.grid.step[1]
@@ -44,7 +44,7 @@ impl GridsExit {
 /// Pressures on the last grids.
 pub(crate) struct GapOutcome {
     /// The grids with their pressures: one, or one per patch.
-    pub(crate) tiles: Vec<Tile>,
+    pub(crate) patch_grids: Vec<PatchGrid>,
     /// Iterations over all grids.
     pub(crate) iterations: u32,
     /// How the refinement of the grids ended.

@@ -47,7 +47,7 @@ enum ScaledPlace {
 
 /// The displacements of a state that was smaller by a factor, at the nodes of the present one.
 #[derive(Debug, Clone)]
-pub(crate) struct SmallerSelf {
+pub(crate) struct SelfSimilarState {
     factor: f64,
     places: Vec<ScaledPlace>,
 }
@@ -63,7 +63,7 @@ pub(crate) struct PressedPair<'a> {
     pub(crate) pressure: &'a [f64],
 }
 
-impl SmallerSelf {
+impl SelfSimilarState {
     /// The state that was smaller by `factor`, more than 1, about `centre`, at the first `cells` nodes of a mesh.
     pub(crate) fn new(
         mesh: &Mesh,
@@ -71,7 +71,7 @@ impl SmallerSelf {
         centre: [f64; 2],
         factor: f64,
         cells: usize,
-    ) -> SmallerSelf {
+    ) -> SelfSimilarState {
         let scaled = |x: f64, y: f64| {
             [
                 centre[0] + factor * (x - centre[0]),
@@ -88,7 +88,7 @@ impl SmallerSelf {
                 });
             }
         }
-        SmallerSelf { factor, places }
+        SelfSimilarState { factor, places }
     }
 
     /// Displacements of the smaller state at the nodes.
@@ -245,7 +245,7 @@ mod tests {
             displacement: [u.clone(), v.clone()],
             traction: [vec![0.0; cells], vec![0.0; cells]],
         };
-        let smaller = SmallerSelf::new(&mesh, &pair, [0.0; 2], 1.05, cells);
+        let smaller = SelfSimilarState::new(&mesh, &pair, [0.0; 2], 1.05, cells);
         let found = smaller.displacements(&state);
         let mut inside = 0;
         for i in 0..cells {

@@ -4,7 +4,7 @@ use std::f64::consts::LN_2;
 
 use crate::contact::numerics::monotone_root::{CloseEnough, Course, find};
 
-/// Rounding of the slip of [`BoundFall::resolvent`], relative to that of a cell without traction.
+/// Rounding of the slip of [`Softening::resolvent`], relative to that of a cell without traction.
 const ROUNDING: f64 = 1e-14;
 
 /// Largest slip that a unit of traction over G on one cell takes from it: `max |M_ii|` of the three-point rule on ellipses with a/b from
@@ -30,16 +30,16 @@ pub enum FallForm {
 
 /// One term of a law: what it adds at rest, and the speed of slip at which half of that is left.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FallTerm {
+pub struct SofteningTerm {
     /// Part of the coefficient that falls, not negative.
     pub coefficient: f64,
     /// Speed of slip in mm/s at which half of it is left, positive.
     pub half_speed: f64,
 }
 
-impl FallTerm {
+impl SofteningTerm {
     /// A term that is not there.
-    pub const NONE: FallTerm = FallTerm {
+    pub const NONE: SofteningTerm = SofteningTerm {
         coefficient: 0.0,
         half_speed: 1.0,
     };
@@ -53,7 +53,7 @@ pub struct FallingLaw {
     /// What is left at the highest speeds, f₀, not negative.
     pub limit: f64,
     /// Its terms; a term that is not there has the coefficient 0.
-    pub terms: [FallTerm; 2],
+    pub terms: [SofteningTerm; 2],
 }
 
 impl FallingLaw {
@@ -124,8 +124,8 @@ impl FallingLaw {
 
     /// The bounds of cells that roll at a speed in mm/s, for slips counted in `slip_unit`.
     #[must_use]
-    pub fn bound_fall(&self, rolling_speed: f64, slip_unit: f64) -> BoundFall {
-        BoundFall {
+    pub fn bound_fall(&self, rolling_speed: f64, slip_unit: f64) -> Softening {
+        Softening {
             law: *self,
             speed: rolling_speed * slip_unit,
             drop: 1.0,
@@ -135,7 +135,7 @@ impl FallingLaw {
 
 /// The bound of a cell over its bound at rest, as a function of its dimensionless slip.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BoundFall {
+pub struct Softening {
     law: FallingLaw,
     /// Speed of slip in mm/s for one unit of slip.
     speed: f64,
@@ -143,11 +143,11 @@ pub struct BoundFall {
     drop: f64,
 }
 
-impl BoundFall {
+impl Softening {
     /// The same with a part of the fall, from 0 (a constant bound) to 1 (the law).
     #[must_use]
-    pub fn softened(&self, drop: f64) -> BoundFall {
-        BoundFall { drop, ..*self }
+    pub fn softened(&self, drop: f64) -> Softening {
+        Softening { drop, ..*self }
     }
 
     /// Bound over the bound at rest at a slip, and its derivative.
@@ -205,7 +205,7 @@ mod tests {
     use super::*;
 
     fn law(form: FallForm) -> FallingLaw {
-        let term = |coefficient, half_speed| FallTerm {
+        let term = |coefficient, half_speed| SofteningTerm {
             coefficient,
             half_speed,
         };
@@ -252,11 +252,11 @@ mod tests {
             form: FallForm::Exponential,
             limit: 0.6,
             terms: [
-                FallTerm {
+                SofteningTerm {
                     coefficient: 0.4,
                     half_speed: 0.5 * LN_2,
                 },
-                FallTerm {
+                SofteningTerm {
                     coefficient: 0.0,
                     half_speed: 1.0,
                 },
@@ -281,7 +281,7 @@ mod tests {
         }
     }
 
-    fn law_fall(form: FallForm) -> BoundFall {
+    fn law_fall(form: FallForm) -> Softening {
         law(form).bound_fall(20_000.0, 0.005)
     }
 

@@ -17,9 +17,9 @@ use crate::contact::normal::gap::constants::{
     APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
 };
 use crate::contact::normal::gap::grid::{GridFineness, PressureGrid, within};
+use crate::contact::normal::gap::patch_grid::{GapOutcome, GridsExit, PatchGrid};
+use crate::contact::normal::gap::patch_grid_influence::TilesInfluence;
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::gap::tile::{GapOutcome, GridsExit, Tile};
-use crate::contact::normal::gap::tiles_influence::TilesInfluence;
 
 /// More grids than this are not coupled: such a gap is rough, not a few patches of different size.
 const TILES_MAX: usize = 6;
@@ -41,7 +41,7 @@ const RESOLUTION_SMALL: f64 = 0.7;
 const CELLS_TINY: f64 = 10.0;
 
 /// What follows the grid of a patch.
-enum NextTiles {
+enum NextGrids {
     Keep,
     Rough,
     Change(PressureGrid),
@@ -51,7 +51,7 @@ impl GapTask {
     /// Goes on from a solution on one grid with one grid per patch; none if there is only one patch, or too many.
     pub(crate) fn solve_on_tiles(
         &self,
-        whole: Tile,
+        whole: PatchGrid,
         least: f64,
         resolution: GridFineness,
         workspace: &mut GridWorkspace<f32>,
@@ -63,7 +63,7 @@ impl GapTask {
             return Ok(None);
         }
         let found = GapOutcome {
-            tiles: vec![whole],
+            patch_grids: vec![whole],
             iterations: 0,
             exit: GridsExit::GridsUsedUp,
             pressure_change: 0.0,
@@ -84,30 +84,36 @@ impl GapTask {
     ) -> Result<GapOutcome, NormalError> {
         for _ in 0..GRIDS_MAX {
             let tolerance = TOLERANCE_SHARE * resolution.tolerance;
-            let tiles = self.press_tiles(grids, &found.tiles, tolerance, workspace, monitor)?;
-            let before = std::mem::replace(&mut found.tiles, tiles);
-            found.iterations += found.tiles[0].pressed.iterations;
-            let peak = |tiles: &[Tile]| tiles.iter().map(Tile::largest).fold(0.0, f64::max);
-            found.pressure_change = peak(&before) / peak(&found.tiles) - 1.0;
-            let depth = found.tiles[0].pressed.approach - found.least;
-            let total: f64 = found.tiles.iter().map(Tile::load).sum();
+            let patch_grids =
+                self.press_grids(grids, &found.patch_grids, tolerance, workspace, monitor)?;
+            let before = std::mem::replace(&mut found.patch_grids, patch_grids);
+            found.iterations += found.patch_grids[0].pressed.iterations;
+            let peak = |patch_grids: &[PatchGrid]| {
+                patch_grids
+                    .iter()
+                    .map(PatchGrid::largest)
+                    .fold(0.0, f64::max)
+            };
+            found.pressure_change = peak(&before) / peak(&found.patch_grids) - 1.0;
+            let depth = found.patch_grids[0].pressed.approach - found.least;
+            let total: f64 = found.patch_grids.iter().map(PatchGrid::load).sum();
             let (mut next, mut changed, mut rough) = (Vec::new(), false, false);
-            for tile in &found.tiles {
-                let resolution = own_resolution(resolution, tile.load() / total);
-                match self.next_tile(tile, &before, depth, resolution)? {
-                    NextTiles::Keep => next.push(tile.grid.clone()),
-                    NextTiles::Rough => {
+            for patch_grid in &found.patch_grids {
+                let resolution = own_resolution(resolution, patch_grid.load() / total);
+                match self.refined_grid(patch_grid, &before, depth, resolution)? {
+                    NextGrids::Keep => next.push(patch_grid.grid.clone()),
+                    NextGrids::Rough => {
                         rough = true;
-                        next.push(tile.grid.clone());
+                        next.push(patch_grid.grid.clone());
                     }
-                    NextTiles::Change(grid) => {
+                    NextGrids::Change(grid) => {
                         changed = true;
                         next.push(grid);
                     }
                 }
             }
             if !changed {
-                let missed = self.missed(&found.tiles, depth);
+                let missed = self.missed(&found.patch_grids, depth);
                 if missed.is_empty() {
                     found.exit = match rough {
                         true => GridsExit::Rough,
@@ -126,14 +132,14 @@ impl GapTask {
         Ok(found)
     }
 
-    fn press_tiles(
+    fn press_grids(
         &self,
         grids: Vec<PressureGrid>,
-        before: &[Tile],
+        before: &[PatchGrid],
         tolerance: f64,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<Vec<Tile>, NormalError> {
+    ) -> Result<Vec<PatchGrid>, NormalError> {
         let influence = TilesInfluence::new(&grids, self.contact_modulus, workspace);
         let (mut gap, mut start) = (Vec::new(), Vec::new());
         for grid in &grids {
@@ -149,7 +155,7 @@ impl GapTask {
         };
         let pressed = solve_pressure(&task, &influence, start, workspace, monitor)?;
         let parts = grids.into_iter().zip(influence.ranges);
-        let tile = |(grid, range): (PressureGrid, Range<usize>)| {
+        let patch_grid = |(grid, range): (PressureGrid, Range<usize>)| {
             let mut pressure = pressed.pressure[range.clone()].to_vec();
             grid.symmetrise(&mut pressure);
             let pressed = PressureAnswer {
@@ -157,48 +163,48 @@ impl GapTask {
                 distance: pressed.distance[range].to_vec(),
                 ..pressed
             };
-            Tile { grid, pressed }
+            PatchGrid { grid, pressed }
         };
-        Ok(parts.map(tile).collect())
+        Ok(parts.map(patch_grid).collect())
     }
 
-    /// Whether the grid of a patch is to be enlarged, refined or kept. See `GapTask::next_grid`.
-    fn next_tile(
+    /// Whether the grid of a patch is to be enlarged, refined or kept. See `GapTask::refined_grid`.
+    fn refined_grid(
         &self,
-        tile: &Tile,
-        before: &[Tile],
+        patch_grid: &PatchGrid,
+        before: &[PatchGrid],
         depth: f64,
         resolution: GridFineness,
-    ) -> Result<NextTiles, NormalError> {
+    ) -> Result<NextGrids, NormalError> {
         let limits = self.gap.window();
-        let Tile { grid, pressed } = tile;
+        let PatchGrid { grid, pressed } = patch_grid;
         let (cut, short): (Vec<_>, Vec<_>) = grid
             .sides_in_contact(&pressed.pressure)
             .into_iter()
             .partition(|side| grid.ends_at(*side, limits));
         if !short.is_empty() {
-            return Ok(NextTiles::Change(grid.enlarged(&short, limits)));
+            return Ok(NextGrids::Change(grid.enlarged(&short, limits)));
         }
-        if tile.largest() <= 0.0 {
-            return Ok(NextTiles::Keep);
+        if patch_grid.largest() <= 0.0 {
+            return Ok(NextGrids::Keep);
         }
         let wanted = grid.wanted(pressed, NEAR * depth, resolution, limits);
         let finer = PressureGrid::new(wanted.window, wanted.cells, grid.mirrored);
         if (0..2).any(|k| finer.step[k] < COARSER_MAX * grid.step[k]) {
-            return Ok(NextTiles::Change(finer));
+            return Ok(NextGrids::Change(finer));
         }
         if let Some(side) = cut.first() {
             return Err(edge_reached(*side, limits));
         }
         let middle = [0, 1].map(|k| 0.5 * (grid.range(k)[0] + grid.range(k)[1]));
-        let holds = |other: &&Tile| {
+        let holds = |other: &&PatchGrid| {
             (0..2).all(|k| (other.grid.range(k)[0]..other.grid.range(k)[1]).contains(&middle[k]))
         };
         let Some(coarse) = before.iter().find(holds) else {
-            return Ok(NextTiles::Keep);
+            return Ok(NextGrids::Keep);
         };
         if resolution.patch <= CELLS_TINY || coarse.grid == *grid {
-            return Ok(NextTiles::Keep);
+            return Ok(NextGrids::Keep);
         }
         let ratio = |k: usize| coarse.grid.step[k] / grid.step[k];
         let ratio = ratio(0).max(ratio(1));
@@ -207,22 +213,22 @@ impl GapTask {
         let moved = (pressed.approach - coarse.pressed.approach).abs();
         if moved <= APPROACH_CHANGE * ratio * depth
             && alone
-            && (coarse.largest() / tile.largest() - 1.0).abs() <= PRESSURE_CHANGE * ratio
+            && (coarse.largest() / patch_grid.largest() - 1.0).abs() <= PRESSURE_CHANGE * ratio
         {
-            return Ok(NextTiles::Keep);
+            return Ok(NextGrids::Keep);
         }
         let cells = grid.cells.map(|n| (n as f64 * REFINEMENT) as usize);
         let finer = PressureGrid::new(wanted.window, cells, grid.mirrored);
         if (0..2).all(|k| finer.step[k] > COARSER_MAX * grid.step[k]) {
-            return Ok(NextTiles::Rough);
+            return Ok(NextGrids::Rough);
         }
-        Ok(NextTiles::Change(finer))
+        Ok(NextGrids::Change(finer))
     }
 
     /// Grids around samples of the gap outside all grids at which the deformed surfaces overlap: patches that were too small to
     /// be seen before.
-    fn missed(&self, tiles: &[Tile], depth: f64) -> Vec<PressureGrid> {
-        let approach = tiles[0].pressed.approach;
+    fn missed(&self, patch_grids: &[PatchGrid], depth: f64) -> Vec<PressureGrid> {
+        let approach = patch_grids[0].pressed.approach;
         let limits = self.gap.window();
         let samples = self.gap.samples();
         let x = if samples[0].is_empty() {
@@ -232,11 +238,11 @@ impl GapTask {
         };
         let y = samples[1];
         let values = self.gap.on(x, y);
-        let sources: Vec<[f64; 3]> = tiles.iter().flat_map(point_loads).collect();
+        let sources: Vec<[f64; 3]> = patch_grids.iter().flat_map(point_loads).collect();
         let inside = |at: [f64; 2]| {
-            tiles.iter().any(|tile| {
+            patch_grids.iter().any(|patch_grid| {
                 (0..2).all(|k| {
-                    let [low, high] = tile.grid.range(k);
+                    let [low, high] = patch_grid.grid.range(k);
                     at[k] >= low && at[k] <= high
                 })
             })
@@ -275,14 +281,14 @@ impl GapTask {
     }
 }
 
-/// Pressures of a tile as point loads `[x, y, N]`, several cells in one.
-fn point_loads(tile: &Tile) -> Vec<[f64; 3]> {
+/// Pressures of a patch grid as point loads `[x, y, N]`, several cells in one.
+fn point_loads(patch_grid: &PatchGrid) -> Vec<[f64; 3]> {
     const PARTS: usize = 10;
-    let grid = &tile.grid;
+    let grid = &patch_grid.grid;
     let [x, y] = [grid.centres(0), grid.centres(1)];
     let area = grid.step[0] * grid.step[1];
     let mut sums = vec![[0.0; 3]; PARTS * PARTS];
-    for (k, p) in tile.pressed.pressure.iter().enumerate() {
+    for (k, p) in patch_grid.pressed.pressure.iter().enumerate() {
         let [i, j] = [k % grid.cells[0], k / grid.cells[0]];
         let part = (j * PARTS / grid.cells[1]) * PARTS + i * PARTS / grid.cells[0];
         let force = p * area;
@@ -316,7 +322,7 @@ fn own_resolution(resolution: GridFineness, share: f64) -> GridFineness {
 }
 
 /// A box around every patch of a grid, those that overlap in one.
-fn boxes(whole: &Tile, limits: [[f64; 2]; 2]) -> Vec<PressureGrid> {
+fn boxes(whole: &PatchGrid, limits: [[f64; 2]; 2]) -> Vec<PressureGrid> {
     let grid = &whole.grid;
     let boxes = grid.patches(&whole.pressed.pressure).into_iter();
     let boxes = boxes.map(|patch| {
@@ -372,17 +378,17 @@ fn cells(grids: &[PressureGrid]) -> usize {
 }
 
 /// Pressures to start from on a grid: those of all earlier grids that reach into it.
-fn start_on(grid: &PressureGrid, before: &[Tile], gap: &[f64]) -> Vec<f64> {
+fn start_on(grid: &PressureGrid, before: &[PatchGrid], gap: &[f64]) -> Vec<f64> {
     let mut start = vec![0.0_f64; gap.len()];
-    for tile in before {
-        if tile.grid == *grid {
-            return tile.pressed.pressure.clone();
+    for patch_grid in before {
+        if patch_grid.grid == *grid {
+            return patch_grid.pressed.pressure.clone();
         }
-        let found = grid.interpolated(&tile.grid, &tile.pressed.pressure);
+        let found = grid.interpolated(&patch_grid.grid, &patch_grid.pressed.pressure);
         for (p, other) in start.iter_mut().zip(found) {
             *p = p.max(other);
         }
     }
-    let largest = before.iter().map(Tile::largest).fold(0.0, f64::max);
+    let largest = before.iter().map(PatchGrid::largest).fold(0.0, f64::max);
     grid.never_empty(start, largest, gap)
 }

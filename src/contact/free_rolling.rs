@@ -1,13 +1,13 @@
-//! The motion of a wheelset in the search for forces: which angular and which lateral velocity have given mean creepages.
+//! Free rolling of a wheelset on prescribed forces: the angular and the lateral velocity that have given mean creepages.
 
 use crate::contact::geometry::wheel_rail::Placement;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::rolling::motion::PrescribedForces;
 use crate::contact::solution::words::answer::PatchSolution;
 
-/// How a wheelset moves whose patches have no creepages on the mean, weighted with their loads.
+/// The motion of a wheelset without mean creepage, weighted with the loads of the patches.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rolling {
+pub(crate) struct FreeRollingState {
     /// Rolling radius in mm.
     radius: f64,
     /// Lateral velocity over the speed.
@@ -16,10 +16,10 @@ pub(crate) struct Rolling {
     across: f64,
 }
 
-impl Rolling {
+impl FreeRollingState {
     /// What is known before patches are: near the tread lateral creepage is that of the yaw.
-    pub(crate) fn about(placement: &Placement) -> Rolling {
-        Rolling {
+    pub(crate) fn about(placement: &Placement) -> FreeRollingState {
+        FreeRollingState {
             radius: placement.rolling_radius,
             drift: placement.yaw,
             across: 1.0,
@@ -27,7 +27,7 @@ impl Rolling {
     }
 
     /// The same from patches at the motion of this one.
-    pub(crate) fn of(self, patches: &[PatchSolution]) -> Rolling {
+    pub(crate) fn of(self, patches: &[PatchSolution]) -> FreeRollingState {
         let (mut load, mut moment, mut sliding, mut across) = (0.0, 0.0, 0.0, 0.0);
         for patch in patches {
             let force = patch.normal_force_n;
@@ -37,7 +37,7 @@ impl Rolling {
             sliding += force * creepage.unwrap_or(0.0);
             across += force * angle_of(patch).cos();
         }
-        Rolling {
+        FreeRollingState {
             radius: moment / load,
             drift: self.drift - sliding / across,
             across: across / load,

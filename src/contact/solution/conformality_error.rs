@@ -30,7 +30,7 @@ const TOLD: f64 = 0.02;
 
 /// What the plane leaves open of a wheel on its rail.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct PlaneError {
+pub(crate) struct ConformalityError {
     /// Length of the difference of the forces in N.
     force: f64,
     /// The part of it due to the direction of the normals, in N.
@@ -41,7 +41,7 @@ pub(crate) struct PlaneError {
     turn: f64,
 }
 
-impl PlaneError {
+impl ConformalityError {
     /// The remark on it, if it is large and more than the target of the forces.
     pub(crate) fn remark(&self, case: &CheckedCase) -> Option<Remark> {
         let least = match case.run.resolution {
@@ -64,7 +64,7 @@ pub(crate) fn of_wheel(
     geometry: &WheelRail,
     wheel: &WheelContact,
     answers: &[(Solution, Fields)],
-) -> PlaneError {
+) -> ConformalityError {
     let (mut along, mut across, mut limit, mut turn) = (0.0_f64, 0.0_f64, 0.0, 0.0_f64);
     let mut normals = [0.0; 2];
     for (gap, (solution, _)) in wheel.patches.iter().zip(answers) {
@@ -89,7 +89,7 @@ pub(crate) fn of_wheel(
     }
     let normals = normals[0].hypot(normals[1]);
     // How it is divided among both components depends on the law more than its length does.
-    PlaneError {
+    ConformalityError {
         force: along.hypot(across).hypot(normals),
         normals,
         limit,

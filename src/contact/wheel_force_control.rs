@@ -11,6 +11,7 @@
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
+use crate::contact::free_rolling::{FreeRollingState, angle_of};
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::numerics::bracketed_root::{FRACTION_MAX, RootExit, find_root};
@@ -18,7 +19,6 @@ use crate::contact::numerics::pair_root::{PairRoot, find_pair};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::run::Run;
 use crate::contact::profile_trust::{settle, trust};
-use crate::contact::pulled_rolling::{Rolling, angle_of};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::cubic_law::CubicLaw;
 use crate::contact::rolling::linear_theory;
@@ -27,7 +27,7 @@ use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::resolution::RelativeTo;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
-use crate::contact::wheel_balance::BALANCE;
+use crate::contact::vertical_equilibrium::BALANCE;
 use crate::contact::wheel_on_rail::SolvedWheel;
 
 /// A force may be missed by this part of the target, and by this part of μN at least: what the normal problem leaves open from trial to
@@ -57,7 +57,7 @@ pub(crate) fn solve(
 ) -> Result<(Solution, Fields), SolveError> {
     let settled = settle::settled(case, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
-    let search = PullSearch {
+    let search = ForceSearch {
         operators,
         case,
         contact,
@@ -74,7 +74,7 @@ struct FirstEstimate {
     /// Friction limit of all patches in N.
     limit: f64,
     law: CubicLaw,
-    rolling: Rolling,
+    rolling: FreeRollingState,
     /// Lateral force in N about without lateral creepage, normal forces included.
     lateral: f64,
     /// Sum of the magnitudes of the lateral parts of the normal forces in N.
@@ -94,7 +94,7 @@ struct Reach {
 }
 
 impl FirstEstimate {
-    fn of(solution: &Solution, case: &CheckedCase, rolling: Rolling) -> FirstEstimate {
+    fn of(solution: &Solution, case: &CheckedCase, rolling: FreeRollingState) -> FirstEstimate {
         let elasticity = &case.problem.elasticity;
         let modulus = case.problem.interface.reduction * elasticity.shear_modulus;
         let (mut limit, mut lateral_normal) = (0.0, 0.0);
@@ -124,7 +124,7 @@ impl FirstEstimate {
 }
 
 /// The search for the motion of one wheel.
-struct PullSearch<'a> {
+struct ForceSearch<'a> {
     operators: &'a Arc<OperatorStore>,
     case: &'a CheckedCase,
     contact: &'a WheelTask,
@@ -132,9 +132,9 @@ struct PullSearch<'a> {
     monitor: &'a dyn Monitor,
 }
 
-impl PullSearch<'_> {
+impl ForceSearch<'_> {
     /// The case at creepages in the directions of the forces, which a wheelset has by its angular and its lateral velocity.
-    fn at(&self, creepages: [f64; 2], rolling: Rolling, run: &Run) -> CheckedCase {
+    fn at(&self, creepages: [f64; 2], rolling: FreeRollingState, run: &Run) -> CheckedCase {
         let problem = &self.case.problem;
         let wheelset = problem.wheelset;
         let wheelset = wheelset.map(|wheelset| rolling.at(wheelset, creepages, self.forces));
@@ -173,7 +173,7 @@ impl PullSearch<'_> {
             own: PROGRESS[0],
         };
         let run = self.case.run.for_resultants(TARGET_FIRST);
-        let rolling = Rolling::about(&self.contact.geometry.placement);
+        let rolling = FreeRollingState::about(&self.contact.geometry.placement);
         let found = self.judged(&self.at([0.0; 2], rolling, &run), part)?;
         Ok(FirstEstimate::of(&found.solution, self.case, rolling))
     }

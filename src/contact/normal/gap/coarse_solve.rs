@@ -1,28 +1,28 @@
-//! The pilot solve of a gap: one solve on a coarse grid, which takes 0.3 ms. The time of a solve is estimated from it.
+//! The coarse_solution solve of a gap: one solve on a coarse grid, which takes 0.3 ms. The time of a solve is estimated from it.
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Unmonitored;
+use crate::contact::normal::gap::coarse_solution::{CoarseGap, CoarsePatch};
 use crate::contact::normal::gap::constants::{LEVEL_BEYOND, NEAR, RESOLUTION};
 use crate::contact::normal::gap::grid::PressureGrid;
-use crate::contact::normal::gap::pilot::{GapPilot, PilotPatch};
 use crate::contact::normal::gap::search_box::reach_of_level;
 use crate::contact::normal::gap::solve::GridStart;
 use crate::contact::normal::gap::task::GapTask;
 
 /// Boxes tried: each is larger than the one before. A product on the coarse grid takes 20 µs, and an iteration one or two of them,
-/// so that the worst pilot of 500 iterations in each box ends within 50 ms.
+/// so that the worst coarse_solution of 500 iterations in each box ends within 50 ms.
 const BOXES_MAX: usize = 3;
 
 impl GapTask {
     /// The contact on a coarse grid, solved at the first call; none if that has no answer.
-    pub fn pilot(&self) -> Option<&GapPilot> {
+    pub fn coarse_solution(&self) -> Option<&CoarseGap> {
         self.seen
-            .pilot
+            .coarse_solution
             .get_or_make(|| self.solve_coarsely())
             .as_ref()
     }
 
-    fn solve_coarsely(&self) -> Option<GapPilot> {
+    fn solve_coarsely(&self) -> Option<CoarseGap> {
         let limits = self.gap.window();
         let mut workspace = GridWorkspace::default();
         let mut reach = self.reach();
@@ -45,7 +45,7 @@ impl GapTask {
             let area = grid.step[0] * grid.step[1];
             let patch = |cells: &Vec<usize>| {
                 let extent = grid.extent_of(cells);
-                PilotPatch {
+                CoarsePatch {
                     half: [0, 1].map(|k| 0.5 * extent[k] * grid.step[k]),
                     force: cells.iter().map(|k| pressed.pressure[*k]).sum::<f64>() * area,
                 }
@@ -53,7 +53,7 @@ impl GapTask {
             let mut patches: Vec<_> = grid.patches(&pressed.pressure).iter().map(patch).collect();
             patches.sort_by(|a, b| b.force.total_cmp(&a.force));
             let wanted = grid.wanted(&pressed, NEAR * depth, RESOLUTION, limits);
-            return Some(GapPilot {
+            return Some(CoarseGap {
                 patches,
                 cells_needed: wanted.needed,
             });
@@ -65,7 +65,7 @@ impl GapTask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::normal::gap::seen::GapSeen;
+    use crate::contact::normal::gap::preview::PreviewCache;
     use crate::contact::normal::gap::surface::GapSurface;
     use crate::contact::normal::hertz::NormalLoad;
 
@@ -78,14 +78,14 @@ mod tests {
             gap: GapSurface::profile(460.0, &y, &gap),
             loading: NormalLoad::Force(30_000.0),
             contact_modulus: 115_000.0,
-            seen: GapSeen::default(),
+            seen: PreviewCache::default(),
         };
-        let Some(GapPilot {
+        let Some(CoarseGap {
             patches,
             cells_needed,
-        }) = task.pilot()
+        }) = task.coarse_solution()
         else {
-            panic!("no pilot")
+            panic!("no coarse_solution")
         };
         assert_eq!(patches.len(), 2);
         let sum: f64 = patches.iter().map(|patch| patch.force).sum();

@@ -1,4 +1,4 @@
-//! The rounds in which normal and tangential forces of a wheel come to balance its vertical load: what to try next, and how they end.
+//! Vertical equilibrium of a wheel on planes: fixed-point iterations with secant steps between normal and tangential forces.
 
 use crate::contact::error::SolveError;
 use crate::contact::normal::wheel_height::wheel_contact::WheelContact;
@@ -18,9 +18,9 @@ const BALANCE_OF_TARGET: f64 = 0.1;
 /// Rounds of the balance; each leaves about a tenth of the difference before, on steep flanges a third, less by the secant.
 pub(crate) const ROUNDS_MAX: u32 = 12;
 
-/// How the rounds of friction end.
+/// How the iterations end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum BalanceExit {
+pub(crate) enum EquilibriumExit {
     /// Friction's share is what it was taken for.
     Balanced,
     /// In the last round the vertical force changed by this part.
@@ -29,7 +29,7 @@ pub(crate) enum BalanceExit {
     NothingCarried,
 }
 
-impl BalanceExit {
+impl EquilibriumExit {
     /// The answers of the last round, if they are good enough: with a remark where they are not quite.
     ///
     /// # Errors
@@ -42,8 +42,8 @@ impl BalanceExit {
         wheel: &mut WheelContact,
     ) -> Result<A, SolveError> {
         match (self, last) {
-            (BalanceExit::Balanced, Some(answers)) => Ok(answers),
-            (BalanceExit::RoundsUsedUp { change }, Some(answers)) if change <= BALANCE_POOR => {
+            (EquilibriumExit::Balanced, Some(answers)) => Ok(answers),
+            (EquilibriumExit::RoundsUsedUp { change }, Some(answers)) if change <= BALANCE_POOR => {
                 let remark = Remark::IterationInexact {
                     iteration: "balance of friction and the vertical force",
                     reason: "the rounds were used up",
