@@ -4,7 +4,7 @@ use crate::contact::error::{CaseError, SolveError};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::jobs::attempts::slices::SlicedWork;
 use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::model::job::Failure;
+use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
 
@@ -30,6 +30,14 @@ pub(crate) enum Outcome {
     Broken(Failure),
     /// The solver did not listen and was left behind.
     Abandoned,
+}
+
+impl Outcome {
+    /// The outcome of work that a defect of the service ended. The log has the reason.
+    pub(crate) fn internal(reason: &str) -> Outcome {
+        tracing::error!(reason, "a job fails inside the service");
+        Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
+    }
 }
 
 /// What is to be done for a job.

@@ -15,7 +15,6 @@ use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
-use crate::jobs::worker::solve::internal;
 
 /// Checks an evolution, of which this is stored, and takes its next steps.
 pub(crate) fn begin(
@@ -26,7 +25,7 @@ pub(crate) fn begin(
 ) -> Outcome {
     let request = match stored.value() {
         Ok(request) => request,
-        Err(error) => return internal(&error.to_string()),
+        Err(error) => return Outcome::internal(&error.to_string()),
     };
     let task = match Evolution::check(&request, &shared.options.limits) {
         Ok(task) => task,
@@ -69,7 +68,9 @@ pub(crate) fn advance(
         .and_then(|record| Ok((record, serde_json::to_vec(&evolution.state)?)));
     let (record, state) = match texts {
         Ok(texts) => texts,
-        Err(error) => return internal(&format!("a step cannot be written as JSON: {error}")),
+        Err(error) => {
+            return Outcome::internal(&format!("a step cannot be written as JSON: {error}"));
+        }
     };
     Outcome::Slice {
         part: Some((
@@ -119,7 +120,9 @@ pub(crate) fn join(
             remarks,
             field_patches: 0,
         },
-        Err(error) => internal(&format!("an evolution cannot be written as JSON: {error}")),
+        Err(error) => {
+            Outcome::internal(&format!("an evolution cannot be written as JSON: {error}"))
+        }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::contact::monitor::Monitor;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::{Fields, PatchFields};
 use crate::jobs::attempts::attempt_control::AttemptControl;
-use crate::jobs::attempts::outcome::{INTERNAL, Outcome, Work};
+use crate::jobs::attempts::outcome::{Outcome, Work};
 use crate::jobs::attempts::slices::{SlicedCase, SlicedWork};
 use crate::jobs::codec::encode::encode;
 use crate::jobs::codec::result::EncodedResult;
@@ -44,12 +44,6 @@ pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Wor
     })
 }
 
-/// The outcome of work that a defect of the service ended.
-pub(crate) fn internal(reason: &str) -> Outcome {
-    tracing::error!(reason, "a job fails inside the service");
-    Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
-}
-
 fn check_and_solve(
     shared: &Shared,
     control: &AttemptControl,
@@ -63,7 +57,7 @@ fn check_and_solve(
     }
     let case = match stored.value() {
         Ok(case) => case,
-        Err(error) => return internal(&error.to_string()),
+        Err(error) => return Outcome::internal(&error.to_string()),
     };
     let mut checked = match (shared.engine.check)(&case, &shared.options.limits) {
         Ok(checked) => checked,
@@ -96,7 +90,7 @@ fn solve_next(shared: &Shared, control: &AttemptControl, sliced: SlicedCase) -> 
             part: Some((sliced.note(spent), part)),
             sliced: Box::new(SlicedWork::Case(sliced)),
         },
-        Err(reason) => internal(&reason),
+        Err(reason) => Outcome::internal(&reason),
     }
 }
 
@@ -141,7 +135,7 @@ pub(crate) fn whole(
             field_patches: u32::try_from(fields.patches.len()).unwrap_or(u32::MAX),
             remarks: solution.remarks,
         },
-        Err(reason) => internal(&reason),
+        Err(reason) => Outcome::internal(&reason),
     }
 }
 
