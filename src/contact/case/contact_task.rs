@@ -10,6 +10,7 @@ use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::remark::rounded::short;
 
 /// Largest pressure of a patch in MPa; a larger one is a mistake rather than a contact.
 const PRESSURE_MAX: f64 = 1e12;
@@ -131,8 +132,9 @@ pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> 
         return Err(fault(
             "/contact",
             format!(
-                "a patch of {a:.3e} mm by {b:.3e} mm (semi-axes) comes out; {SEMI_AXIS_MIN:e} to {SEMI_AXIS_MAX:e} mm \
-                 are allowed"
+                "a patch of {} mm by {} mm (semi-axes) comes out; {SEMI_AXIS_MIN:e} to {SEMI_AXIS_MAX:e} mm are allowed",
+                short(a),
+                short(b)
             ),
         ));
     }
@@ -146,8 +148,9 @@ pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> 
         return Err(fault(
             "/contact",
             format!(
-                "a patch of {a:.3e} mm by {b:.3e} mm (semi-axes) comes out; a ratio of at most {SLENDERNESS_MAX:e} is \
-                 allowed"
+                "a patch of {} mm by {} mm (semi-axes) comes out; a ratio of at most {SLENDERNESS_MAX:e} is allowed",
+                short(a),
+                short(b)
             ),
         ));
     }
@@ -155,9 +158,8 @@ pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> 
         return Err(fault(
             load_pointer,
             format!(
-                "the largest pressure of a patch comes out as {:.3e} MPa; {PRESSURE_MIN:e} to {PRESSURE_MAX:e} MPa are \
-                 allowed",
-                patch.pressure_max
+                "the largest pressure of a patch comes out as {} MPa; {PRESSURE_MIN:e} to {PRESSURE_MAX:e} MPa are allowed",
+                short(patch.pressure_max)
             ),
         ));
     }

@@ -7,4 +7,5 @@ pub mod entry;
 pub mod figure;
 pub mod kind;
 pub mod list;
+pub mod rounded;
 pub mod table;

@@ -22,8 +22,8 @@ macro_rules! motion_remarks {
             severity: Warning,
             advice: "Check the unit (creepages are ratios, spin is in 1/mm). At such sliding speeds forces also depend on heat and wear.",
             detail: {
-                let spin = spin_times_length.map_or_else(String::new, |spin| format!(" and the spin times the length of the patch is {spin:.3e}"));
-                format!("the creepages are {creepage_x:.3e} and {creepage_y:.3e}{spin}; the theory is made for values up to {usual_max}")
+                let spin = spin_times_length.map_or_else(String::new, |spin| format!(" and the spin times the length of the patch is {}", short(spin)));
+                format!("the creepages are {} and {}{spin}; the theory is made for values up to {usual_max}", short(creepage_x), short(creepage_y))
             },
 
             /// The second discretisation rule did not converge; forces come from the first alone.
@@ -74,7 +74,7 @@ macro_rules! motion_remarks {
             advice: "Use the numbers with their error estimate, or ask for a larger target.",
             detail: match estimate {
                 Some(estimate) => format!(
-                    "the error relative to {relative_to} is estimated at {estimate:.2e}, the target was {target}"
+                    "the error relative to {relative_to} is estimated at {}, the target was {target}", short(estimate)
                 ),
                 None => format!("the error relative to {relative_to} is unknown, the target was {target}"),
             },
@@ -92,7 +92,8 @@ macro_rules! motion_remarks {
             severity: Info,
             advice: "Give `solver.relative_to: \"force\"` to solve to a share of the force, or a smaller `target_error`.",
             detail: format!(
-                "the force is {force_over_limit:.2e} of μN, and its estimated error is {:.0} % of it; the target counts relative to μN",
+                "the force is {} of μN, and its estimated error is {:.0} % of it; the target counts relative to μN",
+                short(force_over_limit),
                 100.0 * error_over_force
             ),
 

@@ -94,8 +94,9 @@ macro_rules! normal_remarks {
             severity: Warning,
             advice: "Check units and load. If they are right, the bodies yield and pressures are lower than the answer says.",
             detail: format!(
-                "the bodies overlap by {overlap_mm:.3e} mm, compared with a half width of {half_width_mm:.3e} mm of the contact: strains are too \
-                 large for linear elasticity"
+                "the bodies overlap by {} mm, compared with a half width of {} mm of the contact: strains are too large for linear elasticity",
+                short(overlap_mm),
+                short(half_width_mm)
             ),
 
             /// The patch is large compared with the radii of the bodies, so that half-spaces do not describe them.
@@ -111,7 +112,8 @@ macro_rules! normal_remarks {
             severity: Warning,
             advice: "Check the units of load and radii: bodies are like half-spaces only if the half width is below a third of the radius.",
             detail: format!(
-                "the patch has a half width of {half_width_mm:.3e} mm in the {direction} direction, compared with a radius of {radius_mm} mm"
+                "the patch has a half width of {} mm in the {direction} direction, compared with a radius of {radius_mm} mm",
+                short(half_width_mm)
             ),
 
             /// The largest pressure is far beyond what steel bears.
@@ -125,7 +127,8 @@ macro_rules! normal_remarks {
             severity: Warning,
             advice: "Check the units of load and geometry. If they are right, the bodies yield and the pressure is lower than the answer says.",
             detail: format!(
-                "the largest pressure is {pressure_max_mpa:.4e} MPa, more than {usual_max_mpa} MPa: bodies of steel would yield"
+                "the largest pressure is {} MPa, more than {usual_max_mpa} MPa: bodies of steel would yield",
+                short(pressure_max_mpa)
             ),
 
             /// A length of the track or the wheelset would be usual in another unit than mm.
@@ -165,7 +168,7 @@ macro_rules! normal_remarks {
             code: "load-implausible",
             severity: Warning,
             advice: "Check its unit: forces are in N.",
-            detail: format!("the normal force is {normal_force_n:.3e} N, more than {usual_max_n:e} N"),
+            detail: format!("the normal force is {} N, more than {usual_max_n:e} N", short(normal_force_n)),
         }
     };
 }
