@@ -9,7 +9,7 @@
 //! depth; the defaults of `smoothing_mm` and `step_depth_mm` belong together.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -40,10 +40,11 @@ const UNSOLVED: f64 = 0.1;
 const STACK_BYTES: usize = 16 << 20;
 const BODIES: [Body; 2] = [Body::Rail, Body::Wheel];
 
-/// The monitor of a step, whose progress is that of the evolution.
+/// The monitor of a step for several threads: its progress is that of the evolution, and its time never runs back.
 struct StepMonitor<'a> {
     inner: &'a (dyn Monitor + Sync),
     share: f64,
+    nanoseconds: AtomicU64,
 }
 
 impl Monitor for StepMonitor<'_> {
@@ -52,7 +53,9 @@ impl Monitor for StepMonitor<'_> {
     }
 
     fn elapsed(&self) -> Duration {
-        self.inner.elapsed()
+        let now = self.inner.elapsed().as_nanos() as u64;
+        let latest = self.nanoseconds.fetch_max(now, Ordering::AcqRel);
+        Duration::from_nanos(latest.max(now))
     }
 }
 
@@ -105,6 +108,7 @@ impl Evolution {
         let monitor = &StepMonitor {
             inner: monitor,
             share: before.share,
+            nanoseconds: AtomicU64::new(0),
         };
         let mut state = before.clone();
         let Some(traffic) = &before.traffic else {
@@ -277,15 +281,19 @@ impl Evolution {
     ) -> Result<Vec<Pass>, SolveError> {
         let solve = |values: &&[f64]| pass(self, context, on, values, monitor);
         let next = AtomicUsize::new(0);
-        let found = Mutex::new(vec![Err(SolveError::Cancelled); states.len()]);
+        let found = Mutex::new(vec![None; states.len()]);
         let work = || {
+            // After an error no further state is begun.
             while let Some((k, values)) = states
                 .iter()
                 .enumerate()
                 .nth(next.fetch_add(1, Ordering::Relaxed))
             {
                 let pass = solve(values);
-                found.lock().unwrap_or_else(PoisonError::into_inner)[k] = pass;
+                if pass.is_err() {
+                    next.store(states.len(), Ordering::Relaxed);
+                }
+                found.lock().unwrap_or_else(PoisonError::into_inner)[k] = Some(pass);
             }
         };
         thread::scope(|scope| {
@@ -297,7 +305,8 @@ impl Evolution {
             work();
         });
         let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
-        found.into_iter().collect()
+        // Only an error leaves states without a pass.
+        found.into_iter().flatten().collect()
     }
 
     fn happen(&self, event: usize, state: &mut EvolutionState) {

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::Notify;
 
-/// The pause point of one attempt.
+/// The pause point of the threads of one attempt.
 #[derive(Debug, Default)]
 pub struct PausePoint {
     closed: AtomicBool,
@@ -22,8 +22,10 @@ pub struct PausePoint {
 
 #[derive(Debug, Default)]
 struct PauseTime {
+    /// Threads that wait, and since when there is one.
+    threads: u32,
     since: Option<Instant>,
-    /// Earlier waits, all together.
+    /// Earlier waits, all together; one of several threads counts once.
     before: Duration,
 }
 
@@ -52,8 +54,8 @@ impl PausePoint {
             return;
         }
         let mut waiting = self.lock();
-        let since = Instant::now();
-        waiting.since = Some(since);
+        waiting.threads += 1;
+        let since = *waiting.since.get_or_insert_with(Instant::now);
         self.reached.notify_one();
         while self.closed.load(Ordering::Acquire) && !stopped() {
             waiting = self
@@ -61,8 +63,11 @@ impl PausePoint {
                 .wait(waiting)
                 .unwrap_or_else(PoisonError::into_inner);
         }
-        waiting.since = None;
-        waiting.before += since.elapsed();
+        waiting.threads -= 1;
+        if waiting.threads == 0 {
+            waiting.since = None;
+            waiting.before += since.elapsed();
+        }
     }
 
     /// The solver waits.
@@ -127,5 +132,28 @@ mod tests {
         stop.store(true, Ordering::SeqCst);
         pause_point.nudge();
         solver.join().unwrap();
+    }
+
+    #[test]
+    fn a_wait_of_several_threads_counts_once() {
+        let point = PausePoint::default();
+        let begun = Instant::now();
+        point.close();
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| point.pass(|| false));
+            }
+            while point.lock().threads < 4 {
+                std::thread::yield_now();
+            }
+            std::thread::sleep(Duration::from_millis(20));
+            point.open();
+        });
+        let waited = point.waited();
+        assert!(
+            waited >= Duration::from_millis(20) && waited <= begun.elapsed(),
+            "{waited:?}"
+        );
+        assert!(!point.holds());
     }
 }
