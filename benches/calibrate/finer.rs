@@ -19,7 +19,7 @@ use railhead::contact::rolling::resultants::Resultants;
 use serde_json::{Value, json};
 
 use crate::patches::{self, PatchAnswer};
-use crate::population::Class;
+use crate::population::{Class, on_planes};
 use crate::truth::{Frame, TrueResultants, Truth, distance, print};
 
 /// Cells of the two meshes that make a truth.
@@ -29,6 +29,8 @@ const LEAST: f64 = 2e-5;
 /// Targets that stand for region and pressure of a gap much finer than asked for, and for all of a wheel on a rail.
 const TARGET_GAP: f64 = 4e-4;
 const TARGET_PROFILES: f64 = 4e-4;
+/// Targets of two solves on the curve of the rail: the second is the truth, and off by no more than it differs from the first.
+const TARGETS_CURVE: [f64; 2] = [5e-4, 2e-4];
 /// Share of the estimate of a wheel on a rail that its truth is taken to be off by.
 const SHARE_PROFILES: f64 = 0.5;
 
@@ -37,8 +39,10 @@ const SHARE_PROFILES: f64 = 0.5;
 /// # Errors
 /// Why the case has no answer.
 pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
-    if class == Class::Profiles {
-        return of_profiles(case);
+    match class {
+        Class::Profiles => return of_profiles(case),
+        Class::Curve => return of_curve(case),
+        _ => {}
     }
     let mut fine = case.clone();
     fine["solver"] = json!({ "target_error": TARGET_GAP });
@@ -151,19 +155,52 @@ fn one_mesh(
     Ok((sum, solved.mesh.mesh.cells()))
 }
 
-/// Tangential resultants of a wheel on a rail, patch by patch, from a fine target.
+/// Tangential resultants of a wheel on a rail on planes of contact, patch by patch, from a fine target.
 fn of_profiles(case: &Value) -> Result<Truth, String> {
     let mut fine = case.clone();
     fine["solver"] = json!({ "target_error": TARGET_PROFILES });
+    on_planes(Class::Profiles, &mut fine);
     let checked = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
     let (solution, _) = contact::solve(&checked, &Unmonitored).map_err(|e| e.to_string())?;
-    let found = PatchAnswer::of_solution(&solution).ok_or("no estimate")?;
+    let found = PatchAnswer::of_solution(&solution, 0.0).ok_or("no estimate")?;
+    Ok(of_patches(case, &found, of_patch))
+}
+
+fn of_patches(
+    case: &Value,
+    found: &[PatchAnswer],
+    of: impl Fn(&PatchAnswer) -> TrueResultants,
+) -> Truth {
     let several = found.iter().filter(|_| found.len() > 1);
-    Ok(Truth {
+    Truth {
         print: print(case),
-        whole: of_patch(&patches::sum(&found)),
-        patches: several.map(of_patch).collect(),
-    })
+        whole: of(&patches::sum(found)),
+        patches: several.map(of).collect(),
+    }
+}
+
+/// Tangential resultants of a wheel on the curve of its rail, patch by patch, from a fine target; uncertain by the change from a coarser one.
+fn of_curve(case: &Value) -> Result<Truth, String> {
+    let of_target = |target: f64| {
+        let mut fine = case.clone();
+        fine["solver"] = json!({ "target_error": target });
+        let checked = contact::check(&fine, &Limits::default()).map_err(|e| e.to_string())?;
+        let (solution, _) = contact::solve(&checked, &Unmonitored).map_err(|e| e.to_string())?;
+        PatchAnswer::of_solution(&solution, 0.0).ok_or_else(|| "no estimate".to_owned())
+    };
+    let [coarse, fine] = TARGETS_CURVE.map(of_target);
+    let (coarse, mut truth) = (coarse?, of_patches(case, &fine?, of_patch));
+    let whole = std::iter::once(&mut truth.whole).chain(&mut truth.patches);
+    for known in whole {
+        known.uncertainty = 0.0;
+    }
+    let change = patches::judged(&truth, &coarse).into_iter();
+    let change = change.map(|judged| judged.error).fold(LEAST, f64::max);
+    let whole = std::iter::once(&mut truth.whole).chain(&mut truth.patches);
+    for known in whole {
+        known.uncertainty = change;
+    }
+    Ok(truth)
 }
 
 /// The resultants of a patch as its truth.

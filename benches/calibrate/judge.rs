@@ -1,16 +1,29 @@
 //! How far an answer is from the truth.
 
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::resultants::Resultants;
 use railhead::contact::solution::words::answer::Solution;
+use railhead::contact::solution::words::fields::Fields;
 
-use crate::patches::{self, PatchAnswer};
+use crate::patches::{self, PatchAnswer, left_open};
 use crate::population::Class;
 use crate::truth::{Judged, Truth};
 
-/// The estimates of an answer beside its errors: that of the sum, or of each patch of a wheel on a rail. None without an estimate.
-pub fn judged(class: Class, truth: &Truth, solution: &Solution) -> Option<Vec<Judged>> {
-    if class == Class::Profiles {
-        return PatchAnswer::of_solution(solution).map(|found| patches::judged(truth, &found));
+/// The estimates of an answer beside its errors: that of the sum, or of each patch of a wheel on a rail, there without what the factors for the
+/// turn leave open, which no mesh shows. None without an estimate.
+pub fn judged(
+    class: Class,
+    truth: &Truth,
+    case: &CheckedCase,
+    (solution, fields): &(Solution, Fields),
+) -> Option<Vec<Judged>> {
+    if class.is_wheel() {
+        let open = match class {
+            Class::Curve => left_open(case, solution, fields),
+            _ => 0.0,
+        };
+        return PatchAnswer::of_solution(solution, open)
+            .map(|found| patches::judged(truth, &found));
     }
     let total = &solution.total[0];
     let sum = Resultants {

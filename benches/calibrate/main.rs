@@ -1,7 +1,7 @@
 //! Is the error estimate right? Solves random contacts for three targets and compares with meshes much finer.
 //!
 //! `cargo bench --bench calibrate` prints the tables for the halves of every class (the first for fitting, the second for
-//! checking; of wheels on rails every patch counts); with names of classes (`ellipse smooth jump gap profiles`) those alone. Truths come from
+//! checking; of wheels on rails every patch counts); with names of classes (`ellipse smooth jump gap profiles curve`) those alone. Truths come from
 //! `tests/data/finer_meshes.json`; `-- truths [classes]` finds the missing ones, some seconds each; `-- continuity`
 //! prints how the estimate changes along a sweep, `-- sweeps` how right it is along many, `-- case gap 42` one case as JSON.
 
@@ -27,15 +27,16 @@ use railhead::contact::solution::words::answer::Solution;
 use serde_json::json;
 
 use judge::judged;
-use population::{Class, case};
+use population::{Class, case, on_planes};
 use truth::{Judged, Truths};
 
-const CLASSES: [Class; 5] = [
+const CLASSES: [Class; 6] = [
     Class::Ellipse,
     Class::Smooth,
     Class::Jump,
     Class::Gap,
     Class::Profiles,
+    Class::Curve,
 ];
 const TARGETS: [f64; 3] = [0.02, 0.005, 0.001];
 
@@ -125,9 +126,10 @@ fn tables(class: Class, truths: &Truths, each: bool) {
             let mut question = case(class, *number);
             assert_eq!(truth.print, truth::print(&question), "another population");
             question["solver"] = json!({ "method": "boundary_element", "target_error": target });
+            on_planes(class, &mut question);
             let checked = contact::check(&question, &Limits::default()).expect("a sound case");
             let began = ThreadTime::now();
-            let (solution, _) = match contact::solve(&checked, &Unmonitored) {
+            let answer = match contact::solve(&checked, &Unmonitored) {
                 Ok(found) => found,
                 Err(error) => {
                     println!("{} {number} at {target}: {error}", class.name());
@@ -136,14 +138,14 @@ fn tables(class: Class, truths: &Truths, each: bool) {
             };
             let seconds = began.elapsed().as_secs_f64();
             let half = &mut halves[usize::from(2 * *number >= class.count())];
-            for judged in judged(class, truth, &solution).expect("an estimate") {
+            for judged in judged(class, truth, &checked, &answer).expect("an estimate") {
                 let outcome = Outcome {
                     judged,
                     met: judged.estimate <= target,
                     seconds,
                 };
                 if each || judged.error - judged.uncertainty > judged.estimate {
-                    print_one((class, *number, target), &outcome, &solution);
+                    print_one((class, *number, target), &outcome, &answer.0);
                 }
                 half.push(outcome);
             }

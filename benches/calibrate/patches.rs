@@ -1,7 +1,11 @@
 //! Wheels on rails: each patch has its own frame, its own estimate, and a moment about its own load centre.
 
+use railhead::contact::geometry::reference_curve::ReferenceCurve;
+use railhead::contact::normal::normal_task::NormalTask;
+use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::resultants::Resultants;
 use railhead::contact::solution::words::answer::{PatchSolution, Solution};
+use railhead::contact::solution::words::fields::Fields;
 
 use crate::truth::{Judged, TrueResultants, Truth};
 
@@ -19,12 +23,13 @@ pub struct PatchAnswer {
 }
 
 impl PatchAnswer {
-    /// The patches of an answer; none without an estimate.
-    pub fn of_solution(solution: &Solution) -> Option<Vec<PatchAnswer>> {
-        solution.patches.iter().map(PatchAnswer::new).collect()
+    /// The patches of an answer, whose estimates have a part of μN for what no mesh shows; none without an estimate.
+    pub fn of_solution(solution: &Solution, open: f64) -> Option<Vec<PatchAnswer>> {
+        let patches = solution.patches.iter();
+        patches.map(|patch| PatchAnswer::new(patch, open)).collect()
     }
 
-    fn new(patch: &PatchSolution) -> Option<PatchAnswer> {
+    fn new(patch: &PatchSolution, open: f64) -> Option<PatchAnswer> {
         let point = &patch.points[0];
         let position = patch.position?;
         let [x, y, z] = [0, 1, 2].map(|k| position.track_mm[k] - position.origin_track_mm[k]);
@@ -37,7 +42,7 @@ impl PatchAnswer {
         let limit = patch.friction_limit_n?;
         Some(PatchAnswer {
             resultants: about_origin.about([x, y * cos + z * sin]),
-            estimate: point.error_estimate?.force_x_n,
+            estimate: point.error_estimate?.force_x_n - open * limit,
             limit,
             moment_limit: limit * (patch.area_mm2 / std::f64::consts::PI).sqrt(),
         })
@@ -55,6 +60,40 @@ impl PatchAnswer {
     fn against(&self, known: &TrueResultants) -> Judged {
         known.judged(self.resultants, self.estimate)
     }
+}
+
+/// What the factors for the turn leave open of the forces of an answer on the curve of the rail, relative to μN: a fifth of the standard deviation of the
+/// angle over the load in rad, and at most 3.5 % (`docs/wheel-rail.md`).
+pub fn left_open(case: &CheckedCase, solution: &Solution, fields: &Fields) -> f64 {
+    let NormalTask::Wheel(contact) = &case.problem.task else {
+        unreachable!("a wheel on a rail")
+    };
+    let curve = ReferenceCurve::new(&contact.geometry);
+    let mut sums = [0.0; 3];
+    for (patch, fields) in solution.patches.iter().zip(&fields.patches) {
+        let position = patch.position.as_ref().expect("a place on the rail");
+        // Arc lengths grow to the left.
+        let [mut low, mut high] = curve.range();
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            match curve.at(middle).at[0] < position.origin_track_mm[1] {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        let cells = fields.cells(0);
+        let pressure = cells.pressure_mpa.as_ref().expect("pressures");
+        for (k, pressure) in pressure.iter().enumerate() {
+            let angle = curve.at(low + cells.y_mm[k]).angle;
+            let load = pressure * cells.dx_mm[k] * cells.dy_mm[k];
+            let of_cell = [load, load * angle, load * angle * angle];
+            sums = [0, 1, 2].map(|k| sums[k] + of_cell[k]);
+        }
+    }
+    let [load, first, second] = sums;
+    let mean = first / load;
+    let deviation = (second / load - mean * mean).max(0.0).sqrt();
+    (0.2 * deviation).min(0.035)
 }
 
 /// The sums over patches.

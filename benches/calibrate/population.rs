@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use serde_json::{Value, json};
 
-use crate::profile_shapes::{rail_60e1, s1002};
+use crate::profile_shapes::{rail_60e1, rail_head, s1002};
 use crate::random::Random;
 
 /// Where region and pressure come from.
@@ -18,8 +18,10 @@ pub enum Class {
     Jump,
     /// Crowns of arcs, quartics, two parabolas, skew parabolas, blended radii; as profiles and as grids.
     Gap,
-    /// S1002 on 60E1, moved sideways and yawed.
+    /// S1002 on 60E1, moved sideways and yawed, on planes of contact.
     Profiles,
+    /// New and worn wheels on new and worn rails, on the tread, at gauge corner and flange, on the curve of the rail.
+    Curve,
 }
 
 impl Class {
@@ -31,7 +33,13 @@ impl Class {
             Class::Jump => "jump",
             Class::Gap => "gap",
             Class::Profiles => "profiles",
+            Class::Curve => "curve",
         }
+    }
+
+    /// A wheel on a rail, whose patches have an estimate each.
+    pub fn is_wheel(self) -> bool {
+        matches!(self, Class::Profiles | Class::Curve)
     }
 
     /// Cases of the population. The first half is for fitting, the second for checking.
@@ -42,6 +50,7 @@ impl Class {
             Class::Jump => 80,
             Class::Gap => 200,
             Class::Profiles => 96,
+            Class::Curve => 120,
         }
     }
 }
@@ -56,6 +65,14 @@ pub fn case(class: Class, number: usize) -> Value {
         Class::Smooth | Class::Jump => pressures(class, &setting, random),
         Class::Gap => gap(&setting, random),
         Class::Profiles => profiles(&setting, random),
+        Class::Curve => curve(&setting, random),
+    }
+}
+
+/// Asks for planes of contact if those of a class were solved on them.
+pub fn on_planes(class: Class, case: &mut Value) {
+    if class == Class::Profiles {
+        case["contact"]["reference_surface"] = "plane".into();
     }
 }
 
@@ -273,4 +290,62 @@ fn profiles(setting: &Setting, random: &mut Random) -> Value {
     let mut case = setting.case(contact, motion);
     case["load"] = json!({ "vertical_force_n": force });
     case
+}
+
+/// A wheel that may have worn hollow on a rail that may have worn to other radii.
+fn curve(setting: &Setting, random: &mut Random) -> Value {
+    let mut rail = rail_head([
+        (300.0, 0.0, 10.25),
+        (80.0, 7.70, 26.05),
+        (13.0, 23.015, 23.015 + FACE * 13.0),
+    ]);
+    let mut wheel = s1002();
+    if random.below(2) == 0 {
+        let radii = [(150.0, 600.0), (40.0, 150.0), (9.0, 25.0)];
+        rail = rail_of_arcs(radii.map(|(low, high)| random.decades(low, high)));
+    }
+    if random.below(2) == 0 {
+        let (depth, middle) = (random.between(0.1, 0.6), random.between(-15.0, 10.0));
+        let width = random.between(12.0, 25.0);
+        for [y, z] in &mut wheel {
+            *z -= depth * (-((*y - middle) / width).powi(2)).exp();
+        }
+    }
+    let shift = match random.below(3) {
+        0 => random.between(-3.0, 5.0),
+        1 => random.between(-5.9, -3.0),
+        _ => random.between(-7.0, -5.9),
+    };
+    let contact = json!({
+        "type": "profiles", "rail": { "points_mm": rail }, "wheel": { "points_mm": wheel },
+        "side": "right", "rolling_radius_mm": 460, "gauge_mm": 1435, "gauge_height_mm": 14, "cant_rad": 0.025,
+        "flange_back_distance_mm": 1360, "flange_back_position_mm": -70, "accept_rough_profiles": true,
+        "reference_surface": "curve", "lateral_shift_mm": shift, "yaw_rad": random.between(-0.02, 0.02),
+    });
+    let force = random.decades(20_000.0, 140_000.0);
+    let motion = match random.below(2) {
+        0 => setting.motion(setting.hertz(force, [460.0, 300.0]), force, random),
+        _ => json!({ "wheelset": {
+            "speed_mm_per_s": 20_000, "free_rolling_radius_mm": 460.0 + random.between(-3.0, 3.0),
+        } }),
+    };
+    let mut case = setting.case(contact, motion);
+    case["load"] = json!({ "vertical_force_n": force });
+    // What the factors for the turn leave open follows from the pressures.
+    case["outputs"] = json!(["resultants", "pressure"]);
+    case
+}
+
+/// Sine of the angle of a side inclined 1:20.
+const FACE: f64 = 0.998_752_338_877_845_2;
+
+/// A head with arcs of other radii than 60E1, tangent to each other at the same half widths.
+fn rail_of_arcs([crown, shoulder, corner]: [f64; 3]) -> Vec<[f64; 2]> {
+    let second = 10.25 * (1.0 - shoulder / crown);
+    let third = 26.05 - corner * (26.05 - second) / shoulder;
+    rail_head([
+        (crown, 0.0, 10.25),
+        (shoulder, second, 26.05),
+        (corner, third, third + FACE * corner),
+    ])
 }

@@ -30,25 +30,38 @@ pub(crate) fn forecast(
 ) -> Option<f64> {
     let mut lifted = 0.0;
     for gap in &wheel.patches {
-        let motion = match &problem.wheelset {
-            None => *problem.motions.first()?,
-            Some(wheelset) => motion_in(gap, geometry, wheel.centre, wheelset).ok()?,
-        };
-        let patches = gap.field.patches();
-        let extents = patches.iter().map(|patch| patch.extent);
-        let friction = in_frame(&problem.friction, &gap.frame, geometry, extents);
-        for (k, patch) in patches.iter().enumerate() {
-            let ellipse = LoadEllipse::of_samples(&gap.field, k);
-            let modulus = problem.interface.reduction * problem.elasticity.shear_modulus;
-            let poisson_ratio = problem.elasticity.poisson_ratio;
-            let limit =
-                friction.limit_under(patch.normal_force, || LoadAcross::of_samples(&gap.field, k));
-            let [_, across] = forces(modulus, poisson_ratio, &ellipse, limit, &motion);
+        for [_, across] in patch_forces(problem, geometry, gap, wheel.centre)? {
             lifted -= across * gap.frame.angle.sin();
         }
     }
     let share = lifted / wheel.vertical_force();
     (share.is_finite() && 1.0 + share > LEFT_MIN).then_some(share)
+}
+
+/// Forces of friction on the rail in N along x and across, of each patch in a gap, with every patch taken for the ellipse that carries its load the
+/// same way and the wheel's centre at a height in mm.
+pub(crate) fn patch_forces(
+    problem: &Problem,
+    geometry: &WheelRail,
+    gap: &GapContact,
+    centre: f64,
+) -> Option<Vec<[f64; 2]>> {
+    let motion = match &problem.wheelset {
+        None => *problem.motions.first()?,
+        Some(wheelset) => motion_in(gap, geometry, centre, wheelset).ok()?,
+    };
+    let patches = gap.field.patches();
+    let extents = patches.iter().map(|patch| patch.extent);
+    let friction = in_frame(&problem.friction, &gap.frame, geometry, extents);
+    let of_patch = |k: usize| {
+        let ellipse = LoadEllipse::of_samples(&gap.field, k);
+        let modulus = problem.interface.reduction * problem.elasticity.shear_modulus;
+        let force = patches[k].normal_force;
+        let limit = friction.limit_under(force, || LoadAcross::of_samples(&gap.field, k));
+        let poisson_ratio = problem.elasticity.poisson_ratio;
+        forces(modulus, poisson_ratio, &ellipse, limit, &motion)
+    };
+    Some((0..patches.len()).map(of_patch).collect())
 }
 
 /// Creepages and spin about the origin of a gap, with the wheel's centre at a height: those at its patches, weighted with their forces.

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::SolveError;
+use crate::contact::forecast::{can_forecast, patch_forces};
 use crate::contact::friction::on_rail::on_curve;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::reference_curve::{
@@ -45,7 +46,7 @@ use crate::contact::solution::words::damage::Damage;
 use crate::contact::solution::words::fields::{Fields, PatchFields};
 use crate::contact::time_limit::TimeLimit;
 use crate::contact::unlike_motions::tell_region;
-use crate::contact::vertical_equilibrium::next_share;
+use crate::contact::vertical_equilibrium::{next_share, tolerance};
 
 /// Allowed error of the resultants relative to μN on the coarse grid: that of the coarsest meshes, whatever the few cells of a small patch leave open.
 const TARGET_ROUGH: f64 = 0.2;
@@ -57,9 +58,10 @@ const PATCHES_MAX: usize = 4;
 /// single point that is off makes a ridge a hundred times as long.
 const SLENDER_MAX: f64 = 20.0;
 const SLENDER_SHARE: f64 = 0.02;
-/// Change of the forces relative to μN over the target that ends the rounds, and of the vertical force relative to it.
-const CHANGE: f64 = 0.05;
-const BALANCE: f64 = 1e-4;
+/// Change of the forces relative to μN over the target that ends the rounds.
+const CHANGE: f64 = 0.1;
+/// Part by which the gap that tractions open is off if they are taken to be proportional to the pressure.
+const FORECAST_OFF: f64 = 0.3;
 /// Change of the forces relative to μN that ends the rounds on the coarse grid.
 const CHANGE_ROUGH: f64 = 0.02;
 /// When the rounds are used up, a change of the forces relative to μN up to this is answered with a remark.
@@ -167,10 +169,9 @@ struct CurveSolve<'a> {
 /// The end of the rounds.
 struct Found {
     contact: CurveContact,
-    /// Vertical force of the tractions in N.
-    lift: f64,
     parts: Vec<Part>,
-    remarks: Vec<RemarkEntry>,
+    /// How much forces still change, relative to μN.
+    change: f64,
 }
 
 /// Patches that are solved together.
@@ -285,23 +286,21 @@ impl<'a> CurveSolve<'a> {
         let MotionPart { before: index, all } = self.case.problem.part;
         let workspace = &mut Workspace::default();
         let began = self.watch.elapsed();
-        let found = match patches {
+        let (mut wheel, found) = match patches {
             None => self.rounds(true, before, workspace),
             Some(patches) => match self.rounds(true, &mut |_| Ok(()), workspace) {
-                Ok(found) if count(&found.parts) == patches => Ok(found),
+                Ok(found) if count(&found.1.parts) == patches => Ok(found),
                 Ok(_) | Err(SolveError::NormalProblem { .. }) => self
                     .rounds(false, &mut |_| Ok(()), workspace)
-                    .map(|mut found| {
+                    .map(|(mut wheel, found)| {
                         let remark = Remark::NormalForcesAloneBalance {};
-                        found.remarks.push(remark.into());
-                        found
+                        wheel.remarks.push(remark.into());
+                        (wheel, found)
                     }),
                 Err(error) => Err(error),
             },
         }?;
         let rest = (self.watch.elapsed() - began).as_secs_f64();
-        let mut wheel = self.wheel(&found.contact, found.lift)?;
-        wheel.remarks.extend(found.remarks.iter().cloned());
         let turn_rad = turn(&found.contact);
         if self.influence == Influence::AngleCorrected && turn_rad > TURN_MAX {
             let range_rad = TURN_MAX;
@@ -331,34 +330,21 @@ impl<'a> CurveSolve<'a> {
         coupled: bool,
         before: &mut dyn FnMut(&WheelContact) -> Result<(), SolveError>,
         workspace: &mut Workspace,
-    ) -> Result<Found, SolveError> {
+    ) -> Result<(WheelContact, Found), SolveError> {
         let run = &self.case.run;
         let coupled = coupled
             && (matches!(self.contact.loading, WheelLoad::Vertical(_))
                 || self.influence == Influence::AngleCorrected)
             && !self.case.problem.friction.is_frictionless();
         let task = self.task();
-        let mut coarse = task.coarse(workspace, self.watch)?;
-        let mut friction = Friction::default();
-        let rough = with_tractions(&run.for_resultants(TARGET_ROUGH), &[]);
-        let mut earlier = None;
-        for _ in 0..if coupled { ROUNDS_MAX } else { 0 } {
-            let parts = self.tractions(&coarse, &rough, workspace)?;
-            let next = self.friction(&coarse, &parts, workspace);
-            let limit = self.limit(&parts);
-            let [by_lift, by_gap] = coarse.change_by(&friction, &next);
-            friction = accelerated(&friction, next, &mut earlier);
-            if by_lift.max(by_gap * coarse.normal_force() / limit) <= CHANGE_ROUGH {
-                break;
-            }
-            coarse = task.again(coarse, &friction, workspace, self.watch)?;
-            friction.opened.clone_from(&coarse.opened);
-        }
+        let (mut friction, coarse) = self.coarse(coupled, workspace)?;
         let mut contact = task.fine(&coarse, &friction, workspace, self.watch)?;
         friction.opened.clone_from(&contact.opened);
-        before(&self.wheel(&contact, friction.lift)?)?;
+        let first = self.wheel(&contact, friction.lift)?;
+        before(&first)?;
         let exact = with_tractions(run, &run.outputs);
         let target = run.resolution.target_or_usual();
+        let balance = tolerance(run.resolution);
         let mut earlier = None;
         for round in 1..=ROUNDS_MAX {
             let parts = self.tractions(&contact, &exact, workspace)?;
@@ -368,11 +354,11 @@ impl<'a> CurveSolve<'a> {
                 next = self.friction(&contact, &parts, workspace);
                 let [by_lift, by_gap] = contact.change_by(&friction, &next);
                 let by_gap = by_gap * contact.normal_force() / self.limit(&parts);
-                change = (by_lift / BALANCE).max(by_gap / (CHANGE * target));
+                change = (by_lift / balance).max(by_gap / (CHANGE * target));
             }
             if change <= 1.0 || round == ROUNDS_MAX {
                 let residual = change * CHANGE * target;
-                if residual > CHANGE_POOR {
+                if change > 1.0 && residual > CHANGE_POOR {
                     return Err(SolveError::NormalProblem {
                         reason: format!(
                             "pressures and tractions on the curve of the rail do not come to agree in {ROUNDS_MAX} rounds: forces still change by \
@@ -387,18 +373,116 @@ impl<'a> CurveSolve<'a> {
                     residual,
                     tolerance: CHANGE * target,
                 };
-                return Ok(Found {
+                let lift: f64 = forces.iter().flatten().map(|patch| patch.sheared[2]).sum();
+                let mut wheel = match round {
+                    1 => first,
+                    _ => self.wheel(&contact, lift)?,
+                };
+                wheel.friction_share = -lift / wheel.vertical_force();
+                wheel.remarks.extend((change > 1.0).then(|| remark.into()));
+                let found = Found {
                     contact,
-                    lift: forces.iter().flatten().map(|patch| patch.sheared[2]).sum(),
                     parts,
-                    remarks: (change > 1.0).then(|| remark.into()).into_iter().collect(),
-                });
+                    change: residual,
+                };
+                return Ok((wheel, found));
             }
             friction = accelerated(&friction, next, &mut earlier);
             contact = task.again(contact, &friction, workspace, self.watch)?;
             friction.opened.clone_from(&contact.opened);
         }
         unreachable!("the last round ends them")
+    }
+
+    /// The wheel at rest on a coarse grid, with about the friction that it will have: by the table of creep forces where that is enough, else with coarse
+    /// tractions.
+    fn coarse(
+        &self,
+        coupled: bool,
+        workspace: &mut Workspace,
+    ) -> Result<(Friction, CurveContact), SolveError> {
+        let CheckedCase { problem, run, .. } = self.case;
+        let task = self.task();
+        let mut coarse = task.coarse(workspace, self.watch)?;
+        let mut friction = Friction::default();
+        let rough = with_tractions(&run.for_resultants(TARGET_ROUGH), &[]);
+        let enough = CHANGE * run.resolution.target_or_usual() / FORECAST_OFF;
+        let mut by_table = can_forecast(problem);
+        let mut earlier = None;
+        for _ in 0..if coupled { ROUNDS_MAX } else { 0 } {
+            let limit = problem.friction.largest() * coarse.normal_force();
+            let by_gap = |from: &Friction, to: &Friction| {
+                let [by_lift, by_gap] = coarse.change_by(from, to);
+                (by_lift, by_gap * coarse.normal_force() / limit)
+            };
+            let forecast = match by_table {
+                true => self.forecast(&coarse, workspace)?,
+                false => None,
+            };
+            let forecast = forecast.filter(|next| by_gap(&Friction::default(), next).1 <= enough);
+            by_table = forecast.is_some();
+            let next = match forecast {
+                Some(next) => next,
+                None => {
+                    let parts = self.tractions(&coarse, &rough, workspace)?;
+                    self.friction(&coarse, &parts, workspace)
+                }
+            };
+            let (by_lift, by_gap) = by_gap(&friction, &next);
+            friction = accelerated(&friction, next, &mut earlier);
+            if by_table && by_lift <= CHANGE_ROUGH || by_lift.max(by_gap) <= CHANGE_ROUGH {
+                break;
+            }
+            coarse = task.again(coarse, &friction, workspace, self.watch)?;
+            friction.opened.clone_from(&coarse.opened);
+        }
+        Ok((friction, coarse))
+    }
+
+    /// What friction does by the table of creep forces, with tractions proportional to the pressures.
+    fn forecast(
+        &self,
+        contact: &CurveContact,
+        workspace: &mut Workspace,
+    ) -> Result<Option<Friction>, SolveError> {
+        let gaps = self.gaps(contact)?;
+        let geometry = &self.contact.geometry;
+        let of_gap = |gap: &GapContact| {
+            let forces = patch_forces(&self.case.problem, geometry, gap, contact.centre)?;
+            let sum = forces.iter().fold([0.0; 2], |sum, force| {
+                [sum[0] + force[0], sum[1] + force[1]]
+            });
+            Some(sum)
+        };
+        let Some(forces) = gaps.iter().map(of_gap).collect::<Option<Vec<_>>>() else {
+            return Ok(None);
+        };
+        let forces: Vec<(&GapContact, [f64; 2])> = gaps.iter().zip(forces).collect();
+        let lift = match self.contact.loading {
+            WheelLoad::Vertical(_) => {
+                let lifts = forces
+                    .iter()
+                    .map(|(gap, force)| force[1] * gap.frame.angle.sin());
+                lifts.sum()
+            }
+            WheelLoad::Normal(_) | WheelLoad::Lowering(_) => 0.0,
+        };
+        let mut traction = [Vec::new(), Vec::new()];
+        let rows = contact.pressure.chunks_exact(contact.grid.x.len());
+        for (row, place) in rows.zip(&contact.grid.places) {
+            let far = |gap: &GapContact| (gap.frame.origin[1] - place.at[0]).abs();
+            let nearest = forces
+                .iter()
+                .min_by(|(a, _), (b, _)| far(a).total_cmp(&far(b)));
+            let share = nearest.map_or([0.0; 2], |(gap, force)| {
+                force.map(|force| force / gap.normal_force())
+            });
+            for (traction, share) in traction.iter_mut().zip(share) {
+                traction.extend(row.iter().map(|p| share * p));
+            }
+        }
+        let opened = contact.operator.opened_by_traction(&traction, workspace);
+        Ok(Some(Friction { lift, opened }))
     }
 
     /// Effect of the tractions of all parts on the contact.
@@ -503,8 +587,13 @@ impl<'a> CurveSolve<'a> {
             origin[1],
             |s| self.curve.at(s).rail,
         );
+        let unbalanced = match self.contact.loading {
+            WheelLoad::Vertical(_) => tolerance(run.resolution),
+            WheelLoad::Normal(_) | WheelLoad::Lowering(_) => 0.0,
+        };
+        let load_error = contact.missed.hypot(unbalanced);
         let solved = SolvedFootprint {
-            footprint: Footprint::computed(field.from_origin(origin), contact.missed)
+            footprint: Footprint::computed(field.from_origin(origin), load_error)
                 .on_surface(slip, centres.iter().map(|centre| minus(*centre, origin))),
             report: Some(report),
             coupling_error: 0.0,
@@ -739,9 +828,10 @@ impl<'a> CurveSolve<'a> {
     }
 
     /// Fails where the wheel's profile ends beside a patch.
-    fn check_ends(&self, contact: &CurveContact, field: &PressureField) -> Result<(), SolveError> {
+    fn check_ends(&self, contact: &CurveContact) -> Result<(), SolveError> {
         let beyond = contact.grid.step[1];
-        for [.., low, high] in field.patches().iter().map(|patch| patch.extent) {
+        for [first, last] in contact.grid.runs(&contact.pressure) {
+            let [low, high] = [first, last].map(|j| contact.grid.places[j].s);
             for s in [low - beyond, high + beyond] {
                 let place = self.curve.at(s);
                 if self.curve.nearest(&place, contact.centre).is_none() {
@@ -757,13 +847,12 @@ impl<'a> CurveSolve<'a> {
         Ok(())
     }
 
-    /// The wheel at rest, with the vertical force of tractions in N.
-    fn wheel(&self, contact: &CurveContact, lift: f64) -> Result<WheelContact, SolveError> {
+    /// The patches, each as a gap of its own.
+    fn gaps(&self, contact: &CurveContact) -> Result<Vec<GapContact>, SolveError> {
         let mut gaps = Vec::new();
         for strips in contact.parts(self.influence) {
             for patch in contact.patches(strips)? {
                 let field = CurveContact::field(vec![patch])?;
-                self.check_ends(contact, &field)?;
                 let centre = field.load_centre(None);
                 let (place, over) = self.load_centre(contact, centre)?;
                 let [_, y, z] = place.point(centre[0], 0.0);
@@ -782,6 +871,13 @@ impl<'a> CurveSolve<'a> {
                 });
             }
         }
+        Ok(gaps)
+    }
+
+    /// The wheel at rest, with the vertical force of tractions in N.
+    fn wheel(&self, contact: &CurveContact, lift: f64) -> Result<WheelContact, SolveError> {
+        let gaps = self.gaps(contact)?;
+        self.check_ends(contact)?;
         let forces = gaps.iter().map(GapContact::normal_force);
         let mut wheel = WheelContact {
             lowering: self.touch - contact.centre,
@@ -807,8 +903,12 @@ impl<'a> CurveSolve<'a> {
         seconds: f64,
     ) -> Result<(Solution, Fields), SolveError> {
         let forces = self.forces(&found.contact, &found.parts);
-        let Found { contact, parts, .. } = found;
-        let open = self.left_open(&contact);
+        let Found {
+            contact,
+            parts,
+            change,
+        } = found;
+        let open = self.left_open(&contact) + change;
         let mut remarks = self.case.remarks.clone();
         remarks.extend(wheel.remarks.iter().cloned());
         let centre = load_centre_of_all(self.curve, &parts);

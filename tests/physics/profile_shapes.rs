@@ -57,11 +57,15 @@ fn s1002_depth(y: f64) -> f64 {
 /// Head of the rail 60E1 (EN 13674-1), 72 mm wide, origin in the middle of its top: arcs of 300, 80 and 13 mm that meet at half widths of
 /// 10.25 and 26.05 mm, with centres 0, 7.70 and 23.015 mm from the middle, and sides inclined 1:20.
 pub fn rail_60e1() -> Vec<[f64; 2]> {
-    let arcs = [
+    rail_head([
         (300.0, 0.0, 10.25),
         (80.0, 7.70, 26.05),
         (13.0, 23.015, 23.015 + 13.0 / 1.0025_f64.sqrt()),
-    ];
+    ])
+}
+
+/// A head of arcs, each with its radius, its centre's distance from the middle and the half width until which it goes, and sides inclined 1:20.
+pub fn rail_head(arcs: [(f64, f64, f64); 3]) -> Vec<[f64; 2]> {
     let mut half = vec![[0.0, 0.0]];
     for (radius, centre, until) in arcs {
         let [from, depth] = half[half.len() - 1];

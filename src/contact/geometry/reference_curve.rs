@@ -12,10 +12,12 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::numerics::quadrature::{GaussPoints, integral};
 
-/// Spacing of the table of arc lengths, in mm of the rail's parameter.
-const LENGTH_STEP: f64 = 0.25;
+/// Largest spacing in mm of the places of the rail where overlaps are looked for.
+pub const SPACING: f64 = 0.25;
+/// A place between two that are nearer to the wheel than this, in mm, may be overlapped although both are not.
+const BETWEEN: f64 = 3e-3;
 /// Spacing of the wheel's circles among which the one over a place is looked for, in mm.
-const WHEEL_STEP: f64 = 0.1;
+const WHEEL_STEP: f64 = 0.25;
 /// Intervals between neighbouring circles, or places of the rail, that are looked at together.
 const BLOCK: usize = 16;
 /// Where the wheel's polygon comes nearer to the rail than this, in mm, the distance is computed exactly.
@@ -33,6 +35,8 @@ const INTERVALS_MAX: usize = 15;
 const NODE_DISTANCE: f64 = 0.1;
 /// Sections in which the least gap between two places is looked for.
 const SECTIONS: usize = 16;
+/// Circles that are looked at beside the one over the place asked for before.
+const NEIGHBOURS: usize = 8;
 /// Newton's method for the wheel's surface: steps at most, the last step in mm, and the longest one allowed in mm.
 const STEPS_MAX: usize = 25;
 const STEP_LAST: f64 = 1e-10;
@@ -50,6 +54,8 @@ pub struct ReferenceCurve<'g> {
     blocks: Vec<Circle>,
     /// The place asked for last: cells of a strip ask for the same one after the other.
     last: Cell<CurvePlace>,
+    /// Number of the circle after the point of the wheel that was found last: the next one is near.
+    after: Cell<usize>,
 }
 
 /// The lowest point of a circle of the wheel, with z from the height of the wheel's centre; not a number where the yaw hides it.
@@ -143,6 +149,7 @@ impl<'g> ReferenceCurve<'g> {
         ReferenceCurve {
             blocks: blocks.collect(),
             last: Cell::new(rail[0]),
+            after: Cell::new(1),
             rail,
             geometry,
             circles,
@@ -163,6 +170,9 @@ impl<'g> ReferenceCurve<'g> {
     /// The place at an arc length; beyond the ends the tangent there.
     #[must_use]
     pub fn at(&self, s: f64) -> CurvePlace {
+        if self.last.get().s == s {
+            return self.last.get();
+        }
         let sign = self.sign();
         let next = self
             .rail
@@ -188,14 +198,15 @@ impl<'g> ReferenceCurve<'g> {
     }
 
     /// About where the wheel is nearest to the rail on the line along x through a place, if that is within a distance in mm: x, and the wheel's polygon
-    /// there.
+    /// there. It is looked for beside that of the place asked for before first.
     fn about(&self, place: &CurvePlace, centre: f64, far: f64) -> Option<(f64, WheelOver)> {
         let (tangent, normal) = (place.tangent(), place.normal());
         let here = Circle {
             centre: place.at,
             radius: 0.0,
         };
-        let seen = |circle: &LowestPoint| {
+        let seen = |k: usize| {
+            let circle = &self.circles[k];
             let from = [
                 circle.at[0] - place.at[0],
                 circle.at[1] + centre - place.at[1],
@@ -203,72 +214,72 @@ impl<'g> ReferenceCurve<'g> {
             let [across, gap] = [tangent, normal].map(|axis| axis[0] * from[0] + axis[1] * from[1]);
             [self.sign() * across, gap, circle.x, circle.wheel]
         };
-        let mut found = [0.0, far, 0.0, 0.0];
-        let mut any = false;
-        for (block, circle) in blocks(self.circles.len()).zip(&self.blocks) {
-            if !here.is_near(circle, centre, far) {
-                continue;
+        let between = |k: usize| {
+            let [from, to] = [seen(k - 1), seen(k)];
+            let t = from[0] / (from[0] - to[0]);
+            let at = [0, 1, 2, 3].map(|i| from[i] + t * (to[i] - from[i]));
+            (from[0] <= 0.0 && to[0] > 0.0 && at[1].abs() < far).then_some((k, at))
+        };
+        let last = self.circles.len() - 1;
+        let mut next = self.after.get();
+        let mut found = None;
+        for _ in 0..NEIGHBOURS {
+            found = between(next);
+            if found.is_some() {
+                break;
             }
-            let mut before = [f64::NAN; 4];
-            for circle in &self.circles[block] {
-                let to = seen(circle);
-                if before[0] <= 0.0 && to[0] > 0.0 {
-                    let t = before[0] / (before[0] - to[0]);
-                    let at = [0, 1, 2, 3].map(|k| before[k] + t * (to[k] - before[k]));
-                    if at[1].abs() < found[1].abs() {
-                        (found, any) = (at, true);
-                    }
-                }
-                before = to;
-            }
+            let beyond = seen(next)[0] <= 0.0;
+            next = if beyond { next + 1 } else { next - 1 }.clamp(1, last);
         }
-        let [_, gap, x, wheel] = found;
+        let near = || {
+            blocks(last + 1)
+                .zip(&self.blocks)
+                .filter(|(_, circle)| here.is_near(circle, centre, far))
+        };
+        let found = found.or_else(|| {
+            let all = near()
+                .flat_map(|(block, _)| block.skip(1))
+                .filter_map(between);
+            all.min_by(|(_, a), (_, b)| a[1].abs().total_cmp(&b[1].abs()))
+        });
+        let (next, [_, gap, x, wheel]) = found?;
+        self.after.set(next);
         let start = WheelOver {
             gap,
             wheel,
             lift: place.angle.cos(),
             angle: place.angle,
         };
-        any.then_some((x, start))
+        Some((x, start))
     }
 
-    /// The stretches of the rail in which the bodies overlap with the wheel's centre at a height in mm: overlapped places at most `step` mm apart,
-    /// with increasing arc length. Where none is overlapped, the place between them at which the bodies overlap most, if they do.
+    /// The stretches of the rail in which the bodies overlap with the wheel's centre at a height in mm: overlapped places at most [`SPACING`] apart,
+    /// with increasing arc length. Where the bodies overlap between two places only, the place at which they overlap most.
     #[must_use]
-    pub fn overlaps(&self, centre: f64, step: f64) -> Vec<Vec<Nearest>> {
+    pub fn overlaps(&self, centre: f64) -> Vec<Vec<Nearest>> {
+        let seen = self.close_places(centre);
+        let gap = |k: usize| seen[k].map_or(f64::INFINITY, |seen| seen.wheel.gap);
+        let last = seen.len() - 1;
+        let is_least =
+            |k: usize| gap(k) <= gap(k.saturating_sub(1)) && gap(k) <= gap((k + 1).min(last));
         let mut stretches: Vec<Vec<Nearest>> = Vec::new();
-        let mut least: Option<Nearest> = None;
         let mut open = false;
-        for (k, is_close) in self.close_intervals(centre).into_iter().enumerate() {
-            if !is_close {
+        for (k, here) in seen.iter().enumerate() {
+            let Some(here) = here.filter(|here| here.wheel.gap < BETWEEN) else {
                 open = false;
                 continue;
+            };
+            if here.wheel.gap >= 0.0 {
+                open = false;
+                let deepest = is_least(k).then(|| self.deepest_near(here, centre, SPACING));
+                let deepest = deepest.filter(|deepest| deepest.wheel.gap < 0.0);
+                stretches.extend(deepest.map(|deepest| vec![deepest]));
+            } else if open && let Some(last) = stretches.last_mut() {
+                last.push(here);
+            } else {
+                stretches.push(vec![here]);
+                open = true;
             }
-            let [from, to] = [self.ordered(k).s, self.ordered(k + 1).s];
-            let parts = ((to - from) / step).ceil().max(1.0);
-            for part in 0..parts as usize {
-                let here =
-                    self.nearest_at(from + (part as f64 + 0.5) / parts * (to - from), centre);
-                let Some(here) = here else {
-                    open = false;
-                    continue;
-                };
-                if least.is_none_or(|least| here.wheel.gap < least.wheel.gap) {
-                    least = Some(here);
-                }
-                if here.wheel.gap >= 0.0 {
-                    open = false;
-                } else if open && let Some(last) = stretches.last_mut() {
-                    last.push(here);
-                } else {
-                    stretches.push(vec![here]);
-                    open = true;
-                }
-            }
-        }
-        if let Some(least) = least.filter(|_| stretches.is_empty()) {
-            let deepest = self.deepest_near(least, centre, step);
-            stretches.extend((deepest.wheel.gap < 0.0).then(|| vec![deepest]));
         }
         stretches
     }
@@ -288,10 +299,9 @@ impl<'g> ReferenceCurve<'g> {
         Some(Nearest { place, x, wheel })
     }
 
-    /// Whether the wheel may overlap the rail between a place of the table and the next one, with increasing arc length.
-    fn close_intervals(&self, centre: f64) -> Vec<bool> {
-        let last = self.rail.len() - 1;
-        let mut close = vec![false; last];
+    /// The wheel over the places of the table that it may overlap, with increasing arc length.
+    fn close_places(&self, centre: f64) -> Vec<Option<Nearest>> {
+        let mut close = vec![None; self.rail.len()];
         for block in blocks(self.rail.len()) {
             let places = block.clone().map(|k| self.ordered(k).at);
             let around = Circle::around(places);
@@ -303,11 +313,15 @@ impl<'g> ReferenceCurve<'g> {
                 continue;
             }
             for k in block {
-                let about = self.about(self.ordered(k), centre, DEEPEST);
-                if about.is_some_and(|(_, wheel)| wheel.gap < LOOKED_AT) {
-                    close[k.saturating_sub(1)] = true;
-                    close[k.min(last - 1)] = true;
-                }
+                let place = *self.ordered(k);
+                let about = self.about(&place, centre, DEEPEST);
+                close[k] =
+                    about
+                        .filter(|(_, wheel)| wheel.gap < LOOKED_AT)
+                        .and_then(|(x, start)| {
+                            let wheel = self.over(&place, x, centre, &start)?;
+                            Some(Nearest { place, x, wheel })
+                        });
             }
         }
         close
@@ -462,7 +476,7 @@ fn blocks(points: usize) -> impl Iterator<Item = Range<usize>> {
 
 /// Places along a rail's curve, from its first point to its last.
 fn rail_places(geometry: &WheelRail) -> Vec<CurvePlace> {
-    let [parameters, _] = geometry.parameters(LENGTH_STEP);
+    let [parameters, _] = geometry.parameters(SPACING);
     let sign = geometry.placement.side.sign();
     let mut s = 0.0;
     let mut places = vec![place(geometry, parameters[0], s)];

@@ -21,6 +21,7 @@ use rustfft::num_complex::Complex;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::grid_coefficients::{coefficients, lines};
 use crate::contact::half_space::transforms::{FftPlanners, FftPlans};
+use crate::contact::lazy_field::LazyField;
 use crate::contact::numerics::simd;
 
 /// Waves that are summed side by side.
@@ -68,6 +69,8 @@ pub struct BentOperator {
     /// The normal influence of a cell; and that along x at other strips, over the turn, and at its own strip, over its curvature.
     normal: Spectrum,
     along: Option<Spectrum>,
+    /// Factors of the influence along x and along s between pressures and tractions.
+    coupled: LazyField<[StripFactors; 2]>,
     /// 2κ.
     coupling: f64,
     /// Normal influence at a distance of i cells along x, from `1 − nx` to `nx − 1`, and j strips, at `j * (2 * nx - 1) + i + nx - 1`.
@@ -117,6 +120,7 @@ impl BentOperator {
             plans: workspace.planners.plans(width),
             normal: Vec::new(),
             along: None,
+            coupled: LazyField::default(),
             coupling: 1.17 * (1.0 + 1.0 / (1.0 - nu)),
             coefficients: lines(nx, &known),
             strips,
@@ -214,29 +218,27 @@ impl BentOperator {
     /// Factors by the number of the strip acted on and of the one that acts.
     fn factors(&self, of: impl Fn(usize, usize) -> f64) -> StripFactors {
         let strips = 0..self.strips.number.len();
-        let of_row = |j: usize| strips.clone().map(move |k| (j, k));
-        StripFactors(
-            strips
-                .clone()
-                .flat_map(of_row)
-                .map(|(j, k)| of(j, k) as f32)
-                .collect(),
-        )
+        let pairs = strips
+            .clone()
+            .flat_map(|j| strips.clone().map(move |k| (j, k)));
+        StripFactors(pairs.map(|(j, k)| of(j, k) as f32).collect())
+    }
+
+    /// Sines and cosines of the angles of the strips times a factor: those of turns follow by products.
+    fn sines(&self, of_angle: f64) -> Vec<(f64, f64)> {
+        let angles = self.strips.angle.iter();
+        angles.map(|angle| (of_angle * angle).sin_cos()).collect()
     }
 
     /// The factors of the gaps that pressures open.
     #[must_use]
     pub fn pressure_factors(&self) -> StripFactors {
-        let BentStrips {
-            angle,
-            run,
-            corrected,
-            ..
-        } = &self.strips;
-        self.factors(|j, k| match corrected {
-            true => (TURN_OF_PRESSURE * (angle[j] - angle[k])).cos(),
-            false => f64::from(u8::from(run[j] == run[k])),
-        })
+        let run = &self.strips.run;
+        if !self.strips.corrected {
+            return self.factors(|j, k| f64::from(u8::from(run[j] == run[k])));
+        }
+        let sines = self.sines(TURN_OF_PRESSURE);
+        self.factors(|j, k| sines[j].0 * sines[k].0 + sines[j].1 * sines[k].1)
     }
 
     /// The same factors over those of a weight of each strip acted on and of each that acts.
@@ -253,8 +255,8 @@ impl BentOperator {
 
     /// 2κ sin(Δ/2) between strips.
     fn turn_factors(&self) -> StripFactors {
-        let angle = &self.strips.angle;
-        self.factors(|j, k| self.coupling * (0.5 * (angle[j] - angle[k])).sin())
+        let sines = self.sines(0.5);
+        self.factors(|j, k| self.coupling * (sines[j].0 * sines[k].1 - sines[j].1 * sines[k].0))
     }
 
     /// Δ between strips, and `−dα/ds` of one on itself.
@@ -330,23 +332,13 @@ impl BentOperator {
         workspace: &mut BentWorkspace,
     ) -> Option<[Vec<f64>; 2]> {
         let spectrum = self.along.as_ref()?;
+        let [bend, turn] = self
+            .coupled
+            .get_or_make(|| [self.bend_factors(), self.turn_factors()]);
         let mut out = [vec![0.0; first.len()], vec![0.0; first.len()]];
-        self.product(
-            spectrum,
-            &self.bend_factors(),
-            first,
-            true,
-            &mut out[0],
-            workspace,
-        );
-        self.product(
-            &self.normal,
-            &self.turn_factors(),
-            second,
-            false,
-            &mut out[1],
-            workspace,
-        );
+        let [along, across] = &mut out;
+        self.product(spectrum, bend, first, true, along, workspace);
+        self.product(&self.normal, turn, second, false, across, workspace);
         Some(out)
     }
 

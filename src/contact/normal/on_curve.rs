@@ -4,7 +4,9 @@
 //! has the answer. Its strips lie at multiples of their width from the origin of the arc length, whatever the height is, and leave out what lies
 //! between the patches.
 
-use crate::contact::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCurve, WheelOver};
+use crate::contact::geometry::reference_curve::{
+    CurvePlace, Nearest, ReferenceCurve, SPACING, WheelOver,
+};
 use crate::contact::half_space::bent_surface::{
     BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
 };
@@ -25,8 +27,6 @@ use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::wheel_height::task::WheelLoad;
 use crate::contact::numerics::flood_fill::groups;
 
-/// Spacing of the strips that are looked at for overlaps, in mm.
-const LOOK: f64 = 0.1;
 /// Cells across the overlaps on the grid that finds the contact.
 const FIRST: f64 = 24.0;
 /// Largest number of cells along x and s.
@@ -301,7 +301,7 @@ impl CurveGrid {
     }
 
     /// First and last strip of each run of strips in contact.
-    fn runs(&self, pressure: &[f64]) -> Vec<[usize; 2]> {
+    pub(crate) fn runs(&self, pressure: &[f64]) -> Vec<[usize; 2]> {
         let mut runs: Vec<[usize; 2]> = Vec::new();
         for (j, row) in pressure.chunks_exact(self.x.len()).enumerate() {
             if row.iter().all(|p| *p == 0.0) {
@@ -560,15 +560,15 @@ impl CurveTask<'_> {
     fn over_overlaps(&self, lowering: f64) -> Result<CurveGrid, NormalError> {
         // So that a little more than the lowering still fits.
         let centre = self.touch - 1.1 * lowering;
-        let overlaps = self.curve.overlaps(centre, LOOK);
+        let overlaps = self.curve.overlaps(centre);
         let mut along = [f64::INFINITY, f64::NEG_INFINITY];
-        let (mut widest, mut longest): (f64, f64) = (2.0 * LOOK, 0.0);
+        let (mut widest, mut longest): (f64, f64) = (2.0 * SPACING, 0.0);
         let mut windows = Vec::with_capacity(overlaps.len());
         let [first, last] = self.curve.range();
         for overlap in &overlaps {
             let window = [
-                overlap[0].place.s - LOOK,
-                overlap[overlap.len() - 1].place.s + LOOK,
+                overlap[0].place.s - SPACING,
+                overlap[overlap.len() - 1].place.s + SPACING,
             ];
             if window[0] < first || window[1] > last {
                 return Err(NormalError::NoAnswer(
@@ -576,7 +576,7 @@ impl CurveTask<'_> {
                         .to_owned(),
                 ));
             }
-            widest = widest.max(window[1] - window[0] - LOOK);
+            widest = widest.max(window[1] - window[0] - SPACING);
             windows.push(window);
             for Nearest { x, wheel, .. } in overlap {
                 let half = self.curve.half_length(wheel);

@@ -22,9 +22,8 @@ pub fn all() -> Vec<(String, Value)> {
     cases.extend(methods());
     cases.extend(wheels());
     cases.extend(variants());
+    // Wheels on planes, and those by chance on the curve of the rail.
     for (_, case) in &mut cases {
-        round(case);
-        // The answers on planes, which change less often than those on the curve of the rail.
         let contact = &mut case["contact"];
         let on_rails = ["profiles", "wheelset"]
             .iter()
@@ -32,6 +31,10 @@ pub fn all() -> Vec<(String, Value)> {
         if on_rails && contact.get("reference_surface").is_none() {
             contact["reference_surface"] = json!("plane");
         }
+    }
+    cases.extend(on_the_curve());
+    for (_, case) in &mut cases {
+        round(case);
         // Everything that is recorded has to be there.
         case["outputs"] = json!(["resultants", "zones", "tractions", "pressure", "slip"]);
     }
@@ -204,6 +207,20 @@ fn wheels() -> Vec<(String, Value)> {
             json!({ "wheelset": { "speed_mm_per_s": 20_000, "free_rolling_radius_mm": 461 } });
         cases.push((format!("wheelset {shift} {yaw}"), case));
     }
+    cases
+}
+
+/// New and worn wheels on new and worn rails by chance, and wheelsets, on the curve of the rail.
+fn on_the_curve() -> Vec<(String, Value)> {
+    let mut cases = wheels();
+    for (name, case) in &mut cases {
+        *name = format!("{name} on the curve");
+        case["contact"]["reference_surface"] = json!("curve");
+    }
+    cases.extend((0..WHEELS).map(|number| {
+        let name = format!("{} {number}", Class::Curve.name());
+        (name, population::case(Class::Curve, number))
+    }));
     cases
 }
 
