@@ -179,8 +179,9 @@ fn half_spaces_on_the_curve_agree_with_conformal_contact() {
         }
         let load = state["vertical_force_n"].as_f64().unwrap();
         assert!(
-            (total.force_z_n.unwrap() / -load - 1.0).abs() < 2e-4,
-            "{id}"
+            (total.force_z_n.unwrap() / -load - 1.0).abs() < 6e-4,
+            "{id}: {:?}",
+            total.force_z_n
         );
         let known_pressure = known["pressure_max_mpa"].as_f64().unwrap();
         assert!(

@@ -1009,8 +1009,8 @@ impl CurveContact {
         [mean, (second / load - mean * mean).max(0.0).sqrt()]
     }
 
-    /// About what changes with the friction: the vertical force that the pressures carry, relative to it; and, by the gap that tractions open, the
-    /// lateral force relative to all normal forces.
+    /// About what changes with the friction: the vertical force on the rail, relative to it; and, by the gap that tractions open, the lateral force relative
+    /// to all normal forces.
     pub(crate) fn change_by(&self, from: &Friction, to: &Friction) -> [f64; 2] {
         let (mut depth, mut opened) = (0.0, 0.0);
         for (k, p) in self.pressure.iter().enumerate().filter(|(_, p)| **p > 0.0) {
@@ -1024,7 +1024,7 @@ impl CurveContact {
         let vertical = carried(WheelLoad::Vertical(0.0), &self.grid, &self.pressure);
         let [_, deviation] = self.angles();
         [
-            (to.lift - from.lift).abs() / vertical.abs().max(f64::MIN_POSITIVE),
+            (to.lift - from.lift).abs() / (vertical - to.lift).abs().max(f64::MIN_POSITIVE),
             deviation * opened / depth.max(f64::MIN_POSITIVE),
         ]
     }
