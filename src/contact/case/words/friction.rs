@@ -60,7 +60,7 @@ pub enum FallName {
 
 /// A part of the coefficient that falls with the speed of slip.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
-#[schema(as = SofteningTerm)]
+#[schema(as = FallTerm)]
 pub struct FallTermWords {
     /// Its value at rest, 0 to 100.
     #[schema(minimum = 0.0, maximum = 100.0)]

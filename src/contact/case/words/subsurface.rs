@@ -38,7 +38,7 @@ pub struct SubsurfaceWords {
 
 /// What is judged of a passage of the contact in steady rolling: shakedown always, Dang Van's criterion with its slope.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
-#[schema(as = PathDependentFriction)]
+#[schema(as = Passage)]
 pub struct PassageWords {
     /// Weight of the hydrostatic stress in Dang Van's criterion, a property of the steel; without it the criterion is not evaluated.
     #[serde(skip_serializing_if = "Option::is_none")]
