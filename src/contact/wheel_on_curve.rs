@@ -548,22 +548,6 @@ impl<'a> CurveSolve<'a> {
         let CheckedCase { problem, label, .. } = self.case;
         let field = CurveContact::field(patches.clone())?;
         let loads = field.patches();
-        let slender = loads.iter().find(|patch| {
-            let [rear, front, low, high] = patch.extent;
-            patch.normal_force > SLENDER_SHARE * contact.normal_force()
-                && front - rear > SLENDER_MAX * (high - low)
-        });
-        if let Some(Patch { extent, .. }) = slender {
-            let [rear, front, low, high] = extent;
-            return Err(SolveError::NormalProblem {
-                reason: format!(
-                    "a patch on the curve of the rail is {:.1} mm long and {:.2} mm wide, more than {SLENDER_MAX} times as long as wide, as on a ridge; \
-                     smooth the profiles, or give reference_surface \"plane\"",
-                    front - rear,
-                    high - low
-                ),
-            });
-        }
         let centres: Vec<[f64; 2]> = (0..loads.len())
             .map(|k| field.load_centre(Some(k)))
             .collect();
@@ -878,6 +862,23 @@ impl<'a> CurveSolve<'a> {
     fn wheel(&self, contact: &CurveContact, lift: f64) -> Result<WheelContact, SolveError> {
         let gaps = self.gaps(contact)?;
         self.check_ends(contact)?;
+        let patches: Vec<Patch> = gaps.iter().flat_map(|gap| gap.field.patches()).collect();
+        let slender = patches.iter().find(|patch| {
+            let [rear, front, low, high] = patch.extent;
+            patch.normal_force > SLENDER_SHARE * contact.normal_force()
+                && front - rear > SLENDER_MAX * (high - low)
+        });
+        if let Some(Patch { extent, .. }) = slender {
+            let [rear, front, low, high] = extent;
+            return Err(SolveError::NormalProblem {
+                reason: format!(
+                    "a patch on the curve of the rail is {:.1} mm long and {:.2} mm wide, more than {SLENDER_MAX} times as long as wide, as on a ridge; \
+                     smooth the profiles, or give reference_surface \"plane\"",
+                    front - rear,
+                    high - low
+                ),
+            });
+        }
         let forces = gaps.iter().map(GapContact::normal_force);
         let mut wheel = WheelContact {
             lowering: self.touch - contact.centre,
