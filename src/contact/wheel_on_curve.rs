@@ -54,9 +54,9 @@ const TARGET_ROUGH: f64 = 0.2;
 const ROUNDS_MAX: u32 = 16;
 /// Patches at most. Rough profiles have more, each of a few points; their tractions would be solved together for minutes and mean nothing.
 const PATCHES_MAX: usize = 4;
-/// Length over width at most, of patches with more than this share of the load. Hertz's patch of a gauge corner of 13 mm is 11 times as long as wide; a
-/// single point that is off makes a ridge a hundred times as long.
-const SLENDER_MAX: f64 = 20.0;
+/// Length over width at most, of patches with more than this share of the load. Hertz's patch of a gauge corner of 13 mm is 11 times as long as wide, a
+/// contact at the root of a flange 20 times, and a single point that is off makes a ridge a hundred times as long.
+const SLENDER_MAX: f64 = 40.0;
 const SLENDER_SHARE: f64 = 0.02;
 /// Change of the forces relative to μN over the target that ends the rounds.
 const CHANGE: f64 = 0.1;
