@@ -1,4 +1,4 @@
-//! Reads the worn rail and wheel of the reference files, from the folder that `RAILHEAD_REFERENCE` names or, by default, `shared/reference` beside the checkout.
+//! Reads the worn rail and wheel of the reference files. `RAILHEAD_REFERENCE` names their folder.
 
 use std::path::PathBuf;
 
@@ -6,13 +6,7 @@ use serde_json::{Value, json};
 
 /// Sections of a worn rail and a worn wheel, as a case takes them; `None` without the files.
 pub(crate) fn worn_pair() -> Option<[Value; 2]> {
-    let folder = std::env::var_os("RAILHEAD_REFERENCE").map(PathBuf::from);
-    let folder = folder.unwrap_or_else(|| {
-        PathBuf::from(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../shared/reference"
-        ))
-    });
+    let folder = PathBuf::from(std::env::var_os("RAILHEAD_REFERENCE")?);
     let file = |name: &str| {
         let text = std::fs::read_to_string(folder.join("extended/profiles").join(name)).ok()?;
         Some(json!({ "format": "simpack", "text": text }))

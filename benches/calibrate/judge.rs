@@ -9,8 +9,8 @@ use crate::patches::{self, PatchAnswer, left_open};
 use crate::population::Class;
 use crate::truth::{Judged, Truth};
 
-/// The estimates of an answer beside its errors: that of the sum, or of each patch of a wheel on a rail, there without what the factors for the
-/// turn leave open, which no mesh shows. None without an estimate.
+/// Pairs of estimated and true error of an answer: one for the sum, or one for each patch of a wheel on a rail. The estimates of patches exclude the
+/// part for the turn factors, which mesh refinement cannot show. Returns `None` without an estimate.
 pub fn judged(
     class: Class,
     truth: &Truth,

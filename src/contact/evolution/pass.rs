@@ -50,7 +50,7 @@ impl BodyWear {
         self.open += share * other.open;
     }
 
-    /// The same spread along the section by a kernel of this standard deviation in mm.
+    /// Smooths the wear along the section with a kernel of standard deviation `deviation` in mm.
     pub(crate) fn spread(mut self, deviation: f64) -> BodyWear {
         self.area = smoothed(&self.area, SPACING, deviation);
         self.damage = smoothed(&self.damage, SPACING, deviation);

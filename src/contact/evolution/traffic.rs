@@ -22,7 +22,7 @@ struct Group {
     rows: Vec<usize>,
     share: f64,
     values: Vec<f64>,
-    /// Area that one pass of all rows removes at each point of rail and wheel; nothing of a body that does not wear.
+    /// Area in mm² that one pass of all rows removes at each point of the rail and of the wheel. Empty for a body that does not wear.
     area: [Vec<f64>; 2],
     parted: Option<Parted>,
 }

@@ -35,7 +35,7 @@ const INTERVALS_MAX: usize = 15;
 const NODE_DISTANCE: f64 = 0.1;
 /// Sections in which the least gap between two places is looked for.
 const SECTIONS: usize = 16;
-/// Circles that are looked at beside the one over the place asked for before.
+/// Circles searched from the last result on, before all are searched.
 const NEIGHBOURS: usize = 8;
 /// Newton's method for the wheel's surface: steps at most, the last step in mm, and the longest one allowed in mm.
 const STEPS_MAX: usize = 25;
@@ -198,7 +198,7 @@ impl<'g> ReferenceCurve<'g> {
     }
 
     /// About where the wheel is nearest to the rail on the line along x through a place, if that is within a distance in mm: x, and the wheel's polygon
-    /// there. It is looked for beside that of the place asked for before first.
+    /// there. The search begins at the last result.
     fn about(&self, place: &CurvePlace, centre: f64, far: f64) -> Option<(f64, WheelOver)> {
         let (tangent, normal) = (place.tangent(), place.normal());
         let here = Circle {
