@@ -32,6 +32,7 @@ pub(crate) const FILES: &[PageFile] = files!(
     "js/contactform.js",
     "js/curve.js",
     "js/curvedata.js",
+    "js/curving.js",
     "js/damageview.js",
     "js/deleting.js",
     "js/document.js",

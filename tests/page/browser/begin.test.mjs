@@ -152,7 +152,7 @@ test('a curve radius sets the yaw rate, and another speed keeps the radius', () 
   await ready(page);
   const radius = page.getByLabel('Curve radius');
   await radius.fill('-300');
-  await page.getByText('to the right; rolls without slip at Δr = 2.3 mm').waitFor();
+  await page.getByText('Curve to the right: a wheelset rolls without slip at Δr = 2.3 mm').waitFor();
   const rate = async () => (await json(page)).motion.wheelset.yaw_rate_rad_per_s;
   assert.ok(Math.abs(await rate() - 20 / -300) < 1e-12);
   await page.getByLabel('Speed').fill('36');
@@ -162,6 +162,42 @@ test('a curve radius sets the yaw rate, and another speed keeps the radius', () 
   await ready(page);
   await radius.fill('');
   assert.equal(await rate(), undefined);
+}));
+
+test('a cant changes the load normal to the track and not the roll of the wheelset, and the static load stays', () => onPage('', async (page) => {
+  await ready(page);
+  const load = async () => (await json(page)).load.vertical_force_n;
+  await page.getByLabel('Wheel load Q').fill('80');
+  await page.getByLabel('Curve radius').fill('500');
+  const [gravities, base] = [400 / 500 / 9.80665, 1500];
+  await page.getByText(`${Math.round(base * gravities)} mm balances`).waitFor();
+  await page.getByText('Cant deficiency 122 mm, unbalanced lateral acceleration 0.80 m/s²; an axle pushes the rails to the right with 13.1 kN').waitFor();
+  assert.equal(await load(), 80_000);
+  await page.getByLabel('Cant', { exact: true }).fill('150');
+  const canted = 80_000 * (Math.sqrt(0.99) + 0.1 * gravities);
+  assert.ok(Math.abs(await load() - canted) < 1e-6);
+  await page.getByText('The track rolls by −100.2 mrad. Cant excess 28 mm, unbalanced lateral acceleration 0.18 m/s²; an axle pushes the rails to the left with 3.0 kN').waitFor();
+  const { contact, labels } = await json(page);
+  assert.deepEqual([contact.roll_rad, labels.track_cant_mm], [undefined, '150']);
+  await page.getByLabel('Wheel load Q, static').fill('90');
+  assert.ok(Math.abs(await load() - (canted * 90) / 80) < 1e-6);
+  await page.getByLabel('Speed').fill('36');
+  await page.getByLabel('Curve radius').fill('-500');
+  await page.getByText('The track rolls by 100.2 mrad').waitFor();
+  assert.equal(await page.getByLabel('Wheel load Q, static').inputValue(), '90');
+  // The wheel that is solved carries it, in axes of the track.
+  const [, shown] = /([\d.]+) kN normal to the track/.exec(await page.locator('.form').innerText()) ?? [];
+  assert.ok(Math.abs(Number(shown) - (await load()) / 1000) < 0.006);
+  await ready(page);
+  await page.getByRole('button', { name: /^Solve/ }).click();
+  await page.locator('field-map.main').waitFor();
+  const { jobs: [job] } = await service.ask('/v1/jobs?limit=1&label=track_cant_mm:150');
+  const { total: [{ force_z_n: force }] } = await service.ask(`/v1/jobs/${job.id}/result`);
+  await page.goBack();
+  assert.ok(Math.abs(-force - (await load())) < 300, "within the tolerance of the vertical force");
+  // Another kind of motion has no curve: the load is the static one again.
+  await page.getByRole('radio', { name: 'Creepages' }).check();
+  assert.deepEqual([await load(), (await json(page)).labels], [90_000, undefined]);
 }));
 
 test('the contact is solved on the curve of the rail or on planes, of a wheel and of a wheelset', () => onPage('', async (page) => {

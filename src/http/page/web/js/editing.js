@@ -1,6 +1,7 @@
 // What happens to the case that is being written: changes, checks while writing, the result while typing, solving.
 
 import { cancel, checkCase, examples as examplesOf, Refused, remove, result as resultOf, submit } from './api.js';
+import { withLoadOfCurve } from './curving.js';
 import { at, numberAt, pretty, put } from './document.js';
 import { hasFields, loadField } from './fields.js';
 import { formatRoute } from './routes.js';
@@ -64,8 +65,11 @@ export function editText(app, text) {
   take(app, document, text, unreadable);
 }
 
-/** @param {App} app @param {JsonObject} document */
-export const editDocument = (app, document) => take(app, document, pretty(document), '');
+/** A case that the form has changed. @param {App} app @param {JsonObject} document */
+export function editDocument(app, document) {
+  const loaded = withLoadOfCurve(app.store.get().compose.document, document);
+  take(app, loaded, pretty(loaded), '');
+}
 
 /**
  * @param {App} app
@@ -97,7 +101,7 @@ function openCase(app, name, document) {
   const ordered = inOrder(document);
   opened = pretty(ordered);
   app.compose({ example: name, files: {}, typing: null });
-  editDocument(app, ordered);
+  take(app, ordered, opened, '');
 }
 
 /** Is the case an example that nobody has changed? @param {import('./state.js').Compose} state */

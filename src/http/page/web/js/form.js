@@ -1,13 +1,14 @@
 // The form: fields for the common parts of a case, in engineers' units. Whatever it does not show stays in the JSON untouched.
 
 import { html, nothing } from '../vendor/lit-html.js';
+import { CANT, curving, GRAVITY_MM_PER_S2, labelsWithCant, normalLoad, staticLoad } from './curving.js';
 import { at, isObject, numberAt, put } from './document.js';
 import { change, editDocument } from './editing.js';
 import { fixed, number } from './format.js';
 import { contactFields } from './contactform.js';
 import { freeRolling, hasSections, ONE_MOTION, outputsOf, withContact, withEverything, withOutput, withoutExtras, withoutNameOf } from './starts.js';
 import { faultAt, field } from './field.js';
-import { parseRadius, radiusText } from './written.js';
+import { parse, parseRadius, radiusText, textOf } from './written.js';
 import { FIRST_HISTORY, historyFields } from './historyform.js';
 
 /** @typedef {import('./state.js').App} App */
@@ -30,9 +31,12 @@ function chooseContact(app, kind) {
   const { document, example, examples } = app.store.get().compose;
   const known = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (examples.find(({ name }) => name === example)?.case));
   app.compose({ example: '' });
-  const next = withContact(withoutNameOf(document ?? {}, known), kind);
+  const next = withContact(withoutCant(withoutNameOf(document ?? {}, known)), kind);
   editDocument(app, hasSections(kind) ? withEverything(next) : next);
 }
+
+/** A case without cant, as where no wheelset moves through a curve. @param {JsonObject} document */
+const withoutCant = (document) => put(document, '/labels', labelsWithCant(document, undefined));
 
 /** @param {App} app */
 export function caseForm(app) {
@@ -63,8 +67,20 @@ function loadField(app, type) {
   if (type === 'pressure_grid') return html`<p class="hint">The load is that of the given pressure.</p>`;
   if (at(document, '/load/approach_mm') !== undefined) return field(app, '/load/approach_mm', 'Penetration', 'μm', { factor: 0.001 });
   const vertical = at(document, '/load/vertical_force_n') !== undefined || (hasSections(type) && at(document, '/load/normal_force_n') === undefined);
+  const name = type === 'wheelset' ? 'Axle load' : 'Wheel load Q';
+  const curve = curving(document);
+  if (vertical && curve.cant) {
+    return field(app, '/load/vertical_force_n', `${name}, static`, 'kN', {
+      factor: 1000, format: (value) => (typeof value === 'number' ? textOf(staticLoad(document), 1000) : textOf(value)),
+      read: (text) => {
+        const load = parse(text, 1000);
+        return typeof load === 'number' ? normalLoad(load, curve) : load;
+      },
+      hint: `${fixed(numberAt(document, '/load/vertical_force_n') / 1000, 2)} kN normal to the track`,
+    });
+  }
   return vertical
-    ? field(app, '/load/vertical_force_n', type === 'wheelset' ? 'Axle load' : 'Wheel load Q', 'kN', { factor: 1000 })
+    ? field(app, '/load/vertical_force_n', name, 'kN', { factor: 1000 })
     : field(app, '/load/normal_force_n', 'Normal force N', 'kN', { factor: 1000 });
 }
 
@@ -125,10 +141,16 @@ function wheelFields(app, type) {
   const drive = (/** @type {JsonValue | undefined} */ next) => change(app, '/motion/wheelset', {
     ...given, speed_mm_per_s: next ?? null, ...(rate && speed && Number(next) > 0 ? { yaw_rate_rad_per_s: (rate * Number(next)) / speed } : {}),
   });
-  return html`<div class="pair">${field(app, '/motion/wheelset/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H, take: drive })}
+  const curve = curving(document);
+  return html`<div class="triple">${field(app, '/motion/wheelset/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H, take: drive })}
       ${field(app, '/motion/wheelset/yaw_rate_rad_per_s', 'Curve radius', 'm', {
-        empty: 'straight', format: (value) => radiusText(value, speed), read: (text) => parseRadius(text, speed), hint: curveNote(app, speed / rate),
+        empty: 'straight', format: (value) => radiusText(value, speed), read: (text) => parseRadius(text, speed), hint: '+ left, − right',
+      })}
+      ${field(app, `/labels/${CANT}`, 'Cant', 'mm', {
+        empty: '0', hint: curve.wrong ? `a number below ${number(curve.base)} is needed` : curve.balancing ? `${fixed(curve.balancing, 0)} mm balances` : '+ right rail up',
+        read: (text) => text.trim() || undefined, take: (cant) => change(app, '/labels', labelsWithCant(document, cant === undefined ? cant : String(cant))),
       })}</div>
+    ${curveNotes(document, speed / rate, curve).map((note) => html`<p class="hint">${note}</p>`)}
     <div class="pair"><div class="field"><label for="turning">Rotation</label><select id="turning" @change=${turn}>
         <option value="" ?selected=${free}>free, without torque</option>
         ${ways.map(({ member, label }) => html`<option value=${member} ?selected=${!free && member === way?.member}>${label}</option>`)}</select></div>
@@ -139,14 +161,25 @@ function wheelFields(app, type) {
     <p class="hint">${turningNote(app, way?.member, Boolean(free), numberAt(given, '/free_rolling_radius_mm'))}</p>`;
 }
 
-/** Half the distance of the two contacts of a wheelset on standard gauge, in mm. */
-const HALF_BASE_MM = 750;
-
-/** What a curve asks of a wheelset. @param {App} app @param {number} radius In mm. */
-function curveNote(app, radius) {
-  const wheel = numberAt(app.store.get().compose.document ?? undefined, '/contact/rolling_radius_mm');
-  const needed = Math.abs((2 * HALF_BASE_MM * wheel) / radius);
-  return Number.isFinite(needed) ? `to the ${radius > 0 ? 'left' : 'right'}; rolls without slip at Δr = ${number(needed, 2)} mm` : '+ to the left, − to the right';
+/**
+ * What a curve and its cant ask of a wheelset and its load.
+ * @param {JsonObject | null} document
+ * @param {number} radius In mm.
+ * @param {import('./curving.js').Curving} curve
+ * @returns {string[]}
+ */
+function curveNotes(document, radius, { base, cant, left, roll, balancing, lateral }) {
+  const needed = Math.abs((base * numberAt(document ?? undefined, '/contact/rolling_radius_mm')) / radius);
+  const rolling = Number.isFinite(needed) ? [`Curve to the ${left ? 'left' : 'right'}: a wheelset rolls without slip at Δr = ${number(needed, 2)} mm.`] : [];
+  if (!cant && !balancing) return rolling;
+  const short = balancing - cant;
+  const axle = staticLoad(document) * (at(document ?? undefined, '/contact/type') === 'wheelset' ? 1 : 2);
+  const force = Math.abs((axle * lateral) / GRAVITY_MM_PER_S2);
+  const toward = lateral > 0 === left ? 'right' : 'left';
+  const pushes = Number.isFinite(force) ? `; an axle pushes the rails to the ${toward} with ${fixed(force, 1)} kN` : '';
+  return [...rolling,
+    `${cant ? `The track rolls by ${fixed(1000 * roll, 1)} mrad. ` : ''}Cant ${short < 0 ? 'excess' : 'deficiency'} ${fixed(Math.abs(short), 0)} mm, unbalanced lateral acceleration ${fixed(Math.abs(lateral), 2)} m/s²${pushes}.`,
+    ...(cant ? ['Track and wheelset roll together; load that shifts from one wheel to the other is not included.'] : [])];
 }
 
 /** What the rotation of the wheel means for its longitudinal force. @param {App} app @param {string | undefined} member @param {boolean} free @param {number} radius */
@@ -182,7 +215,7 @@ function sweepFields(app, sweep) {
 /** Another kind of motion. Damage and temperature are those of steady rolling. @param {App} app @param {string} kind @param {string} type */
 function chooseMotion(app, kind, type) {
   const document = app.store.get().compose.document ?? {};
-  const next = put(document, '/motion', startMotion(kind, type, document.motion));
+  const next = put(kind === 'wheelset' ? document : withoutCant(document), '/motion', startMotion(kind, type, document.motion));
   editDocument(app, kind === 'history' ? withoutExtras(next) : next);
 }
 

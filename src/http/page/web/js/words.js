@@ -47,6 +47,7 @@ const WORDS = {
   '/motion/wheelset/free_rolling_radius_mm': ['free rolling radius', 'mm'],
   '/motion/wheelset/lateral_velocity_mm_per_s': ['lateral velocity', 'mm/s'],
   '/motion/wheelset/yaw_rate_rad_per_s': ['yaw rate', 'rad/s'],
+  '/labels/track_cant_mm': ['cant in mm'],
   '/motion/creepage_x': ['creepage x', '%', 0.01],
   '/motion/creepage_y': ['creepage y', '%', 0.01],
   '/motion/spin_per_mm': ['spin', '1/m', 0.001],
