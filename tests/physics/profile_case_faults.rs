@@ -49,6 +49,33 @@ fn a_sound_wheel_on_a_rail_is_accepted_without_being_solved() {
 }
 
 #[test]
+fn a_pair_that_cannot_be_placed_names_the_unit_of_a_profile_of_unusual_size() {
+    // A head of 7.3 by 2.5 mm ends above the height of the gauge.
+    let mut wheel = changed(RAIL, scaled(&rail_60e1(), 0.1));
+    let mut wheelset = wheel.clone();
+    let contact = wheelset["contact"].as_object_mut().unwrap();
+    contact.retain(|name, _| !["side", "roll_rad"].contains(&name.as_str()));
+    contact.insert("type".to_owned(), json!("wheelset"));
+    wheelset["load"] = json!({ "vertical_force_n": 150_000 });
+    wheelset["motion"] =
+        json!({ "wheelset": { "speed_mm_per_s": 20_000, "free_rolling_radius_mm": 460 } });
+    // Both in cm.
+    wheel["contact"]["wheel"]["points_mm"] = scaled(&s1002(), 0.1);
+    for case in [wheel, wheelset] {
+        let found = faults(&case);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].pointer, "/contact/rail", "{found:?}");
+        for words in [
+            "gauge_height_mm",
+            "rail: the profile is 7.",
+            "state unit: \"cm\"",
+        ] {
+            assert!(found[0].detail.contains(words), "{found:?}");
+        }
+    }
+}
+
+#[test]
 fn faults_of_both_cross_sections_and_of_the_rest_come_together() {
     let mut case = generated();
     case["contact"]["rail"]["points_mm"] = scaled(&rail_60e1(), 1e-3);

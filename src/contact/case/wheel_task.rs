@@ -41,8 +41,8 @@ pub(crate) fn task(
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
     let (geometry, flange_back) = wheel_rail(contact, known)?;
     if let Err(detail) = ContactLocus::new(&geometry) {
-        let detail = with_contradiction(detail, &geometry);
-        return Err(vec![fault("/contact".to_owned(), detail)]);
+        let faults = vec![fault("/contact".to_owned(), detail)];
+        return Err(with_reasons(faults, &reasons(geometry.profiles())));
     }
     let mut remarks = geometry.remarks();
     remarks.extend(flange_back);
@@ -127,29 +127,40 @@ fn loading(load: &Load) -> Option<WheelLoad> {
     }
 }
 
-/// The sentence, with the statements on the senses of the profiles that contradict their shapes.
-pub(crate) fn with_contradiction(detail: String, geometry: &WheelRail) -> String {
-    let remarks = geometry.profiles().map(|profile| &profile.remarks);
-    let contradicted = |remark: &Remark| match remark {
-        Remark::ProfileSenseContradicted {
-            profile,
-            member,
-            given,
-        } => Some(format!("{member}: {given} of the {profile}")),
-        _ => None,
-    };
-    let stated: Vec<String> = remarks
-        .into_iter()
-        .flatten()
-        .filter_map(contradicted)
-        .collect();
-    if stated.is_empty() {
-        return detail;
+/// Why a pair of profiles may not fit, each reason after a semicolon: the size of a profile in another unit, a stated sense that contradicts its
+/// shape. Empty for none.
+pub(crate) fn reasons(profiles: [&Profile; 2]) -> String {
+    let mut reasons = String::new();
+    let mut stated = Vec::new();
+    for remark in profiles.into_iter().flat_map(|profile| &profile.remarks) {
+        match remark {
+            Remark::ProfileSizeUnusual { .. } => {
+                reasons.push_str("; ");
+                reasons.push_str(&remark.clone().at_pointer("").detail);
+            }
+            Remark::ProfileSenseContradicted {
+                profile,
+                member,
+                given,
+            } => stated.push(format!("{member}: {given} of the {profile}")),
+            _ => {}
+        }
     }
-    format!(
-        "{detail}; {} contradicts the shape of the points, try the opposite or leave it out",
-        stated.join(", ")
-    )
+    if !stated.is_empty() {
+        let stated = stated.join(", ");
+        reasons.push_str(&format!(
+            "; {stated} contradicts the shape of the points, try the opposite or leave it out"
+        ));
+    }
+    reasons
+}
+
+/// Faults of a pair of profiles, each with its [`reasons`].
+pub(crate) fn with_reasons(mut faults: Vec<Fault>, reasons: &str) -> Vec<Fault> {
+    for fault in &mut faults {
+        fault.detail.push_str(reasons);
+    }
+    faults
 }
 
 /// Rail and wheel in place, with a remark on the back of the flange.
@@ -201,28 +212,27 @@ fn wheel_rail(
     let sections: [&CrossSection; 2] = [rail, wheel];
     let stated = *flange_back_position_mm;
     let back_of = |wheel: &Profile| {
-        flange_back::position(
-            wheel,
-            "/contact/wheel",
-            stated,
-            placement.flange_back_distance,
-        )
-        .map_err(|fault| vec![fault])
+        let distance = *flange_back_distance_mm;
+        flange_back::position(wheel, "/contact/wheel", stated, distance)
+            .map_err(|fault| vec![fault])
+    };
+    let checked = |profiles: [&Profile; 2]| {
+        let back = in_order(profiles).and_then(|()| back_of(profiles[1]));
+        back.map_err(|faults| with_reasons(faults, &reasons(profiles)))
     };
     if let Some(geometry) = known.placed(sections, stated, &placement) {
-        in_order(geometry.profiles())?;
-        let (_, remark) = back_of(geometry.profiles()[1])?;
+        let (_, remark) = checked(geometry.profiles())?;
         return Ok((geometry, remark));
     }
     let pointers = ["/contact/rail", "/contact/wheel"];
     let read = (profile(Body::Rail, rail), profile(Body::Wheel, wheel));
     let [rail, wheel] = both(read, pointers)?;
-    in_order([&rail, &wheel])?;
-    let (position, remark) = back_of(&wheel)?;
+    let (position, remark) = checked([&rail, &wheel])?;
+    let reasons = reasons([&rail, &wheel]);
     placement.flange_back_position = position;
     let geometry = WheelRail::new(rail, wheel, placement).map_err(|reason| {
         let pointers = ["/contact/rail", "/contact/rolling_radius_mm"];
-        vec![unplaced(reason, pointers)]
+        with_reasons(vec![unplaced(reason, pointers)], &reasons)
     })?;
     known.keep(sections, stated, &geometry);
     Ok((geometry, remark))

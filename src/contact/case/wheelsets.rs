@@ -6,7 +6,7 @@ use crate::contact::case::flange_back;
 use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::swept_values;
 use crate::contact::case::wheel_task::{
-    both, exchanged, moves, profile_at, unplaced, with_contradiction,
+    both, exchanged, moves, profile_at, reasons, unplaced, with_reasons,
 };
 use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing};
 use crate::contact::case::words::motion::{Combine, Motions, Swept};
@@ -221,8 +221,10 @@ fn in_place(
     else {
         unreachable!("only wheelsets have two sides")
     };
+    let reasons = reasons([&rail, &wheel]);
+    let explained = |faults| with_reasons(faults, &reasons);
     if !accept_rough_profiles {
-        exchanged([&rail, &wheel], pointers)?;
+        exchanged([&rail, &wheel], pointers).map_err(explained)?;
     }
     let (flange_back_position, remark) = flange_back::position(
         &wheel,
@@ -230,7 +232,7 @@ fn in_place(
         *flange_back_position_mm,
         *flange_back_distance_mm,
     )
-    .map_err(|fault| vec![fault])?;
+    .map_err(|fault| explained(vec![fault]))?;
     let own = right.as_ref().and_then(|right| right.rolling_radius_mm);
     let own = own.filter(|_| side == 1);
     let placement = Placement {
@@ -249,10 +251,9 @@ fn in_place(
         None => "/contact/rolling_radius_mm",
     };
     let geometry = WheelRail::new(rail, wheel, placement)
-        .map_err(|reason| vec![unplaced(reason, [pointers[0], radius])])?;
+        .map_err(|reason| explained(vec![unplaced(reason, [pointers[0], radius])]))?;
     if let Err(detail) = ContactLocus::new(&geometry) {
-        let detail = with_contradiction(detail, &geometry);
-        return Err(vec![Fault::new("/contact", detail)]);
+        return Err(explained(vec![Fault::new("/contact", detail)]));
     }
     Ok((geometry, remark))
 }
