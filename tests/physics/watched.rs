@@ -106,3 +106,53 @@ fn no_stage_leaves_the_caller_unasked_on_the_largest_inputs() {
         }
     }
 }
+
+/// The back of a flange beside the face of a guard rail, 41 mm from the gauge face and 20 mm higher than the running rail.
+fn beside_guard_rail() -> Value {
+    let text = include_str!("../../api/examples/wheel-rail.case.json");
+    let mut case: Value = serde_json::from_str(text).unwrap();
+    let face = -77.5;
+    let top = [-40.0, -32.0, -26.0, -20.0, -14.0].map(|y| [face + y, -20.0]);
+    let corner = (0..=20).map(|k| {
+        let (sin, cos) = (f64::from(k) * std::f64::consts::PI / 40.0).sin_cos();
+        [face - 8.0 + 8.0 * sin, -12.0 - 8.0 * cos]
+    });
+    let side = (1..=18).map(|k| [face, -12.0 + 2.0 * f64::from(k)]);
+    let groove = (0..=10).map(|k| [face + 1.0 + 3.9 * f64::from(k), 45.0]);
+    let mut points = vec![[face - 40.0, 30.0]];
+    points.extend(top);
+    points.extend(corner.chain(side));
+    points.push([face, 25.0]);
+    points.extend(groove);
+    points.push([-36.7, 28.0]);
+    let contact = case["contact"].as_object_mut().unwrap();
+    let rail = contact["rail"]["points_mm"].as_array().unwrap();
+    let points = points.into_iter().map(|point| json!(point));
+    contact["rail"]["points_mm"] = points.chain(rail.iter().cloned()).collect();
+    let mut wheel = contact["wheel"]["text"]
+        .as_str()
+        .unwrap()
+        .trim_end()
+        .to_owned();
+    for k in 0..24 {
+        let k = f64::from(k);
+        wheel.push_str(&format!("\n{:.3} {:.3}", -69.6 - 0.02 * k, 13.2 - k));
+    }
+    contact["wheel"]["text"] = json!(wheel);
+    contact.remove("gauge_mm");
+    contact.insert("rail_origin_mm".to_owned(), json!(753.5));
+    contact.insert("lateral_shift_mm".to_owned(), json!(4.4));
+    case
+}
+
+#[test]
+fn a_contact_that_outgrows_its_grids_is_given_up_on_the_first_of_them() {
+    let checked = check(&beside_guard_rail(), &Limits::default()).unwrap();
+    let monitor = Counting::new(None);
+    let answer = solve(&checked, &monitor);
+    assert!(
+        matches!(&answer, Err(SolveError::NormalProblem { reason }) if reason.contains("the end of a profile")),
+        "{answer:?}"
+    );
+    assert!(monitor.ticks.get() < 1000, "{}", monitor.ticks.get());
+}

@@ -116,6 +116,8 @@ pub(crate) struct CurveContact {
     pub(crate) work: NormalWork,
     /// Heights that were solved.
     pub(crate) heights: u32,
+    /// Was the height found before the heights were used up?
+    settled: bool,
     /// By which part the force is missed.
     pub(crate) missed: f64,
     /// The gap in mm that tractions open at each cell, where any do.
@@ -644,6 +646,14 @@ impl CurveTask<'_> {
                 found.opened = opened;
                 return Ok(found);
             };
+            // On a face that is nearly vertical, the contact outgrows every grid.
+            if !found.settled {
+                return Err(NormalError::NoAnswer(
+                    "the contact outgrows the surfaces on which it was looked for, and no height of the wheel carries its load there, as beside a \
+                     face that is nearly vertical"
+                        .to_owned(),
+                ));
+            }
             friction.opened = opened.map(|opened| grid.interpolated(&found.grid, &opened));
             start = Start {
                 runs: grid.runs_of(&found.grid, &found.runs),
@@ -746,9 +756,7 @@ impl CurveTask<'_> {
             if least >= 0.0 && wanted.is_none() {
                 return Err(NormalError::NoAnswer(no_touch(self.touch - centre, 0.0)));
             }
-            each_row(&mut pressure, &weights, |pressure, weight| {
-                pressure * weight
-            });
+            each_row(&mut pressure, &weights, |p, weight| p * weight);
             if pressure.iter().all(|p| *p == 0.0) {
                 let depth = (-least).max(self.expected);
                 pressure = first_pressure(&weighted, depth, grid.area(), self.elasticity);
@@ -762,9 +770,7 @@ impl CurveTask<'_> {
             let found = solve_pressure(&task, &influence, pressure, workspace, monitor)?;
             iterations += found.iterations;
             pressure = found.pressure;
-            each_row(&mut pressure, &weights, |pressure, weight| {
-                pressure / weight
-            });
+            each_row(&mut pressure, &weights, |p, weight| p / weight);
             centre -= found.approach;
             let depth = found.approach - least;
             let carried = carried(self.loading, &grid, &pressure);
@@ -772,7 +778,8 @@ impl CurveTask<'_> {
             let off = over.lift_off(&pressure, &weights) * found.approach.abs();
             let is_linear = (over.centre - centre).abs() <= LINEAR * depth;
             let ends = height + 1 == HEIGHTS_MAX;
-            if ends || is_linear && off <= tolerance * depth && missed.abs() <= FORCE {
+            let settled = is_linear && off <= tolerance * depth && missed.abs() <= FORCE;
+            if ends || settled {
                 if missed.abs() > FORCE_POOR {
                     return Err(load_missed(missed));
                 }
@@ -796,6 +803,7 @@ impl CurveTask<'_> {
                     pressure,
                     runs,
                     heights,
+                    settled,
                     missed: missed.abs(),
                     over,
                 });
