@@ -89,6 +89,12 @@ impl FaultCode {
 #[error("the case has {} fault(s): {}", .0.len(), .0.iter().map(|f| format!("{}: {}", f.pointer, f.detail)).collect::<Vec<_>>().join("; "))]
 pub struct CaseError(pub Vec<Fault>);
 
+impl From<Fault> for CaseError {
+    fn from(fault: Fault) -> CaseError {
+        CaseError(vec![fault])
+    }
+}
+
 /// Why a solve gave no answer.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SolveError {

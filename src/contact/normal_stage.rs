@@ -50,7 +50,7 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprin
             let mut found = solve_gap(case, task, fineness, 0.0, workspace, monitor)?;
             found.coupling_error = first_order_error;
             found.report = found.report.map(|report| NormalReport {
-                seconds: (monitor.elapsed() - began).as_secs_f64(),
+                seconds: monitor.elapsed().saturating_sub(began).as_secs_f64(),
                 ..report
             });
             Ok(found)

@@ -167,7 +167,7 @@ impl UnlikeGap {
         if self.without.remarks.contains(&rough) {
             solved.remarks.push(rough);
         }
-        let mut seconds = (watch.elapsed() - began).as_secs_f64();
+        let mut seconds = watch.elapsed().saturating_sub(began).as_secs_f64();
         if neighbour.is_none() {
             seconds += self.without.report.map_or(0.0, |report| report.seconds);
         }

@@ -7,8 +7,8 @@ use bytes::Bytes;
 use serde_json::Value;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::error::{CaseError, Fault};
-use crate::contact::evolution::task::Evolution;
+use crate::contact::error::CaseError;
+use crate::contact::evolution::task::{Evolution, located};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
@@ -72,33 +72,24 @@ impl Jobs {
         options: SubmitOptions,
     ) -> Result<(Job, bool), JobsError> {
         if let Some(template) = request.get_mut("template") {
-            *template = self
-                .with_profiles(template.take())
-                .await
-                .map_err(in_template)?;
+            let filled = self.with_profiles(template.take()).await;
+            *template = filled.map_err(|error| match error {
+                JobsError::Case(faults) => located(faults, &[], 0).into(),
+                error => error,
+            })?;
         }
         let check = move |jobs: &Jobs, request: &Value| {
             let task = Evolution::check(request, &jobs.shared.options.limits)?;
-            let id = jobs.shared.new_id();
             let seconds = task.expected_seconds();
             Ok(NewJob {
-                id,
-                tenant: jobs.tenant.clone(),
                 kind: Kind::Evolution,
-                created_at: created_at(id),
                 method: Kind::Evolution.name().to_owned(),
                 outputs: outputs_text(&[]),
                 cost_us: microseconds(seconds),
                 slice_us: microseconds(seconds / f64::from(task.plan.records)),
-                cache_key: None,
-                source: None,
-                body: Bytes::new(),
-                row: false,
-                idempotency: None,
-                traceparent: None,
-                options: SubmitOptions::default(),
                 name,
                 labels,
+                ..jobs.blank_job()
             })
         };
         self.submit_work(request, false, check, idempotency_key, options)
@@ -197,25 +188,27 @@ impl Jobs {
 
     /// A checked case as a job about to be queued.
     fn new_job(&self, checked: CheckedCase, body: Bytes) -> NewJob {
-        let id = self.shared.new_id();
         NewJob {
-            id,
-            tenant: self.tenant.clone(),
-            kind: Kind::Case,
-            created_at: created_at(id),
             method: checked.run.method.name().to_owned(),
             outputs: outputs_text(&checked.run.outputs),
             cost_us: cost_us(&checked),
             slice_us: self.slice_us(&checked),
             cache_key: self.cache_key(&checked.label.digest),
-            source: None,
             body,
-            row: false,
-            idempotency: None,
-            traceparent: None,
-            options: SubmitOptions::default(),
             name: checked.label.name,
             labels: checked.label.labels,
+            ..self.blank_job()
+        }
+    }
+
+    /// A job about to be queued without anything to do.
+    pub(crate) fn blank_job(&self) -> NewJob {
+        let id = self.shared.new_id();
+        NewJob {
+            id,
+            tenant: self.tenant.clone(),
+            created_at: created_at(id),
+            ..NewJob::default()
         }
     }
 
@@ -260,20 +253,6 @@ impl Jobs {
             Enqueued::Conflict => Err(JobsError::IdempotencyConflict),
             Enqueued::Refused(refusal) => Err(self.refused(refusal)),
         }
-    }
-}
-
-/// The same faults, of the template of an evolution.
-fn in_template(error: JobsError) -> JobsError {
-    match error {
-        JobsError::Case(CaseError(faults)) => {
-            let moved = faults.into_iter().map(|fault| Fault {
-                pointer: format!("/template{}", fault.pointer),
-                ..fault
-            });
-            CaseError(moved.collect()).into()
-        }
-        error => error,
     }
 }
 

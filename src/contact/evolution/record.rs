@@ -36,33 +36,33 @@ pub(crate) fn record(
     state: &EvolutionState,
     now: &Evaluation,
 ) -> EvolutionRecord {
-    let traffic = state
-        .traffic
-        .as_ref()
-        .map_or([0.0; 2], |traffic| traffic.error);
+    let [rail, wheel] = [0, 1].map(|k| with_uncertainty(task, state, k));
     EvolutionRecord {
         progress: task.progress(state.share),
         events_done: state.events_done,
-        losses: losses(state),
-        conicity: conicity(task, state),
+        losses: losses(&state.bodies),
+        conicity: conicity(task, &state.bodies),
         contact: range(&now.states),
         states: now.states.clone(),
-        rail: with_uncertainty(task, &state.rail, traffic[0]),
-        wheel: with_uncertainty(task, &state.wheel, traffic[1]),
+        rail,
+        wheel,
     }
 }
 
-fn with_uncertainty(task: &Evolution, body: &BodyState, states: f64) -> WornBody {
+fn with_uncertainty(task: &Evolution, state: &EvolutionState, k: usize) -> WornBody {
+    let body = &state.bodies[k];
     let worn = body.worn.worn_area_mm2;
     let over = |area: f64| if worn > 0.0 { area / worn } else { 0.0 };
-    let changed = body
-        .step_change_mm
-        .iter()
-        .zip(lengths(&body.worn.points_mm));
+    let lengths = lengths(&body.worn.points_mm);
+    let changed = body.step_change_mm.iter().zip(lengths);
     WornBody {
         uncertainty: WearUncertainty {
             steps: over(changed.map(|(depth, length)| depth.abs() * length).sum()),
-            states: if worn > 0.0 { states } else { 0.0 },
+            states: if worn > 0.0 {
+                state.traffic.error[k]
+            } else {
+                0.0
+            },
             contact: over(body.contact_mm2),
             coefficients: coefficients(task, &body.regimes_mm2),
         },
@@ -93,8 +93,8 @@ fn coefficients(task: &Evolution, areas: &[f64; 3]) -> [f64; 2] {
     [0.05, 0.95].map(|share| samples[(share * f64::from(SAMPLES - 1)).round() as usize])
 }
 
-fn losses(state: &EvolutionState) -> WearLosses {
-    let [rail, wheel] = [&state.rail, &state.wheel];
+fn losses(bodies: &[BodyState; 2]) -> WearLosses {
+    let [rail, wheel] = bodies;
     let loss = |body: &BodyState, from: [f64; 2], direction: [f64; 2]| {
         let now = distance(&body.worn.points_mm, from, direction);
         Some(now? - distance(&body.start_mm, from, direction)?)
@@ -103,24 +103,30 @@ fn losses(state: &EvolutionState) -> WearLosses {
     let top = heights.fold(f64::INFINITY, f64::min);
     let gauge = [-1e3, top + GAUGE_DEPTH];
     let face = distance(&rail.start_mm, gauge, [1.0, 0.0]);
-    let tread = distance(&wheel.start_mm, [0.0, 1e3], [0.0, -1.0]);
-    WearLosses::from([
-        loss(rail, [0.0, top - 1e3], [0.0, 1.0]),
-        loss(rail, gauge, [1.0, 0.0]),
-        face.and_then(|face| loss(rail, [face - 1e3, top], [FRAC_1_SQRT_2; 2])),
-        loss(wheel, [0.0, 1e3], [0.0, -1.0]),
-        tread.and_then(|off| loss(wheel, [0.0, 1e3 - off + FLANGE_DEPTH], [-1.0, 0.0])),
-    ])
+    let below = [0.0, 1e3];
+    let tread = distance(&wheel.start_mm, below, [0.0, -1.0]);
+    WearLosses {
+        height_mm: loss(rail, [0.0, top - 1e3], [0.0, 1.0]),
+        gauge_face_mm: loss(rail, gauge, [1.0, 0.0]),
+        gauge_corner_mm: face.and_then(|y| loss(rail, [y - 1e3, top], [FRAC_1_SQRT_2; 2])),
+        tread_mm: loss(wheel, below, [0.0, -1.0]),
+        flange_mm: tread.and_then(|off| loss(wheel, [0.0, 1e3 - off + FLANGE_DEPTH], [-1.0, 0.0])),
+    }
 }
 
-fn conicity(task: &Evolution, state: &EvolutionState) -> Option<f64> {
-    let reading = Reading {
-        mirror_y: Some(false),
-        mirror_z: Some(false),
-        smoothing: 0.0,
+fn conicity(task: &Evolution, bodies: &[BodyState; 2]) -> Option<f64> {
+    let profile = |body: Body, own: &BodyState| {
+        let reading = Reading {
+            mirror_y: Some(false),
+            mirror_z: Some(false),
+            smoothing: 0.0,
+        };
+        Profile::new(body, &own.worn.points_mm, reading).ok()
     };
-    let rail = Profile::new(Body::Rail, &state.rail.worn.points_mm, reading).ok()?;
-    let wheel = Profile::new(Body::Wheel, &state.wheel.worn.points_mm, reading).ok()?;
+    let (rail, wheel) = (
+        profile(Body::Rail, &bodies[0])?,
+        profile(Body::Wheel, &bodies[1])?,
+    );
     let placement = Placement {
         rail: RailPlace::Origin(task.geometry.rail_origin()),
         ..task.geometry.placement
@@ -155,11 +161,8 @@ fn range(states: &[StateContact]) -> ContactRange {
             range.unsolved_share += state.share;
             continue;
         }
-        let pressure = state
-            .patches
-            .iter()
-            .map(|patch| patch.pressure_max_mpa)
-            .fold(0.0, f64::max);
+        let pressures = state.patches.iter().map(|patch| patch.pressure_max_mpa);
+        let pressure = pressures.fold(0.0, f64::max);
         range.pressure_max_mpa = range.pressure_max_mpa.max(pressure);
         range.y_over_q_max = range.y_over_q_max.max(state.y_over_q);
         range.pressure_mean_mpa += state.share * pressure;
@@ -182,7 +185,7 @@ impl Evolution {
     pub fn answer(&self, state: &EvolutionState, records: Vec<EvolutionRecord>) -> EvolutionAnswer {
         EvolutionAnswer {
             limits: self.limits_reached(&records),
-            traffic: state.traffic.clone().unwrap_or_default(),
+            traffic: state.traffic.clone(),
             steps: state.steps,
             steps_rejected: state.rejected,
             solves: state.solves,
@@ -197,17 +200,11 @@ impl Evolution {
             let all = records.iter().map(|record| of(&record.contact));
             all.fold(0.0, f64::max)
         };
-        let (largest_mpa, hardness_mpa) =
-            (largest(|c| c.pressure_max_mpa), self.figures.hardness_mpa);
+        let largest_mpa = largest(|c| c.pressure_max_mpa);
+        let hardness_mpa = self.figures.hardness_mpa;
         let unsolved_share = largest(|c| c.unsolved_share);
-        let traffic = state
-            .traffic
-            .as_ref()
-            .map_or([0.0; 2], |traffic| traffic.error);
-        let (traffic_error, tolerance_asked) = (
-            traffic[0].max(traffic[1]),
-            self.plan.accuracy.states_tolerance,
-        );
+        let traffic_error = state.traffic.error[0].max(state.traffic.error[1]);
+        let tolerance_asked = self.plan.accuracy.states_tolerance;
         let factor = self.plan.coefficient_factor;
         let found = [
             (self.plan.wear_model != DamageModel::ArchardWear)
@@ -226,32 +223,30 @@ impl Evolution {
     }
 
     fn limits_reached(&self, records: &[EvolutionRecord]) -> Vec<LimitReached> {
-        let limits = self.plan.limits.values().into_iter().enumerate();
-        let reached = limits.filter_map(|(k, limit)| {
+        let limits = self.plan.limits.named().into_iter().enumerate();
+        let reached = limits.filter_map(|(k, (name, limit))| {
             let limit_mm = limit?;
             let at = |factor: &dyn Fn(&WearUncertainty) -> f64| {
                 // Between two records at one time maintenance removes material, whose depth is not uncertain.
                 let (mut machined, mut last) = (0.0, None);
                 let losses = records.iter().filter_map(|record| {
                     let body = if k < 3 { &record.rail } else { &record.wheel };
-                    let loss = record.losses.values()[k]?;
-                    let share = record.progress.share;
+                    let (_, loss) = record.losses.named()[k];
+                    let (share, loss) = (record.progress.share, loss?);
                     if let Some((at, before)) = last.replace((share, loss))
                         && at == share
                     {
                         machined += loss - before;
                     }
-                    Some([
-                        share,
-                        machined + (loss - machined) * factor(&body.uncertainty),
-                    ])
+                    let worn = (loss - machined) * factor(&body.uncertainty);
+                    Some([share, machined + worn])
                 });
                 let losses: Vec<[f64; 2]> = losses.collect();
                 crossing(&losses, limit_mm).map(|share| self.progress(share))
             };
             let open = |own: &WearUncertainty| own.steps.hypot(own.states).hypot(own.contact);
             Some(LimitReached {
-                loss: WearLosses::NAMES[k].to_owned(),
+                loss: name.to_owned(),
                 limit_mm,
                 reached: at(&|_| 1.0),
                 earliest: at(&|own| own.coefficients[1] * (1.0 + open(own))),

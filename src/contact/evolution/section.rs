@@ -5,16 +5,15 @@
 
 use crate::contact::geometry::profile::{Body, Profile};
 
-/// Points along the curve of a profile, at most `spacing` mm apart.
+/// Distance of the points of the sections in mm: a twentieth of a narrow patch, and what measured sections have at the gauge corner.
+pub const SPACING: f64 = 0.25;
+
+/// Points along the curve of a profile, at most [`SPACING`] apart.
 #[must_use]
-pub fn sampled(profile: &Profile, spacing: f64) -> Vec<[f64; 2]> {
-    let places = profile.parameters(spacing).into_iter();
-    places
-        .map(|s| {
-            let [y, z] = profile.at(s).at;
-            [y, -z]
-        })
-        .collect()
+pub fn sampled(profile: &Profile) -> Vec<[f64; 2]> {
+    let places = profile.parameters(SPACING).into_iter();
+    let points = places.map(|s| profile.at(s).at);
+    points.map(|[y, z]| [y, -z]).collect()
 }
 
 /// Length of the section from the first point to each.
@@ -38,18 +37,29 @@ pub fn lengths(points: &[[f64; 2]]) -> Vec<f64> {
         .collect()
 }
 
-/// Unit normals into the body.
-fn normals(body: Body, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let sign = match body {
+/// Adds values times a factor.
+pub(crate) fn add(to: &mut [f64], factor: f64, from: &[f64]) {
+    to.iter_mut()
+        .zip(from)
+        .for_each(|(to, from)| *to += factor * from);
+}
+
+/// Sign of z into the body.
+fn inward(body: Body) -> f64 {
+    match body {
         Body::Rail => 1.0,
         Body::Wheel => -1.0,
-    };
+    }
+}
+
+/// Unit normals into the body.
+fn normals(body: Body, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let last = points.len() - 1;
     (0..=last)
         .map(|k| {
             let (before, after) = (points[k.saturating_sub(1)], points[(k + 1).min(last)]);
             let [y, z] = [after[0] - before[0], after[1] - before[1]];
-            let length = sign * y.hypot(z);
+            let length = inward(body) * y.hypot(z);
             [-z / length, y / length]
         })
         .collect()
@@ -58,34 +68,22 @@ fn normals(body: Body, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 /// Area between a section and a later one with as many points, positive where material is gone.
 #[must_use]
 pub fn area_between(body: Body, before: &[[f64; 2]], after: &[[f64; 2]]) -> f64 {
-    let sign = match body {
-        Body::Rail => 1.0,
-        Body::Wheel => -1.0,
-    };
     let outline = before.iter().chain(after.iter().rev());
     let next = outline.clone().skip(1).chain(before.first());
     let twice: f64 = outline
         .zip(next)
         .map(|(a, b)| a[0] * b[1] - b[0] * a[1])
         .sum();
-    sign * 0.5 * twice
+    inward(body) * 0.5 * twice
 }
 
-/// A section that has lost an area, in mm² for each point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Moved {
-    /// The points.
-    pub points: Vec<[f64; 2]>,
-    /// How far each moved into the body, in mm.
-    pub depth: Vec<f64>,
-}
-
-/// Moves points along their normals by so much that the section loses the sum of `areas`.
+/// Moves points along their normals by so much that the section loses the sum of `areas`, in mm² for each point. Returns the points and how far
+/// each moved into the body, in mm.
 ///
 /// A convex section is shorter below its surface, so that the depths are larger than areas over lengths, by half of the depth times the
 /// curvature; the factor is found from the outlines.
 #[must_use]
-pub fn moved(body: Body, points: &[[f64; 2]], areas: &[f64]) -> Moved {
+pub fn moved(body: Body, points: &[[f64; 2]], areas: &[f64]) -> (Vec<[f64; 2]>, Vec<f64>) {
     let wanted: f64 = areas.iter().sum();
     let (normals, lengths) = (normals(body, points), lengths(points));
     let depths = areas
@@ -107,18 +105,14 @@ pub fn moved(body: Body, points: &[[f64; 2]], areas: &[f64]) -> Moved {
             after = by(&depth);
         }
     }
-    Moved {
-        points: after,
-        depth,
-    }
+    (after, depth)
 }
 
-/// Spreads areas along the section by a kernel of this standard deviation in mm, `spacing` being the usual distance of the points; their sum is
-/// kept.
+/// Spreads areas along the section by a kernel of this standard deviation in mm; their sum is kept.
 #[must_use]
-pub fn smoothed(areas: &[f64], spacing: f64, deviation: f64) -> Vec<f64> {
-    // One pass of ¼, ½, ¼ has the variance spacing²/2; a pass with a smaller share makes up the rest.
-    let passes = 2.0 * (deviation / spacing).powi(2);
+pub fn smoothed(areas: &[f64], deviation: f64) -> Vec<f64> {
+    // One pass of ¼, ½, ¼ has half the square of the spacing as its variance; a pass with a smaller share makes up the rest.
+    let passes = 2.0 * (deviation / SPACING).powi(2);
     let mut areas = areas.to_vec();
     for k in 0..passes.ceil() as usize {
         let share = 0.25 * (passes - k as f64).min(1.0);
@@ -140,10 +134,7 @@ const CUT_MAX: f64 = 20.0;
 /// That distance is measured where the present section is less steep than 70°. Every point that is then outside is cut along its normal.
 #[must_use]
 pub fn machined(body: Body, points: &[[f64; 2]], target: &[[f64; 2]], depth: f64) -> Vec<[f64; 2]> {
-    let sign = match body {
-        Body::Rail => 1.0,
-        Body::Wheel => -1.0,
-    };
+    let sign = inward(body);
     let normals = normals(body, points);
     let steep = 70_f64.to_radians().cos();
     let flat = points
@@ -217,8 +208,8 @@ mod tests {
             let points: Vec<[f64; 2]> =
                 arc(30.0, 400).iter().map(|[y, z]| [*y, sign * z]).collect();
             let areas: Vec<f64> = lengths(&points).iter().map(|length| 0.5 * length).collect();
-            let after = moved(body, &points, &areas);
-            let radii = after.points.iter().map(|[y, z]| y.hypot(z - sign * 30.0));
+            let (after, _) = moved(body, &points, &areas);
+            let radii = after.iter().map(|[y, z]| y.hypot(z - sign * 30.0));
             let (least, most) = radii.fold((f64::INFINITY, 0.0_f64), |(least, most), radius| {
                 (least.min(radius), most.max(radius))
             });
@@ -227,7 +218,7 @@ mod tests {
                 "{least} {most}"
             );
             let wanted: f64 = areas.iter().sum();
-            let lost = area_between(body, &points, &after.points);
+            let lost = area_between(body, &points, &after);
             assert!((lost / wanted - 1.0).abs() < 1e-5, "{lost} {wanted}");
         }
     }
@@ -236,7 +227,7 @@ mod tests {
     fn smoothing_keeps_the_area_and_has_the_variance_it_says() {
         let mut areas = vec![0.0; 101];
         areas[50] = 2.0;
-        let spread = smoothed(&areas, 0.25, 0.6);
+        let spread = smoothed(&areas, 0.6);
         let sum: f64 = spread.iter().sum();
         let variance = |(k, area): (usize, &f64)| area * (0.25 * (k as f64 - 50.0)).powi(2);
         let variance: f64 = spread.iter().enumerate().map(variance).sum();

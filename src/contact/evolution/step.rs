@@ -8,24 +8,22 @@
 //! Explicit steps stay stable where the wear of a step is smoothed over a length of about a tenth of what E* over the pressure makes of its
 //! depth; the defaults of `smoothing_mm` and `step_depth_mm` belong together.
 
-use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::Duration;
 
 use crate::contact::error::SolveError;
-use crate::contact::evolution::pass::{BodyWear, Evaluation, Pass, Sections, pass};
+use crate::contact::evolution::pass::{BodyWear, Evaluation, Pass, pass};
 use crate::contact::evolution::record::record;
 use crate::contact::evolution::section::{
-    area_between, distance, lengths, machined, moved, smoothed,
+    add, area_between, distance, lengths, machined, moved, smoothed,
 };
-use crate::contact::evolution::task::{Evolution, SPACING, SolveContext};
+use crate::contact::evolution::task::{Evolution, Sections, SolveContext};
 use crate::contact::evolution::traffic::condensed;
 use crate::contact::geometry::profile::Body;
-use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::solution::words::evolution::{
-    BodyState, CondensedTraffic, EvolutionRecord, EvolutionState, StateContact, WornBody,
+    BodyState, EvolutionRecord, EvolutionState, StateContact, WornBody,
 };
 
 /// Two shares of the extent that differ by less are one.
@@ -40,44 +38,23 @@ const UNSOLVED: f64 = 0.1;
 const STACK_BYTES: usize = 16 << 20;
 const BODIES: [Body; 2] = [Body::Rail, Body::Wheel];
 
-/// The monitor of a step for several threads: its progress is that of the evolution, and its time never runs back.
-struct StepMonitor<'a> {
-    inner: &'a (dyn Monitor + Sync),
-    share: f64,
-    nanoseconds: AtomicU64,
-}
-
-impl Monitor for StepMonitor<'_> {
-    fn tick(&self, _: f64) -> ControlFlow<Stop> {
-        self.inner.tick(self.share)
-    }
-
-    fn elapsed(&self) -> Duration {
-        let now = self.inner.elapsed().as_nanos() as u64;
-        let latest = self.nanoseconds.fetch_max(now, Ordering::AcqRel);
-        Duration::from_nanos(latest.max(now))
-    }
-}
-
 impl Evolution {
     /// An evolution before its first step.
     #[must_use]
     pub fn begin(&self) -> EvolutionState {
-        let [rail, wheel] = self.start().map(|start| BodyState {
-            worn: WornBody {
-                depth_mm: vec![0.0; start.len()],
-                damage: vec![0.0; start.len()],
-                points_mm: start.clone(),
-                ..WornBody::default()
-            },
-            step_change_mm: vec![0.0; start.len()],
-            start_mm: start,
-            ..BodyState::default()
-        });
         EvolutionState {
             next: 1.0 / f64::from(self.plan.records),
-            rail,
-            wheel,
+            bodies: self.start().map(|start| BodyState {
+                worn: WornBody {
+                    depth_mm: vec![0.0; start.len()],
+                    damage: vec![0.0; start.len()],
+                    points_mm: start.clone(),
+                    ..WornBody::default()
+                },
+                step_change_mm: vec![0.0; start.len()],
+                start_mm: start,
+                ..BodyState::default()
+            }),
             ..EvolutionState::default()
         }
     }
@@ -91,7 +68,7 @@ impl Evolution {
     /// The event that is due.
     fn due(&self, state: &EvolutionState) -> Option<usize> {
         let next = state.events_done as usize;
-        (next < self.plan.events.len() && self.share_of_event(next) <= state.share + SAME)
+        (next < self.events.len() && self.share_of_event(next) <= state.share + SAME)
             .then_some(next)
     }
 
@@ -105,31 +82,23 @@ impl Evolution {
         before: &EvolutionState,
         monitor: &(dyn Monitor + Sync),
     ) -> Result<(EvolutionState, Option<EvolutionRecord>), SolveError> {
-        let monitor = &StepMonitor {
-            inner: monitor,
+        let solver = Solver {
+            task: self,
+            context,
+            monitor,
             share: before.share,
-            nanoseconds: AtomicU64::new(0),
         };
         let mut state = before.clone();
-        let Some(traffic) = &before.traffic else {
-            let on = sections([&before.rail, &before.wheel], before.friction, 0.0);
-            let mut solves = 0;
-            let mut solve = |states: &[&[f64]]| {
-                solves += states.len() as u32;
-                self.passes(context, on, states, monitor)
-            };
-            state.traffic = Some(condensed(self, &mut solve)?);
-            state.solves = solves;
+        if before.traffic.states.is_empty() {
+            let on = sections(&before.bodies, before.friction, 0.0);
+            state.traffic = condensed(self, &mut |states| {
+                state.solves += states.len() as u32;
+                solver.passes(on, states)
+            })?;
             return Ok((state, None));
-        };
-        let now = self.evaluate(
-            context,
-            traffic,
-            [&before.rail, &before.wheel],
-            before,
-            monitor,
-        )?;
-        state.solves += traffic.states.len() as u32;
+        }
+        let now = solver.evaluate(before, &before.bodies)?;
+        state.solves += now.states.len() as u32;
         state.wheel_y = touched(&now.states, &before.wheel_y);
         let found = (!before.recorded).then(|| record(self, before, &now));
         state.recorded = true;
@@ -138,50 +107,67 @@ impl Evolution {
                 self.happen(event, &mut state);
             }
             state.recorded = false;
-            return Ok((state, found));
-        }
-        if state.share < 1.0 {
-            self.advance(context, before, &now, &mut state, monitor)?;
+        } else if state.share < 1.0 {
+            self.advance(&solver, &now, &mut state)?;
         }
         Ok((state, found))
     }
 
-    /// Advances the sections by a step from `before`.
-    fn advance(
+    /// Takes steps until there is a record, all is done or `most` are taken. Returns the state after them, and the record.
+    ///
+    /// # Errors
+    /// As [`Evolution::step`].
+    pub fn steps(
         &self,
         context: &SolveContext,
-        before: &EvolutionState,
+        mut state: EvolutionState,
+        most: u32,
+        monitor: &(dyn Monitor + Sync),
+    ) -> Result<(EvolutionState, Option<EvolutionRecord>), SolveError> {
+        let mut found = None;
+        for _ in 0..most {
+            (state, found) = self.step(context, &state, monitor)?;
+            if found.is_some() || self.is_over(&state) {
+                break;
+            }
+        }
+        Ok((state, found))
+    }
+
+    /// Advances the sections by a step.
+    fn advance(
+        &self,
+        solver: &Solver,
         now: &Evaluation,
         state: &mut EvolutionState,
-        monitor: &(dyn Monitor + Sync),
     ) -> Result<(), SolveError> {
-        let accuracy = &self.plan.accuracy;
-        let traffic = before.traffic.clone().unwrap_or_default();
-        if before.steps >= accuracy.steps_max {
+        let (accuracy, begin) = (&self.plan.accuracy, state.share);
+        if state.steps >= accuracy.steps_max {
             let reason = format!(
                 "after {} steps {:.1} % of the extent are done; raise accuracy.steps_max or accuracy.step_depth_mm, or shorten the extent",
-                before.steps,
-                100.0 * before.share
+                state.steps,
+                100.0 * begin
             );
             return Err(SolveError::NormalProblem { reason });
         }
-        let bodies = [&before.rail, &before.wheel];
+        let bodies = state.bodies.clone();
         let deepest = [0, 1].map(|k| deepest(&bodies[k].worn.points_mm, &now.wear[k].area));
         let allowed = accuracy.step_depth_mm / deepest[0].max(deepest[1]).max(f64::MIN_POSITIVE);
-        let stop = self.next_stop(before.share);
-        let mut length = before.next.min(allowed).max(SHORTEST);
+        let stop = self.next_stop(begin);
+        let left = stop - begin;
+        let mut length = state.next.min(allowed).max(SHORTEST);
         for attempt in 1..=ATTEMPTS {
-            let left = stop - before.share;
             // Not to end just before the stop.
-            let step = if length > 0.6 * left {
-                left.min(if length >= left { left } else { 0.5 * left })
+            let step = if length >= left {
+                left
+            } else if length > 0.6 * left {
+                0.5 * left
             } else {
                 length
             };
-            let half = [0, 1].map(|k| moved_body(BODIES[k], bodies[k], &now.wear[k], 0.5 * step));
-            let middle = [&half[0], &half[1]];
-            let then = self.evaluate(context, &traffic, middle, state, monitor)?;
-            state.solves += traffic.states.len() as u32;
+            let half = [0, 1].map(|k| moved_body(BODIES[k], &bodies[k], &now.wear[k], 0.5 * step));
+            let then = solver.evaluate(state, &half)?;
+            state.solves += then.states.len() as u32;
             let changes = [0, 1].map(|k| change(&now.wear[k].area, &then.wear[k].area));
             let error = 0.5 * changes[0].max(changes[1]);
             let better = (0.8 * accuracy.step_tolerance / error.max(1e-6)).clamp(0.4, 2.0);
@@ -190,23 +176,21 @@ impl Evolution {
                 length = step * better.min(0.7);
                 continue;
             }
-            let [rail, wheel] = [0, 1].map(|k| {
-                let mut body = moved_body(BODIES[k], bodies[k], &then.wear[k], step);
+            state.bodies = [0, 1].map(|k| {
+                let mut body = moved_body(BODIES[k], &bodies[k], &then.wear[k], step);
                 let lengths = lengths(&body.worn.points_mm);
                 for (i, sum) in body.step_change_mm.iter_mut().enumerate() {
                     *sum += 0.5 * step * (then.wear[k].area[i] - now.wear[k].area[i]) / lengths[i];
                 }
                 body
             });
-            (state.rail, state.wheel) = (rail, wheel);
             state.steps += 1;
             state.wheel_y = touched(&then.states, &state.wheel_y);
-            state.next = if step < length {
-                length.max(step * better)
-            } else {
-                step * better
+            state.next = match step < length {
+                true => length.max(step * better),
+                false => step * better,
             };
-            state.share = before.share + step;
+            state.share = begin + step;
             if (stop - state.share).abs() < SAME {
                 state.share = stop;
                 state.recorded = false;
@@ -220,99 +204,14 @@ impl Evolution {
     fn next_stop(&self, share: f64) -> f64 {
         let records = f64::from(self.plan.records);
         let record = ((share + SAME) * records).floor() + 1.0;
-        let events = (0..self.plan.events.len()).map(|k| self.share_of_event(k));
+        let events = (0..self.events.len()).map(|k| self.share_of_event(k));
         let events = events.filter(|at| *at > share + SAME);
         events.fold((record / records).min(1.0), f64::min)
     }
 
-    /// The wear of all states on sections, over the extent and smoothed.
-    fn evaluate(
-        &self,
-        context: &SolveContext,
-        traffic: &CondensedTraffic,
-        bodies: [&BodyState; 2],
-        of: &EvolutionState,
-        monitor: &(dyn Monitor + Sync),
-    ) -> Result<Evaluation, SolveError> {
-        let radius = radius_change(traffic, bodies[1], &of.wheel_y);
-        let on = sections(bodies, of.friction, radius);
-        let mut wear = on.points.map(|points| BodyWear::none(points.len()));
-        let mut states = Vec::with_capacity(traffic.states.len());
-        let values: Vec<&[f64]> = traffic.states.iter().map(|state| &*state.values).collect();
-        let passes = self.passes(context, on, &values, monitor)?;
-        for (state, Pass { wear: own, contact }) in traffic.states.iter().zip(passes) {
-            for (k, own) in own.into_iter().enumerate() {
-                wear[k].add(state.share, &own.spread(state.spread_mm[k]));
-            }
-            states.push(StateContact {
-                share: state.share,
-                ..contact
-            });
-        }
-        let failed = states.iter().filter(|state| state.failure.is_some());
-        let unsolved: f64 = failed.clone().map(|state| state.share).sum();
-        if unsolved > UNSOLVED {
-            let first = failed
-                .clone()
-                .next()
-                .and_then(|state| state.failure.as_deref());
-            let reason = format!(
-                "{:.0} % of the traffic have no answer; the first of these states: {}",
-                100.0 * unsolved,
-                first.unwrap_or_default()
-            );
-            return Err(SolveError::NormalProblem { reason });
-        }
-        for (wear, amount) in wear.iter_mut().zip(self.amounts) {
-            let own = std::mem::replace(wear, BodyWear::none(wear.area.len()));
-            wear.add(amount, &own);
-            wear.area = smoothed(&wear.area, SPACING, self.plan.accuracy.smoothing_mm);
-        }
-        Ok(Evaluation { wear, states })
-    }
-
-    /// Solves the states of these values, each on its own, on the threads of the context.
-    fn passes(
-        &self,
-        context: &SolveContext,
-        on: Sections,
-        states: &[&[f64]],
-        monitor: &(dyn Monitor + Sync),
-    ) -> Result<Vec<Pass>, SolveError> {
-        let solve = |values: &&[f64]| pass(self, context, on, values, monitor);
-        let next = AtomicUsize::new(0);
-        let found = Mutex::new(vec![None; states.len()]);
-        let work = || {
-            // After an error no further state is begun.
-            while let Some((k, values)) = states
-                .iter()
-                .enumerate()
-                .nth(next.fetch_add(1, Ordering::Relaxed))
-            {
-                let pass = solve(values);
-                if pass.is_err() {
-                    next.store(states.len(), Ordering::Relaxed);
-                }
-                found.lock().unwrap_or_else(PoisonError::into_inner)[k] = Some(pass);
-            }
-        };
-        thread::scope(|scope| {
-            for _ in 1..context.threads {
-                let builder = thread::Builder::new().stack_size(STACK_BYTES);
-                // Without another thread this one does all.
-                drop(builder.spawn_scoped(scope, work));
-            }
-            work();
-        });
-        let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
-        // Only an error leaves states without a pass.
-        found.into_iter().flatten().collect()
-    }
-
     fn happen(&self, event: usize, state: &mut EvolutionState) {
-        let planned = &self.plan.events[event];
-        let bodies = [&mut state.rail, &mut state.wheel];
-        for ((body, target), kind) in bodies.into_iter().zip(&self.machined[event]).zip(BODIES) {
+        let (planned, sections) = &self.events[event];
+        for ((body, target), kind) in state.bodies.iter_mut().zip(sections).zip(BODIES) {
             let Some(target) = target else { continue };
             let before = &body.worn.points_mm;
             let after = machined(kind, before, target, planned.depth_mm);
@@ -330,9 +229,92 @@ impl Evolution {
     }
 }
 
-fn sections(bodies: [&BodyState; 2], friction: Option<f64>, radius: f64) -> Sections<'_> {
+/// What solves the states of a step.
+struct Solver<'a> {
+    task: &'a Evolution,
+    context: &'a SolveContext,
+    monitor: &'a (dyn Monitor + Sync),
+    /// Share of the extent that is done.
+    share: f64,
+}
+
+impl Solver<'_> {
+    /// The wear of all states of an evolution on sections, over the extent and smoothed.
+    fn evaluate(
+        &self,
+        of: &EvolutionState,
+        bodies: &[BodyState; 2],
+    ) -> Result<Evaluation, SolveError> {
+        let on = sections(bodies, of.friction, radius_change(of, &bodies[1]));
+        let mut wear = on.points.map(|points| BodyWear::none(points.len()));
+        let mut states = Vec::with_capacity(of.traffic.states.len());
+        let values: Vec<&[f64]> = of.traffic.states.iter().map(|s| &*s.values).collect();
+        let passes = self.passes(on, &values)?;
+        for (state, Pass { wear: own, contact }) in of.traffic.states.iter().zip(passes) {
+            for (k, own) in own.into_iter().enumerate() {
+                wear[k].add(state.share, &own.spread(state.spread_mm[k]));
+            }
+            let share = state.share;
+            states.push(StateContact { share, ..contact });
+        }
+        let mut failed = states.iter().filter(|state| state.failure.is_some());
+        let unsolved: f64 = failed.clone().map(|state| state.share).sum();
+        if unsolved > UNSOLVED {
+            let first = failed.next().and_then(|state| state.failure.as_deref());
+            let reason = format!(
+                "{:.0} % of the traffic have no answer; the first of these states: {}",
+                100.0 * unsolved,
+                first.unwrap_or_default()
+            );
+            return Err(SolveError::NormalProblem { reason });
+        }
+        for (wear, amount) in wear.iter_mut().zip(self.task.amounts) {
+            let own = std::mem::replace(wear, BodyWear::none(wear.area.len()));
+            wear.add(amount, &own);
+            wear.area = smoothed(&wear.area, self.task.plan.accuracy.smoothing_mm);
+        }
+        Ok(Evaluation { wear, states })
+    }
+
+    /// Solves the states of these values, each on its own, on the threads of the context.
+    fn passes(&self, on: Sections, states: &[&[f64]]) -> Result<Vec<Pass>, SolveError> {
+        let found: Vec<_> = states.iter().map(|_| OnceLock::new()).collect();
+        let next = AtomicUsize::new(0);
+        let work = || {
+            let monitor = MonitorPart {
+                inner: self.monitor,
+                before: self.share,
+                own: 0.0,
+            };
+            loop {
+                let k = next.fetch_add(1, Ordering::Relaxed);
+                let (Some(values), Some(found)) = (states.get(k), found.get(k)) else {
+                    return;
+                };
+                let pass = || pass(self.task, self.context, on, values, &monitor);
+                if found.get_or_init(pass).is_err() {
+                    // After an error no further state is begun.
+                    next.store(states.len(), Ordering::Relaxed);
+                }
+            }
+        };
+        thread::scope(|scope| {
+            for _ in 1..self.context.threads {
+                let builder = thread::Builder::new().stack_size(STACK_BYTES);
+                // Without another thread this one does all.
+                drop(builder.spawn_scoped(scope, work));
+            }
+            work();
+        });
+        // Only an error leaves states without a pass.
+        let found = found.into_iter().filter_map(OnceLock::into_inner);
+        found.collect()
+    }
+}
+
+fn sections(bodies: &[BodyState; 2], friction: Option<f64>, radius: f64) -> Sections<'_> {
     Sections {
-        points: bodies.map(|body| body.worn.points_mm.as_slice()),
+        points: [0, 1].map(|k| bodies[k].worn.points_mm.as_slice()),
         friction,
         radius,
     }
@@ -352,13 +334,12 @@ fn touched(states: &[StateContact], before: &[f64]) -> Vec<f64> {
 
 /// Change of the wheel's radius in mm where the states touch it, the mean over the traffic: the radius at which it rolls freely changes by
 /// as much.
-fn radius_change(traffic: &CondensedTraffic, wheel: &BodyState, touched: &[f64]) -> f64 {
+fn radius_change(of: &EvolutionState, wheel: &BodyState) -> f64 {
     let up = |points: &[[f64; 2]], y: f64| distance(points, [y, 1e3], [0.0, -1.0]);
-    let parts = traffic.states.iter().zip(touched).map(|(state, y)| {
+    let parts = of.traffic.states.iter().zip(&of.wheel_y).map(|(state, y)| {
         let [before, after] = [&wheel.start_mm, &wheel.worn.points_mm].map(|points| up(points, *y));
-        after
-            .zip(before)
-            .map_or(0.0, |(after, before)| state.share * (before - after))
+        let change = before.zip(after).map(|(before, after)| before - after);
+        change.map_or(0.0, |change| state.share * change)
     });
     parts.sum()
 }
@@ -386,18 +367,15 @@ fn change(now: &[f64], then: &[f64]) -> f64 {
 /// A body after a share of the extent under this wear.
 fn moved_body(body: Body, before: &BodyState, wear: &BodyWear, share: f64) -> BodyState {
     let areas: Vec<f64> = wear.area.iter().map(|area| share * area).collect();
-    let after = moved(body, &before.worn.points_mm, &areas);
+    let (points, depth) = moved(body, &before.worn.points_mm, &areas);
     let mut state = before.clone();
     let worn = &mut state.worn;
-    worn.worn_area_mm2 += area_between(body, &before.worn.points_mm, &after.points);
-    worn.points_mm = after.points;
-    worn.depth_mm
-        .iter_mut()
-        .zip(&after.depth)
-        .for_each(|(sum, depth)| *sum += depth);
+    worn.worn_area_mm2 += area_between(body, &before.worn.points_mm, &points);
+    worn.points_mm = points;
+    add(&mut worn.depth_mm, 1.0, &depth);
     let damage = worn.damage.iter_mut().zip(&wear.damage);
     damage.for_each(|(sum, damage)| *sum = (*sum + share * damage).max(0.0));
-    (0..3).for_each(|k| state.regimes_mm2[k] += share * wear.regimes[k]);
+    add(&mut state.regimes_mm2, share, &wear.regimes);
     state.contact_mm2 += share * wear.open;
     state
 }

@@ -7,10 +7,9 @@ use serde_json::{Value, json};
 use crate::contact;
 use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
-use crate::contact::case::read::evolution::EvolutionDraft;
 use crate::contact::case::read::object::join;
 use crate::contact::case::wheel_task::profile_at;
-use crate::contact::case::words::evolution::EvolutionWords;
+use crate::contact::case::words::evolution::{EvolutionEvent, EvolutionWords, TrafficColumn};
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::many::task::several_answers;
 use crate::contact::evaluate::placing::{members, put};
@@ -18,13 +17,11 @@ use crate::contact::evolution::section::sampled;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::numerics::sampling::{PRIMES, samples};
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::damage::DamageFiguresUsed;
 use crate::contact::solution::words::evolution::Progress;
 
-/// Distance of the points of the sections in mm: a twentieth of a narrow patch, and what measured sections have at the gauge corner.
-pub const SPACING: f64 = 0.25;
 /// Steps of an evolution of usual length.
 const STEPS_USUAL: f64 = 50.0;
 /// Target of the contacts' forces where the template has none: wear coefficients are known far less well.
@@ -32,8 +29,19 @@ const TARGET: f64 = 0.02;
 /// Wheel load in N of a million gross tonnes on an axle with one wheel of that load on each rail.
 const NEWTONS_PER_MGT: f64 = 1e9 * 9.80665 / 2.0;
 
-/// Sections that an event leaves, rail and wheel.
-pub type Machined = [Option<Vec<[f64; 2]>>; 2];
+/// The sections that a state is solved on, and what has changed beside them.
+#[derive(Debug, Clone, Copy)]
+pub struct Sections<'a> {
+    /// Rail and wheel.
+    pub points: [&'a [[f64; 2]]; 2],
+    /// Coefficient of friction in place of that of the state.
+    pub friction: Option<f64>,
+    /// Change of the wheel's radius in mm.
+    pub radius: f64,
+}
+
+/// An event with the sections that it leaves, rail and wheel.
+pub type PlannedEvent = (EvolutionEvent, [Option<Vec<[f64; 2]>>; 2]);
 
 /// State shared by the solves of an evolution.
 #[derive(Debug, Default)]
@@ -57,10 +65,10 @@ pub struct Evolution {
     pub columns: Vec<Vec<f64>>,
     /// Shares of the rows, their sum 1.
     pub shares: Vec<f64>,
-    /// The plan.
+    /// The plan, without what is kept beside it.
     pub plan: EvolutionWords,
-    /// Sections that events leave, rail and wheel, in the order of the events.
-    pub machined: Vec<Machined>,
+    /// The events in their order.
+    pub events: Vec<PlannedEvent>,
     /// Rail and wheel at the start.
     pub geometry: WheelRail,
     /// Figures of wear and damage.
@@ -69,10 +77,12 @@ pub struct Evolution {
     pub amounts: [f64; 2],
     /// Million gross tonnes over the extent.
     mgt: f64,
-    limits: Limits,
-    digest: String,
-    /// Of a state.
-    memory_bytes: u64,
+    /// Those of the service.
+    pub limits: Limits,
+    /// Hexadecimal digest of the evolution and of the solver.
+    pub digest: String,
+    /// Memory in bytes that one thread takes to solve a state.
+    pub memory_bytes: u64,
     state_seconds: f64,
 }
 
@@ -82,30 +92,40 @@ impl Evolution {
     /// # Errors
     /// Every fault, with its JSON pointer.
     pub fn check(value: &Value, limits: &Limits) -> Result<Evolution, CaseError> {
-        let draft = EvolutionDraft::read(value)?;
-        let template = template(&draft)?;
-        let (pointers, columns): (Vec<String>, Vec<Vec<f64>>) = draft.columns.into_iter().unzip();
-        let values: Vec<f64> = columns.iter().map(|column| column[0]).collect();
-        let first = filled(&template, &pointers, &values, None)
+        let mut plan = EvolutionWords::read(value)?;
+        let template = template(&plan)?;
+        let passes = std::mem::take(&mut plan.traffic.passes);
+        let mut bases = PRIMES.into_iter();
+        let mut values = |column| match column {
+            TrafficColumn::Numbers(values) => values,
+            TrafficColumn::Distribution(of) => {
+                let normal = of.mean.zip(of.standard_deviation);
+                let base = bases.next().unwrap_or(PRIMES[0]);
+                samples([of.min, of.max], normal, plan.traffic.samples, base)
+            }
+        };
+        let columns = std::mem::take(&mut plan.traffic.columns).into_iter();
+        let (pointers, columns): (Vec<String>, Vec<Vec<f64>>) = columns
+            .map(|(pointer, column)| (pointer, values(column)))
+            .unzip();
+        let first: Vec<f64> = columns.iter().map(|column| column[0]).collect();
+        let first = filled(&template, &pointers, &first, None)
             .and_then(|case| contact::check(&case, limits))
             .map_err(|error| located(error, &pointers, 0))?;
         let (NormalTask::Wheel(wheel), Some(damage)) =
             (&first.problem.task, &first.run.after.damage)
         else {
-            return Err(CaseError(vec![Fault::new(
-                "/template/contact/type",
-                "\"profiles\" is needed",
-            )]));
+            return Err(not_profiles());
         };
         let cost = first.cost();
         // That of the case contains the revision of the solver.
         let mut digest = blake3::Hasher::new();
         digest.update(first.label.digest.as_bytes());
         digest.update(value.to_string().as_bytes());
-        let all: f64 = draft.passes.iter().sum();
+        let all: f64 = passes.iter().sum();
         let mut evolution = Evolution {
-            shares: draft.passes.iter().map(|passes| passes / all).collect(),
-            machined: machined(&draft.plan)?,
+            shares: passes.iter().map(|passes| passes / all).collect(),
+            events: events(&mut plan)?,
             geometry: wheel.geometry.clone(),
             figures: damage.used(),
             amounts: [0.0; 2],
@@ -117,7 +137,7 @@ impl Evolution {
             template,
             pointers,
             columns,
-            plan: draft.plan,
+            plan,
         };
         evolution.place_rail();
         evolution.check_rows()?;
@@ -128,9 +148,8 @@ impl Evolution {
     /// The rail stays where its gauge puts it at the start, and the wheel on its flange back, however they wear.
     fn place_rail(&mut self) {
         let contact = &mut self.template["contact"];
-        if let Some(contact) = contact.as_object_mut() {
-            contact.remove("gauge_mm");
-            contact.remove("gauge_height_mm");
+        for name in ["gauge_mm", "gauge_height_mm"] {
+            contact.as_object_mut().map(|contact| contact.remove(name));
         }
         contact["rail_origin_mm"] = self.geometry.rail_origin().into();
         contact["flange_back_position_mm"] = self.geometry.placement.flange_back_position.into();
@@ -140,11 +159,8 @@ impl Evolution {
     fn check_rows(&self) -> Result<(), CaseError> {
         let known = KnownPair::default();
         let [rail, wheel] = self.start();
-        let friction = self
-            .plan
-            .events
-            .iter()
-            .map(|event| (0, event.friction_coefficient));
+        let events = self.events.iter();
+        let friction = events.map(|(event, _)| (0, event.friction_coefficient));
         let ends = self.columns.iter().flat_map(|column| {
             let by = |a: &usize, b: &usize| column[*a].total_cmp(&column[*b]);
             let rows = 0..column.len();
@@ -152,10 +168,15 @@ impl Evolution {
         });
         for (row, friction) in ends.flatten().map(|row| (row, None)).chain(friction) {
             let values: Vec<f64> = self.columns.iter().map(|column| column[row]).collect();
-            self.case([&rail, &wheel], &values, friction, 0.0)
+            let on = Sections {
+                points: [&rail, &wheel],
+                friction,
+                radius: 0.0,
+            };
+            self.case(on, &values)
                 .and_then(|case| contact::check_with(&known, &case, &self.limits))
                 .and_then(|checked| match several_answers(&checked) {
-                    Some(fault) => Err(CaseError(vec![fault])),
+                    Some(fault) => Err(fault.into()),
                     None => Ok(()),
                 })
                 .map_err(|error| located(error, &self.pointers, row))?;
@@ -169,20 +190,17 @@ impl Evolution {
         let column = self.pointers.iter().position(|pointer| pointer == place);
         let fixed = self.template.pointer(place).and_then(Value::as_f64);
         let load = |row: usize| column.map(|k| self.columns[k][row]).or(fixed);
-        let mean: Option<f64> = self
-            .shares
-            .iter()
-            .enumerate()
-            .map(|(row, share)| Some(share * load(row)?))
-            .sum();
+        let loads = self.shares.iter().enumerate();
+        let loads = loads.map(|(row, share)| Some(share * load(row)?));
+        let mean: Option<f64> = loads.sum();
         let extent = &self.plan.extent;
-        let axles = match (extent.mgt, extent.axle_passes, mean) {
-            (Some(mgt), _, Some(mean)) => mgt * NEWTONS_PER_MGT / mean,
-            (Some(_), _, None) => {
+        let axles = match (extent.mgt, mean) {
+            (None, _) => extent.axle_passes.unwrap_or(0.0),
+            (Some(mgt), Some(mean)) => mgt * NEWTONS_PER_MGT / mean,
+            (Some(_), None) => {
                 let detail = "given for a traffic without vertical_force_n; give axle_passes";
-                return Err(CaseError(vec![Fault::new("/extent/mgt", detail)]));
+                return Err(Fault::new("/extent/mgt", detail).into());
             }
-            (None, axles, _) => axles.unwrap_or(0.0),
         };
         self.mgt = axles * mean.unwrap_or(0.0) / NEWTONS_PER_MGT;
         let distance = extent.wheel_distance_km.unwrap_or(0.0) * 1e6;
@@ -194,40 +212,23 @@ impl Evolution {
         Ok(())
     }
 
-    /// Hexadecimal digest of the evolution and of the solver.
-    #[must_use]
-    pub fn digest(&self) -> String {
-        self.digest.clone()
-    }
-
-    /// Memory in bytes that one thread takes to solve a state.
-    #[must_use]
-    pub fn memory_bytes(&self) -> u64 {
-        self.memory_bytes
-    }
-
     /// Rough solve time in s on one core: two solves of each state for each step that the records need.
     #[must_use]
     pub fn expected_seconds(&self) -> f64 {
-        let states = self
-            .shares
-            .len()
-            .min(self.plan.accuracy.states_max as usize);
-        2.0 * states as f64 * f64::from(self.plan.records).max(STEPS_USUAL) * self.state_seconds
+        let states = f64::from(self.plan.accuracy.states_max).min(self.shares.len() as f64);
+        2.0 * states * f64::from(self.plan.records).max(STEPS_USUAL) * self.state_seconds
     }
 
     /// Rail and wheel at the start.
     #[must_use]
     pub fn start(&self) -> [Vec<[f64; 2]>; 2] {
-        self.geometry
-            .profiles()
-            .map(|profile| sampled(profile, SPACING))
+        self.geometry.profiles().map(sampled)
     }
 
     /// Share of the extent at which an event happens.
     #[must_use]
     pub fn share_of_event(&self, event: usize) -> f64 {
-        self.plan.events[event].at / self.plan.end()
+        self.events[event].0.at / self.plan.end()
     }
 
     /// How far an evolution has come at a share of its extent.
@@ -242,19 +243,13 @@ impl Evolution {
         }
     }
 
-    /// The case of these values on these sections, with another coefficient of friction and a wheel whose radius has changed by `radius` mm.
+    /// The case of these values on these sections.
     ///
     /// # Errors
     /// A column leads nowhere in the template.
-    pub fn case(
-        &self,
-        [rail, wheel]: [&[[f64; 2]]; 2],
-        values: &[f64],
-        friction: Option<f64>,
-        radius: f64,
-    ) -> Result<Value, CaseError> {
-        let mut case = filled(&self.template, &self.pointers, values, friction)?;
-        for (body, points) in [("rail", rail), ("wheel", wheel)] {
+    pub fn case(&self, on: Sections, values: &[f64]) -> Result<Value, CaseError> {
+        let mut case = filled(&self.template, &self.pointers, values, on.friction)?;
+        for (body, points) in ["rail", "wheel"].into_iter().zip(on.points) {
             case["contact"][body] =
                 json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
         }
@@ -262,46 +257,32 @@ impl Evolution {
         if let Some(value) = case.pointer_mut(free)
             && let Some(given) = value.as_f64()
         {
-            *value = (given + radius).into();
+            *value = (given + on.radius).into();
         }
         Ok(case)
     }
+}
 
-    /// Checks and prepares a case.
-    ///
-    /// # Errors
-    /// Its faults.
-    pub fn checked(&self, context: &SolveContext, case: &Value) -> Result<CheckedCase, CaseError> {
-        contact::check_with(&context.known, case, &self.limits)
-    }
+fn not_profiles() -> CaseError {
+    let detail = "\"profiles\" is needed, whose sections wear";
+    Fault::new("/template/contact/type", detail).into()
 }
 
 /// The template with the outputs that wear needs.
-fn template(draft: &EvolutionDraft) -> Result<Value, CaseError> {
-    let mut template = draft.template.clone();
-    let fault = |place: &str, detail: &str| {
-        Err(CaseError(vec![Fault::new(
-            format!("/template{place}"),
-            detail,
-        )]))
-    };
-    if template
-        .pointer("/contact/type")
-        .is_none_or(|kind| kind != "profiles")
-    {
-        return fault(
-            "/contact/type",
-            "\"profiles\" is needed, whose sections wear",
-        );
+fn template(plan: &EvolutionWords) -> Result<Value, CaseError> {
+    let mut template = plan.template.clone();
+    let kind = template.pointer("/contact/type");
+    if kind.is_none_or(|kind| kind != "profiles") {
+        return Err(not_profiles());
     }
     for body in ["rail", "wheel"] {
         if template["contact"][body]["smoothing_mm"].is_string() {
+            let pointer = format!("/template/contact/{body}/smoothing_mm");
             let detail = "\"auto\" given; a length in mm is needed, since the sections change";
-            return fault(&format!("/contact/{body}/smoothing_mm"), detail);
+            return Err(Fault::new(pointer, detail).into());
         }
     }
-    let mut damage =
-        json!({ "models": ["t_gamma", draft.plan.wear_model, "wlrm"], "across": true });
+    let mut damage = json!({ "models": ["t_gamma", plan.wear_model, "wlrm"], "across": true });
     if let Some(own) = template.pointer("/damage/parameters") {
         damage["parameters"] = own.clone();
     }
@@ -329,13 +310,14 @@ fn filled(
         .zip(values.iter().copied());
     for (pointer, value) in columns.chain(friction.map(|mu| ("/friction/coefficient", mu))) {
         put(&mut case, &members(pointer), value.into())
-            .map_err(|reason| CaseError(vec![Fault::new(pointer, reason)]))?;
+            .map_err(|reason| Fault::new(pointer, reason))?;
     }
     Ok(case)
 }
 
 /// Faults of the case of a row, with pointers into the evolution.
-fn located(CaseError(faults): CaseError, pointers: &[String], row: usize) -> CaseError {
+#[must_use]
+pub fn located(CaseError(faults): CaseError, pointers: &[String], row: usize) -> CaseError {
     let moved = faults.into_iter().map(|fault| {
         let pointer = match pointers.contains(&fault.pointer) {
             true => format!("{}/{row}", join("/traffic/columns", &fault.pointer)),
@@ -346,31 +328,32 @@ fn located(CaseError(faults): CaseError, pointers: &[String], row: usize) -> Cas
     CaseError(moved.collect())
 }
 
-/// Sections that the events leave, rail and wheel.
-fn machined(plan: &EvolutionWords) -> Result<Vec<Machined>, CaseError> {
+/// The events in their order, with the sections that they leave.
+fn events(plan: &mut EvolutionWords) -> Result<Vec<PlannedEvent>, CaseError> {
     let mut faults = Vec::new();
-    let events = plan.events.iter().enumerate().map(|(k, event)| {
-        if event.at > plan.end() {
-            let detail = format!(
-                "{} given; at most {}, where the extent ends, is allowed",
-                event.at,
-                plan.end()
-            );
+    let end = plan.end();
+    let given = std::mem::take(&mut plan.events).into_iter().enumerate();
+    let planned = given.map(|(k, event)| {
+        if event.at > end {
+            let at = event.at;
+            let detail = format!("{at} given; at most {end}, where the extent ends, is allowed");
             faults.push(Fault::new(format!("/events/{k}/at"), detail));
         }
         let bodies = [
             (Body::Rail, &event.grind, "grind"),
             (Body::Wheel, &event.reprofile, "reprofile"),
         ];
-        bodies.map(|(body, section, name)| {
+        let sections = bodies.map(|(body, section, name)| {
             let found = profile_at(&format!("/events/{k}/{name}"), body, section.as_ref()?);
             let found = found.map_err(|fault| faults.push(fault)).ok()?;
-            Some(sampled(&found, SPACING))
-        })
+            Some(sampled(&found))
+        });
+        (event, sections)
     });
-    let machined = events.collect();
+    let mut planned: Vec<PlannedEvent> = planned.collect();
+    planned.sort_by(|(a, _), (b, _)| a.at.total_cmp(&b.at));
     match faults.is_empty() {
-        true => Ok(machined),
+        true => Ok(planned),
         false => Err(CaseError(faults)),
     }
 }

@@ -3,9 +3,9 @@
 use serde_json::{Value, json};
 
 use crate::contact::case::limits::Limits;
-use crate::contact::evolution::pass::{Sections, pass};
+use crate::contact::evolution::pass::pass;
 use crate::contact::evolution::section::{area_between, distance};
-use crate::contact::evolution::task::{Evolution, SolveContext};
+use crate::contact::evolution::task::{Evolution, Sections, SolveContext};
 use crate::contact::geometry::profile::Body;
 use crate::contact::monitor::Unmonitored;
 use crate::contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
@@ -85,25 +85,34 @@ fn symmetric(records: u32, axles: f64) -> Value {
 fn a_symmetric_problem_stays_symmetric_and_loses_the_volume_of_its_wear() {
     let task = checked(&symmetric(2, 2e5));
     let (state, _) = run(&task);
-    let depth = &state.rail.worn.depth_mm;
+    let depth = &state.bodies[0].worn.depth_mm;
     let most = depth.iter().copied().fold(0.0, f64::max);
     let off = depth
         .iter()
         .zip(depth.iter().rev())
         .map(|(a, b)| (a - b).abs());
     assert!(off.fold(0.0, f64::max) < 0.01 * most, "{most}");
-    let lost = area_between(Body::Rail, &state.rail.start_mm, &state.rail.worn.points_mm);
-    let worn: f64 = state.rail.regimes_mm2.iter().sum();
+    let lost = area_between(
+        Body::Rail,
+        &state.bodies[0].start_mm,
+        &state.bodies[0].worn.points_mm,
+    );
+    let worn: f64 = state.bodies[0].regimes_mm2.iter().sum();
     assert!((lost / worn - 1.0).abs() < 1e-3, "{lost} {worn}");
-    assert!((lost / state.rail.worn.worn_area_mm2 - 1.0).abs() < 1e-9);
-    assert_eq!(state.wheel.worn.points_mm, state.wheel.start_mm);
+    assert!((lost / state.bodies[0].worn.worn_area_mm2 - 1.0).abs() < 1e-9);
+    assert_eq!(state.bodies[1].worn.points_mm, state.bodies[1].start_mm);
 }
 
 /// Halving the step at least halves the distance to the finest run.
 #[test]
 fn steps_converge() {
     let depths: Vec<Vec<f64>> = [1, 2, 4, 16]
-        .map(|records| run(&checked(&symmetric(records, 4e4))).0.rail.worn.depth_mm)
+        .map(|records| {
+            run(&checked(&symmetric(records, 4e4))).0.bodies[0]
+                .worn
+                .depth_mm
+                .clone()
+        })
         .into();
     let off = |k: usize| -> f64 {
         let pairs = depths[k].iter().zip(&depths[3]);
@@ -127,7 +136,7 @@ fn without_friction_or_creepage_nothing_wears() {
     for request in [without_friction, without_creepage] {
         let task = checked(&request);
         let (state, records) = run(&task);
-        assert_eq!(state.rail.worn.points_mm, state.rail.start_mm);
+        assert_eq!(state.bodies[0].worn.points_mm, state.bodies[0].start_mm);
         assert!(
             records
                 .iter()
@@ -151,12 +160,11 @@ fn twice_the_passes_at_half_the_weight_are_the_same() {
         state
     });
     assert!(once.share > 0.0 && (once.share - twice.share).abs() < 1e-12);
-    for (a, b) in once
-        .rail
+    for (a, b) in once.bodies[0]
         .worn
         .points_mm
         .iter()
-        .zip(&twice.rail.worn.points_mm)
+        .zip(&twice.bodies[0].worn.points_mm)
     {
         assert!((a[1] - b[1]).abs() < 1e-9, "{a:?} {b:?}");
     }
@@ -182,9 +190,9 @@ fn the_error_of_a_condensed_traffic_covers_what_all_rows_wear() {
         asked["accuracy"]["states_tolerance"] = json!(tolerance);
         let task = checked(&asked);
         let (state, _) = run(&task);
-        let traffic = state.traffic.expect("a condensed traffic");
+        let traffic = state.traffic;
         (
-            state.rail.worn.worn_area_mm2,
+            state.bodies[0].worn.worn_area_mm2,
             traffic.error[0],
             traffic.states.len(),
         )
@@ -217,7 +225,7 @@ fn the_wear_of_a_state_is_spread_over_the_places_of_its_rows() {
         asked["accuracy"]["states_max"] = json!(states);
         asked["accuracy"]["states_tolerance"] = json!(1e-12);
         let (state, _) = run(&checked(&asked));
-        (state.rail.worn.depth_mm, state.traffic.expect("a traffic"))
+        (state.bodies[0].worn.depth_mm.clone(), state.traffic)
     };
     let (all, _) = run_with(25);
     for states in [1, 2, 4] {
@@ -281,19 +289,19 @@ fn an_evolution_in_two_parts_wears_as_a_whole() {
     let (whole, _) = run(&checked(&symmetric(2, 4e4)));
     let (first, _) = run(&checked(&symmetric(1, 2e4)));
     let mut rest = symmetric(1, 2e4);
-    rest["template"]["contact"]["rail"]["points_mm"] = json!(first.rail.worn.points_mm);
+    rest["template"]["contact"]["rail"]["points_mm"] = json!(first.bodies[0].worn.points_mm);
     let (second, _) = run(&checked(&rest));
     let [one, parts] = [
-        whole.rail.worn.worn_area_mm2,
-        first.rail.worn.worn_area_mm2 + second.rail.worn.worn_area_mm2,
+        whole.bodies[0].worn.worn_area_mm2,
+        first.bodies[0].worn.worn_area_mm2 + second.bodies[0].worn.worn_area_mm2,
     ];
     assert!((parts / one - 1.0).abs() < 2e-3, "{parts} {one}");
     for y in [-4.0, 0.0, 2.5] {
         let height = |points: &[[f64; 2]]| distance(points, [y, -1e2], [0.0, 1.0]).expect("below");
         let [start, one, parts] = [
-            &whole.rail.start_mm,
-            &whole.rail.worn.points_mm,
-            &second.rail.worn.points_mm,
+            &whole.bodies[0].start_mm,
+            &whole.bodies[0].worn.points_mm,
+            &second.bodies[0].worn.points_mm,
         ]
         .map(|points| height(points));
         assert!(
@@ -315,9 +323,7 @@ fn wear_across_a_section_is_that_of_the_power_of_the_cells() {
         radius: 0.0,
     };
     let found = pass(&task, &SolveContext::default(), on, &[0.0], &Unmonitored).expect("solved");
-    let mut case = task
-        .case([&rail, &wheel], &[0.0], None, 0.0)
-        .expect("a case");
+    let mut case = task.case(on, &[0.0]).expect("a case");
     case["outputs"] = json!(["resultants", "tractions", "slip", "zones"]);
     case.as_object_mut().expect("an object").remove("damage");
     let case = crate::contact::check(&case, &Limits::default()).expect("no faults");

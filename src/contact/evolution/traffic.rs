@@ -7,8 +7,8 @@
 
 use crate::contact::error::SolveError;
 use crate::contact::evolution::pass::Pass;
-use crate::contact::evolution::section::smoothed;
-use crate::contact::evolution::task::{Evolution, SPACING};
+use crate::contact::evolution::section::{SPACING, add, smoothed};
+use crate::contact::evolution::task::Evolution;
 use crate::contact::solution::words::evolution::{CondensedTraffic, TrafficState};
 
 /// In each round the groups that change most are parted, this share of all.
@@ -24,13 +24,9 @@ struct Group {
     values: Vec<f64>,
     /// Area in mm² that one pass of all rows removes at each point of the rail and of the wheel. Empty for a body that does not wear.
     area: [Vec<f64>; 2],
-    parted: Option<Parted>,
-}
-
-/// Effect of halving a group.
-#[derive(Debug)]
-struct Parted {
-    /// Change of the areas after spreading, summed over the columns.
+    /// The halves were solved.
+    parted: bool,
+    /// Change of the areas by halving, after spreading, summed over the columns.
     change: [Vec<f64>; 2],
     /// Variance in mm² along rail and wheel that the rows add to the wear of their mean.
     variance: [f64; 2],
@@ -56,20 +52,14 @@ pub(crate) fn condensed(
     let most = task.plan.accuracy.states_max as usize;
     loop {
         part(task, &scales, &mut groups, solve)?;
-        let changes: Vec<&[Vec<f64>; 2]> = groups
-            .iter()
-            .flat_map(|group| &group.parted)
-            .map(|parted| &parted.change)
-            .collect();
         let total = [0, 1].map(|body| {
             let all: f64 = groups.iter().map(|group| size(&group.area[body])).sum();
             all.max(f64::MIN_POSITIVE)
         });
         let error = [0, 1].map(|body| {
-            let mut all = vec![0.0; changes[0][body].len()];
-            changes
-                .iter()
-                .for_each(|change| add(&mut all, 1.0, &change[body]));
+            let mut all = vec![0.0; groups[0].change[body].len()];
+            let changes = groups.iter().map(|group| &group.change[body]);
+            changes.for_each(|change| add(&mut all, 1.0, change));
             size(&all) / total[body]
         });
         if error[0].max(error[1]) <= task.plan.accuracy.states_tolerance || groups.len() >= most {
@@ -77,9 +67,7 @@ pub(crate) fn condensed(
                 share: group.share,
                 rows: group.rows.len() as u32,
                 values: group.values,
-                spread_mm: group
-                    .parted
-                    .map_or([0.0; 2], |parted| parted.variance.map(f64::sqrt)),
+                spread_mm: group.variance.map(f64::sqrt),
             });
             return Ok(CondensedTraffic {
                 rows: task.shares.len() as u32,
@@ -88,21 +76,21 @@ pub(crate) fn condensed(
                 error,
             });
         }
-        let weight =
-            |change: &[Vec<f64>; 2]| size(&change[0]) / total[0] + size(&change[1]) / total[1];
-        let weights: Vec<f64> = changes.into_iter().map(weight).collect();
-        let halves = |k: usize| groups[k].parted.as_ref().map(|parted| &parted.halves);
+        let weight = |k: usize| {
+            let [rail, wheel] = &groups[k].change;
+            size(rail) / total[0] + size(wheel) / total[1]
+        };
+        let weights: Vec<f64> = (0..groups.len()).map(weight).collect();
         let mut order: Vec<usize> = (0..groups.len())
-            .filter(|k| halves(*k).is_some_and(|halves| !halves.is_empty()))
+            .filter(|k| !groups[*k].halves.is_empty())
             .collect();
         order.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]).then(a.cmp(b)));
         let count = (PARTED * groups.len() as f64).ceil() as usize;
         order.truncate(count.min(most - groups.len()));
         order.sort_unstable();
         for k in order.into_iter().rev() {
-            if let Some(parted) = groups[k].parted.take() {
-                groups.splice(k..=k, parted.halves);
-            }
+            let halves = std::mem::take(&mut groups[k].halves);
+            groups.splice(k..=k, halves);
         }
     }
 }
@@ -115,15 +103,9 @@ fn part(
     solve: &mut SolveStates,
 ) -> Result<(), SolveError> {
     let (mut owners, mut rows) = (Vec::new(), Vec::new());
-    for (k, group) in groups.iter_mut().enumerate() {
-        if group.parted.is_some() {
-            continue;
-        }
-        group.parted = Some(Parted {
-            change: [0, 1].map(|body| vec![0.0; group.area[body].len()]),
-            variance: [0.0; 2],
-            halves: Vec::new(),
-        });
+    let unparted = groups.iter_mut().enumerate();
+    for (k, group) in unparted.filter(|(_, group)| !group.parted) {
+        group.parted = true;
         let relative = |column: usize| match scales[column] > 0.0 {
             true => variance(task, column, group) / scales[column],
             false => 0.0,
@@ -150,9 +132,6 @@ fn part(
             .iter()
             .map(|half| half.share * (half.values[column] - group.values[column]).powi(2));
         let factor = variance(task, column, group) / between.sum::<f64>();
-        let Some(parted) = &mut group.parted else {
-            continue;
-        };
         let mut own = 0.0;
         for (body, mean) in group.area.iter().enumerate() {
             let mut both = halves[0].area[body].clone();
@@ -163,20 +142,20 @@ fn part(
                 add(&mut change, -1.0, mean);
                 change
             };
-            let (unspread, spread) = (change(mean), change(&smoothed(mean, SPACING, added.sqrt())));
+            let (unspread, spread) = (change(mean), change(&smoothed(mean, added.sqrt())));
             // Halves that touch at two places far apart have little in between.
             let change = if size(&spread) < size(&unspread) {
-                parted.variance[body] += factor * added;
+                group.variance[body] += factor * added;
                 spread
             } else {
                 unspread
             };
-            add(&mut parted.change[body], 1.0, &change);
+            add(&mut group.change[body], 1.0, &change);
             own += size(&change) / size(mean).max(f64::MIN_POSITIVE);
         }
         if own > largest[k] {
             largest[k] = own;
-            parted.halves = halves;
+            group.halves = halves;
         }
     }
     Ok(())
@@ -198,17 +177,19 @@ fn groups_of(
     let groups = parts.into_iter().zip(means).zip(passes);
     let groups = groups.map(|((rows, values), pass)| {
         let share = rows.iter().map(|row| task.shares[*row]).sum();
-        let mut wear = pass.wear.into_iter().zip(wearing);
-        let mut area = || match wear.next() {
-            Some((wear, true)) => wear.area.iter().map(|area| share * area).collect(),
-            _ => Vec::new(),
-        };
+        let area = [0, 1].map(|body| {
+            let area = pass.wear[body].area.iter().filter(|_| wearing[body]);
+            area.map(|area| share * area).collect::<Vec<f64>>()
+        });
         Group {
-            area: [area(), area()],
             rows,
             share,
             values,
-            parted: None,
+            parted: false,
+            change: [0, 1].map(|body| vec![0.0; area[body].len()]),
+            variance: [0.0; 2],
+            halves: Vec::new(),
+            area,
         }
     });
     Ok(groups.collect())
@@ -217,12 +198,6 @@ fn groups_of(
 /// Sum of the sizes.
 fn size(areas: &[f64]) -> f64 {
     areas.iter().map(|area| area.abs()).sum()
-}
-
-fn add(to: &mut [f64], factor: f64, from: &[f64]) {
-    to.iter_mut()
-        .zip(from)
-        .for_each(|(to, from)| *to += factor * from);
 }
 
 /// Variance in mm² of the place along the section at which areas lie; 0 where there are none.
@@ -242,13 +217,11 @@ fn along_variance(areas: &[f64]) -> f64 {
 fn mean(task: &Evolution, rows: &[usize], column: &[f64]) -> f64 {
     let first = column[rows[0]];
     // About the first value, so that equal values have it as their mean to the last bit.
-    let parts = rows.iter().map(|row| {
-        [
-            task.shares[*row],
-            task.shares[*row] * (column[*row] - first),
-        ]
-    });
-    let [share, sum] = parts.fold([0.0; 2], |all, part| [all[0] + part[0], all[1] + part[1]]);
+    let (mut share, mut sum) = (0.0, 0.0);
+    for row in rows {
+        share += task.shares[*row];
+        sum += task.shares[*row] * (column[*row] - first);
+    }
     first + sum / share
 }
 

@@ -14,13 +14,33 @@ pub(crate) fn halton(mut k: u32, base: u32) -> f64 {
     sum
 }
 
+/// Samples of a distribution between two values at the points of one dimension of Halton's sequence: of a uniform one, or of a truncated normal
+/// one with a mean and a standard deviation.
+pub(crate) fn samples(
+    [low, high]: [f64; 2],
+    normal: Option<(f64, f64)>,
+    count: u32,
+    base: u32,
+) -> Vec<f64> {
+    // The value below which a share of the samples lies.
+    let value = |share: f64| match normal {
+        Some((mean, deviation)) => {
+            let below = |value: f64| normal_probability((value - mean) / deviation);
+            let probability = below(low) + share * (below(high) - below(low));
+            (mean + deviation * normal_quantile(probability)).clamp(low, high)
+        }
+        None => low + share * (high - low),
+    };
+    (1..=count).map(|k| value(halton(k, base))).collect()
+}
+
 /// Probability that a standard normal variable is at most `x`, with a relative error of 1e-15.
-pub(crate) fn normal_probability(x: f64) -> f64 {
+fn normal_probability(x: f64) -> f64 {
     0.5 * libm::erfc(-x / 2.0_f64.sqrt())
 }
 
 /// The value that a standard normal variable exceeds with the probability 1 - `probability`, within ±38, by bisection.
-pub(crate) fn normal_quantile(probability: f64) -> f64 {
+fn normal_quantile(probability: f64) -> f64 {
     let (mut low, mut high) = (-38.0, 38.0);
     for _ in 0..64 {
         let middle = 0.5 * (low + high);

@@ -2,7 +2,6 @@
 
 pub(super) mod batch;
 pub(super) mod cells;
-pub(super) mod evolution;
 pub(super) mod job;
 pub(super) mod result;
 pub(super) mod resultants;

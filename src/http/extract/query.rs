@@ -161,6 +161,16 @@ pub fn seconds(low: u32, high: u32) -> Reader<u32> {
     )
 }
 
+/// One of some words, each with its meaning.
+pub fn word<T: Copy>(words: &'static [(&'static str, T)]) -> Reader<T> {
+    let names = words.iter().map(|(name, _)| format!("`{name}`"));
+    let names: Vec<String> = names.collect();
+    reader(names.join(", "), |text| {
+        let found = words.iter().find(|(name, _)| *name == text);
+        found.map(|(_, meaning)| *meaning)
+    })
+}
+
 /// The id of a job or batch.
 pub fn id(of: &'static str) -> Reader<Uuid> {
     reader(format!("the id of a {of}"), |text| {

@@ -1,6 +1,8 @@
 //! The formats of answers: what each is called in `?format=`, and its content type.
 
+use axum::body::Body;
 use axum::http::{HeaderName, HeaderValue, header};
+use axum::response::{IntoResponse, Response};
 
 /// A form in which something can be answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +62,17 @@ impl Format {
             Format::Parquet => "application/vnd.apache.parquet",
             Format::Events => "text/event-stream",
         }
+    }
+
+    /// An answer in this form, which `Accept` may have chosen; `name` as in [`Format::disposition`].
+    pub(crate) fn answer(self, name: &str, body: impl Into<Body>) -> Response {
+        let head = [
+            (header::CONTENT_TYPE, self.media_type()),
+            (header::VARY, "Accept"),
+        ];
+        let mut response = (head, body.into()).into_response();
+        response.headers_mut().extend(self.disposition(name));
+        response
     }
 
     /// The header `Content-Disposition` of an answer in this form, under which a browser saves it as `name` with the usual extension. Pictures are shown

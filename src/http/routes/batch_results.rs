@@ -6,8 +6,8 @@ use std::sync::Arc;
 use axum::Extension;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
-use axum::http::{HeaderMap, Uri, header};
-use axum::response::{IntoResponse, Response};
+use axum::http::{HeaderMap, Uri};
+use axum::response::Response;
 use futures_util::{StreamExt, stream};
 use serde::Serialize;
 use tokio::time::Instant;
@@ -160,14 +160,7 @@ pub(crate) async fn results(
     let revoked = revoked(jobs, key.map(|Extension(key)| key));
     let head = stream::iter([Ok(Bytes::from(head))]);
     let body = Body::from_stream(until_revoked(head.chain(lines.text(writer)), revoked));
-    let headers = [
-        (header::CONTENT_TYPE, format.media_type()),
-        (header::VARY, "Accept"),
-    ];
-    let mut response = (headers, body).into_response();
-    response
-        .headers_mut()
-        .extend(format.disposition(&format!("batch-{id}")));
+    let mut response = format.answer(&format!("batch-{id}"), body);
     if waits {
         response.extensions_mut().insert(StreamedUnbuffered);
     }

@@ -7,7 +7,7 @@ use uuid::Uuid;
 use crate::http::dto::batch::Cases;
 use crate::http::extract::batch::body::{form, read_draft};
 use crate::http::extract::multipart::{TableUpload, separate_template};
-use crate::http::extract::query::{id, query, reader};
+use crate::http::extract::query::{id, query, word};
 use crate::http::limits::memory::Memory;
 use crate::http::options::HttpOptions;
 use crate::http::problem::body::Fault;
@@ -28,11 +28,7 @@ query! {
     BatchQuery(() => ()) {
         /// `reject` (when left out): one faulty case refuses the batch; `skip`: faulty cases are left out and reported
         #[param(pattern = "^(reject|skip)$", example = "skip")]
-        on_invalid: bool as String = reader("`reject` or `skip`", |text| match text {
-            "reject" => Some(false),
-            "skip" => Some(true),
-            _ => None,
-        });
+        on_invalid: bool as String = word(&[("reject", false), ("skip", true)]);
         /// The job whose case is the template of a table; not with `multipart/form-data`, which holds the template itself
         #[param(format = "uuid")]
         template: Uuid as String = id("job");

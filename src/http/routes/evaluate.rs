@@ -7,8 +7,7 @@ use std::time::{Duration, Instant};
 
 use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
-use axum::http::header;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use serde::Serialize;
 use serde_json::Value;
 use tokio::runtime::Handle;
@@ -274,14 +273,7 @@ pub(crate) async fn evaluate(
         Ok((body, share))
     });
     let (body, share) = work.await?;
-    let headers = [
-        (header::CONTENT_TYPE, format.media_type()),
-        (header::VARY, "Accept"),
-    ];
-    let mut response = (headers, body).into_response();
-    response
-        .headers_mut()
-        .extend(format.disposition("evaluate"));
+    let response = format.answer("evaluate", body);
     Ok(hold_while_sent(response, share))
 }
 

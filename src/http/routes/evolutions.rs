@@ -6,16 +6,16 @@ use axum::response::{IntoResponse, Response};
 use serde_json::{Map, Value};
 use uuid::Uuid;
 
+use crate::contact::case::words::evolution::EvolutionWords;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::request_faults::column_pointer;
-use crate::contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord, WornBody};
-use crate::http::dto::evolution::EvolutionRequest;
+use crate::contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord};
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::{JobId, parsed};
 use crate::http::extract::json::JsonBody;
-use crate::http::extract::query::{Parameters, count, query, reader};
-use crate::http::extract::titles::place;
+use crate::http::extract::query::{Parameters, count, query, word};
+use crate::http::extract::titles::{Place, place, question};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
 use crate::http::limits::tenant_semaphore::Permit;
@@ -43,7 +43,7 @@ const TABLES: &[Format] = &[Format::Csv, Format::Ndjson, Format::Arrow, Format::
     tag = "evolutions",
     operation_id = "submit_evolution",
     params(NamedQuery, SubmitParameters),
-    request_body(content = EvolutionRequest, description = "Case, traffic and plan", content_type = "application/json"),
+    request_body(content = EvolutionWords, description = "Case, traffic and plan", content_type = "application/json"),
     responses(JobAccepted, SubmitProblems)
 )]
 pub(crate) async fn submit(
@@ -76,20 +76,20 @@ fn name_columns(request: &mut Value) -> Result<(), ApiError> {
     };
     let (mut named, mut faults) = (Map::new(), Vec::new());
     for (title, mut values) in std::mem::take(columns) {
-        let found = place(&title, None).and_then(|found| {
-            found.ok_or_else(|| {
-                "names nothing in the case; allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs".to_owned()
-            })
-        });
-        let added = found.and_then(|found| {
-            scale(&mut values, found.factor);
-            match named.insert(found.pointer.clone(), values) {
-                Some(_) => Err(format!("a second column for `{}`", found.pointer)),
-                None => Ok(()),
+        let detail = match place(&title, None) {
+            Ok(Some(Place { pointer, factor })) => {
+                scale(&mut values, factor);
+                let other = named.insert(pointer.clone(), values);
+                other.map(|_| format!("a second column for `{pointer}`"))
             }
-        });
+            Ok(None) => Some(format!(
+                "names nothing in the case; {}allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs",
+                question(&title, None)
+            )),
+            Err(detail) => Some(detail),
+        };
         let pointer = format!("/traffic{}", column_pointer(&title));
-        faults.extend(added.err().map(|detail| Fault::new(pointer, detail)));
+        faults.extend(detail.map(|detail| Fault::new(pointer, detail)));
     }
     *columns = named;
     match faults.is_empty() {
@@ -117,7 +117,7 @@ fn scale(values: &mut Value, factor: f64) {
     tag = "evolutions",
     operation_id = "get_evolution_request",
     params(("id" = String, Path, description = "Id of the evolution", format = "uuid")),
-    responses((status = 200, description = "Case, traffic and plan", body = EvolutionRequest), GetProblems)
+    responses((status = 200, description = "Case, traffic and plan", body = EvolutionWords), GetProblems)
 )]
 pub(crate) async fn request(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
     let text = jobs.of_kind(Kind::Evolution).case(id).await?;
@@ -150,25 +150,17 @@ query! {
     EvolutionTableQuery(() => ()) {
         /// `records`, a row for each stored step (when left out), or `points`, a row for each point of both sections in each of them
         #[param(pattern = "^(records|points)$", example = "records")]
-        of: TableOf as String = reader("`records` or `points`", |text| match text {
-            "records" => Some(TableOf::Records),
-            "points" => Some(TableOf::Points),
-            _ => None,
-        });
+        of: TableOf as String = word(&ROWS);
         /// `csv`, `ndjson`, `arrow` or `parquet`; overrides `Accept`
         #[param(pattern = "^(csv|ndjson|arrow|parquet)$", example = "parquet")]
         format: Format as String = one_of(TABLES);
     }
 }
 
+/// What makes a table.
+type TableOf = fn(&EvolutionAnswer) -> RowTable;
 /// What the rows of a table are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum TableOf {
-    /// Stored steps.
-    Records,
-    /// Points of the sections.
-    Points,
-}
+const ROWS: [(&str, TableOf); 2] = [("records", records_table), ("points", points_table)];
 
 /// The answer of a succeeded evolution as a table.
 #[utoipa::path(
@@ -194,20 +186,11 @@ pub(crate) async fn table(
     let query = EvolutionTableQuery::read(&uri, &())?;
     let format = choose(&headers, query.format, TABLES)?;
     let found = read(jobs, &memory, id, move |evolution| {
-        let table = match query.of {
-            Some(TableOf::Points) => points_table(evolution),
-            _ => records_table(evolution),
-        };
+        let table = query.of.unwrap_or(records_table)(evolution);
         RowWriter::whole(format, table).map_err(|error| ApiError::internal(&error))
     });
     let (text, share) = found.await?;
-    let head = [
-        (header::CONTENT_TYPE, format.media_type()),
-        (header::VARY, "Accept"),
-    ];
-    let mut response = (head, text).into_response();
-    let name = format!("evolution-{id}");
-    response.headers_mut().extend(format.disposition(&name));
+    let response = format.answer(&format!("evolution-{id}"), text);
     Ok(hold_while_sent(response, share))
 }
 
@@ -219,18 +202,19 @@ query! {
         record: u32 as u32 = count(0, 100_000);
         /// `columns` (when left out), `miniprof` or `simpack`
         #[param(pattern = "^(columns|miniprof|simpack)$", example = "miniprof")]
-        format: SectionForm as String = reader("`columns`, `miniprof` or `simpack`", |text| {
-            FORMS.into_iter().find(|(name, _)| *name == text)
-        });
+        format: SectionForm as String = word(&FORMS);
     }
 }
 
-/// A form of a file with a section: its name, and the extensions for a rail and a wheel.
-type SectionForm = (&'static str, [&'static str; 2]);
-const FORMS: [SectionForm; 3] = [
-    ("columns", ["txt", "txt"]),
-    ("miniprof", ["ban", "whl"]),
-    ("simpack", ["prr", "prw"]),
+/// A form of a file with a section: its extensions for a rail and a wheel, and its text for points `[y, z]` in mm.
+type SectionForm = ([&'static str; 2], fn(&[[f64; 2]], bool) -> String);
+const FORMS: [(&str, SectionForm); 3] = [
+    (
+        "columns",
+        (["txt", "txt"], |points, _| lines(points, 1.0, ' ')),
+    ),
+    ("miniprof", (["ban", "whl"], miniprof)),
+    ("simpack", (["prr", "prw"], simpack)),
 ];
 
 /// A section of a succeeded evolution as a file for other programs.
@@ -259,7 +243,7 @@ pub(crate) async fn section(
         return Err(ApiError::new(ProblemKind::JobNotFound, detail));
     }
     let wheel = body == "wheel";
-    let (form, extensions) = query.format.unwrap_or(FORMS[0]);
+    let (extensions, text) = query.format.unwrap_or(FORMS[0].1);
     let found = read(jobs, &memory, id, move |evolution| {
         let last = evolution.records.len().saturating_sub(1);
         let number = query.record.map_or(last, |number| number as usize);
@@ -267,7 +251,7 @@ pub(crate) async fn section(
             ApiError::bad_parameter("record", format!("{number} given; 0 to {last} are there"))
         })?;
         let worn = if wheel { &record.wheel } else { &record.rail };
-        Ok(file(worn, wheel, form).into_bytes())
+        Ok(text(&worn.points_mm, wheel).into_bytes())
     });
     let (text, share) = found.await?;
     let extension = extensions[usize::from(wheel)];
@@ -299,107 +283,106 @@ async fn read(
 }
 
 fn records_table(evolution: &EvolutionAnswer) -> RowTable {
-    type Of = fn(&EvolutionRecord) -> Option<f64>;
-    let columns: [(&str, Of); 26] = [
-        ("share", |r| Some(r.progress.share)),
-        ("mgt", |r| r.progress.mgt),
-        ("axle_passes", |r| r.progress.axle_passes),
-        ("wheel_distance_km", |r| r.progress.wheel_distance_km),
-        ("height_mm", |r| r.losses.height_mm),
-        ("gauge_face_mm", |r| r.losses.gauge_face_mm),
-        ("gauge_corner_mm", |r| r.losses.gauge_corner_mm),
-        ("tread_mm", |r| r.losses.tread_mm),
-        ("flange_mm", |r| r.losses.flange_mm),
-        ("rail_worn_area_mm2", |r| Some(r.rail.worn_area_mm2)),
-        ("rail_machined_area_mm2", |r| Some(r.rail.machined_area_mm2)),
-        ("rail_damage_max", |r| largest(&r.rail.damage)),
-        ("rail_depth_max_mm", |r| largest(&r.rail.depth_mm)),
-        ("rail_coefficients_low", |r| {
-            Some(r.rail.uncertainty.coefficients[0])
-        }),
-        ("rail_coefficients_high", |r| {
-            Some(r.rail.uncertainty.coefficients[1])
-        }),
-        ("wheel_worn_area_mm2", |r| Some(r.wheel.worn_area_mm2)),
-        ("wheel_machined_area_mm2", |r| {
-            Some(r.wheel.machined_area_mm2)
-        }),
-        ("wheel_damage_max", |r| largest(&r.wheel.damage)),
-        ("wheel_depth_max_mm", |r| largest(&r.wheel.depth_mm)),
-        ("conicity", |r| r.conicity),
-        ("pressure_max_mpa", |r| Some(r.contact.pressure_max_mpa)),
-        ("pressure_mean_mpa", |r| Some(r.contact.pressure_mean_mpa)),
-        ("y_over_q_max", |r| Some(r.contact.y_over_q_max)),
-        ("y_over_q_mean", |r| Some(r.contact.y_over_q_mean)),
-        ("t_gamma_mean_n", |r| Some(r.contact.t_gamma_mean_n)),
-        ("unsolved_share", |r| Some(r.contact.unsolved_share)),
-    ];
-    let records = &evolution.records;
-    let numbers = (0..records.len()).map(|k| k as i64).collect();
-    let first = [("record".to_owned(), TableColumn::Integers(numbers))];
-    let rest = columns.into_iter().map(|(name, of)| {
-        let values = records.iter().map(|record| of(record).unwrap_or(f64::NAN));
-        (name.to_owned(), TableColumn::Numbers(values.collect()))
-    });
-    RowTable {
-        columns: first.into_iter().chain(rest).collect(),
+    let rows: Vec<_> = evolution.records.iter().map(values).collect();
+    let numbers = (0..rows.len()).map(|k| k as i64).collect();
+    let mut columns = vec![("record".to_owned(), TableColumn::Integers(numbers))];
+    for (k, (name, _)) in rows
+        .iter()
+        .flatten()
+        .enumerate()
+        .take(rows.first().map_or(0, Vec::len))
+    {
+        let values = rows.iter().map(|row| row[k].1.unwrap_or(f64::NAN));
+        columns.push((name.clone(), TableColumn::Numbers(values.collect())));
     }
+    RowTable { columns }
 }
 
-fn largest(values: &[f64]) -> Option<f64> {
-    values.iter().copied().max_by(f64::total_cmp)
+/// The values of a row of the table of records.
+fn values(record: &EvolutionRecord) -> Vec<(String, Option<f64>)> {
+    let (progress, contact) = (&record.progress, &record.contact);
+    let mut values = vec![
+        ("share".to_owned(), Some(progress.share)),
+        ("mgt".to_owned(), progress.mgt),
+        ("axle_passes".to_owned(), progress.axle_passes),
+        ("wheel_distance_km".to_owned(), progress.wheel_distance_km),
+    ];
+    let mut add = |name: String, value| values.push((name, value));
+    for (name, loss) in record.losses.named() {
+        add(name.to_owned(), loss);
+    }
+    for (name, body) in [("rail", &record.rail), ("wheel", &record.wheel)] {
+        let largest = |values: &[f64]| values.iter().copied().max_by(f64::total_cmp);
+        let [low, high] = body.uncertainty.coefficients;
+        add(format!("{name}_worn_area_mm2"), Some(body.worn_area_mm2));
+        add(
+            format!("{name}_machined_area_mm2"),
+            Some(body.machined_area_mm2),
+        );
+        add(format!("{name}_damage_max"), largest(&body.damage));
+        add(format!("{name}_depth_max_mm"), largest(&body.depth_mm));
+        add(format!("{name}_coefficients_low"), Some(low));
+        add(format!("{name}_coefficients_high"), Some(high));
+    }
+    add("conicity".to_owned(), record.conicity);
+    for (name, value) in [
+        ("pressure_max_mpa", contact.pressure_max_mpa),
+        ("pressure_mean_mpa", contact.pressure_mean_mpa),
+        ("y_over_q_max", contact.y_over_q_max),
+        ("y_over_q_mean", contact.y_over_q_mean),
+        ("t_gamma_mean_n", contact.t_gamma_mean_n),
+        ("unsolved_share", contact.unsolved_share),
+    ] {
+        add(name.to_owned(), Some(value));
+    }
+    values
 }
 
 fn points_table(evolution: &EvolutionAnswer) -> RowTable {
-    let (mut record, mut point) = (Vec::new(), Vec::new());
-    let mut body = Vec::new();
+    let (mut record, mut body, mut point) = (Vec::new(), Vec::new(), Vec::new());
     let mut values: [Vec<f64>; 5] = Default::default();
     for (number, one) in evolution.records.iter().enumerate() {
         for (name, worn) in [("rail", &one.rail), ("wheel", &one.wheel)] {
             for (k, [y, z]) in worn.points_mm.iter().enumerate() {
                 record.push(number as i64);
-                point.push(k as i64);
                 body.push(Some(name.to_owned()));
+                point.push(k as i64);
                 let row = [one.progress.share, *y, *z, worn.depth_mm[k], worn.damage[k]];
-                values
-                    .iter_mut()
-                    .zip(row)
-                    .for_each(|(column, value)| column.push(value));
+                (0..5).for_each(|k| values[k].push(row[k]));
             }
         }
     }
-    let names = ["share", "y_mm", "z_mm", "depth_mm", "damage"];
-    let numbers = names.into_iter().zip(values);
-    let numbers = numbers.map(|(name, values)| (name.to_owned(), TableColumn::Numbers(values)));
     let first = [
-        ("record".to_owned(), TableColumn::Integers(record)),
-        ("body".to_owned(), TableColumn::Texts(body)),
-        ("point".to_owned(), TableColumn::Integers(point)),
+        TableColumn::Integers(record),
+        TableColumn::Texts(body),
+        TableColumn::Integers(point),
     ];
+    let names = [
+        "record", "body", "point", "share", "y_mm", "z_mm", "depth_mm", "damage",
+    ];
+    let columns = first.into_iter().chain(values.map(TableColumn::Numbers));
     RowTable {
-        columns: first.into_iter().chain(numbers).collect(),
+        columns: names.map(str::to_owned).into_iter().zip(columns).collect(),
     }
 }
 
-/// The text of a file with a section, in mm.
-fn file(worn: &WornBody, wheel: bool, form: &str) -> String {
-    let points = worn.points_mm.iter();
-    let kind = u8::from(wheel);
-    match form {
-        "miniprof" => {
-            // MiniProf's X points to the track centre.
-            let rows = points.map(|[y, z]| format!("{:.6}\t{z:.6}\n", 0.0 - y));
-            let (count, rows) = (worn.points_mm.len(), rows.collect::<String>());
-            format!("ProgramName=railhead\nXYPoints={count}\nColumnDef=X,Y\n\n{rows}")
-        }
-        _ => {
-            let rows: String = points.map(|[y, z]| format!("{y:.6} {z:.6}\n")).collect();
-            match form {
-                "simpack" => format!(
-                    "header.begin\n  version = 1\n  type = {kind}\nheader.end\nspline.begin\n  type = 0\n  units.len.f = 1000\n  point.begin\n{rows}  point.end\nspline.end\n"
-                ),
-                _ => rows,
-            }
-        }
-    }
+/// A line for each point; y is positive to the field side times `sense`.
+fn lines(points: &[[f64; 2]], sense: f64, between: char) -> String {
+    let points = points.iter();
+    points
+        .map(|[y, z]| format!("{:.6}{between}{z:.6}\n", 0.0 + sense * y))
+        .collect()
+}
+
+/// MiniProf's X points to the track centre.
+fn miniprof(points: &[[f64; 2]], _: bool) -> String {
+    let (count, lines) = (points.len(), lines(points, -1.0, '\t'));
+    format!("ProgramName=railhead\nXYPoints={count}\nColumnDef=X,Y\n\n{lines}")
+}
+
+fn simpack(points: &[[f64; 2]], wheel: bool) -> String {
+    let (kind, lines) = (u8::from(wheel), lines(points, 1.0, ' '));
+    format!(
+        "header.begin\n  version = 1\n  type = {kind}\nheader.end\nspline.begin\n  type = 0\n  units.len.f = 1000\n  point.begin\n{lines}  point.end\nspline.end\n"
+    )
 }

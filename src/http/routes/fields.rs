@@ -2,7 +2,7 @@
 
 use axum::body::Body;
 use axum::http::{HeaderValue, header};
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -11,7 +11,7 @@ use crate::contact::solution::words::fields::{PatchCells, PointFields};
 use crate::http::dto::cells::{Cells, GriddedField, Outlines, gridded, per_cell};
 use crate::http::dto::result::name_of;
 use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::query::{Parameters, Reader, index, query, reader, whole};
+use crate::http::extract::query::{Parameters, Reader, index, query, reader, whole, word};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Rendering;
 use crate::http::problem::error::ApiError;
@@ -195,11 +195,7 @@ impl Selection {
 
 /// How exactly numbers are written.
 pub(crate) fn precision() -> Reader<Precision> {
-    reader("`single`, `double`", |text| match text {
-        "single" => Some(Precision::Single),
-        "double" => Some(Precision::Double),
-        _ => None,
-    })
+    word(&[("single", Precision::Single), ("double", Precision::Double)])
 }
 
 /// A regular grid of at most so many samples.
@@ -400,15 +396,6 @@ pub(crate) async fn write(
         }
         Written::Whole(bytes) => Body::from(bytes),
     };
-    let headers = [
-        (
-            header::CONTENT_TYPE,
-            HeaderValue::from_static(format.media_type()),
-        ),
-        (header::VARY, HeaderValue::from_static("Accept")),
-    ];
-    let mut response = (headers, body).into_response();
-    let disposition = format.disposition(&format!("{name}-{patch}-{point}"));
-    response.headers_mut().extend(disposition);
+    let response = format.answer(&format!("{name}-{patch}-{point}"), body);
     Ok(hold_while_sent(response, share))
 }

@@ -4,7 +4,7 @@ use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 use crate::contact::case::words::solver::Output;
-use crate::http::extract::query::{Parameters, count, index, query, reader, require_index};
+use crate::http::extract::query::{Parameters, count, index, query, reader, require_index, word};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
@@ -24,6 +24,15 @@ const VIEW_WIDTH_MIN: u32 = 200;
 /// Limits of the width in pixels.
 const WIDTH: [u32; 2] = [48, 2400];
 
+/// The fields of the view `patch`.
+const FIELDS: [(&str, Output); 5] = [
+    ("traction", Output::Tractions),
+    ("pressure", Output::Pressure),
+    ("slip", Output::Slip),
+    ("temperature", Output::Temperature),
+    ("zones", Output::Zones),
+];
+
 query! {
     /// The parameters of a picture.
     PlotQuery(() => ()) {
@@ -35,14 +44,7 @@ query! {
         /// Field of the view `patch`: `traction` (default), `pressure`, `slip`, `temperature` or `zones`; the case must request that output. The
         /// border of the stick zone is drawn if the case requests `zones` too
         #[param(example = "traction")]
-        field: Output as String = reader("`traction`, `pressure`, `slip`, `temperature` or `zones`", |text| match text {
-            "traction" => Some(Output::Tractions),
-            "pressure" => Some(Output::Pressure),
-            "slip" => Some(Output::Slip),
-            "temperature" => Some(Output::Temperature),
-            "zones" => Some(Output::Zones),
-            _ => None,
-        });
+        field: Output as String = word(&FIELDS);
         /// The motion, counted from 0; 0 when left out
         point: usize as u32 = index();
         /// The patch, counted from 0; 0 when left out

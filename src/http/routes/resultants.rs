@@ -1,7 +1,6 @@
 //! `/v1/jobs/{id}/resultants`: forces and moments, per patch and in sum, as JSON or as a table.
 
-use axum::http::header;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 
 use crate::contact::solution::words::answer::Solution;
 use crate::http::dto::resultants::{Resultants, sums};
@@ -86,13 +85,6 @@ async fn write(
         Format::Csv => csv_body(resultants, sums),
         _ => json_body(resultants).map_err(|error| ApiError::internal(&error))?,
     };
-    let headers = [
-        (header::CONTENT_TYPE, format.media_type()),
-        (header::VARY, "Accept"),
-    ];
-    let mut response = (headers, body).into_response();
-    response
-        .headers_mut()
-        .extend(format.disposition("resultants"));
+    let response = format.answer("resultants", body);
     Ok(hold_while_sent(response, share))
 }

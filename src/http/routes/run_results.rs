@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use axum::body::{Body, Bytes};
 use axum::extract::State;
-use axum::http::{HeaderMap, Uri, header};
-use axum::response::{IntoResponse, Response};
+use axum::http::{HeaderMap, Uri};
+use axum::response::Response;
 use axum::{Extension, Json};
 use futures_util::stream::{self, StreamExt, try_unfold};
 use serde::Serialize;
@@ -150,14 +150,7 @@ pub(crate) async fn results(
     let begin = stream::iter([Ok::<_, WriteError>(Bytes::from(head)), Ok(first)]);
     let revoked = revoked(jobs, key.map(|Extension(key)| key));
     let body = Body::from_stream(until_revoked(begin.chain(rest), revoked));
-    let headers = [
-        (header::CONTENT_TYPE, format.media_type()),
-        (header::VARY, "Accept"),
-    ];
-    let mut response = (headers, body).into_response();
-    response
-        .headers_mut()
-        .extend(format.disposition(&format!("run-{id}")));
+    let response = format.answer(&format!("run-{id}"), body);
     Ok(hold_while_sent(wait.tell_applied(response), share))
 }
 

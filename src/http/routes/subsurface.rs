@@ -1,7 +1,6 @@
 //! `/v1/jobs/{id}/subsurface`: stresses below the surface at the points that the case asked for, and the worst point of the patch.
 
-use axum::http::header;
-use axum::response::{IntoResponse, Response};
+use axum::response::Response;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -117,13 +116,6 @@ async fn write(
         serde_json::to_vec(&answer).map_err(|error| ApiError::internal(&error))
     };
     let (text, share) = turn.await?.run(write, Vec::len).await?;
-    let head = [
-        (header::CONTENT_TYPE, format.media_type()),
-        (header::VARY, "Accept"),
-    ];
-    let mut response = (head, text).into_response();
-    response
-        .headers_mut()
-        .extend(format.disposition("subsurface"));
+    let response = format.answer("subsurface", text);
     Ok(hold_while_sent(response, share))
 }

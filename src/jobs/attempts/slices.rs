@@ -5,11 +5,9 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use crate::contact::error::SolveError;
-use crate::contact::evolution::task::{Evolution, SolveContext};
-use crate::contact::monitor::Monitor;
+use crate::contact::evolution::task::Evolution;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
+use crate::contact::solution::words::evolution::EvolutionState;
 use crate::jobs::store::ending::SliceRecord;
 
 /// A checked case with its slices, of which the first `done` are stored.
@@ -89,17 +87,14 @@ impl SlicedCase {
     }
 }
 
-/// Steps of an evolution that are stored together, unless a record ends them before.
-const STEPS: u32 = 16;
-
 /// An evolution between two slices.
 #[derive(Debug)]
 pub(crate) struct SlicedEvolution {
     pub(crate) task: Evolution,
-    /// Where it stands; nothing if that has to be read from the last slice.
+    /// Where it stands; nothing if that has to be read from the stored slices.
     pub(crate) state: Option<EvolutionState>,
     /// Slices stored.
-    done: u32,
+    pub(crate) done: u32,
     /// Solver time up to the end of what is stored.
     pub(crate) spent: Duration,
 }
@@ -107,60 +102,20 @@ pub(crate) struct SlicedEvolution {
 impl SlicedEvolution {
     /// An evolution of which this is stored. What another solver stored is left aside.
     pub(crate) fn new(task: Evolution, stored: &[SliceRecord]) -> SlicedEvolution {
-        let fit = stored.iter().all(|note| note.digest == task.digest());
-        let done = if fit { stored.len() } else { 0 };
-        let last = done.checked_sub(1).and_then(|last| stored.get(last));
+        let fit = stored.iter().all(|note| note.digest == task.digest);
+        let stored = if fit { stored } else { &[] };
         SlicedEvolution {
-            state: last.is_none().then(|| task.begin()),
-            done: u32::try_from(done).unwrap_or(u32::MAX),
-            spent: last.map_or(Duration::ZERO, |note| note.spent),
+            state: stored.is_empty().then(|| task.begin()),
+            done: u32::try_from(stored.len()).unwrap_or(u32::MAX),
+            spent: stored.last().map_or(Duration::ZERO, |note| note.spent),
             task,
         }
     }
 
-    /// Takes steps up to the next record, and returns it, or so many that they are worth being stored.
-    ///
-    /// # Errors
-    /// Those of a step.
-    pub(crate) fn steps(
-        &mut self,
-        context: &SolveContext,
-        monitor: &(dyn Monitor + Sync),
-    ) -> Result<Option<EvolutionRecord>, SolveError> {
-        let mut state = self.state.take().unwrap_or_else(|| self.task.begin());
-        let mut found = None;
-        for _ in 0..STEPS {
-            let (next, record) = self.task.step(context, &state, monitor)?;
-            state = next;
-            found = record;
-            if found.is_some() || self.task.is_over(&state) {
-                break;
-            }
-        }
-        self.state = Some(state);
-        Ok(found)
-    }
-
-    /// What is to be noted of the slice that was solved last, when the job had taken so long.
-    pub(crate) fn note(&self, spent: Duration) -> SliceRecord {
-        SliceRecord {
-            number: self.done,
-            motions: self.state.as_ref().map_or(0, |state| state.steps),
-            digest: self.task.digest(),
-            spent,
-        }
-    }
-
-    /// Is everything solved?
-    pub(crate) fn is_over(&self) -> bool {
-        self.state
-            .as_ref()
-            .is_some_and(|state| self.task.is_over(state))
-    }
-
-    /// Are these parts as many as there are slices?
-    pub(crate) fn is_whole(&self, parts: usize) -> bool {
-        parts == self.done as usize
+    /// What is stored cannot be used.
+    pub(crate) fn begin_again(&mut self) {
+        self.done = 0;
+        self.state = Some(self.task.begin());
     }
 }
 
@@ -175,11 +130,11 @@ pub(crate) enum SlicedWork {
 }
 
 impl SlicedWork {
-    /// Nothing can be done before the stored parts are read: all is solved, or it is not known where to go on.
+    /// Nothing can be done before the stored parts are read: all is solved, or where to go on is in them.
     pub(crate) fn waits_for_parts(&self) -> bool {
         match self {
             SlicedWork::Case(case) => case.next().is_none(),
-            SlicedWork::Evolution(evolution) => evolution.state.is_none() || evolution.is_over(),
+            SlicedWork::Evolution(evolution) => evolution.state.is_none(),
         }
     }
 
@@ -217,10 +172,7 @@ impl SlicedWork {
     pub(crate) fn begin_again(&mut self) {
         match self {
             SlicedWork::Case(case) => case.begin_again(),
-            SlicedWork::Evolution(evolution) => {
-                evolution.done = 0;
-                evolution.state = Some(evolution.task.begin());
-            }
+            SlicedWork::Evolution(evolution) => evolution.begin_again(),
         }
     }
 }

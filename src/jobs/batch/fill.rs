@@ -10,8 +10,6 @@ use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::batch::Batch;
-use crate::jobs::model::job::created_at;
-use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob};
 use crate::jobs::trace::KeyValue;
@@ -178,12 +176,7 @@ impl Jobs {
         options: SubmitOptions,
         traceparent: Option<Arc<str>>,
     ) -> NewJob {
-        let id = self.shared.new_id();
         NewJob {
-            id,
-            tenant: self.tenant.clone(),
-            kind: Kind::Case,
-            created_at: created_at(id),
             name: staged.name,
             labels: staged.labels,
             method: staged.method,
@@ -196,10 +189,9 @@ impl Jobs {
             cache_key: Some(staged.digest)
                 .filter(|digest| !digest.is_empty())
                 .and_then(|digest| self.cache_key(&digest)),
-            source: None,
-            idempotency: None,
             traceparent,
             options: options.of_case(staged.own),
+            ..self.blank_job()
         }
     }
 }

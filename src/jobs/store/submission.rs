@@ -14,7 +14,7 @@ use crate::jobs::model::submit_options::SubmitOptions;
 pub type CacheKey = [u8; 16];
 
 /// A job about to be queued.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct NewJob {
     /// UUIDv7.
     pub id: Uuid,

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
+use serde::Serialize;
 
 use crate::contact::error::SolveError;
 use crate::contact::evolution::task::{Evolution, SolveContext};
@@ -15,6 +16,12 @@ use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
+
+/// Steps that are stored together, unless a record ends them before.
+const STEPS: u32 = 16;
+
+/// What a slice stores: the record that ends it, if one does, and the state after it.
+type Part = (Option<EvolutionRecord>, EvolutionState);
 
 /// Checks an evolution, of which this is stored, and takes its next steps.
 pub(crate) fn begin(
@@ -31,22 +38,22 @@ pub(crate) fn begin(
         Ok(task) => task,
         Err(error) => return Outcome::Refused(error),
     };
-    control.set_memory_bytes(task.memory_bytes());
+    control.set_memory_bytes(task.memory_bytes);
     advance(shared, control, SlicedEvolution::new(task, notes))
 }
 
-/// Takes the next steps, if it is known where to go on; otherwise the stored parts are wanted.
+/// Takes the next steps; where there are none, or it is not known where to go on, the stored parts are wanted.
 pub(crate) fn advance(
     shared: &Shared,
     control: &AttemptControl,
     mut evolution: SlicedEvolution,
 ) -> Outcome {
-    if evolution.state.is_none() || evolution.is_over() {
+    let state = evolution.state.take();
+    let Some(state) = state.filter(|state| !evolution.task.is_over(state)) else {
         let sliced = Box::new(SlicedWork::Evolution(evolution));
         return Outcome::Slice { sliced, part: None };
-    }
-    let limit = shared.options.time_limit;
-    if evolution.spent >= limit {
+    };
+    if evolution.spent >= shared.options.time_limit {
         return Outcome::Unsolved(SolveError::OutOfTime {
             limit_s: None,
             motions: None,
@@ -58,29 +65,27 @@ pub(crate) fn advance(
         known: Arc::clone(&shared.engine.known),
     };
     control.begin(evolution.spent);
-    let solved = evolution.steps(&context, control);
+    let solved = evolution.task.steps(&context, state, STEPS, control);
     let spent = control.pause();
-    let record = match solved {
-        Ok(record) => record,
+    let (state, record) = match solved {
+        Ok(solved) => solved,
         Err(error) => return Outcome::Unsolved(error),
     };
-    let texts = serde_json::to_vec(&record)
-        .and_then(|record| Ok((record, serde_json::to_vec(&evolution.state)?)));
-    let (record, state) = match texts {
-        Ok(texts) => texts,
-        Err(error) => {
-            return Outcome::internal(&format!("a step cannot be written as JSON: {error}"));
-        }
+    let note = SliceRecord {
+        number: evolution.done,
+        motions: state.steps,
+        digest: evolution.task.digest.clone(),
+        spent,
     };
-    Outcome::Slice {
-        part: Some((
-            evolution.note(spent),
-            EncodedResult {
-                solution: Bytes::from(record),
-                fields: Some(Bytes::from(state)),
+    match encoded(&(record, &state)) {
+        Ok(part) => Outcome::Slice {
+            part: Some((note, part)),
+            sliced: {
+                evolution.state = Some(state);
+                Box::new(SlicedWork::Evolution(evolution))
             },
-        )),
-        sliced: Box::new(SlicedWork::Evolution(evolution)),
+        },
+        Err(error) => Outcome::internal(&error),
     }
 }
 
@@ -91,51 +96,54 @@ pub(crate) fn join(
     mut evolution: SlicedEvolution,
     parts: &[EncodedResult],
 ) -> Outcome {
-    let read = match evolution.is_whole(parts.len()) {
-        true => read(parts),
-        false => Err(JobsError::Damaged("slices are missing".to_owned())),
-    };
-    let (state, records) = match read {
-        Ok(read) => read,
+    match read(parts, evolution.done) {
+        Ok((state, records)) if evolution.task.is_over(&state) => {
+            let answer = evolution.task.answer(&state, records);
+            match encoded(&answer) {
+                Ok(result) => Outcome::Solved {
+                    result,
+                    remarks: answer.remarks,
+                    field_patches: 0,
+                },
+                Err(error) => Outcome::internal(&error),
+            }
+        }
+        Ok((state, _)) => {
+            evolution.state = Some(state);
+            advance(shared, control, evolution)
+        }
         Err(error) => {
             tracing::error!(%error, "the slices of an evolution cannot be used; it is solved again");
-            let mut sliced = SlicedWork::Evolution(evolution);
-            sliced.begin_again();
-            let sliced = Box::new(sliced);
-            return Outcome::Slice { sliced, part: None };
-        }
-    };
-    if !evolution.task.is_over(&state) {
-        evolution.state = Some(state);
-        return advance(shared, control, evolution);
-    }
-    let answer = evolution.task.answer(&state, records);
-    let remarks = answer.remarks.clone();
-    match serde_json::to_vec(&answer) {
-        Ok(text) => Outcome::Solved {
-            result: EncodedResult {
-                solution: Bytes::from(text),
-                fields: None,
-            },
-            remarks,
-            field_patches: 0,
-        },
-        Err(error) => {
-            Outcome::internal(&format!("an evolution cannot be written as JSON: {error}"))
+            evolution.begin_again();
+            advance(shared, control, evolution)
         }
     }
 }
 
-/// The state after the last of stored parts, and all their records.
-fn read(parts: &[EncodedResult]) -> Result<(EvolutionState, Vec<EvolutionRecord>), JobsError> {
-    let damaged = |error: serde_json::Error| JobsError::Damaged(format!("a slice: {error}"));
-    let mut records = Vec::new();
+/// A part or the whole of an answer in its stored form.
+fn encoded(answer: &impl Serialize) -> Result<EncodedResult, String> {
+    let text = serde_json::to_vec(answer);
+    let text = text.map_err(|error| format!("an evolution cannot be written as JSON: {error}"))?;
+    Ok(EncodedResult {
+        solution: Bytes::from(text),
+        fields: None,
+    })
+}
+
+/// The state after the last of this many stored parts, and all their records.
+fn read(
+    parts: &[EncodedResult],
+    count: u32,
+) -> Result<(EvolutionState, Vec<EvolutionRecord>), JobsError> {
+    let (mut last, mut records) = (None, Vec::new());
     for part in parts {
-        let record: Option<EvolutionRecord> =
-            serde_json::from_slice(&part.solution).map_err(damaged)?;
+        let read = serde_json::from_slice(&part.solution);
+        let (record, state): Part =
+            read.map_err(|error| JobsError::Damaged(format!("a slice: {error}")))?;
         records.extend(record);
+        last = Some(state);
     }
-    let last = parts.last().and_then(|part| part.fields.as_ref());
-    let last = last.ok_or_else(|| JobsError::Damaged("a slice without a state".to_owned()))?;
-    Ok((serde_json::from_slice(last).map_err(damaged)?, records))
+    last.filter(|_| parts.len() == count as usize)
+        .map(|state| (state, records))
+        .ok_or_else(|| JobsError::Damaged("slices are missing".to_owned()))
 }

@@ -1,6 +1,6 @@
-//! Reads what is asked of an evolution: its plan, and its traffic as columns of numbers.
+//! Reads what is asked of an evolution: its plan, and its traffic as columns of numbers and distributions.
 
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::object::{Object, join, number, shown};
@@ -8,10 +8,11 @@ use crate::contact::case::read::subsurface::optional;
 use crate::contact::case::read::wheel_rail::section;
 use crate::contact::case::words::damage::DamageModel;
 use crate::contact::case::words::evolution::{
-    EvolutionAccuracy, EvolutionEvent, EvolutionExtent, EvolutionWords, WearLosses, WearingBodies,
+    EvolutionAccuracy, EvolutionEvent, EvolutionExtent, EvolutionWords, Traffic, TrafficColumn,
+    TrafficDistribution, WearLosses, WearingBodies,
 };
-use crate::contact::error::{CaseError, Fault};
-use crate::contact::numerics::sampling::{PRIMES, halton, normal_probability, normal_quantile};
+use crate::contact::error::CaseError;
+use crate::contact::numerics::sampling::PRIMES;
 
 const BODIES: [(&str, WearingBodies); 3] = [
     ("rail", WearingBodies::Rail),
@@ -35,130 +36,99 @@ const MEMBERS: [&str; 10] = [
     "coefficient_factor",
 ];
 const AMOUNT: AllowedRange = AllowedRange::positive(1e12, "");
+const NOT_NEGATIVE: AllowedRange = AllowedRange::closed(0.0, 1e12, "");
 const ANY: AllowedRange = AllowedRange::closed(-1e12, 1e12, "");
 const LOSS: AllowedRange = AllowedRange::positive(100.0, "mm");
 const SHARE: AllowedRange = AllowedRange::positive(1.0, "");
 /// Events of one evolution.
 const EVENTS_MAX: usize = 100;
 /// Rows of a traffic.
-pub const ROWS_MAX: usize = 200_000;
+const ROWS_MAX: u32 = 200_000;
 /// Samples of a traffic whose columns are distributions.
-const SAMPLES_DEFAULT: usize = 4096;
+const SAMPLES_DEFAULT: u32 = 4096;
 
-/// An evolution as it was sent, without faults of the text.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EvolutionDraft {
-    /// A case of one motion.
-    pub template: Value,
-    /// Places in the case and their values, one for each row.
-    pub columns: Vec<(String, Vec<f64>)>,
-    /// Relative numbers of passes of the rows.
-    pub passes: Vec<f64>,
-    /// The plan.
-    pub plan: EvolutionWords,
-}
-
-impl EvolutionDraft {
+impl EvolutionWords {
     /// Reads an evolution whose columns are named by JSON pointers into the template.
     ///
     /// # Errors
     /// Every fault of the text, with its JSON pointer.
-    pub fn read(value: &Value) -> Result<EvolutionDraft, CaseError> {
+    pub fn read(value: &Value) -> Result<EvolutionWords, CaseError> {
         let mut faults = Faults::default();
-        let draft =
-            Object::open(value, String::new(), &mut faults).and_then(|mut all| draft(&mut all));
-        let listed = faults.into_list();
-        match draft {
-            Some(draft) if listed.is_empty() => Ok(draft),
-            _ if listed.is_empty() => Err(CaseError(vec![Fault::new("", "not an evolution")])),
-            _ => Err(CaseError(listed)),
-        }
+        let words =
+            Object::open(value, String::new(), &mut faults).and_then(|mut all| words(&mut all));
+        let faults = faults.into_list();
+        words.filter(|_| faults.is_empty()).ok_or(CaseError(faults))
     }
 }
 
-fn draft(all: &mut Object) -> Option<EvolutionDraft> {
+// A faulty member is read as if it were left out: the fault refuses the evolution.
+
+fn words(all: &mut Object) -> Option<EvolutionWords> {
     all.only(&MEMBERS, &[]);
     let template = all.required("template", "a case of one motion").cloned();
-    let traffic = traffic(&mut all.child("traffic")?);
-    let wearing = or(all, "wearing", WearingBodies::Both, |all, name| {
-        all.word(name, &BODIES, &[])
-    });
-    let model = DamageModel::UsfdWear;
-    let wear_model = or(all, "wear_model", model, |all, name| {
-        all.word(name, &MODELS, &[])
-    });
-    let extent = extent(&mut all.child("extent")?, wearing.unwrap_or_default());
-    let records = or(all, "records", 10, |all, name| {
-        all.required_count(name, 1, 500)
-    });
-    let usual = EvolutionAccuracy::default();
-    let accuracy = or(all, "accuracy", usual, |all, name| {
-        accuracy(&mut all.child(name)?)
-    });
-    let none = WearLosses::default();
-    let limits = or(all, "limits", none, |all, name| {
-        limits(&mut all.child(name)?)
-    });
-    let events = or(all, "events", Vec::new(), events);
+    let traffic = all
+        .child("traffic")
+        .and_then(|mut block| traffic(&mut block));
+    let wearing = all.word("wearing", &BODIES, &[]).unwrap_or_default();
+    let extent = all
+        .child("extent")
+        .map(|mut block| extent(&mut block, wearing));
+    let wear_model = all.word("wear_model", &MODELS, &[]);
     let factor = AllowedRange::closed(1.0, 100.0, "");
-    let coefficient_factor = number_or(all, "coefficient_factor", factor, 2.0);
-    let (columns, passes) = traffic?;
-    Some(EvolutionDraft {
+    Some(EvolutionWords {
+        wearing,
+        wear_model: wear_model.unwrap_or(DamageModel::UsfdWear),
+        records: count_or(all, "records", 500, 10),
+        accuracy: block_or_default(all, "accuracy", accuracy),
+        limits: block_or_default(all, "limits", limits),
+        events: events(all).unwrap_or_default(),
+        coefficient_factor: number_or(all, "coefficient_factor", factor, 2.0),
         template: template?,
-        columns,
-        passes,
-        plan: EvolutionWords {
-            wearing: wearing?,
-            wear_model: wear_model?,
-            extent: extent?,
-            records: records?,
-            accuracy: accuracy?,
-            limits: limits?,
-            events: events?,
-            coefficient_factor: coefficient_factor?,
-        },
+        traffic: traffic?,
+        extent: extent?,
     })
 }
 
-/// A member that has a value where it is left out.
-fn or<T>(
-    block: &mut Object,
+fn block_or_default<T: Default>(
+    all: &mut Object,
     name: &str,
-    or: T,
-    read: impl FnOnce(&mut Object, &str) -> Option<T>,
-) -> Option<T> {
-    optional(block, name, read).map(|found| found.unwrap_or(or))
+    read: impl FnOnce(&mut Object) -> T,
+) -> T {
+    let found = optional(all, name, |all, name| Some(read(&mut all.child(name)?)));
+    found.flatten().unwrap_or_default()
 }
 
-fn number_or(block: &mut Object, name: &str, allowed: AllowedRange, usual: f64) -> Option<f64> {
-    or(block, name, usual, |block, name| {
-        block.number(name, allowed)
-    })
+fn number_or(block: &mut Object, name: &str, allowed: AllowedRange, usual: f64) -> f64 {
+    block.number(name, allowed).unwrap_or(usual)
 }
 
-fn extent(block: &mut Object, wearing: WearingBodies) -> Option<EvolutionExtent> {
+fn count_or(block: &mut Object, name: &str, most: u32, usual: u32) -> u32 {
+    let found = optional(block, name, |block, name| {
+        block.required_count(name, 1, most)
+    });
+    found.flatten().unwrap_or(usual)
+}
+
+fn extent(block: &mut Object, wearing: WearingBodies) -> EvolutionExtent {
     block.only(&["mgt", "axle_passes", "wheel_distance_km"], &[]);
-    let extent = EvolutionExtent {
-        mgt: block.number("mgt", AMOUNT),
-        axle_passes: block.number("axle_passes", AMOUNT),
-        wheel_distance_km: block.number("wheel_distance_km", AMOUNT),
-    };
     let [rail, wheel] = wearing.flags();
     if block.has("mgt") && block.has("axle_passes") {
         block.fault("axle_passes", "given together with mgt; give one of them");
-    } else if rail && !block.has("mgt") && !block.has("axle_passes") {
-        block.required(
-            "mgt",
-            "mgt or axle_passes, how much traffic passes over the rail",
-        );
+    } else if rail && !block.has("axle_passes") {
+        let what = "mgt or axle_passes, how much traffic passes over the rail";
+        block.required("mgt", what);
     }
     if wheel {
         block.required("wheel_distance_km", "the distance that the wheel rolls");
     }
-    Some(extent)
+    EvolutionExtent {
+        mgt: block.number("mgt", AMOUNT),
+        axle_passes: block.number("axle_passes", AMOUNT),
+        wheel_distance_km: block.number("wheel_distance_km", AMOUNT),
+    }
 }
 
-fn accuracy(block: &mut Object) -> Option<EvolutionAccuracy> {
+fn accuracy(block: &mut Object) -> EvolutionAccuracy {
     let names = [
         "states_max",
         "states_tolerance",
@@ -169,184 +139,148 @@ fn accuracy(block: &mut Object) -> Option<EvolutionAccuracy> {
     ];
     block.only(&names, &[]);
     let usual = EvolutionAccuracy::default();
-    let count_or = |block: &mut Object, name: &str, most: u32, usual: u32| {
-        or(block, name, usual, |block, name| {
-            block.required_count(name, 1, most)
-        })
-    };
     let depth = AllowedRange::positive(1.0, "mm");
     let kernel = AllowedRange::closed(0.0, 5.0, "mm");
-    let states_max = count_or(block, "states_max", 2000, usual.states_max);
-    let states_tolerance = number_or(block, "states_tolerance", SHARE, usual.states_tolerance);
-    let step_tolerance = number_or(block, "step_tolerance", SHARE, usual.step_tolerance);
-    let step_depth_mm = number_or(block, "step_depth_mm", depth, usual.step_depth_mm);
-    let steps_max = count_or(block, "steps_max", 100_000, usual.steps_max);
-    let smoothing_mm = number_or(block, "smoothing_mm", kernel, usual.smoothing_mm);
-    Some(EvolutionAccuracy {
-        states_max: states_max?,
-        states_tolerance: states_tolerance?,
-        step_tolerance: step_tolerance?,
-        step_depth_mm: step_depth_mm?,
-        steps_max: steps_max?,
-        smoothing_mm: smoothing_mm?,
-    })
+    EvolutionAccuracy {
+        states_max: count_or(block, "states_max", 2000, usual.states_max),
+        states_tolerance: number_or(block, "states_tolerance", SHARE, usual.states_tolerance),
+        step_tolerance: number_or(block, "step_tolerance", SHARE, usual.step_tolerance),
+        step_depth_mm: number_or(block, "step_depth_mm", depth, usual.step_depth_mm),
+        steps_max: count_or(block, "steps_max", 100_000, usual.steps_max),
+        smoothing_mm: number_or(block, "smoothing_mm", kernel, usual.smoothing_mm),
+    }
 }
 
-fn limits(block: &mut Object) -> Option<WearLosses> {
-    block.only(&WearLosses::NAMES, &[]);
-    Some(WearLosses::from(
-        WearLosses::NAMES.map(|name| block.number(name, LOSS)),
-    ))
+fn limits(block: &mut Object) -> WearLosses {
+    block.only(&WearLosses::default().named().map(|(name, _)| name), &[]);
+    WearLosses {
+        height_mm: block.number("height_mm", LOSS),
+        gauge_face_mm: block.number("gauge_face_mm", LOSS),
+        gauge_corner_mm: block.number("gauge_corner_mm", LOSS),
+        tread_mm: block.number("tread_mm", LOSS),
+        flange_mm: block.number("flange_mm", LOSS),
+    }
 }
 
-fn events(all: &mut Object, name: &str) -> Option<Vec<EvolutionEvent>> {
-    let value = all.value(name)?;
-    let pointer = all.pointer_to(name);
+fn events(all: &mut Object) -> Option<Vec<EvolutionEvent>> {
+    let value = all.value("events")?;
     let Some(elements) = value.as_array().filter(|list| list.len() <= EVENTS_MAX) else {
         let given = shown(value);
         let detail = format!("{given} given; an array of at most {EVENTS_MAX} events is needed");
-        all.fault(name, detail);
+        all.fault("events", detail);
         return None;
     };
-    let faults = all.faults();
-    let read = elements
-        .iter()
-        .enumerate()
-        .map(|(k, element)| event(&mut Object::open(element, join(&pointer, k), faults)?));
-    let read: Vec<Option<EvolutionEvent>> = read.collect();
-    let mut events = read.into_iter().collect::<Option<Vec<EvolutionEvent>>>()?;
-    events.sort_by(|a, b| a.at.total_cmp(&b.at));
-    Some(events)
+    let pointer = all.pointer_to("events");
+    let event = |(k, element)| event(&mut Object::open(element, join(&pointer, k), all.faults())?);
+    Some(elements.iter().enumerate().filter_map(event).collect())
 }
 
 fn event(block: &mut Object) -> Option<EvolutionEvent> {
     let kinds = ["grind", "reprofile", "friction_coefficient"];
     block.only(&["at", kinds[0], kinds[1], kinds[2], "depth_mm"], &[]);
-    let boxed = |block: &mut Object, name: &str| section(block, name).map(Box::new);
-    let at = block.required_number("at", AllowedRange::closed(0.0, 1e12, ""));
-    let grind = optional(block, kinds[0], boxed);
-    let reprofile = optional(block, kinds[1], boxed);
-    let depth = AllowedRange::closed(0.0, 20.0, "mm");
-    let depth_mm = number_or(block, "depth_mm", depth, 0.0);
-    let friction_coefficient = block.number(kinds[2], AllowedRange::closed(0.0, 2.0, ""));
     if kinds.iter().all(|kind| !block.has(kind)) {
         block.fault_here(format!("nothing happens; give one of {}", kinds.join(", ")));
     }
+    let at = block.required_number("at", NOT_NEGATIVE);
+    let [grind, reprofile] =
+        [kinds[0], kinds[1]].map(|kind| optional(block, kind, section).flatten().map(Box::new));
     Some(EvolutionEvent {
         at: at?,
-        grind: grind?,
-        reprofile: reprofile?,
-        depth_mm: depth_mm?,
-        friction_coefficient,
+        grind,
+        reprofile,
+        depth_mm: number_or(
+            block,
+            "depth_mm",
+            AllowedRange::closed(0.0, 20.0, "mm"),
+            0.0,
+        ),
+        friction_coefficient: block.number(kinds[2], AllowedRange::closed(0.0, 2.0, "")),
     })
 }
 
-type Traffic = (Vec<(String, Vec<f64>)>, Vec<f64>);
-
-/// Columns and passes. A distribution is sampled once for each row.
 fn traffic(block: &mut Object) -> Option<Traffic> {
     block.only(&["columns", "passes", "samples"], &[]);
-    let most = ROWS_MAX as u32;
     let samples = optional(block, "samples", |block, name| {
-        block.required_count(name, 1, most)
+        block.required_count(name, 1, ROWS_MAX)
     })?;
     let value = block.required("columns", "an object of columns")?;
-    let Some(members) = value.as_object().filter(|members| !members.is_empty()) else {
+    let members = value.as_object().filter(|members| !members.is_empty());
+    let first = members
+        .into_iter()
+        .flat_map(Map::values)
+        .find_map(Value::as_array);
+    let rows = samples.or(first.map(|first| first.len() as u32));
+    let samples = rows.unwrap_or(SAMPLES_DEFAULT);
+    let Some(members) = members.filter(|_| (1..=ROWS_MAX).contains(&samples)) else {
         let given = shown(value);
-        block.fault(
-            "columns",
-            format!("{given} given; an object with at least one column is needed"),
+        let detail = format!(
+            "{given} with {samples} rows given; an object of at least one column with 1 to {ROWS_MAX} rows is needed"
         );
+        block.fault("columns", detail);
         return None;
     };
-    let first = members.values().find_map(Value::as_array).map(Vec::len);
-    let rows = samples.map(|samples| samples as usize).or(first);
-    let rows = rows.unwrap_or(SAMPLES_DEFAULT);
-    if !(1..=ROWS_MAX).contains(&rows) {
-        block.fault(
-            "columns",
-            format!("{rows} rows given; 1 to {ROWS_MAX} are allowed"),
-        );
-        return None;
-    }
-    let pointer = block.pointer_to("columns");
-    let faults = block.faults();
-    let mut dimensions = PRIMES.into_iter();
-    let read = members.iter().map(|(name, value)| {
-        let pointer = join(&pointer, name);
-        let values = match value {
+    let mut distributions = 0;
+    let mut block_of_columns = block.child("columns")?;
+    let column = |(name, value): (&String, &Value)| {
+        let column = match value {
             Value::Object(_) => {
-                let mut block = Object::open(value, pointer, faults)?;
-                sampled(&mut block, rows, dimensions.next())
+                distributions += 1;
+                distribution(&mut block_of_columns.child(name)?).map(TrafficColumn::Distribution)
             }
-            _ => numbers(value, &pointer, (ANY, rows), faults),
+            _ => numbers(&mut block_of_columns, name, ANY, samples).map(TrafficColumn::Numbers),
         };
-        Some((name.clone(), values?))
-    });
-    let read: Vec<Option<(String, Vec<f64>)>> = read.collect();
-    let weight = AllowedRange::closed(0.0, 1e12, "");
-    let passes = or(block, "passes", vec![1.0; rows], |block, name| {
-        let pointer = block.pointer_to(name);
-        numbers(block.value(name)?, &pointer, (weight, rows), block.faults())
-    })?;
+        Some((name.clone(), column?))
+    };
+    let columns = members.iter().filter_map(column).collect();
+    if distributions > PRIMES.len() {
+        let detail = format!(
+            "{distributions} distributions given; at most {} are allowed",
+            PRIMES.len()
+        );
+        block.fault("columns", detail);
+    }
+    let passes = match block.has("passes") {
+        true => numbers(block, "passes", NOT_NEGATIVE, samples)?,
+        false => vec![1.0; samples as usize],
+    };
     if passes.iter().sum::<f64>() <= 0.0 {
         block.fault("passes", "all are 0; at least one more than 0 is needed");
     }
-    Some((read.into_iter().collect::<Option<_>>()?, passes))
+    Some(Traffic {
+        columns,
+        passes,
+        samples,
+    })
 }
 
-/// Samples of a distribution at the points of one dimension of Halton's sequence: uniform between two values, or normal where it has a mean and a
-/// standard deviation.
-fn sampled(block: &mut Object, rows: usize, dimension: Option<u32>) -> Option<Vec<f64>> {
+fn distribution(block: &mut Object) -> Option<TrafficDistribution> {
     block.only(&["min", "max", "mean", "standard_deviation"], &[]);
-    let Some(base) = dimension else {
-        block.fault_here(format!(
-            "at most {} distributions are allowed",
-            PRIMES.len()
-        ));
-        return None;
-    };
-    let low = block.required_number("min", ANY);
-    let high = block.required_number("max", AllowedRange::closed(low.unwrap_or(-1e12), 1e12, ""));
-    let normal = match block.has("mean") || block.has("standard_deviation") {
-        true => {
-            let between = AllowedRange::closed(low?, high?, "");
-            let mean = block.required_number("mean", between);
-            let spread = AllowedRange::positive(1e12, "");
-            let deviation = block.required_number("standard_deviation", spread);
-            Some([mean?, deviation?])
-        }
-        false => None,
-    };
-    let (low, high) = (low?, high?);
-    // The value below which this share of the traffic lies.
-    let value = |share: f64| match normal {
-        Some([mean, deviation]) => {
-            let below = |value: f64| normal_probability((value - mean) / deviation);
-            let probability = below(low) + share * (below(high) - below(low));
-            (mean + deviation * normal_quantile(probability)).clamp(low, high)
-        }
-        None => low + share * (high - low),
-    };
-    Some((1..=rows).map(|k| value(halton(k as u32, base))).collect())
+    let min = block.required_number("min", ANY);
+    let max = block.required_number("max", AllowedRange::closed(min.unwrap_or(-1e12), 1e12, ""));
+    let (min, max) = (min?, max?);
+    let (mut mean, mut standard_deviation) = (None, None);
+    if block.has("mean") || block.has("standard_deviation") {
+        mean = block.required_number("mean", AllowedRange::closed(min, max, ""));
+        standard_deviation = block.required_number("standard_deviation", AMOUNT);
+    }
+    Some(TrafficDistribution {
+        min,
+        max,
+        mean,
+        standard_deviation,
+    })
 }
 
-/// As many numbers as there are rows.
-fn numbers(
-    value: &Value,
-    pointer: &str,
-    (allowed, rows): (AllowedRange, usize),
-    faults: &mut Faults,
-) -> Option<Vec<f64>> {
-    let Some(elements) = value.as_array().filter(|all| all.len() == rows) else {
-        let detail = format!(
-            "{} given; one number for each of {rows} rows is needed",
-            shown(value)
-        );
-        faults.add(pointer, detail);
+/// One number for each row.
+fn numbers(block: &mut Object, name: &str, allowed: AllowedRange, rows: u32) -> Option<Vec<f64>> {
+    let value = block.value(name)?;
+    let Some(elements) = value.as_array().filter(|all| all.len() == rows as usize) else {
+        let given = shown(value);
+        let detail = format!("{given} given; one number for each of {rows} rows is needed");
+        block.fault(name, detail);
         return None;
     };
-    let one = |(k, element)| number(element, &join(pointer, k), allowed, faults);
-    let read: Vec<Option<f64>> = elements.iter().enumerate().map(one).collect();
-    read.into_iter().collect()
+    let pointer = block.pointer_to(name);
+    let one = |(k, element)| number(element, &join(&pointer, k), allowed, block.faults());
+    Some(elements.iter().enumerate().filter_map(one).collect())
 }

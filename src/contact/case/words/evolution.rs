@@ -1,15 +1,22 @@
 //! Request of an evolution: the bodies that wear, the wear model, the extent, events and limits.
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::contact::CrossSection;
 use crate::contact::case::words::damage::DamageModel;
 
-/// Plan of an evolution: what it wears, how far and how accurately.
+/// Profiles that wear under a traffic.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-#[schema(as = EvolutionPlan)]
+#[schema(as = EvolutionRequest)]
 pub struct EvolutionWords {
+    /// A case of one motion whose contact is of the type `profiles`. Members that a column holds may be left out; `outputs` is not needed, and
+    /// `solver` has a target of 0.02 when left out.
+    #[schema(value_type = Object)]
+    pub template: Value,
+    /// The states of the traffic.
+    pub traffic: Traffic,
     /// Which bodies wear; `both` when left out.
     #[schema(required = false)]
     pub wearing: WearingBodies,
@@ -34,6 +41,46 @@ pub struct EvolutionWords {
     /// probability of 90 %; 2 when left out.
     #[schema(required = false, minimum = 1.0)]
     pub coefficient_factor: f64,
+}
+
+/// States of a traffic: a table, distributions that the service samples, or both.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Traffic {
+    /// Columns named as those of a run: a number for each row, or a distribution that is sampled once for each row. Distributions are independent of
+    /// each other.
+    #[schema(value_type = BTreeMap<String, TrafficColumn>)]
+    pub columns: Vec<(String, TrafficColumn)>,
+    /// Relative numbers of passes of the rows; 1 for each when left out.
+    #[schema(required = false)]
+    pub passes: Vec<f64>,
+    /// Rows of a traffic whose columns are all distributions; 4096 when left out.
+    #[schema(required = false, minimum = 1, maximum = 200_000)]
+    pub samples: u32,
+}
+
+/// A column of a traffic.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum TrafficColumn {
+    /// The values of the rows.
+    Numbers(Vec<f64>),
+    /// A distribution.
+    Distribution(TrafficDistribution),
+}
+
+/// Distribution of a column: normal between two values if it has a mean and a standard deviation, else uniform.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct TrafficDistribution {
+    /// Least value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+    /// Mean before the ends are cut off.
+    #[schema(nullable = false)]
+    pub mean: Option<f64>,
+    /// Standard deviation before the ends are cut off.
+    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    pub standard_deviation: Option<f64>,
 }
 
 /// The bodies that wear.
@@ -146,44 +193,16 @@ pub struct WearLosses {
 }
 
 impl WearLosses {
-    /// The names; the first three are those of the rail.
-    pub const NAMES: [&str; 5] = [
-        "height_mm",
-        "gauge_face_mm",
-        "gauge_corner_mm",
-        "tread_mm",
-        "flange_mm",
-    ];
-
-    /// The values, in the order of the names.
+    /// Names and values, first those of the rail.
     #[must_use]
-    pub fn values(&self) -> [Option<f64>; 5] {
+    pub fn named(&self) -> [(&'static str, Option<f64>); 5] {
         [
-            self.height_mm,
-            self.gauge_face_mm,
-            self.gauge_corner_mm,
-            self.tread_mm,
-            self.flange_mm,
+            ("height_mm", self.height_mm),
+            ("gauge_face_mm", self.gauge_face_mm),
+            ("gauge_corner_mm", self.gauge_corner_mm),
+            ("tread_mm", self.tread_mm),
+            ("flange_mm", self.flange_mm),
         ]
-    }
-}
-
-impl From<[Option<f64>; 5]> for WearLosses {
-    fn from(values: [Option<f64>; 5]) -> WearLosses {
-        let [
-            height_mm,
-            gauge_face_mm,
-            gauge_corner_mm,
-            tread_mm,
-            flange_mm,
-        ] = values;
-        WearLosses {
-            height_mm,
-            gauge_face_mm,
-            gauge_corner_mm,
-            tread_mm,
-            flange_mm,
-        }
     }
 }
 

@@ -119,7 +119,7 @@ pub struct ContactRange {
 }
 
 /// The contact of one state.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct StateContact {
     /// Share of the traffic.
     pub share: f64,
@@ -208,14 +208,12 @@ pub struct EvolutionState {
     pub events_done: u32,
     /// Coefficient of friction in place of that of the states.
     pub friction: Option<f64>,
-    /// The states; nothing before the first step.
-    pub traffic: Option<CondensedTraffic>,
+    /// The states; none before the first step.
+    pub traffic: CondensedTraffic,
     /// y on the wheel's section where each state touched last.
     pub wheel_y: Vec<f64>,
-    /// The rail.
-    pub rail: BodyState,
-    /// The wheel.
-    pub wheel: BodyState,
+    /// Rail and wheel.
+    pub bodies: [BodyState; 2],
     /// Accepted steps.
     pub steps: u32,
     /// Repeated steps.
