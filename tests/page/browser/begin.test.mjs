@@ -148,6 +148,18 @@ test('a rail whose points jump says so, and is solved all the same on request', 
   assert.equal((await json(page)).contact.accept_rough_profiles, undefined);
 }));
 
+test('a rail in cm is refused with its unit, and stating it is one choice away', () => onPage('', async (page) => {
+  await ready(page);
+  const area = page.locator('.code textarea');
+  await page.locator('.code summary').click();
+  const document = await json(page);
+  const rail = { points_mm: document.contact.rail.points_mm.map((/** @type {number[]} */ point) => point.map((part) => part / 10)) };
+  await area.fill(JSON.stringify({ ...document, contact: { ...document.contact, rail } }));
+  await page.locator('.verdict .faults').getByText('state unit: "cm"').waitFor();
+  await page.locator('.reading').filter({ hasText: 'How the rail is read' }).getByLabel('Unit').selectOption('cm');
+  await ready(page);
+}));
+
 test('a curve radius sets the yaw rate, and another speed keeps the radius', () => onPage('', async (page) => {
   await ready(page);
   const radius = page.getByLabel('Curve radius');
