@@ -16,7 +16,6 @@ pub mod length_units;
 pub mod limits;
 pub mod motions;
 pub mod pair_quality;
-pub mod patch_guess;
 pub mod read;
 pub mod resolution;
 pub mod section_check;

@@ -1,6 +1,5 @@
 //! What will the contact of a gap be like? A look at the samples, before anything is solved.
 
-use crate::contact::normal::gap::constants::{TARGET_POWER, TARGET_USUAL};
 use crate::contact::normal::gap::preview::GapPreview;
 use crate::contact::normal::gap::search_box::{SearchBox, reach};
 use crate::contact::normal::gap::task::GapTask;
@@ -12,8 +11,6 @@ const SUMMITS_MAX: usize = 48;
 /// Half-length of the contact over that of the box it is looked for in, which is made for 1.3 times the approach: Hertz's edge
 /// lies where the gap is half the approach.
 const CONTACT_OVER_BOX: f64 = 0.62;
-/// The sum of second differences of a parabola's samples over the depth of the box, times their number.
-const TURNS_SMOOTH: f64 = 8.0;
 
 impl GapTask {
     /// What the contact will be like: its size, and how many asperities touch, with valleys between them that are not pressed flat.
@@ -45,29 +42,13 @@ impl GapTask {
             .iter()
             .map(|line| valleys(line, reach.level, DEPTH * depth))
             .max();
-        let bends = lines[1]
-            .windows(3)
-            .map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
-        // A ridge between two asperities is one sharp bend, and no roughness.
-        let (all, sharpest) = bends.fold((0.0, 0.0_f64), |(all, sharpest), bend| {
-            (all + bend, sharpest.max(bend))
-        });
         GapPreview {
             half: reach
                 .window
                 .map(|[low, high]| 0.5 * CONTACT_OVER_BOX * (high - low)),
             depth,
             asperities: asperities.unwrap_or(1).clamp(1, SUMMITS_MAX),
-            teeth: (all - sharpest) / depth / (4.0 * y.len() as f64),
-            turns: (all - sharpest) / depth * y.len() as f64 / TURNS_SMOOTH,
         }
-    }
-
-    /// How many times longer region and pressure take for a target than usually: as the cells of the last grid.
-    #[must_use]
-    pub fn growth(&self, target: Option<f64>) -> f64 {
-        let target = target.unwrap_or(TARGET_USUAL).min(TARGET_USUAL);
-        (target / TARGET_USUAL).powf(2.0 * TARGET_POWER)
     }
 }
 

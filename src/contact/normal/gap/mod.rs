@@ -3,8 +3,6 @@
 pub mod answer;
 pub mod asperities;
 pub mod cell_sums;
-pub mod coarse_solution;
-pub mod coarse_solve;
 pub mod conjugate_gradients;
 pub mod constants;
 pub mod coupling;

@@ -1,7 +1,6 @@
 //! Preview of a contact from the samples of its gap, cached because check and solution use it several times.
 
 use crate::contact::lazy_field::LazyField;
-use crate::contact::normal::gap::coarse_solution::CoarseGap;
 use crate::contact::normal::gap::search_box::SearchBox;
 
 /// Estimates of a contact before it is solved.
@@ -13,10 +12,6 @@ pub struct GapPreview {
     pub depth: f64,
     /// Asperities of the bodies that are likely to touch, at least 1.
     pub asperities: usize,
-    /// How much the gap turns across rolling, over a parabola, its sharpest bend left out.
-    pub turns: f64,
-    /// Mean height of its teeth over the depth, of a saw that bends as much.
-    pub teeth: f64,
 }
 
 /// The cached parts of a preview.
@@ -26,6 +21,4 @@ pub struct PreviewCache {
     pub(super) reach: LazyField<SearchBox>,
     /// Size and roughness of the contact.
     pub(super) preview: LazyField<GapPreview>,
-    /// The contact on a coarse grid.
-    pub(super) coarse_solution: LazyField<Option<CoarseGap>>,
 }
