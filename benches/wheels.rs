@@ -2,11 +2,16 @@
 //!
 //! `cargo bench --bench wheels` prints times in LU (the report's unit), best of several; `-- rows 1000` the means of so many rows that differ in
 //! shift, yaw and load, solved one after the other as a run solves them, at a target of 0.02 and without fields.
+//! `-- shift` draws forces over the shift of the wheelset into `docs/wheel-rail/shift.svg`; the worn pair needs the reference files.
 //! `-- curve 20` prints the ratio of the time on the reference curve to that on planes, for 20 random placements of each class.
 
 extern crate railhead_contact as railhead;
 
+#[path = "figures/drawing.rs"]
+#[allow(dead_code, reason = "other pictures use the rest")]
+mod drawing;
 mod machine;
+mod wheel_shift;
 mod worn_pair;
 
 use std::hint::black_box;
@@ -24,6 +29,7 @@ use railhead::contact::{check, check_with, solve, solve_with};
 use serde_json::{Value, json};
 
 use machine::{lu_seconds, median, quantile, seconds_of};
+use wheel_shift::{Shifted, draw};
 use worn_pair::worn_pair;
 
 /// Lateral shifts of the wheelset in mm, from the tread to the gauge corner.
@@ -49,6 +55,8 @@ fn main() {
         rows(count);
     } else if let Some(count) = form("curve", 20) {
         curve(count);
+    } else if form("shift", 1).is_some() {
+        shift();
     } else {
         cases();
     }
@@ -276,6 +284,28 @@ fn classes() -> Vec<Class> {
         }
     }
     classes
+}
+
+fn shift() {
+    let new = Shifted {
+        name: "S1002 on 60E1, 75 kN, yaw 3 mrad",
+        pair: example("wheel-rail.case.json"),
+        load: 75e3,
+        yaw: 0.003,
+    };
+    let worn = worn_case().map(|pair| Shifted {
+        name: "worn pair, 137 kN",
+        pair,
+        load: 137e3,
+        yaw: 0.005,
+    });
+    let pairs: Vec<Shifted> = std::iter::once(new).chain(worn).collect();
+    let path = format!(
+        "{}/../docs/wheel-rail/shift.svg",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    std::fs::write(&path, draw(&pairs).svg()).expect("a picture can be written");
+    println!("{path}");
 }
 
 /// The worn pair of the reference files, for the right-hand rail; `None` without the files.
