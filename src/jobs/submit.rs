@@ -8,7 +8,8 @@ use serde_json::Value;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::CaseError;
-use crate::contact::evolution::task::{Evolution, located};
+use crate::contact::evaluate::request_faults::in_template;
+use crate::contact::evolution::task::Evolution;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
@@ -74,7 +75,7 @@ impl Jobs {
         if let Some(template) = request.get_mut("template") {
             let filled = self.with_profiles(template.take()).await;
             *template = filled.map_err(|error| match error {
-                JobsError::Case(faults) => located(faults, &[], 0).into(),
+                JobsError::Case(faults) => in_template(faults, |_| None).into(),
                 error => error,
             })?;
         }

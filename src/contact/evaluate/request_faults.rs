@@ -16,13 +16,22 @@ pub fn column_pointer(name: &str) -> String {
 /// Faults of the case of the first row, with pointers into the request; of each column the pointer into the case and its name.
 #[must_use]
 pub fn of_first_row(CaseError(faults): CaseError, columns: &[(&str, &str)]) -> CaseError {
-    let moved = faults.into_iter().map(|fault| {
-        let mut columns = columns.iter();
-        let pointer = match columns.find(|(pointer, _)| *pointer == fault.pointer) {
-            Some((_, name)) => format!("{}/0", column_pointer(name)),
-            None => format!("/template{}", fault.pointer),
-        };
-        Fault { pointer, ..fault }
+    in_template(CaseError(faults), |pointer| {
+        let (_, name) = columns.iter().find(|(known, _)| *known == pointer)?;
+        Some(format!("{}/0", column_pointer(name)))
+    })
+}
+
+/// Faults of the case of a row, with pointers into the request: that of a column where `column` knows the pointer into the case, below the template
+/// elsewhere.
+#[must_use]
+pub fn in_template(
+    CaseError(faults): CaseError,
+    column: impl Fn(&str) -> Option<String>,
+) -> CaseError {
+    let moved = faults.into_iter().map(|fault| Fault {
+        pointer: column(&fault.pointer).unwrap_or_else(|| format!("/template{}", fault.pointer)),
+        ..fault
     });
     CaseError(moved.collect())
 }

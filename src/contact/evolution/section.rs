@@ -6,19 +6,17 @@
 use crate::contact::geometry::profile::{Body, Profile};
 
 /// Distance of the points of the sections in mm: a twentieth of a narrow patch, and what measured sections have at the gauge corner.
-pub const SPACING: f64 = 0.25;
+pub(crate) const SPACING: f64 = 0.25;
 
 /// Points along the curve of a profile, at most [`SPACING`] apart.
-#[must_use]
-pub fn sampled(profile: &Profile) -> Vec<[f64; 2]> {
+pub(crate) fn sampled(profile: &Profile) -> Vec<[f64; 2]> {
     let places = profile.parameters(SPACING).into_iter();
     let points = places.map(|s| profile.at(s).at);
     points.map(|[y, z]| [y, -z]).collect()
 }
 
 /// Length of the section from the first point to each.
-#[must_use]
-pub fn along(points: &[[f64; 2]]) -> Vec<f64> {
+pub(crate) fn along(points: &[[f64; 2]]) -> Vec<f64> {
     let mut sum = vec![0.0];
     for pair in points.windows(2) {
         let step = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
@@ -28,13 +26,19 @@ pub fn along(points: &[[f64; 2]]) -> Vec<f64> {
 }
 
 /// Length that each point stands for.
-#[must_use]
-pub fn lengths(points: &[[f64; 2]]) -> Vec<f64> {
+pub(crate) fn lengths(points: &[[f64; 2]]) -> Vec<f64> {
     let along = along(points);
     let last = along.len() - 1;
     (0..=last)
         .map(|k| 0.5 * (along[(k + 1).min(last)] - along[k.saturating_sub(1)]))
         .collect()
+}
+
+/// Depths of areas.
+pub(crate) fn depths(points: &[[f64; 2]], areas: &[f64]) -> Vec<f64> {
+    let lengths = lengths(points);
+    let depths = areas.iter().zip(lengths);
+    depths.map(|(area, length)| area / length).collect()
 }
 
 /// Adds values times a factor.
@@ -66,8 +70,7 @@ fn normals(body: Body, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 }
 
 /// Area between a section and a later one with as many points, positive where material is gone.
-#[must_use]
-pub fn area_between(body: Body, before: &[[f64; 2]], after: &[[f64; 2]]) -> f64 {
+pub(crate) fn area_between(body: Body, before: &[[f64; 2]], after: &[[f64; 2]]) -> f64 {
     let outline = before.iter().chain(after.iter().rev());
     let next = outline.clone().skip(1).chain(before.first());
     let twice: f64 = outline
@@ -82,15 +85,10 @@ pub fn area_between(body: Body, before: &[[f64; 2]], after: &[[f64; 2]]) -> f64 
 ///
 /// A convex section is shorter below its surface, so that the depths are larger than areas over lengths, by half of the depth times the
 /// curvature; the factor is found from the outlines.
-#[must_use]
-pub fn moved(body: Body, points: &[[f64; 2]], areas: &[f64]) -> (Vec<[f64; 2]>, Vec<f64>) {
+pub(crate) fn moved(body: Body, points: &[[f64; 2]], areas: &[f64]) -> (Vec<[f64; 2]>, Vec<f64>) {
     let wanted: f64 = areas.iter().sum();
-    let (normals, lengths) = (normals(body, points), lengths(points));
-    let depths = areas
-        .iter()
-        .zip(&lengths)
-        .map(|(area, length)| area / length);
-    let mut depth: Vec<f64> = depths.collect();
+    let normals = normals(body, points);
+    let mut depth = depths(points, areas);
     let by = |depth: &[f64]| {
         let parts = points.iter().zip(&normals).zip(depth);
         let moved = parts.map(|((at, normal), depth)| [0, 1].map(|k| at[k] + depth * normal[k]));
@@ -109,8 +107,7 @@ pub fn moved(body: Body, points: &[[f64; 2]], areas: &[f64]) -> (Vec<[f64; 2]>, 
 }
 
 /// Spreads areas along the section by a kernel of this standard deviation in mm; their sum is kept.
-#[must_use]
-pub fn smoothed(areas: &[f64], deviation: f64) -> Vec<f64> {
+pub(crate) fn smoothed(areas: &[f64], deviation: f64) -> Vec<f64> {
     // One pass of ¼, ½, ¼ has half the square of the spacing as its variance; a pass with a smaller share makes up the rest.
     let passes = 2.0 * (deviation / SPACING).powi(2);
     let mut areas = areas.to_vec();
@@ -132,8 +129,12 @@ const CUT_MAX: f64 = 20.0;
 /// Cuts a section down to another one, which is moved in z into the body until it lies nowhere outside, and by `depth` mm more.
 ///
 /// That distance is measured where the present section is less steep than 70°. Every point that is then outside is cut along its normal.
-#[must_use]
-pub fn machined(body: Body, points: &[[f64; 2]], target: &[[f64; 2]], depth: f64) -> Vec<[f64; 2]> {
+pub(crate) fn machined(
+    body: Body,
+    points: &[[f64; 2]],
+    target: &[[f64; 2]],
+    depth: f64,
+) -> Vec<[f64; 2]> {
     let sign = inward(body);
     let normals = normals(body, points);
     let steep = 70_f64.to_radians().cos();
@@ -172,8 +173,7 @@ fn height_at(points: &[[f64; 2]], y: f64) -> Option<f64> {
 }
 
 /// Distance in mm from a place to the section in a direction, of unit length; the nearest place ahead.
-#[must_use]
-pub fn distance(points: &[[f64; 2]], from: [f64; 2], direction: [f64; 2]) -> Option<f64> {
+pub(crate) fn distance(points: &[[f64; 2]], from: [f64; 2], direction: [f64; 2]) -> Option<f64> {
     let seen = |at: &[f64; 2]| {
         let [y, z] = [at[0] - from[0], at[1] - from[1]];
         [

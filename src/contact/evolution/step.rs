@@ -16,9 +16,9 @@ use crate::contact::error::SolveError;
 use crate::contact::evolution::pass::{BodyWear, Evaluation, Pass, pass};
 use crate::contact::evolution::record::record;
 use crate::contact::evolution::section::{
-    add, area_between, distance, lengths, machined, moved, smoothed,
+    add, area_between, depths, distance, lengths, machined, moved, smoothed,
 };
-use crate::contact::evolution::task::{Evolution, Sections, SolveContext};
+use crate::contact::evolution::task::{Evolution, PlannedEvent, Sections, SolveContext};
 use crate::contact::evolution::traffic::condensed;
 use crate::contact::geometry::profile::Body;
 use crate::contact::monitor::{Monitor, MonitorPart};
@@ -66,10 +66,10 @@ impl Evolution {
     }
 
     /// The event that is due.
-    fn due(&self, state: &EvolutionState) -> Option<usize> {
+    fn due(&self, state: &EvolutionState) -> Option<&PlannedEvent> {
         let next = state.events_done as usize;
-        (next < self.events.len() && self.share_of_event(next) <= state.share + SAME)
-            .then_some(next)
+        let event = self.events.get(next);
+        event.filter(|_| self.share_of_event(next) <= state.share + SAME)
     }
 
     /// One step: condenses the traffic, lets an event happen, or advances the sections. Returns the record of the state before, if one is due.
@@ -104,7 +104,7 @@ impl Evolution {
         state.recorded = true;
         if self.due(&state).is_some() {
             while let Some(event) = self.due(&state) {
-                self.happen(event, &mut state);
+                happen(event, &mut state);
             }
             state.recorded = false;
         } else if state.share < 1.0 {
@@ -151,8 +151,9 @@ impl Evolution {
             return Err(SolveError::NormalProblem { reason });
         }
         let bodies = state.bodies.clone();
-        let deepest = [0, 1].map(|k| deepest(&bodies[k].worn.points_mm, &now.wear[k].area));
-        let allowed = accuracy.step_depth_mm / deepest[0].max(deepest[1]).max(f64::MIN_POSITIVE);
+        let depths = [0, 1].map(|k| depths(&bodies[k].worn.points_mm, &now.wear[k].area));
+        let deepest = depths.iter().flatten().copied().fold(0.0, f64::max);
+        let allowed = accuracy.step_depth_mm / deepest.max(f64::MIN_POSITIVE);
         let stop = self.next_stop(begin);
         let left = stop - begin;
         let mut length = state.next.min(allowed).max(SHORTEST);
@@ -207,25 +208,6 @@ impl Evolution {
         let events = (0..self.events.len()).map(|k| self.share_of_event(k));
         let events = events.filter(|at| *at > share + SAME);
         events.fold((record / records).min(1.0), f64::min)
-    }
-
-    fn happen(&self, event: usize, state: &mut EvolutionState) {
-        let (planned, sections) = &self.events[event];
-        for ((body, target), kind) in state.bodies.iter_mut().zip(sections).zip(BODIES) {
-            let Some(target) = target else { continue };
-            let before = &body.worn.points_mm;
-            let after = machined(kind, before, target, planned.depth_mm);
-            body.worn.machined_area_mm2 += area_between(kind, before, &after);
-            // Cracks go with the material that they are in.
-            for (k, damage) in body.worn.damage.iter_mut().enumerate() {
-                if after[k] != before[k] {
-                    *damage = 0.0;
-                }
-            }
-            body.worn.points_mm = after;
-        }
-        state.friction = planned.friction_coefficient.or(state.friction);
-        state.events_done += 1;
     }
 }
 
@@ -312,6 +294,24 @@ impl Solver<'_> {
     }
 }
 
+fn happen((planned, sections): &PlannedEvent, state: &mut EvolutionState) {
+    for ((body, target), kind) in state.bodies.iter_mut().zip(sections).zip(BODIES) {
+        let Some(target) = target else { continue };
+        let before = &body.worn.points_mm;
+        let after = machined(kind, before, target, planned.depth_mm);
+        body.worn.machined_area_mm2 += area_between(kind, before, &after);
+        // Cracks go with the material that they are in.
+        for (k, damage) in body.worn.damage.iter_mut().enumerate() {
+            if after[k] != before[k] {
+                *damage = 0.0;
+            }
+        }
+        body.worn.points_mm = after;
+    }
+    state.friction = planned.friction_coefficient.or(state.friction);
+    state.events_done += 1;
+}
+
 fn sections(bodies: &[BodyState; 2], friction: Option<f64>, radius: f64) -> Sections<'_> {
     Sections {
         points: [0, 1].map(|k| bodies[k].worn.points_mm.as_slice()),
@@ -342,15 +342,6 @@ fn radius_change(of: &EvolutionState, wheel: &BodyState) -> f64 {
         change.map_or(0.0, |change| state.share * change)
     });
     parts.sum()
-}
-
-/// Largest area over length.
-fn deepest(points: &[[f64; 2]], areas: &[f64]) -> f64 {
-    let depths = areas
-        .iter()
-        .zip(lengths(points))
-        .map(|(area, length)| area / length);
-    depths.fold(0.0, f64::max)
 }
 
 /// Difference of two distributions over the second.

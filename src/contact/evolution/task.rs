@@ -7,12 +7,12 @@ use serde_json::{Value, json};
 use crate::contact;
 use crate::contact::case::known_pair::KnownPair;
 use crate::contact::case::limits::Limits;
-use crate::contact::case::read::object::join;
 use crate::contact::case::wheel_task::profile_at;
 use crate::contact::case::words::evolution::{EvolutionEvent, EvolutionWords, TrafficColumn};
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::many::task::several_answers;
 use crate::contact::evaluate::placing::{members, put};
+use crate::contact::evaluate::request_faults::{column_pointer, in_template};
 use crate::contact::evolution::section::sampled;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::wheel_rail::WheelRail;
@@ -220,20 +220,17 @@ impl Evolution {
     }
 
     /// Rail and wheel at the start.
-    #[must_use]
-    pub fn start(&self) -> [Vec<[f64; 2]>; 2] {
+    pub(crate) fn start(&self) -> [Vec<[f64; 2]>; 2] {
         self.geometry.profiles().map(sampled)
     }
 
     /// Share of the extent at which an event happens.
-    #[must_use]
-    pub fn share_of_event(&self, event: usize) -> f64 {
+    pub(crate) fn share_of_event(&self, event: usize) -> f64 {
         self.events[event].0.at / self.plan.end()
     }
 
     /// How far an evolution has come at a share of its extent.
-    #[must_use]
-    pub fn progress(&self, share: f64) -> Progress {
+    pub(crate) fn progress(&self, share: f64) -> Progress {
         let [rail, wheel] = self.plan.wearing.flags();
         Progress {
             share,
@@ -247,7 +244,7 @@ impl Evolution {
     ///
     /// # Errors
     /// A column leads nowhere in the template.
-    pub fn case(&self, on: Sections, values: &[f64]) -> Result<Value, CaseError> {
+    pub(crate) fn case(&self, on: Sections, values: &[f64]) -> Result<Value, CaseError> {
         let mut case = filled(&self.template, &self.pointers, values, on.friction)?;
         for (body, points) in ["rail", "wheel"].into_iter().zip(on.points) {
             case["contact"][body] =
@@ -316,16 +313,11 @@ fn filled(
 }
 
 /// Faults of the case of a row, with pointers into the evolution.
-#[must_use]
-pub fn located(CaseError(faults): CaseError, pointers: &[String], row: usize) -> CaseError {
-    let moved = faults.into_iter().map(|fault| {
-        let pointer = match pointers.contains(&fault.pointer) {
-            true => format!("{}/{row}", join("/traffic/columns", &fault.pointer)),
-            false => format!("/template{}", fault.pointer),
-        };
-        Fault { pointer, ..fault }
-    });
-    CaseError(moved.collect())
+fn located(error: CaseError, pointers: &[String], row: usize) -> CaseError {
+    in_template(error, |pointer| {
+        let known = pointers.iter().any(|known| known == pointer);
+        known.then(|| format!("/traffic{}/{row}", column_pointer(pointer)))
+    })
 }
 
 /// The events in their order, with the sections that they leave.

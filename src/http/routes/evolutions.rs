@@ -6,10 +6,10 @@ use axum::response::{IntoResponse, Response};
 use serde_json::{Map, Value};
 use uuid::Uuid;
 
-use crate::contact::case::words::evolution::EvolutionWords;
+use crate::contact::case::words::evolution::{EvolutionWords, WearLosses};
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::request_faults::column_pointer;
-use crate::contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord};
+use crate::contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord, WornBody};
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::{JobId, parsed};
@@ -18,12 +18,11 @@ use crate::http::extract::query::{Parameters, count, query, word};
 use crate::http::extract::titles::{Place, place, question};
 use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::limits::memory::Memory;
-use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::format::Format;
 use crate::http::render::row_tables::RowWriter;
-use crate::http::routes::jobs::{GetProblems, SubmitProblems};
+use crate::http::routes::jobs::{self, GetProblems, SubmitProblems};
 use crate::http::routes::results::ResultProblems;
 use crate::http::routes::submission::{JobAccepted, NamedQuery, Submission, SubmitParameters};
 use crate::jobs::codec::table::{RowTable, TableColumn};
@@ -82,10 +81,15 @@ fn name_columns(request: &mut Value) -> Result<(), ApiError> {
                 let other = named.insert(pointer.clone(), values);
                 other.map(|_| format!("a second column for `{pointer}`"))
             }
-            Ok(None) => Some(format!(
-                "names nothing in the case; {}allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs",
-                question(&title, None)
-            )),
+            Ok(None) => {
+                let allowed = "allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs";
+                let asked = question(&title, None);
+                Some(
+                    format!("names nothing in the case; {allowed} {asked}")
+                        .trim_end()
+                        .to_owned(),
+                )
+            }
             Err(detail) => Some(detail),
         };
         let pointer = format!("/traffic{}", column_pointer(&title));
@@ -120,8 +124,7 @@ fn scale(values: &mut Value, factor: f64) {
     responses((status = 200, description = "Case, traffic and plan", body = EvolutionWords), GetProblems)
 )]
 pub(crate) async fn request(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
-    let text = jobs.of_kind(Kind::Evolution).case(id).await?;
-    Ok(([(header::CONTENT_TYPE, Format::Json.media_type())], text).into_response())
+    jobs::case(Caller(jobs.of_kind(Kind::Evolution)), JobId(id)).await
 }
 
 /// The answer of a succeeded evolution.
@@ -185,14 +188,17 @@ pub(crate) async fn table(
 ) -> Result<Response, ApiError> {
     let query = EvolutionTableQuery::read(&uri, &())?;
     let format = choose(&headers, query.format, TABLES)?;
-    let found = read(jobs, &memory, id, move |evolution| {
+    let made = read(jobs, &memory, id, move |evolution| {
         let table = query.of.unwrap_or(records_table)(evolution);
-        RowWriter::whole(format, table).map_err(|error| ApiError::internal(&error))
+        let text = RowWriter::whole(format, table).map_err(|error| ApiError::internal(&error))?;
+        Ok(format.answer(&format!("evolution-{id}"), text))
     });
-    let (text, share) = found.await?;
-    let response = format.answer(&format!("evolution-{id}"), text);
-    Ok(hold_while_sent(response, share))
+    made.await
 }
+
+/// The bodies of a record.
+type BodyOf = fn(&EvolutionRecord) -> &WornBody;
+const BODIES: [(&str, BodyOf); 2] = [("rail", |r| &r.rail), ("wheel", |r| &r.wheel)];
 
 query! {
     /// Parameters of a section of an evolution.
@@ -238,38 +244,35 @@ pub(crate) async fn section(
 ) -> Result<Response, ApiError> {
     let query = SectionQuery::read(&uri, &())?;
     let id = parsed(&id, ProblemKind::JobNotFound, "evolution")?;
-    if !["rail", "wheel"].contains(&body.as_str()) {
+    let Some(k) = BODIES.iter().position(|(name, _)| *name == body) else {
         let detail = format!("`{body}` is no body; allowed: rail, wheel");
         return Err(ApiError::new(ProblemKind::JobNotFound, detail));
-    }
-    let wheel = body == "wheel";
+    };
     let (extensions, text) = query.format.unwrap_or(FORMS[0].1);
-    let found = read(jobs, &memory, id, move |evolution| {
+    let made = read(jobs, &memory, id, move |evolution| {
         let last = evolution.records.len().saturating_sub(1);
         let number = query.record.map_or(last, |number| number as usize);
         let record = evolution.records.get(number).ok_or_else(|| {
             ApiError::bad_parameter("record", format!("{number} given; 0 to {last} are there"))
         })?;
-        let worn = if wheel { &record.wheel } else { &record.rail };
-        Ok(text(&worn.points_mm, wheel).into_bytes())
+        let extension = extensions[k];
+        let name = format!("attachment; filename=\"{body}-{id}.{extension}\"");
+        let head = [
+            (header::CONTENT_TYPE, "text/plain; charset=utf-8".to_owned()),
+            (header::CONTENT_DISPOSITION, name),
+        ];
+        Ok((head, text(&BODIES[k].1(record).points_mm, k == 1)).into_response())
     });
-    let (text, share) = found.await?;
-    let extension = extensions[usize::from(wheel)];
-    let name = format!("attachment; filename=\"{body}-{id}.{extension}\"");
-    let head = [
-        (header::CONTENT_TYPE, "text/plain; charset=utf-8".to_owned()),
-        (header::CONTENT_DISPOSITION, name),
-    ];
-    Ok(hold_while_sent((head, text).into_response(), share))
+    made.await
 }
 
-/// Makes something of the answer of an evolution, off the threads that answer requests.
+/// Answers with something made of an evolution, off the threads that answer requests.
 async fn read(
     jobs: Jobs,
     memory: &Memory,
     id: Uuid,
-    make: impl FnOnce(&EvolutionAnswer) -> Result<Vec<u8>, ApiError> + Send + 'static,
-) -> Result<(Vec<u8>, Option<Permit>), ApiError> {
+    make: impl FnOnce(&EvolutionAnswer) -> Result<Response, ApiError> + Send + 'static,
+) -> Result<Response, ApiError> {
     let jobs = jobs.of_kind(Kind::Evolution);
     // Once as text, and about as much as numbers.
     let share = memory.ready_answer(jobs.tenant(), 2 * jobs.answer_bytes(id).await?)?;
@@ -279,70 +282,53 @@ async fn read(
         make(&read.map_err(|error| ApiError::internal(&error))?)
     });
     let made = made.await.map_err(|error| ApiError::internal(&error))??;
-    Ok((made, share))
+    Ok(hold_while_sent(made, share))
 }
 
 fn records_table(evolution: &EvolutionAnswer) -> RowTable {
-    let rows: Vec<_> = evolution.records.iter().map(values).collect();
-    let numbers = (0..rows.len()).map(|k| k as i64).collect();
-    let mut columns = vec![("record".to_owned(), TableColumn::Integers(numbers))];
-    for (k, (name, _)) in rows
-        .iter()
-        .flatten()
-        .enumerate()
-        .take(rows.first().map_or(0, Vec::len))
-    {
-        let values = rows.iter().map(|row| row[k].1.unwrap_or(f64::NAN));
-        columns.push((name.clone(), TableColumn::Numbers(values.collect())));
+    let records = &evolution.records;
+    let numbers = TableColumn::Integers((0..records.len() as i64).collect());
+    let mut columns = vec![("record".to_owned(), numbers)];
+    let mut add = |name: &str, of: &dyn Fn(&EvolutionRecord) -> Option<f64>| {
+        let values = records.iter().map(|r| of(r).unwrap_or(f64::NAN));
+        columns.push((name.to_owned(), TableColumn::Numbers(values.collect())));
+    };
+    add("share", &|r| Some(r.progress.share));
+    add("mgt", &|r| r.progress.mgt);
+    add("axle_passes", &|r| r.progress.axle_passes);
+    add("wheel_distance_km", &|r| r.progress.wheel_distance_km);
+    for (k, (name, _)) in WearLosses::default().named().into_iter().enumerate() {
+        add(name, &|r| r.losses.named()[k].1);
     }
+    let largest = |values: &[f64]| values.iter().copied().max_by(f64::total_cmp);
+    for (name, body) in BODIES {
+        let mut add = |what: &str, of: &dyn Fn(&WornBody) -> Option<f64>| {
+            add(&format!("{name}_{what}"), &|r| of(body(r)));
+        };
+        add("worn_area_mm2", &|b| Some(b.worn_area_mm2));
+        add("machined_area_mm2", &|b| Some(b.machined_area_mm2));
+        add("damage_max", &|b| largest(&b.damage));
+        add("depth_max_mm", &|b| largest(&b.depth_mm));
+        add("coefficients_low", &|b| Some(b.uncertainty.coefficients[0]));
+        add("coefficients_high", &|b| {
+            Some(b.uncertainty.coefficients[1])
+        });
+    }
+    add("conicity", &|r| r.conicity);
+    add("pressure_max_mpa", &|r| Some(r.contact.pressure_max_mpa));
+    add("pressure_mean_mpa", &|r| Some(r.contact.pressure_mean_mpa));
+    add("y_over_q_max", &|r| Some(r.contact.y_over_q_max));
+    add("y_over_q_mean", &|r| Some(r.contact.y_over_q_mean));
+    add("t_gamma_mean_n", &|r| Some(r.contact.t_gamma_mean_n));
+    add("unsolved_share", &|r| Some(r.contact.unsolved_share));
     RowTable { columns }
-}
-
-/// The values of a row of the table of records.
-fn values(record: &EvolutionRecord) -> Vec<(String, Option<f64>)> {
-    let (progress, contact) = (&record.progress, &record.contact);
-    let mut values = vec![
-        ("share".to_owned(), Some(progress.share)),
-        ("mgt".to_owned(), progress.mgt),
-        ("axle_passes".to_owned(), progress.axle_passes),
-        ("wheel_distance_km".to_owned(), progress.wheel_distance_km),
-    ];
-    let mut add = |name: String, value| values.push((name, value));
-    for (name, loss) in record.losses.named() {
-        add(name.to_owned(), loss);
-    }
-    for (name, body) in [("rail", &record.rail), ("wheel", &record.wheel)] {
-        let largest = |values: &[f64]| values.iter().copied().max_by(f64::total_cmp);
-        let [low, high] = body.uncertainty.coefficients;
-        add(format!("{name}_worn_area_mm2"), Some(body.worn_area_mm2));
-        add(
-            format!("{name}_machined_area_mm2"),
-            Some(body.machined_area_mm2),
-        );
-        add(format!("{name}_damage_max"), largest(&body.damage));
-        add(format!("{name}_depth_max_mm"), largest(&body.depth_mm));
-        add(format!("{name}_coefficients_low"), Some(low));
-        add(format!("{name}_coefficients_high"), Some(high));
-    }
-    add("conicity".to_owned(), record.conicity);
-    for (name, value) in [
-        ("pressure_max_mpa", contact.pressure_max_mpa),
-        ("pressure_mean_mpa", contact.pressure_mean_mpa),
-        ("y_over_q_max", contact.y_over_q_max),
-        ("y_over_q_mean", contact.y_over_q_mean),
-        ("t_gamma_mean_n", contact.t_gamma_mean_n),
-        ("unsolved_share", contact.unsolved_share),
-    ] {
-        add(name.to_owned(), Some(value));
-    }
-    values
 }
 
 fn points_table(evolution: &EvolutionAnswer) -> RowTable {
     let (mut record, mut body, mut point) = (Vec::new(), Vec::new(), Vec::new());
     let mut values: [Vec<f64>; 5] = Default::default();
     for (number, one) in evolution.records.iter().enumerate() {
-        for (name, worn) in [("rail", &one.rail), ("wheel", &one.wheel)] {
+        for (name, worn) in BODIES.map(|(name, body)| (name, body(one))) {
             for (k, [y, z]) in worn.points_mm.iter().enumerate() {
                 record.push(number as i64);
                 body.push(Some(name.to_owned()));

@@ -52,7 +52,7 @@ impl EvolutionWords {
     ///
     /// # Errors
     /// Every fault of the text, with its JSON pointer.
-    pub fn read(value: &Value) -> Result<EvolutionWords, CaseError> {
+    pub(crate) fn read(value: &Value) -> Result<EvolutionWords, CaseError> {
         let mut faults = Faults::default();
         let words =
             Object::open(value, String::new(), &mut faults).and_then(|mut all| words(&mut all));

@@ -98,8 +98,7 @@ pub enum WearingBodies {
 
 impl EvolutionWords {
     /// The extent in the unit that events are given in.
-    #[must_use]
-    pub fn end(&self) -> f64 {
+    pub(crate) fn end(&self) -> f64 {
         let extent = &self.extent;
         let rail = extent.mgt.or(extent.axle_passes);
         rail.or(extent.wheel_distance_km).unwrap_or(0.0)
@@ -108,8 +107,7 @@ impl EvolutionWords {
 
 impl WearingBodies {
     /// Whether the rail and the wheel wear.
-    #[must_use]
-    pub fn flags(self) -> [bool; 2] {
+    pub(crate) fn flags(self) -> [bool; 2] {
         [self != WearingBodies::Wheel, self != WearingBodies::Rail]
     }
 }
