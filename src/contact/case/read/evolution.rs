@@ -185,7 +185,6 @@ fn event(block: &mut Object) -> Option<EvolutionEvent> {
     let [grind, reprofile] =
         [kinds[0], kinds[1]].map(|kind| optional(block, kind, section).flatten().map(Box::new));
     Some(EvolutionEvent {
-        at: at?,
         grind,
         reprofile,
         depth_mm: number_or(
@@ -195,6 +194,7 @@ fn event(block: &mut Object) -> Option<EvolutionEvent> {
             0.0,
         ),
         friction_coefficient: block.number(kinds[2], AllowedRange::closed(0.0, 2.0, "")),
+        at: at?,
     })
 }
 
@@ -211,11 +211,14 @@ fn traffic(block: &mut Object) -> Option<Traffic> {
         .find_map(Value::as_array);
     let rows = samples.or(first.map(|first| first.len() as u32));
     let samples = rows.unwrap_or(SAMPLES_DEFAULT);
+    let detail = match members {
+        None => format!(
+            "{} given; an object with at least one column is needed",
+            shown(value)
+        ),
+        Some(_) => format!("{samples} rows given; 1 to {ROWS_MAX} are allowed"),
+    };
     let Some(members) = members.filter(|_| (1..=ROWS_MAX).contains(&samples)) else {
-        let given = shown(value);
-        let detail = format!(
-            "{given} with {samples} rows given; an object of at least one column with 1 to {ROWS_MAX} rows is needed"
-        );
         block.fault("columns", detail);
         return None;
     };
