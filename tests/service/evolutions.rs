@@ -188,7 +188,7 @@ async fn faults_are_named_with_their_place_and_what_is_allowed() {
             "/traffic/columns",
             json!({ "lateral_shft": [1, 2] }),
             "/traffic/columns/lateral_shft",
-            "column",
+            "is it `lateral_shift [mm]`?",
         ),
         ("/wear_model", json!("rust"), "/wear_model", "archard_wear"),
     ] {

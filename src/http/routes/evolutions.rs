@@ -84,11 +84,8 @@ fn name_columns(request: &mut Value) -> Result<(), ApiError> {
             Ok(None) => {
                 let allowed = "allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs";
                 let asked = question(&title, None);
-                Some(
-                    format!("names nothing in the case; {allowed} {asked}")
-                        .trim_end()
-                        .to_owned(),
-                )
+                let detail = format!("names nothing in the case; {allowed}; {asked}");
+                Some(detail.trim_end_matches("; ").to_owned())
             }
             Err(detail) => Some(detail),
         };
