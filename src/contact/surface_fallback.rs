@@ -13,8 +13,8 @@ use crate::contact::solution::words::answer::Solution;
 
 /// Solves a wheel on its reference surface, or on planes where the curve has no answer and the case does not ask for it.
 ///
-/// Motions of a case share their patches. Of several motions, all are solved on planes if the wheel without tractions does not come to rest on the
-/// curve; so each part of a sweep makes the same choice.
+/// Of several motions, all are solved on planes if the wheel without tractions does not come to rest on the curve; so each part of a sweep makes the same
+/// choice. A history has no parts.
 ///
 /// # Errors
 /// That of `solve` on the surface that was tried last.
@@ -28,8 +28,9 @@ pub(crate) fn solve_wheel<T>(
         Ok(found) => return Ok((found, None)),
         Err(error) => error,
     };
-    let all = case.problem.part.all;
-    let error = match all > 1 && contact.may_fall_back() {
+    let CheckedCase { problem, .. } = case;
+    let several = problem.part.all > 1 && problem.history.is_none();
+    let error = match several && contact.may_fall_back() {
         true => match trust::comes_to_rest(case, contact, monitor) {
             Ok(()) => return Err(error),
             Err(error) => error,

@@ -29,7 +29,7 @@ use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelConta
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::post::damage::evaluate::{DamagedPatch, damage};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::physics::MotionPart;
+use crate::contact::problem::physics::Problem;
 use crate::contact::problem::run::Run;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
@@ -81,7 +81,7 @@ const FRAME: &str = "every patch on the surface of the rail: x along rolling (le
 
 /// Solves a case on the curve of the rail. `before` is asked before tractions are solved whether there is any point in it, of several motions about the
 /// wheel without tractions. Tractions change pressures, so that every motion has its own; of several motions, the wheel and the patches of the answer are
-/// those of the first.
+/// those of the first. The points of a history share the pressures without tractions.
 ///
 /// # Errors
 /// A named reason why there is no answer.
@@ -95,17 +95,21 @@ pub(crate) fn solve(
 ) -> Result<(WheelContact, Solution, Fields), SolveError> {
     let motions = case.problem.motions.len();
     let curve = ReferenceCurve::new(&contact.geometry);
-    let patches = match case.problem.part.all {
-        1 => None,
-        _ => Some(patches_at_rest(case, contact, influence, before, monitor)?),
+    let together = match case.problem.history {
+        Some(_) => motions,
+        None => 1,
+    };
+    let patches = match case.problem.part.all > together {
+        false => None,
+        true => Some(patches_at_rest(case, contact, influence, before, monitor)?),
     };
     let mut whole: Option<(WheelContact, Solution, Fields)> = None;
-    for index in 0..motions {
-        let part = case.slice(index..index + 1);
+    for index in (0..motions).step_by(together) {
+        let part = case.slice(index..index + together);
         let share = MonitorPart {
             inner: monitor,
             before: index as f64 / motions as f64,
-            own: 1.0 / motions as f64,
+            own: together as f64 / motions as f64,
         };
         let watch = TimeLimit::new(&share, case.run.time_limit, 1);
         let solve = CurveSolve::new(operators, &part, contact, influence, &curve, &watch);
@@ -152,7 +156,7 @@ pub(crate) fn patches_at_rest(
     Ok(patches.sum())
 }
 
-/// A wheel on the curve of its rail, in one motion.
+/// A wheel on the curve of its rail, in one motion or one history.
 #[derive(Clone, Copy)]
 struct CurveSolve<'a> {
     operators: &'a Arc<OperatorStore>,
@@ -170,8 +174,8 @@ struct CurveSolve<'a> {
 struct Found {
     contact: CurveContact,
     parts: Vec<Part>,
-    /// How much forces still change, relative to μN.
-    change: f64,
+    /// How much the forces of each motion would change if its tractions and the pressures agreed, relative to μN.
+    changes: Vec<f64>,
 }
 
 /// Patches that are solved together.
@@ -210,8 +214,8 @@ impl PatchForces {
 }
 
 impl Part {
-    /// Adds to the estimates of all forces what the factors for the turn leave open of them, relative to the friction limit.
-    fn leave_open(&mut self, share: f64) {
+    /// Adds to the estimates of all forces of a motion what is left open of them, relative to the friction limit.
+    fn leave_open(&mut self, index: usize, share: f64) {
         let mut all = ErrorEstimate::default();
         for patch in &mut self.solution.patches {
             let limit = patch.friction_limit_n.unwrap_or(0.0);
@@ -220,7 +224,7 @@ impl Part {
                 force_y_n: share * limit,
                 moment_z_n_mm: 0.0,
             };
-            let point = &mut patch.points[0];
+            let point = &mut patch.points[index];
             point.error_estimate = point.error_estimate.map(|error| error.plus(open));
             let of_pressure = share * FRICTION_OPEN * patch.normal_force_n;
             all = all.plus(ErrorEstimate {
@@ -228,7 +232,7 @@ impl Part {
                 ..open
             });
         }
-        let total = &mut self.solution.total[0];
+        let total = &mut self.solution.total[index];
         total.error_estimate = total.error_estimate.map(|error| error.plus(all));
     }
 }
@@ -276,18 +280,19 @@ impl<'a> CurveSolve<'a> {
         }
     }
 
-    /// The wheel at rest, and the answer to the motion. As one of several it has a number of `patches`: where its tractions would change that, or leave
-    /// no answer, pressures are those without tractions.
+    /// The wheel at rest, and the answer to the motion or the history. As one of several a motion has a number of `patches`: where its tractions would
+    /// change that, or leave no answer, pressures are those without tractions, as for a history.
     fn motion(
         &self,
         before: &mut dyn FnMut(&WheelContact) -> Result<(), SolveError>,
         patches: Option<usize>,
     ) -> Result<(WheelContact, Solution, Fields), SolveError> {
-        let MotionPart { before: index, all } = self.case.problem.part;
+        let Problem { part, history, .. } = &self.case.problem;
+        let history = history.is_some();
         let workspace = &mut Workspace::default();
         let began = self.watch.elapsed();
         let (mut wheel, found) = match patches {
-            None => self.rounds(true, before, workspace),
+            None => self.rounds(!history, before, workspace),
             Some(patches) => match self.rounds(true, &mut |_| Ok(()), workspace) {
                 Ok(found) if count(&found.1.parts) == patches => Ok(found),
                 Ok(_) | Err(SolveError::NormalProblem { .. }) => self
@@ -301,6 +306,10 @@ impl<'a> CurveSolve<'a> {
             },
         }?;
         let rest = (self.watch.elapsed() - began).as_secs_f64();
+        if history && matches!(self.contact.loading, WheelLoad::Vertical(_)) {
+            let remark = Remark::NormalForcesAloneBalance {};
+            wheel.remarks.push(remark.into());
+        }
         let turn_rad = turn(&found.contact);
         if self.influence == Influence::AngleCorrected && turn_rad > TURN_MAX {
             let range_rad = TURN_MAX;
@@ -312,27 +321,27 @@ impl<'a> CurveSolve<'a> {
                 .into(),
             );
         }
-        if all > 1 {
-            let of_motion = |remark: &mut RemarkEntry| remark.point = Some(index);
+        if patches.is_some() {
+            let of_motion = |remark: &mut RemarkEntry| remark.point = Some(part.before);
             wheel.remarks.iter_mut().for_each(of_motion);
         }
         let (mut solution, fields) = self.answer(found, &wheel, rest)?;
-        if all > 1 {
+        if patches.is_some() {
             solution.patches.iter_mut().for_each(tell_region);
         }
         Ok((wheel, solution, fields))
     }
 
     /// Pressures and tractions in turn: on a coarse grid until friction is known about, then on the fine one. `before` is asked of the wheel at rest
-    /// on the fine grid. Unless they are `coupled`, tractions are solved once, on pressures without friction.
+    /// on the fine grid. Unless they are `together`, tractions are solved once, on pressures without friction.
     fn rounds(
         &self,
-        coupled: bool,
+        together: bool,
         before: &mut dyn FnMut(&WheelContact) -> Result<(), SolveError>,
         workspace: &mut Workspace,
     ) -> Result<(WheelContact, Found), SolveError> {
         let run = &self.case.run;
-        let coupled = coupled
+        let coupled = together
             && (matches!(self.contact.loading, WheelLoad::Vertical(_))
                 || self.influence == Influence::AngleCorrected)
             && !self.case.problem.friction.is_frictionless();
@@ -348,12 +357,11 @@ impl<'a> CurveSolve<'a> {
         let mut earlier = None;
         for round in 1..=ROUNDS_MAX {
             let parts = self.tractions(&contact, &exact, workspace)?;
-            let forces = self.forces(&contact, &parts);
             let (mut next, mut change) = (Friction::default(), 0.0);
             if coupled {
-                next = self.friction(&contact, &parts, workspace);
+                next = self.friction(&contact, &parts, 0, workspace);
                 let [by_lift, by_gap] = contact.change_by(&friction, &next);
-                let by_gap = by_gap * contact.normal_force() / self.limit(&parts);
+                let by_gap = by_gap * contact.normal_force() / limit(&parts);
                 change = (by_lift / balance).max(by_gap / (CHANGE * target));
             }
             if change <= 1.0 || round == ROUNDS_MAX {
@@ -373,17 +381,23 @@ impl<'a> CurveSolve<'a> {
                     residual,
                     tolerance: CHANGE * target,
                 };
-                let lift: f64 = forces.iter().flatten().map(|patch| patch.sheared[2]).sum();
                 let mut wheel = match round {
                     1 => first,
-                    _ => self.wheel(&contact, lift)?,
+                    _ => self.wheel(&contact, 0.0)?,
                 };
-                wheel.friction_share = -lift / wheel.vertical_force();
+                let mut changes = vec![residual];
+                if together {
+                    let forces = self.forces(&contact, &parts, 0);
+                    let lift: f64 = forces.iter().flatten().map(|patch| patch.sheared[2]).sum();
+                    wheel.friction_share = -lift / wheel.vertical_force();
+                } else {
+                    changes = self.neglected(&contact, &parts, workspace);
+                }
                 wheel.remarks.extend((change > 1.0).then(|| remark.into()));
                 let found = Found {
                     contact,
                     parts,
-                    change: residual,
+                    changes,
                 };
                 return Ok((wheel, found));
             }
@@ -392,6 +406,22 @@ impl<'a> CurveSolve<'a> {
             friction.opened.clone_from(&contact.opened);
         }
         unreachable!("the last round ends them")
+    }
+
+    /// How much the gap that the tractions of each motion open would change its forces, relative to μN.
+    fn neglected(
+        &self,
+        contact: &CurveContact,
+        parts: &[Part],
+        workspace: &mut Workspace,
+    ) -> Vec<f64> {
+        let share = contact.normal_force() / limit(parts).max(f64::MIN_POSITIVE);
+        let of = |index: usize| {
+            let friction = self.friction(contact, parts, index, workspace);
+            let [_, by_gap] = contact.change_by(&Friction::default(), &friction);
+            by_gap * share
+        };
+        (0..self.case.problem.motions.len()).map(of).collect()
     }
 
     /// The wheel at rest on a coarse grid, with about the friction that it will have: by the table of creep forces where that is enough, else with coarse
@@ -425,7 +455,7 @@ impl<'a> CurveSolve<'a> {
                 Some(next) => next,
                 None => {
                     let parts = self.tractions(&coarse, &rough, workspace)?;
-                    self.friction(&coarse, &parts, workspace)
+                    self.friction(&coarse, &parts, 0, workspace)
                 }
             };
             let (by_lift, by_gap) = by_gap(&friction, &next);
@@ -485,21 +515,22 @@ impl<'a> CurveSolve<'a> {
         Ok(Some(Friction { lift, opened }))
     }
 
-    /// Effect of the tractions of all parts on the contact.
+    /// Effect of the tractions of all parts in a motion on the contact.
     fn friction(
         &self,
         contact: &CurveContact,
         parts: &[Part],
+        index: usize,
         workspace: &mut Workspace,
     ) -> Friction {
         let lift = match self.contact.loading {
             WheelLoad::Vertical(_) => {
-                let forces = self.forces(contact, parts);
+                let forces = self.forces(contact, parts, index);
                 forces.iter().flatten().map(|patch| patch.sheared[2]).sum()
             }
             WheelLoad::Normal(_) | WheelLoad::Lowering(_) => 0.0,
         };
-        let traction = self.on_grid(contact, parts);
+        let traction = self.on_grid(contact, parts, index);
         Friction {
             lift,
             opened: contact.operator.opened_by_traction(&traction, workspace),
@@ -517,7 +548,8 @@ impl<'a> CurveSolve<'a> {
             .operator
             .slip_of_pressure(&contact.pressure, workspace);
         let parts = contact.parts(self.influence);
-        let watch = TimeLimit::new(self.watch, run.time_limit, parts.len());
+        let motions = parts.len() * self.case.problem.motions.len();
+        let watch = TimeLimit::new(self.watch, run.time_limit, motions);
         let parts = parts.into_iter().map(|strips| contact.patches(strips));
         let parts: Vec<Vec<GridPressure>> = parts.collect::<Result<_, _>>()?;
         let patches: usize = parts.iter().map(Vec::len).sum();
@@ -556,9 +588,29 @@ impl<'a> CurveSolve<'a> {
             .unwrap_or(0);
         let origin = centres[heaviest];
         let (place, over) = self.load_centre(contact, origin)?;
-        let rigid = self.rigid(contact, &field)?;
-        let motion = creepages(&rigid[heaviest], origin[0], &place, &over);
-        let slip = self.surface_slip(contact, &field, &rigid, slip, origin, &motion);
+        let under = |motion: &Motion, of_pressure| {
+            let rigid = self.rigid(contact, &field, motion)?;
+            let motion = creepages(&rigid[heaviest], origin[0], &place, &over);
+            let slip = self.surface_slip(contact, &field, &rigid, of_pressure, origin, &motion);
+            Ok::<_, SolveError>((motion, slip))
+        };
+        let (motions, slip, by_motion) = match problem.history {
+            None => {
+                let (motion, slip) = under(&problem.motions[0], slip)?;
+                (vec![motion], slip, None)
+            }
+            Some(_) => {
+                let (_, still) = under(&Motion::default(), slip)?;
+                let unit = |creepage_y, spin_per_mm| Motion {
+                    creepage_x: 0.0,
+                    creepage_y,
+                    spin_per_mm,
+                };
+                let (_, across) = under(&unit(1.0, 0.0), None)?;
+                let (_, spin) = under(&unit(0.0, 1.0), None)?;
+                (problem.motions.clone(), still, Some([across, spin]))
+            }
+        };
         let report = NormalReport {
             force_residual: contact.missed,
             ..contact.work.with_time(0.0)
@@ -568,7 +620,7 @@ impl<'a> CurveSolve<'a> {
             &problem.friction,
             &self.contact.geometry,
             extents,
-            origin[1],
+            origin,
             |s| self.curve.at(s).rail,
         );
         let unbalanced = match self.contact.loading {
@@ -577,14 +629,17 @@ impl<'a> CurveSolve<'a> {
         };
         let load_error = contact.missed.hypot(unbalanced);
         let solved = SolvedFootprint {
-            footprint: Footprint::computed(field.from_origin(origin), load_error)
-                .on_surface(slip, centres.iter().map(|centre| minus(*centre, origin))),
+            footprint: Footprint::computed(field.from_origin(origin), load_error).on_surface(
+                slip,
+                by_motion,
+                centres.iter().map(|centre| minus(*centre, origin)),
+            ),
             report: Some(report),
             coupling_error: 0.0,
             remarks: Vec::new(),
         };
         let part = CheckedCase {
-            problem: problem.of_gap(friction, vec![motion]),
+            problem: problem.of_gap(friction, motions),
             run: run.clone(),
             label: label.clone(),
             remarks: Vec::new(),
@@ -619,12 +674,13 @@ impl<'a> CurveSolve<'a> {
         Ok((place, over))
     }
 
-    /// The motion of the wheel as a rigid body at each patch: the same at all if the case gives that of a wheelset, else the one with the given creepages
+    /// The motion of the wheel as a rigid body at each patch: the same at all if the case gives that of a wheelset, else the one with these creepages
     /// at its load centre.
     fn rigid(
         &self,
         contact: &CurveContact,
         field: &PressureField,
+        creepages: &Motion,
     ) -> Result<Vec<RigidMotion>, SolveError> {
         let (problem, geometry) = (&self.case.problem, &self.contact.geometry);
         let patches = 0..field.patches().len();
@@ -636,7 +692,7 @@ impl<'a> CurveSolve<'a> {
             creepage_x,
             creepage_y,
             spin_per_mm,
-        } = problem.motions[0];
+        } = *creepages;
         let of = |patch: usize| {
             let centre = field.load_centre(Some(patch));
             let (place, over) = self.load_centre(contact, centre)?;
@@ -703,8 +759,13 @@ impl<'a> CurveSolve<'a> {
         }
     }
 
-    /// Forces of every patch of every part: of the pressures on the grid, and of the tractions, corrected to their extrapolated resultants.
-    fn forces(&self, contact: &CurveContact, parts: &[Part]) -> Vec<Vec<PatchForces>> {
+    /// Forces in a motion of every patch of every part: of the pressures on the grid, and of the tractions, corrected to their extrapolated resultants.
+    fn forces(
+        &self,
+        contact: &CurveContact,
+        parts: &[Part],
+        index: usize,
+    ) -> Vec<Vec<PatchForces>> {
         let of_part = |part: &Part| {
             let field = part.solution.patches.iter().enumerate();
             let of_patch = |(k, patch): (usize, &PatchSolution)| {
@@ -713,14 +774,14 @@ impl<'a> CurveSolve<'a> {
                     ..PatchForces::default()
                 };
                 let (mut shear, mut plain) = ([0.0; 3], [0.0; 2]);
-                each_cell(part, k, |place, _, area, [x, y, _]| {
+                each_cell(part, k, index, |place, _, area, [x, y, _]| {
                     let (sin, cos) = self.curve.at(place[1]).angle.sin_cos();
                     plain = [plain[0] + area * x, plain[1] + area * y];
                     shear[1] += area * y * cos;
                     shear[2] += area * y * sin;
                 });
                 let (sin, cos) = forces.angle().sin_cos();
-                let point = &patch.points[0];
+                let point = &patch.points[index];
                 let beyond = point.force_y_n - plain[1];
                 forces.sheared = [
                     point.force_x_n,
@@ -758,8 +819,8 @@ impl<'a> CurveSolve<'a> {
         sums.map(|sum| sum * grid.area())
     }
 
-    /// Tractions on the cells of the grid in MPa, with the same forces.
-    fn on_grid(&self, contact: &CurveContact, parts: &[Part]) -> [Vec<f64>; 2] {
+    /// Tractions of a motion on the cells of the grid in MPa, with the same forces.
+    fn on_grid(&self, contact: &CurveContact, parts: &[Part], index: usize) -> [Vec<f64>; 2] {
         let grid = &contact.grid;
         let [nx, ny] = grid.cells();
         let mut traction = [vec![0.0; nx * ny], vec![0.0; nx * ny]];
@@ -770,7 +831,7 @@ impl<'a> CurveSolve<'a> {
         let cells = [nx, grid.numbers[ny - 1] + 1];
         for part in parts {
             for k in 0..part.solution.patches.len() {
-                each_cell(part, k, |place, size, _, [x, y, _]| {
+                each_cell(part, k, index, |place, size, _, [x, y, _]| {
                     // The cells that it covers, and the part of each.
                     let [along, across] = [0, 1].map(|axis| {
                         let ends = [-0.5, 0.5].map(|half| {
@@ -792,12 +853,6 @@ impl<'a> CurveSolve<'a> {
             }
         }
         traction
-    }
-
-    /// The friction limit of all parts in N.
-    fn limit(&self, parts: &[Part]) -> f64 {
-        let patches = parts.iter().flat_map(|part| &part.solution.patches);
-        patches.filter_map(|patch| patch.friction_limit_n).sum()
     }
 
     /// What the factors for the turn leave open of a force, relative to the friction limit.
@@ -903,17 +958,21 @@ impl<'a> CurveSolve<'a> {
         wheel: &WheelContact,
         seconds: f64,
     ) -> Result<(Solution, Fields), SolveError> {
-        let forces = self.forces(&found.contact, &found.parts);
         let Found {
             contact,
             parts,
-            change,
+            changes,
         } = found;
-        let open = self.left_open(&contact) + change;
+        let left_open = self.left_open(&contact);
+        let motions = 0..changes.len();
+        let forces: Vec<_> = motions
+            .clone()
+            .map(|index| self.forces(&contact, &parts, index))
+            .collect();
         let mut remarks = self.case.remarks.clone();
         remarks.extend(wheel.remarks.iter().cloned());
         let centre = load_centre_of_all(self.curve, &parts);
-        let mut total = Total {
+        let nothing = Total {
             force_x_n: 0.0,
             force_y_n: 0.0,
             force_z_n: Some(0.0),
@@ -921,23 +980,29 @@ impl<'a> CurveSolve<'a> {
             error_estimate: Some(ErrorEstimate::default()),
             profile_uncertainty: None,
         };
+        let mut totals = vec![nothing; changes.len()];
         let mut whole: Option<(Solution, Fields)> = None;
-        for (mut part, forces) in parts.into_iter().zip(forces) {
+        for (number, mut part) in parts.into_iter().enumerate() {
             let first = whole.as_ref().map_or(0, |(whole, _)| whole.patches.len());
             remarks.extend(part.solution.remarks.iter().map(|remark| RemarkEntry {
                 patch: remark.patch.map(|patch| patch + first),
                 ..remark.clone()
             }));
-            part.leave_open(open);
-            let error = self.error_of(&part, centre);
-            total.error_estimate = total.error_estimate.zip(error).map(|(a, b)| a.plus(b));
-            for (k, forces) in forces.iter().enumerate() {
-                let moment = self.add_patch(&contact, &mut part, k, forces, centre)?;
-                let [x, y, z] = forces.in_track();
-                total.force_x_n += x;
-                total.force_y_n += y;
-                total.force_z_n = total.force_z_n.map(|sum| sum + z);
-                total.moment_z_n_mm += moment;
+            for (index, total) in totals.iter_mut().enumerate() {
+                part.leave_open(index, left_open + changes[index]);
+                let error = self.error_of(&part, index, centre);
+                total.error_estimate = total.error_estimate.zip(error).map(|(a, b)| a.plus(b));
+            }
+            for k in 0..part.patches.len() {
+                for (index, total) in totals.iter_mut().enumerate() {
+                    let [x, y, z] = forces[index][number][k].in_track();
+                    total.force_x_n += x;
+                    total.force_y_n += y;
+                    total.force_z_n = total.force_z_n.map(|sum| sum + z);
+                    total.moment_z_n_mm += self.moment(&part, k, index, centre);
+                }
+                let of_patch = motions.clone().map(|index| forces[index][number][k]);
+                self.add_patch(&contact, &mut part, k, of_patch)?;
             }
             match &mut whole {
                 None => whole = Some((part.solution, part.fields)),
@@ -956,7 +1021,7 @@ impl<'a> CurveSolve<'a> {
             normal.seconds = seconds;
         }
         let solution = Solution {
-            total: vec![total],
+            total: totals,
             remarks: merged(remarks),
             wheel_lowering_mm: Some(wheel.lowering),
             origin: Origin {
@@ -971,40 +1036,30 @@ impl<'a> CurveSolve<'a> {
         Ok((solution, fields))
     }
 
-    /// Completes a patch with its position, its force at its mean angle and the motion at its load centre; returns its moment about the
-    /// vertical line through a point `[x, y]` of the track.
-    fn add_patch(
-        &self,
-        contact: &CurveContact,
-        part: &mut Part,
-        k: usize,
-        forces: &PatchForces,
-        about: [f64; 2],
-    ) -> Result<f64, SolveError> {
-        let geometry = &self.contact.geometry;
-        let centre = part.centres[k];
-        let (place, over) = self.load_centre(contact, centre)?;
-        let [_, y, z] = place.point(centre[0], 0.0);
-        let rigid = match &self.case.problem.wheelset {
-            Some(wheelset) => RigidMotion::of_wheelset(geometry, contact.centre, wheelset),
-            None => {
-                let given = self.case.problem.motions[0];
-                let point = place.point(centre[0], over.gap);
-                let creepages = [given.creepage_x, given.creepage_y, given.spin_per_mm];
-                RigidMotion::of_creepages(point, &place, creepages)
-            }
-        };
-        let motion = creepages(&rigid, centre[0], &place, &over);
+    /// The moment of a patch in a motion about the vertical line through a point `[x, y]` of the track.
+    fn moment(&self, part: &Part, k: usize, index: usize, about: [f64; 2]) -> f64 {
         let mut moment = 0.0;
-        each_cell(part, k, |cell, _, area, [q_x, q_s, p]| {
+        each_cell(part, k, index, |cell, _, area, [q_x, q_s, p]| {
             let place = self.curve.at(cell[1]);
             let (sin, cos) = place.angle.sin_cos();
             let across = q_s * cos + p * sin;
             moment += area * ((cell[0] - about[0]) * across - (place.at[0] - about[1]) * q_x);
         });
-        let angle = forces.angle();
-        let (sin, cos) = angle.sin_cos();
-        let [along, y_share, z_share] = forces.sheared;
+        moment
+    }
+
+    /// Completes a patch with its position, and in every motion with its force at its mean angle and the motion at its load centre.
+    fn add_patch(
+        &self,
+        contact: &CurveContact,
+        part: &mut Part,
+        k: usize,
+        forces: impl Iterator<Item = PatchForces>,
+    ) -> Result<(), SolveError> {
+        let geometry = &self.contact.geometry;
+        let centre = part.centres[k];
+        let (place, over) = self.load_centre(contact, centre)?;
+        let [_, y, z] = place.point(centre[0], 0.0);
         let by = minus(part.centres[k], part.origin);
         move_origin(
             &mut part.solution.patches[k],
@@ -1014,6 +1069,9 @@ impl<'a> CurveSolve<'a> {
         let load = part.loads[k];
         let patch = &mut part.solution.patches[k];
         let limit = patch.friction_limit_n.unwrap_or(0.0);
+        let forces: Vec<PatchForces> = forces.collect();
+        // Pressures are those of all motions.
+        let angle = forces[0].angle();
         patch.position = Some(Position {
             track_mm: [centre[0], y, z],
             rail_mm: geometry.on_rail(place.rail),
@@ -1023,35 +1081,47 @@ impl<'a> CurveSolve<'a> {
             origin_track_mm: [centre[0], y, z],
         });
         patch.approach_mm = Some(-over.gap);
-        let elasticity = &self.case.problem.elasticity;
-        let point = &mut patch.points[0];
-        point.force_y_n = y_share * cos + z_share * sin;
-        point.force_track_n = Some(forces.in_track());
-        point.motion = motion.into();
-        point.normalised = normalised(elasticity, patch.area_mm2, limit, &motion);
-        point.friction_power_without_spin_n =
-            (motion.creepage_x * along).abs() + (motion.creepage_y * point.force_y_n).abs();
-        if let Some(task) = &self.case.run.after.damage {
-            let across = point.damage.take().and_then(|damage| damage.across);
-            let of = DamagedPatch {
-                patch: &load,
-                point,
-                limit,
-                speed: self.case.problem.speeds[0],
-            };
-            point.damage = Some(Box::new(Damage {
-                across,
-                ..damage(task, of)
-            }));
+        let Problem {
+            elasticity,
+            speeds,
+            wheelset,
+            ..
+        } = &self.case.problem;
+        let (sin, cos) = angle.sin_cos();
+        for ((point, forces), speed) in patch.points.iter_mut().zip(&forces).zip(speeds) {
+            if let Some(wheelset) = wheelset {
+                let rigid = RigidMotion::of_wheelset(geometry, contact.centre, wheelset);
+                let motion = creepages(&rigid, centre[0], &place, &over);
+                point.motion = motion.into();
+                point.normalised = normalised(elasticity, patch.area_mm2, limit, &motion);
+            }
+            let [along, y_share, z_share] = forces.sheared;
+            point.force_y_n = y_share * cos + z_share * sin;
+            point.force_track_n = Some(forces.in_track());
+            point.friction_power_without_spin_n = (point.motion.creepage_x * along).abs()
+                + (point.motion.creepage_y * point.force_y_n).abs();
+            if let Some(task) = &self.case.run.after.damage {
+                let across = point.damage.take().and_then(|damage| damage.across);
+                let of = DamagedPatch {
+                    patch: &load,
+                    point,
+                    limit,
+                    speed: *speed,
+                };
+                point.damage = Some(Box::new(Damage {
+                    across,
+                    ..damage(task, of)
+                }));
+            }
         }
-        Ok(moment)
+        Ok(())
     }
 
-    /// The errors of the forces of a part in track axes, and of its moment about the vertical line through a point `[x, y]`.
-    fn error_of(&self, part: &Part, about: [f64; 2]) -> Option<ErrorEstimate> {
+    /// The errors of the forces of a part in a motion in track axes, and of its moment about the vertical line through a point `[x, y]`.
+    fn error_of(&self, part: &Part, index: usize, about: [f64; 2]) -> Option<ErrorEstimate> {
         let [x, s] = part.origin;
         let arm = [x - about[0], self.curve.at(s).at[0] - about[1]];
-        let error = part.solution.total[0].error_estimate?;
+        let error = part.solution.total[index].error_estimate?;
         Some(ErrorEstimate {
             moment_z_n_mm: error.moment_z_n_mm
                 + arm[0].abs() * error.force_y_n
@@ -1117,12 +1187,18 @@ fn creepages(rigid: &RigidMotion, x: f64, place: &CurvePlace, over: &WheelOver) 
     }
 }
 
-/// Calls with the place `[x, s]`, the size and the area of every cell of a patch, in mm and mm², and with its tractions and pressure in MPa.
-fn each_cell(part: &Part, patch: usize, mut call: impl FnMut([f64; 2], [f64; 2], f64, [f64; 3])) {
+/// Calls with the place `[x, s]`, the size and the area of every cell of a patch, in mm and mm², and with its pressure and its tractions in a motion in
+/// MPa.
+fn each_cell(
+    part: &Part,
+    patch: usize,
+    index: usize,
+    mut call: impl FnMut([f64; 2], [f64; 2], f64, [f64; 3]),
+) {
     let Some(fields) = part.fields.patches.get(patch) else {
         return;
     };
-    let (cells, point) = (fields.cells(0), &fields.points[0]);
+    let (cells, point) = (fields.cells(index), &fields.points[index]);
     let (Some(x), Some(y), Some(p)) = (
         &point.traction_x_mpa,
         &point.traction_y_mpa,
@@ -1148,6 +1224,12 @@ fn covered([from, to]: [f64; 2], cells: usize) -> Vec<(usize, f64)> {
         .map(|cell| (cell, part(cell)))
         .filter(|(_, part)| *part > 0.0)
         .collect()
+}
+
+/// The friction limit of some parts in N.
+fn limit(parts: &[Part]) -> f64 {
+    let patches = parts.iter().flat_map(|part| &part.solution.patches);
+    patches.filter_map(|patch| patch.friction_limit_n).sum()
 }
 
 /// How many patches some parts have.
@@ -1177,7 +1259,7 @@ fn load_centre_of_all(curve: &ReferenceCurve, parts: &[Part]) -> [f64; 2] {
     let (mut load, mut sum) = (0.0, [0.0; 2]);
     for part in parts {
         for k in 0..part.solution.patches.len() {
-            each_cell(part, k, |[x, s], _, area, [.., p]| {
+            each_cell(part, k, 0, |[x, s], _, area, [.., p]| {
                 load += area * p;
                 sum = [sum[0] + area * p * x, sum[1] + area * p * curve.at(s).at[0]];
             });

@@ -79,8 +79,7 @@ impl CheckedParts {
         let task = normal_task(given.contact, given.load, elasticity.as_ref(), limits);
         let task = match (task, given.contact) {
             (None, Some(contact)) if contact.has_profiles() => {
-                let history = motions.as_ref().is_some_and(|all| all.history.is_some());
-                let surface = surface(&given, elasticity, history);
+                let surface = surface(&given, elasticity);
                 let (surface, remark) = surface.unwrap_or_else(|found| {
                     faults.extend(found);
                     (ReferenceSurface::Planes, None)
@@ -157,7 +156,6 @@ impl CheckedParts {
 fn surface(
     given: &PartialCase,
     elasticity: Option<Elasticity>,
-    history: bool,
 ) -> Result<(ReferenceSurface, Option<Remark>), Vec<Fault>> {
     let (asked, influence) = given.contact.map_or((None, None), Contact::surface);
     if asked == Some(SurfaceName::Plane) {
@@ -172,7 +170,6 @@ fn surface(
     let differ = elasticity.is_some_and(|pair| pair.difference != 0.0);
     let refused = [
         (differ, "/material", "bodies that differ are not solved"),
-        (history, "/motion/history", "a history is not solved"),
         (
             other_method,
             "/solver/method",

@@ -17,37 +17,37 @@ pub(crate) fn in_frame(
     geometry: &WheelRail,
     extents: impl Iterator<Item = [f64; 4]>,
 ) -> FrictionLaw {
-    if let Some(law) = friction.along() {
-        return FrictionLaw::Along(law.about(frame.origin[0]));
-    }
     // Where the rail turns away from the plane nothing touches.
-    across_rail(friction, geometry, extents, |y| {
+    on_rail(friction, geometry, extents, frame.origin[0], |y| {
         geometry.rail_over(frame, y).ok()
     })
 }
 
 /// Friction in the axes of the surface of a rail whose patches have these extents `[x_min, x_max, s_min, s_max]` in mm along its cross-section: a
-/// coefficient by the y of the rail's profile, or by the inclination of its surface, becomes one by the arc length from an origin. `rail` gives
-/// the parameter of the rail's curve by the arc length.
+/// coefficient by the y of the rail's profile, or by the inclination of its surface, becomes one by the arc length from an origin `[x, s]`, and one by
+/// the place along the track becomes one by x. `rail` gives the parameter of the rail's curve by the arc length.
 pub(crate) fn on_curve(
     friction: &FrictionLaw,
     geometry: &WheelRail,
     extents: impl Iterator<Item = [f64; 4]>,
-    origin: f64,
+    [x, s]: [f64; 2],
     rail: impl Fn(f64) -> f64,
 ) -> FrictionLaw {
-    let extents =
-        extents.map(|[x_min, x_max, low, high]| [x_min, x_max, low - origin, high - origin]);
-    across_rail(friction, geometry, extents, |y| Some(rail(origin + y)))
+    let extents = extents.map(|[x_min, x_max, low, high]| [x_min, x_max, low - s, high - s]);
+    on_rail(friction, geometry, extents, x, |y| Some(rail(s + y)))
 }
 
-/// Friction across patches whose places y lie over parameters of the rail's curve.
-fn across_rail(
+/// Friction of patches whose origin lies at x in mm of the track, and whose places y lie over parameters of the rail's curve.
+fn on_rail(
     friction: &FrictionLaw,
     geometry: &WheelRail,
     extents: impl Iterator<Item = [f64; 4]>,
+    x: f64,
     rail: impl Fn(f64) -> Option<f64>,
 ) -> FrictionLaw {
+    if let Some(law) = friction.along() {
+        return FrictionLaw::Along(law.about(x));
+    }
     let Some(law) = friction.across() else {
         return friction.clone();
     };

@@ -19,6 +19,7 @@ pub struct Footprint {
     patches: Vec<Patch>,
     uncertainty: Option<NormalUncertainty>,
     slip: Option<Arc<SurfaceSlip>>,
+    slip_by_motion: Option<Arc<[SurfaceSlip; 2]>>,
     /// Of each patch of a curved surface, the origin `[x, y]` in mm of the coordinates that its places are given in.
     origins: Vec<[f64; 2]>,
     loads: LazyField<Vec<LoadAcross>>,
@@ -76,6 +77,7 @@ impl Footprint {
             shape: FootprintShape::Hertz(ellipse),
             uncertainty: None,
             slip: None,
+            slip_by_motion: None,
             origins: Vec::new(),
             loads: LazyField::default(),
         }
@@ -89,6 +91,7 @@ impl Footprint {
             shape: FootprintShape::Sampled(field),
             uncertainty: None,
             slip: None,
+            slip_by_motion: None,
             origins: Vec::new(),
             loads: LazyField::default(),
         }
@@ -107,16 +110,19 @@ impl Footprint {
         }
     }
 
-    /// Returns this footprint on a curved surface: with a rigid slip of its own in every cell, added to that of the motion, and for every patch the
-    /// origin `[x, y]` in mm of the coordinates that its places are given in.
+    /// Returns this footprint on a curved surface: with a rigid slip of its own in every cell, added to that of the motion; with the part of it that
+    /// follows from a motion, for a unit of creepage across and of spin in 1/mm, where motions share the footprint; and for every patch the origin
+    /// `[x, y]` in mm of the coordinates that its places are given in.
     #[must_use]
     pub(crate) fn on_surface(
         self,
         slip: SurfaceSlip,
+        by_motion: Option<[SurfaceSlip; 2]>,
         origins: impl Iterator<Item = [f64; 2]>,
     ) -> Footprint {
         Footprint {
             slip: Some(Arc::new(slip)),
+            slip_by_motion: by_motion.map(Arc::new),
             origins: origins.collect(),
             ..self
         }
@@ -132,6 +138,12 @@ impl Footprint {
     #[must_use]
     pub fn slip(&self) -> Option<&SurfaceSlip> {
         self.slip.as_deref()
+    }
+
+    /// What is added to it by a unit of creepage across, and of spin in 1/mm, where motions share the footprint.
+    #[must_use]
+    pub fn slip_by_motion(&self) -> Option<&[SurfaceSlip; 2]> {
+        self.slip_by_motion.as_deref()
     }
 
     /// The patches, in order of their smallest y.

@@ -118,6 +118,8 @@ pub struct StripMesh {
     /// Mean slip of every cell beyond that of the motion, dimensionless, along x and across: from the pressure of unlike bodies, or on a
     /// surface that bends.
     pub surface_slip: Option<[Vec<f64>; 2]>,
+    /// What a unit of creepage across, and of spin in 1/mm, about the origin of the case adds to it, where motions share a surface that bends.
+    pub slip_by_motion: Option<[[Vec<f64>; 2]; 2]>,
     poisson_ratio: f64,
     precision: Precision,
     mirrored: bool,
@@ -194,10 +196,11 @@ impl StripMesh {
         if precision == Precision::Single {
             normalised.round(COORDINATE_STEP);
         }
-        let of_surface = footprint
-            .slip()
-            .filter(|_| scale.traction > 0.0)
-            .map(|slip| surface_slips(&mesh, slip, scale.slip()));
+        let of_surface = |slip| surface_slips(&mesh, slip, scale.slip());
+        let own_slip = footprint.slip().filter(|_| scale.traction > 0.0);
+        let of_motion = footprint.slip_by_motion().filter(|_| scale.traction > 0.0);
+        let slip_by_motion = of_motion.map(|slips| slips.each_ref().map(of_surface));
+        let own_slip = own_slip.map(of_surface);
         let of_pressure = (task.is_coupled() && scale.traction > 0.0).then(|| {
             // A reduced shear modulus is one for tractions alone.
             let unit = task.interface.reduction / scale.traction;
@@ -213,7 +216,8 @@ impl StripMesh {
             normalised: Arc::new(normalised),
             bound,
             layer: task.interface.layer * scale.shear_modulus / scale.length,
-            surface_slip: of_pressure.or(of_surface),
+            surface_slip: of_pressure.or(own_slip),
+            slip_by_motion,
             poisson_ratio,
             precision,
             mirrored: mirror.is_some(),

@@ -49,12 +49,21 @@ impl LevelRun<'_> {
         }
     }
 
-    /// Rigid slip of a motion, with that of the pressure of unlike bodies where they roll.
+    /// Rigid slip of a dimensionless motion on the surface, with that of the pressure of unlike bodies or on a surface that bends where they roll.
     pub(super) fn rigid(&self, of: &StepEquations, motion: &Motion) -> Vec<f64> {
         let rolls = matches!(of.kind, StepKind::Steady | StepKind::Roll { .. });
         let source = self.level.surface_slip.as_ref().filter(|_| rolls);
-        of.equations
-            .given(motion, source.map(|[x, y]| SlipSource { x, y }))
+        let source = source.map(|[x, y]| SlipSource { x, y });
+        let mut rigid = of.equations.given(motion, source);
+        if let Some(by_motion) = &self.level.slip_by_motion {
+            let motion = self.level.scale.creepages(motion);
+            let shares = [motion.creepage_y, motion.spin_per_mm];
+            for (slips, share) in by_motion.iter().zip(shares) {
+                let slips = slips.each_ref().map(|slips| slips.iter().map(|slip| share * slip).collect());
+                self.add_to_cells(&mut rigid, slips.each_ref());
+            }
+        }
+        rigid
     }
 
     /// Adds values of the cells, along x and across, to those of the unknowns.
