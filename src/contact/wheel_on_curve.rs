@@ -391,7 +391,7 @@ impl<'a> CurveSolve<'a> {
                     let lift: f64 = forces.iter().flatten().map(|patch| patch.sheared[2]).sum();
                     wheel.friction_share = -lift / wheel.vertical_force();
                 } else {
-                    changes = self.neglected(&contact, &parts, workspace);
+                    changes = self.neglected(coarse, &parts, workspace)?;
                 }
                 wheel.remarks.extend((change > 1.0).then(|| remark.into()));
                 let found = Found {
@@ -408,20 +408,39 @@ impl<'a> CurveSolve<'a> {
         unreachable!("the last round ends them")
     }
 
-    /// How much the gap that the tractions of each motion open would change its forces, relative to μN.
+    /// How much the gap that the tractions of each motion open would change its forces, relative to μN: by the pressures on a coarse grid under the
+    /// tractions that open most.
     fn neglected(
         &self,
-        contact: &CurveContact,
+        coarse: CurveContact,
         parts: &[Part],
         workspace: &mut Workspace,
-    ) -> Vec<f64> {
-        let share = contact.normal_force() / limit(parts).max(f64::MIN_POSITIVE);
-        let of = |index: usize| {
-            let friction = self.friction(contact, parts, index, workspace);
-            let [_, by_gap] = contact.change_by(&Friction::default(), &friction);
-            by_gap * share
-        };
-        (0..self.case.problem.motions.len()).map(of).collect()
+    ) -> Result<Vec<f64>, SolveError> {
+        let (task, still) = (self.task(), Friction::default());
+        let mut contact = task.again(coarse, &still, workspace, self.watch)?;
+        let mut largest = (0.0, still.clone());
+        let mut changes = Vec::with_capacity(self.case.problem.motions.len());
+        for index in 0..self.case.problem.motions.len() {
+            let traction = self.on_grid(&contact, parts, index);
+            let friction = Friction {
+                lift: 0.0,
+                opened: contact.operator.opened_by_traction(&traction, workspace),
+            };
+            let [_, by_gap] = contact.change_by(&still, &friction);
+            changes.push(by_gap);
+            if by_gap > largest.0 {
+                largest = (by_gap, friction);
+            }
+        }
+        let (most, friction) = largest;
+        if most > 0.0 {
+            let before = resultant(&contact);
+            contact = task.again(contact, &friction, workspace, self.watch)?;
+            let [across, down] = minus(resultant(&contact), before);
+            let share = across.hypot(down) / limit(parts) / most;
+            changes.iter_mut().for_each(|change| *change *= share);
+        }
+        Ok(changes)
     }
 
     /// The wheel at rest on a coarse grid, with about the friction that it will have: by the table of creep forces where that is enough, else with coarse
@@ -1224,6 +1243,17 @@ fn covered([from, to]: [f64; 2], cells: usize) -> Vec<(usize, f64)> {
         .map(|cell| (cell, part(cell)))
         .filter(|(_, part)| *part > 0.0)
         .collect()
+}
+
+/// Pressures times the sine and the cosine of the angles of their strips, in N.
+fn resultant(contact: &CurveContact) -> [f64; 2] {
+    let rows = contact.pressure.chunks_exact(contact.grid.x.len());
+    let rows = rows.zip(&contact.grid.places);
+    let sum = rows.fold([0.0; 2], |sum, (row, place)| {
+        let (load, (sin, cos)) = (row.iter().sum::<f64>(), place.angle.sin_cos());
+        [sum[0] + load * sin, sum[1] + load * cos]
+    });
+    sum.map(|sum| sum * contact.grid.area())
 }
 
 /// The friction limit of some parts in N.

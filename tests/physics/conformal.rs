@@ -306,33 +306,36 @@ fn mirrored(case: &Value) -> Value {
 
 /// A wheel of 300 mm across its tread on a flat rail, where the curve is a plane; the wheel bends, so that half of its turn and of what its rolling
 /// radius loses across the contact counts: 2e-5 of creepage, where 1e-3 slide.
-#[test]
-fn a_flat_rail_has_the_forces_of_a_plane() {
-    let flat = |of: fn(f64) -> f64| -> Vec<[f64; 2]> {
+fn flat(surface: &str, influence: Option<&str>) -> Value {
+    let section = |of: fn(f64) -> f64| -> Vec<[f64; 2]> {
         let y = (-80..=80).map(|k| 0.25 * f64::from(k));
         y.map(|y| [y, of(y)]).collect()
     };
-    let solve_on = |surface: &str, influence: Option<&str>| {
-        let mut case = usual(surface, 0.0, 0.001);
-        let contact = &mut case["contact"];
-        for (body, points) in [("rail", flat(|_| 0.0)), ("wheel", flat(|y| -y * y / 600.0))] {
-            contact[body] = json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
-        }
-        contact["rail_origin_mm"] = json!(0.0);
-        contact["cant_rad"] = json!(0.0);
-        contact["flange_back_distance_mm"] = json!(0.0);
-        contact["flange_back_position_mm"] = json!(0.0);
-        contact["accept_rough_profiles"] = json!(true);
-        let contact = &mut case["contact"];
-        if let Some(influence) = influence {
-            contact["influence"] = json!(influence);
-        }
-        solve(&case)
-    };
-    let plane = solve_on("plane", None);
+    let mut case = usual(surface, 0.0, 0.001);
+    let contact = &mut case["contact"];
+    for (body, points) in [
+        ("rail", section(|_| 0.0)),
+        ("wheel", section(|y| -y * y / 600.0)),
+    ] {
+        contact[body] = json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
+    }
+    contact["rail_origin_mm"] = json!(0.0);
+    contact["cant_rad"] = json!(0.0);
+    contact["flange_back_distance_mm"] = json!(0.0);
+    contact["flange_back_position_mm"] = json!(0.0);
+    contact["accept_rough_profiles"] = json!(true);
+    if let Some(influence) = influence {
+        contact["influence"] = json!(influence);
+    }
+    case
+}
+
+#[test]
+fn a_flat_rail_has_the_forces_of_a_plane() {
+    let plane = solve(&flat("plane", None));
     let limit = limit(&plane);
     for (influence, allowed) in [("half_space", 0.006), ("angle_corrected", 0.008)] {
-        let curve = solve_on("curve", Some(influence));
+        let curve = solve(&flat("curve", Some(influence)));
         let (found, known) = (&curve.total[0], &plane.total[0]);
         for (found, known) in [
             (found.force_x_n, known.force_x_n),
@@ -455,14 +458,6 @@ fn fields_lie_about_the_load_centres_and_carry_the_forces() {
 fn what_is_not_solved_on_the_curve_is_refused() {
     let case = usual("curve", 0.0, 0.0);
     let with = |pointer: &str, value: Value| crate::cases::with(&case, pointer, Some(value));
-    let history = json!({ "history": {
-        "distance_mm": [0.0, 5.0], "creepage_x": [0.0, 0.001]
-    } });
-    assert_fault(
-        &with("/motion", history),
-        "/motion/history",
-        &["history", "plane"],
-    );
     let bodies = json!({
         "upper": { "young_modulus_mpa": 210e3, "poisson_ratio": 0.3 },
         "lower": { "young_modulus_mpa": 70e3, "poisson_ratio": 0.33 }
@@ -480,6 +475,118 @@ fn what_is_not_solved_on_the_curve_is_refused() {
     let plane = usual("plane", 0.0, 0.0);
     let influence = crate::cases::with(&plane, "/contact/influence", Some(json!("half_space")));
     assert_fault(&influence, "/contact/influence", &["curve"]);
+}
+
+/// A history of creepages and shifts: steps without rolling, at rest and on the way.
+fn history(creepages: [f64; 3]) -> Value {
+    let [x, y, spin] = creepages;
+    json!({ "history": {
+        "distance_mm": [0.0, 2.0, 2.0, 5.0, 30.0, 90.0],
+        "shift_x_mm": [0.002, 0.0, 0.0, 0.0, 0.0, 0.0],
+        "shift_y_mm": [0.0, 0.0, 1.5 * y, 0.0, 0.0, 0.0],
+        "turn_rad": [0.0, 0.0, 2.0 * spin, 0.0, 0.0, 0.0],
+        "creepage_x": x, "creepage_y": y, "spin_per_mm": spin
+    } })
+}
+
+/// Forces along, across and down at every point of a history.
+fn forces_of(solution: &Solution) -> Vec<[f64; 3]> {
+    let totals = solution.total.iter();
+    totals
+        .map(|total| [total.force_x_n, total.force_y_n, total.force_z_n.unwrap()])
+        .collect()
+}
+
+#[test]
+fn a_history_on_a_flat_rail_has_the_forces_of_a_plane() {
+    let motion = history([0.0008, 0.0005, 2e-4]);
+    let mut plane = flat("plane", None);
+    plane["motion"] = motion.clone();
+    let plane = solve(&plane);
+    let limit = limit(&plane);
+    for influence in ["half_space", "angle_corrected"] {
+        let mut curve = flat("curve", Some(influence));
+        curve["motion"] = motion.clone();
+        let curve = solve(&curve);
+        for (found, known) in forces_of(&curve).iter().zip(&forces_of(&plane)) {
+            for k in 0..3 {
+                let off = (found[k] - known[k]).abs() / limit;
+                assert!(off < 0.005, "{influence} {k}: {found:?} {known:?} {off}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_history_of_the_left_wheel_is_the_mirror_image_of_the_right_one() {
+    let mut right = usual("curve", -6.0, 0.003);
+    right["motion"] = history([0.0008, 0.001, 2e-4]);
+    let mut left = mirrored(&right);
+    left["motion"] = history([0.0008, -0.001, -2e-4]);
+    let (right, left) = (solve(&right), solve(&left));
+    let limit = limit(&right);
+    for (r, l) in forces_of(&right).iter().zip(&forces_of(&left)) {
+        assert!((r[0] - l[0]).abs() < 2e-4 * limit, "{r:?} {l:?}");
+        assert!((r[1] + l[1]).abs() < 2e-4 * limit, "{r:?} {l:?}");
+        assert!((r[2] - l[2]).abs() < 2e-4 * limit, "{r:?} {l:?}");
+    }
+}
+
+/// At a gauge corner a history of one motion is steady from the start, or in the end, with the forces of that motion on the curve, where a plane has
+/// others. With factors for the turn, the tractions of the motion change its pressures, which the estimate of the history knows.
+#[test]
+fn a_history_at_a_gauge_corner_has_the_steady_forces_of_the_curve() {
+    let [x, y, spin] = [0.0006, 0.001, 4e-4];
+    let steadily = json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": spin });
+    let mut from_steady = history([x, y, spin]);
+    from_steady["history"]["distance_mm"] = json!([0.0, 5.0]);
+    for name in ["shift_x_mm", "shift_y_mm", "turn_rad"] {
+        from_steady["history"][name] = json!(0.0);
+    }
+    from_steady["start"] = json!("steady");
+    let with = |surface: &str, influence: Option<&str>, motion: &Value| {
+        let mut case = usual(surface, -6.2, 0.003);
+        case["load"] = json!({ "normal_force_n": 75e3 });
+        case["motion"] = motion.clone();
+        if let Some(influence) = influence {
+            case["contact"]["influence"] = json!(influence);
+        }
+        solve(&case)
+    };
+    let plane = forces_of(&with("plane", None, &steadily))[0];
+    for (influence, axis) in [("half_space", 1), ("angle_corrected", 0)] {
+        let known = with("curve", Some(influence), &steadily);
+        let steady = forces_of(&known)[0];
+        let limit = limit(&known);
+        let off = |from: &[f64; 3], k: usize| (from[k] - steady[k]).abs() / limit;
+        let ended = with("curve", Some(influence), &history([x, y, spin]));
+        let begun = with("curve", Some(influence), &from_steady);
+        for (solution, first) in [(ended, 5), (begun, 0)] {
+            let forces = forces_of(&solution);
+            for (forces, total) in forces.iter().zip(&solution.total).skip(first) {
+                let errors = [total, &known.total[0]].map(|t| t.error_estimate.unwrap());
+                let allowed = errors.iter().fold([0.0; 2], |sum, e| {
+                    [sum[0] + e.force_x_n / limit, sum[1] + e.force_y_n / limit]
+                });
+                println!(
+                    "{influence} {:?} {allowed:?} plane {:?}",
+                    [0, 1, 2].map(|k| off(forces, k)),
+                    [0, 1, 2].map(|k| off(&plane, k))
+                );
+                for k in 0..2 {
+                    assert!(
+                        off(forces, k) < allowed[k],
+                        "{influence} {k}: {forces:?} {steady:?}"
+                    );
+                }
+                assert!(off(&plane, axis) > 0.03, "{plane:?} {steady:?}");
+                assert!(
+                    off(forces, axis) < 0.2 * off(&plane, axis),
+                    "{forces:?} {steady:?}"
+                );
+            }
+        }
+    }
 }
 
 /// Several motions are those of as many cases: tractions change the pressures of each.

@@ -41,11 +41,19 @@ fn ends(patch: &PatchSolution) -> [f64; 2] {
     [0, 1].map(|k| origin + patch.extent_mm[k])
 }
 
+/// Also on the curve with factors for its turn, where the tractions of steady rolling change their pressures and those of a history do not.
 #[test]
 fn every_patch_ends_in_steady_rolling() {
     let mut failures = Vec::new();
-    for case in [generated(), two_patches()] {
-        let mut case = on_planes(&case);
+    let surfaces = |case: Value| {
+        let half_space = json!({ "influence": "half_space" });
+        [
+            on_planes(&case),
+            put(&case, "contact", half_space),
+            put(&case, "contact", json!({ "reference_surface": "curve" })),
+        ]
+    };
+    for mut case in [generated(), two_patches()].into_iter().flat_map(surfaces) {
         case["load"] = json!({ "normal_force_n": 75_000 });
         let [x, y, spin] = CREEPAGES;
         let steady = moving(
@@ -93,21 +101,17 @@ fn totals_are_sums_in_track_axes_at_every_distance() {
     assert!(solution.patches.len() > 1, "gauge corner and flange");
     assert_eq!(solution.total.len(), 3);
     for (k, total) in solution.total.iter().enumerate() {
-        let parts = solution.patches.iter().map(|patch| {
-            let angle = patch
-                .position
-                .as_ref()
-                .expect("of profiles")
-                .contact_angle_rad;
-            let point = &patch.points[k];
-            [
-                point.force_x_n,
-                point.force_y_n * angle.cos() + patch.normal_force_n * angle.sin(),
-            ]
-        });
-        let sum = parts.fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
-        assert!((sum[0] - total.force_x_n).abs() < 1e-6 * 75e3);
-        assert!((sum[1] - total.force_y_n).abs() < 1e-6 * 75e3);
+        let found = [
+            total.force_x_n,
+            total.force_y_n,
+            total.force_z_n.expect("of profiles"),
+        ];
+        for (axis, found) in found.into_iter().enumerate() {
+            let force =
+                |patch: &PatchSolution| patch.points[k].force_track_n.expect("of profiles")[axis];
+            let sum: f64 = solution.patches.iter().map(force).sum();
+            assert!((sum - found).abs() < 1e-6 * 75e3, "{axis}: {sum} {found}");
+        }
     }
 }
 
@@ -116,16 +120,14 @@ fn totals_are_sums_in_track_axes_at_every_distance() {
 fn a_vertical_force_is_balanced_by_normal_forces_and_a_remark_says_so() {
     let mut case = two_patches();
     case["load"] = json!({ "vertical_force_n": 75_000 });
-    for distances in [&[6.0][..], &[1.0, 6.0]] {
-        let solution = moving(&case, rolled(distances, CREEPAGES));
+    for case in [on_planes(&case), case] {
+        // Nothing is displaced at 0.
+        let solution = moving(&case, rolled(&[0.0, 6.0], CREEPAGES));
         let code = "normal-forces-alone-balance";
         assert!(solution.remarks.iter().any(|remark| remark.code == code));
-        let of = |patch: &PatchSolution| {
-            let position = patch.position.as_ref().expect("of profiles");
-            patch.normal_force_n * position.contact_angle_rad.cos()
-        };
-        let vertical: f64 = solution.patches.iter().map(of).sum();
-        assert!((vertical / 75e3 - 1.0).abs() < 1e-3, "{vertical}");
+        let [still, rolling] = [0, 1].map(|k| solution.total[k].force_z_n.expect("of profiles"));
+        assert!((still / -75e3 - 1.0).abs() < 1e-3, "{still}");
+        assert!((rolling / still - 1.0).abs() > 0.01, "{rolling}");
     }
 }
 
@@ -150,6 +152,12 @@ fn patches_reach_a_jump_of_friction_where_they_are() {
     distances.sort_by(f64::total_cmp);
     case["friction"] = json!({ "along": { "x_mm": [jump, jump], "coefficient": [MU, 0.1] } });
     let found = moving(&case, rolled(&distances, [0.2, 0.0, 0.0]));
+    assert!(
+        found
+            .remarks
+            .iter()
+            .all(|remark| remark.code != "on-planes")
+    );
     let mut seen = [0; 2];
     for patch in &found.patches {
         let [rear, front] = ends(patch);

@@ -59,7 +59,9 @@ impl LevelRun<'_> {
             let motion = self.level.scale.creepages(motion);
             let shares = [motion.creepage_y, motion.spin_per_mm];
             for (slips, share) in by_motion.iter().zip(shares) {
-                let slips = slips.each_ref().map(|slips| slips.iter().map(|slip| share * slip).collect());
+                let slips = slips
+                    .each_ref()
+                    .map(|slips| slips.iter().map(|slip| share * slip).collect());
                 self.add_to_cells(&mut rigid, slips.each_ref());
             }
         }

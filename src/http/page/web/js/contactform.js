@@ -74,7 +74,7 @@ function surfaceFields(app) {
   })}
       ${bent ? choice(app, '/contact/influence', 'Influence of cells', INFLUENCES) : nothing}</div>
     <p class="hint">${bent
-      ? 'The contact bends around the rail. What the curve does not solve, such as a history, is solved on planes.'
+      ? 'The contact bends around the rail. What the curve does not solve, such as bodies that differ, is solved on planes.'
       : 'A plane of contact for each patch, for comparison. At a gauge corner the contact bends, and planes are off.'}</p></details>`;
 }
 
