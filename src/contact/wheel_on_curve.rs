@@ -18,6 +18,7 @@ use crate::contact::geometry::reference_curve::{
 use crate::contact::half_space::bent_surface::{Influence, TURN_MAX};
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::gap::answer::NormalError;
 use crate::contact::normal::gap::grid::GridFineness;
 use crate::contact::normal::on_curve::{CurveContact, CurveTask, Friction, Workspace};
 use crate::contact::normal::patch::Patch;
@@ -359,7 +360,7 @@ impl<'a> CurveSolve<'a> {
             let parts = self.tractions(&contact, &exact, workspace)?;
             let (mut next, mut change) = (Friction::default(), 0.0);
             if coupled {
-                next = self.friction(&contact, &parts, 0, workspace);
+                next = self.friction(&contact, &parts, workspace);
                 let [by_lift, by_gap] = contact.change_by(&friction, &next);
                 let by_gap = by_gap * contact.normal_force() / limit(&parts);
                 change = (by_lift / balance).max(by_gap / (CHANGE * target));
@@ -409,7 +410,7 @@ impl<'a> CurveSolve<'a> {
     }
 
     /// How much the gap that the tractions of each motion open would change its forces, relative to μN: by the pressures on a coarse grid under the
-    /// tractions that open most.
+    /// tractions that open most, if there are any.
     fn neglected(
         &self,
         coarse: CurveContact,
@@ -417,7 +418,7 @@ impl<'a> CurveSolve<'a> {
         workspace: &mut Workspace,
     ) -> Result<Vec<f64>, SolveError> {
         let (task, still) = (self.task(), Friction::default());
-        let mut contact = task.again(coarse, &still, workspace, self.watch)?;
+        let contact = task.again(coarse, &still, workspace, self.watch)?;
         let mut largest = (0.0, still.clone());
         let mut changes = Vec::with_capacity(self.case.problem.motions.len());
         for index in 0..self.case.problem.motions.len() {
@@ -434,10 +435,16 @@ impl<'a> CurveSolve<'a> {
         }
         let (most, friction) = largest;
         if most > 0.0 {
-            let before = resultant(&contact);
-            contact = task.again(contact, &friction, workspace, self.watch)?;
-            let [across, down] = minus(resultant(&contact), before);
-            let share = across.hypot(down) / limit(parts) / most;
+            let (before, normal) = (resultant(&contact), contact.normal_force());
+            let change = match task.again(contact, &friction, workspace, self.watch) {
+                Ok(opened) => {
+                    let [across, down] = minus(resultant(&opened), before);
+                    across.hypot(down)
+                }
+                Err(NormalError::NoAnswer(_)) => most * normal,
+                Err(error) => return Err(error.into()),
+            };
+            let share = change / most / limit(parts);
             changes.iter_mut().for_each(|change| *change *= share);
         }
         Ok(changes)
@@ -474,7 +481,7 @@ impl<'a> CurveSolve<'a> {
                 Some(next) => next,
                 None => {
                     let parts = self.tractions(&coarse, &rough, workspace)?;
-                    self.friction(&coarse, &parts, 0, workspace)
+                    self.friction(&coarse, &parts, workspace)
                 }
             };
             let (by_lift, by_gap) = by_gap(&friction, &next);
@@ -534,22 +541,21 @@ impl<'a> CurveSolve<'a> {
         Ok(Some(Friction { lift, opened }))
     }
 
-    /// Effect of the tractions of all parts in a motion on the contact.
+    /// Effect of the tractions of all parts on the contact.
     fn friction(
         &self,
         contact: &CurveContact,
         parts: &[Part],
-        index: usize,
         workspace: &mut Workspace,
     ) -> Friction {
         let lift = match self.contact.loading {
             WheelLoad::Vertical(_) => {
-                let forces = self.forces(contact, parts, index);
+                let forces = self.forces(contact, parts, 0);
                 forces.iter().flatten().map(|patch| patch.sheared[2]).sum()
             }
             WheelLoad::Normal(_) | WheelLoad::Lowering(_) => 0.0,
         };
-        let traction = self.on_grid(contact, parts, index);
+        let traction = self.on_grid(contact, parts, 0);
         Friction {
             lift,
             opened: contact.operator.opened_by_traction(&traction, workspace),
@@ -983,9 +989,7 @@ impl<'a> CurveSolve<'a> {
             changes,
         } = found;
         let left_open = self.left_open(&contact);
-        let motions = 0..changes.len();
-        let forces: Vec<_> = motions
-            .clone()
+        let of_motions: Vec<_> = (0..changes.len())
             .map(|index| self.forces(&contact, &parts, index))
             .collect();
         let mut remarks = self.case.remarks.clone();
@@ -1013,15 +1017,16 @@ impl<'a> CurveSolve<'a> {
                 total.error_estimate = total.error_estimate.zip(error).map(|(a, b)| a.plus(b));
             }
             for k in 0..part.patches.len() {
+                let forces: Vec<PatchForces> =
+                    of_motions.iter().map(|forces| forces[number][k]).collect();
                 for (index, total) in totals.iter_mut().enumerate() {
-                    let [x, y, z] = forces[index][number][k].in_track();
+                    let [x, y, z] = forces[index].in_track();
                     total.force_x_n += x;
                     total.force_y_n += y;
                     total.force_z_n = total.force_z_n.map(|sum| sum + z);
                     total.moment_z_n_mm += self.moment(&part, k, index, centre);
                 }
-                let of_patch = motions.clone().map(|index| forces[index][number][k]);
-                self.add_patch(&contact, &mut part, k, of_patch)?;
+                self.add_patch(&contact, &mut part, k, &forces)?;
             }
             match &mut whole {
                 None => whole = Some((part.solution, part.fields)),
@@ -1073,7 +1078,7 @@ impl<'a> CurveSolve<'a> {
         contact: &CurveContact,
         part: &mut Part,
         k: usize,
-        forces: impl Iterator<Item = PatchForces>,
+        forces: &[PatchForces],
     ) -> Result<(), SolveError> {
         let geometry = &self.contact.geometry;
         let centre = part.centres[k];
@@ -1088,7 +1093,6 @@ impl<'a> CurveSolve<'a> {
         let load = part.loads[k];
         let patch = &mut part.solution.patches[k];
         let limit = patch.friction_limit_n.unwrap_or(0.0);
-        let forces: Vec<PatchForces> = forces.collect();
         // Pressures are those of all motions.
         let angle = forces[0].angle();
         patch.position = Some(Position {
@@ -1107,7 +1111,7 @@ impl<'a> CurveSolve<'a> {
             ..
         } = &self.case.problem;
         let (sin, cos) = angle.sin_cos();
-        for ((point, forces), speed) in patch.points.iter_mut().zip(&forces).zip(speeds) {
+        for ((point, forces), speed) in patch.points.iter_mut().zip(forces).zip(speeds) {
             if let Some(wheelset) = wheelset {
                 let rigid = RigidMotion::of_wheelset(geometry, contact.centre, wheelset);
                 let motion = creepages(&rigid, centre[0], &place, &over);

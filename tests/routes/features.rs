@@ -384,19 +384,21 @@ fn methods() -> Vec<Feature> {
 }
 
 fn histories() -> Vec<Feature> {
-    let of = |name: &str, motion: Value| {
-        ellipse()
+    let of_contact = |contact: Feature, name: &str, motion: Value| {
+        contact
             .named(name)
             .with("/motion", motion)
             .but(Route::List, Expected::Absent)
             .but(Route::Sweep, Expected::Absent)
     };
-    let one_point = |name: &str, start: &str| {
+    let of = |name: &str, motion: Value| of_contact(ellipse(), name, motion);
+    let point_of = |contact: Feature, name: &str, start: &str| {
         let point = json!({ "distance_mm": [0.0], "creepage_x": [1e-3], "creepage_y": [-5e-4] });
-        let mut feature = of(name, json!({ "history": point, "start": start }));
+        let mut feature = of_contact(contact, name, json!({ "history": point, "start": start }));
         feature.motion_columns = vec![("/motion/history/creepage_x/0", [1e-3, -5e-4, 2e-3])];
         feature
     };
+    let one_point = |name: &str, start: &str| point_of(ellipse(), name, start);
     let along = json!({ "along": { "x_mm": [-2.0, 2.0], "coefficient": [0.35, 0.2] } });
     let several = json!({ "distance_mm": [0, 2, 4, 8], "creepage_x": 1e-3, "creepage_y": 0.0 });
     let several_points = Expected::Refused("a row has one motion");
@@ -407,6 +409,7 @@ fn histories() -> Vec<Feature> {
     whole.motion_columns = vec![("/motion/history/creepage_x", [1e-3, -5e-4, 2e-3])];
     vec![
         one_point("one point of a history", "steady"),
+        point_of(profiles(), "one point of a history of profiles", "steady"),
         one_point("one point of a history, along", "steady").with("/friction", along),
         one_point("bodies pressed together", "pressed"),
         whole,

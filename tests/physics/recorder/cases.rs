@@ -217,6 +217,13 @@ fn on_the_curve() -> Vec<(String, Value)> {
         *name = format!("{name} on the curve");
         case["contact"]["reference_surface"] = json!("curve");
     }
+    let place = json!({ "lateral_shift_mm": -5.0, "reference_surface": "curve" });
+    let mut case = put(&generated(), "contact", place);
+    case["motion"] = json!({ "history": {
+        "distance_mm": [0, 3, 8, 8, 20], "shift_y_mm": [0, 0, 0, 0.004, 0],
+        "creepage_x": [0, 0.002, 0, 0, 0], "creepage_y": 0.001, "spin_per_mm": 2e-4
+    } });
+    cases.push(("history on the curve".to_owned(), case));
     cases.extend((0..WHEELS).map(|number| {
         let name = format!("{} {number}", Class::Curve.name());
         (name, population::case(Class::Curve, number))
