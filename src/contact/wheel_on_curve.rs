@@ -30,7 +30,6 @@ use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelConta
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::post::damage::evaluate::{DamagedPatch, damage};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::physics::Problem;
 use crate::contact::problem::run::Run;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
@@ -288,8 +287,7 @@ impl<'a> CurveSolve<'a> {
         before: &mut dyn FnMut(&WheelContact) -> Result<(), SolveError>,
         patches: Option<usize>,
     ) -> Result<(WheelContact, Solution, Fields), SolveError> {
-        let Problem { part, history, .. } = &self.case.problem;
-        let history = history.is_some();
+        let history = self.case.problem.history.is_some();
         let workspace = &mut Workspace::default();
         let began = self.watch.elapsed();
         let (mut wheel, found) = match patches {
@@ -323,7 +321,9 @@ impl<'a> CurveSolve<'a> {
             );
         }
         if patches.is_some() {
-            let of_motion = |remark: &mut RemarkEntry| remark.point = Some(part.before);
+            let of_motion = |remark: &mut RemarkEntry| {
+                remark.point = Some(self.case.problem.part.before);
+            };
             wheel.remarks.iter_mut().for_each(of_motion);
         }
         let (mut solution, fields) = self.answer(found, &wheel, rest)?;
@@ -1104,19 +1104,15 @@ impl<'a> CurveSolve<'a> {
             origin_track_mm: [centre[0], y, z],
         });
         patch.approach_mm = Some(-over.gap);
-        let Problem {
-            elasticity,
-            speeds,
-            wheelset,
-            ..
-        } = &self.case.problem;
+        let problem = &self.case.problem;
         let (sin, cos) = angle.sin_cos();
-        for ((point, forces), speed) in patch.points.iter_mut().zip(forces).zip(speeds) {
-            if let Some(wheelset) = wheelset {
+        let points = patch.points.iter_mut().zip(forces);
+        for ((point, forces), speed) in points.zip(&problem.speeds) {
+            if let Some(wheelset) = &problem.wheelset {
                 let rigid = RigidMotion::of_wheelset(geometry, contact.centre, wheelset);
                 let motion = creepages(&rigid, centre[0], &place, &over);
                 point.motion = motion.into();
-                point.normalised = normalised(elasticity, patch.area_mm2, limit, &motion);
+                point.normalised = normalised(&problem.elasticity, patch.area_mm2, limit, &motion);
             }
             let [along, y_share, z_share] = forces.sheared;
             point.force_y_n = y_share * cos + z_share * sin;
