@@ -67,11 +67,7 @@ pub(crate) fn fallback(contact: &WheelTask, error: SolveError) -> Result<RemarkE
 
 /// Whether a solution is one on planes in place of the curve.
 pub(crate) fn is_on_planes(solution: &Solution) -> bool {
-    let code = Remark::OnPlanes {
-        reason: String::new(),
-    };
-    solution
-        .remarks
-        .iter()
-        .any(|remark| remark.code == code.code())
+    let reason = String::new();
+    let code = Remark::OnPlanes { reason }.code();
+    solution.remarks.iter().any(|remark| remark.code == code)
 }

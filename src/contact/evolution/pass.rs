@@ -29,12 +29,13 @@ pub(crate) struct BodyWear {
 }
 
 impl BodyWear {
-    pub(crate) fn none(points: usize) -> BodyWear {
-        BodyWear {
-            area: vec![0.0; points],
-            damage: vec![0.0; points],
+    /// No wear of rail and wheel.
+    pub(crate) fn none(on: Sections) -> [BodyWear; 2] {
+        on.points.map(|points| BodyWear {
+            area: vec![0.0; points.len()],
+            damage: vec![0.0; points.len()],
             ..BodyWear::default()
-        }
+        })
     }
 
     pub(crate) fn add(&mut self, share: f64, other: &BodyWear) {
@@ -60,13 +61,6 @@ pub(crate) struct Pass {
     pub(crate) contact: StateContact,
 }
 
-/// Wear of all states over the extent.
-pub(crate) struct Evaluation {
-    /// Rail and wheel.
-    pub(crate) wear: [BodyWear; 2],
-    pub(crate) states: Vec<StateContact>,
-}
-
 /// Solves a state. One without an answer wears nothing and says why.
 ///
 /// # Errors
@@ -79,7 +73,7 @@ pub(crate) fn pass(
     monitor: &dyn Monitor,
 ) -> Result<Pass, SolveError> {
     let unsolved = |reason: String| Pass {
-        wear: on.points.map(|points| BodyWear::none(points.len())),
+        wear: BodyWear::none(on),
         contact: StateContact {
             failure: Some(reason),
             ..StateContact::default()
@@ -102,7 +96,7 @@ pub(crate) fn pass(
     let on_curve = wheel.surface != ReferenceSurface::Planes && !is_on_planes(&solution);
     // The coordinate across a patch runs to the left, the points of the sections to the field side.
     let to_left = wheel.geometry.placement.side.sign();
-    let mut wear = on.points.map(|points| BodyWear::none(points.len()));
+    let mut wear = BodyWear::none(on);
     let mut patches = Vec::new();
     for patch in &solution.patches {
         let Some(position) = patch.position else {
@@ -116,14 +110,9 @@ pub(crate) fn pass(
             t_gamma_n: patch.points[0].friction_power_n,
         });
         // The coordinate of the load centre: on a curve it is counted from there.
-        let centre = match on_curve {
-            true => 0.0,
-            false => {
-                let (sin, cos) = position.contact_angle_rad.sin_cos();
-                let [y, z] = [1, 2].map(|k| position.track_mm[k] - position.origin_track_mm[k]);
-                y * cos + z * sin
-            }
-        };
+        let (sin, cos) = position.contact_angle_rad.sin_cos();
+        let [y, z] = [1, 2].map(|k| position.track_mm[k] - position.origin_track_mm[k]);
+        let centre = if on_curve { 0.0 } else { y * cos + z * sin };
         // A line of the wheel is passed once in a turn.
         let turn = 2.0 * PI * position.rolling_radius_mm;
         let places = [(position.rail_mm, 1.0), (position.wheel_mm, 1.0 / turn)];
@@ -198,10 +187,8 @@ impl PatchArc {
         let nearest = (0..points.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
         let nearest = nearest.unwrap_or(0);
         let along = along(points);
-        let [low, high] = [
-            nearest.saturating_sub(1),
-            (nearest + 1).min(points.len() - 1),
-        ];
+        let (low, high) = (nearest.saturating_sub(1), nearest + 1);
+        let high = high.min(points.len() - 1);
         let chord = [0, 1].map(|k| points[high][k] - points[low][k]);
         let [y, z] = from_point(nearest);
         let of_centre = along[nearest] + (y * chord[0] + z * chord[1]) / chord[0].hypot(chord[1]);

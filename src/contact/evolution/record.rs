@@ -4,12 +4,11 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use crate::contact::case::words::damage::DamageModel;
 use crate::contact::case::words::evolution::WearLosses;
-use crate::contact::evolution::pass::Evaluation;
 use crate::contact::evolution::section::{distance, lengths};
 use crate::contact::evolution::task::Evolution;
 use crate::contact::geometry::conicity::RadiusDifference;
 use crate::contact::geometry::profile::{Body, Profile, Reading};
-use crate::contact::geometry::wheel_rail::{Placement, RailPlace, WheelRail};
+use crate::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
 use crate::contact::geometry::wheelset_pose::PairOfRails;
 use crate::contact::numerics::sampling::halton;
 use crate::contact::remark::entry::RemarkEntry;
@@ -34,7 +33,7 @@ const SAMPLES: u32 = 2000;
 pub(crate) fn record(
     task: &Evolution,
     state: &EvolutionState,
-    now: &Evaluation,
+    states: Vec<StateContact>,
 ) -> EvolutionRecord {
     let [rail, wheel] = [0, 1].map(|k| with_uncertainty(task, state, k));
     EvolutionRecord {
@@ -42,8 +41,8 @@ pub(crate) fn record(
         events_done: state.events_done,
         losses: losses(&state.bodies),
         conicity: conicity(task, &state.bodies),
-        contact: range(&now.states),
-        states: now.states.clone(),
+        contact: range(&states),
+        states,
         rail,
         wheel,
     }
@@ -52,17 +51,14 @@ pub(crate) fn record(
 fn with_uncertainty(task: &Evolution, state: &EvolutionState, k: usize) -> WornBody {
     let body = &state.bodies[k];
     let worn = body.worn.worn_area_mm2;
+    let error = Some(state.traffic.error[k]);
     let over = |area: f64| if worn > 0.0 { area / worn } else { 0.0 };
     let lengths = lengths(&body.worn.points_mm);
     let changed = body.step_change_mm.iter().zip(lengths);
     WornBody {
         uncertainty: WearUncertainty {
             steps: over(changed.map(|(depth, length)| depth.abs() * length).sum()),
-            states: if worn > 0.0 {
-                state.traffic.error[k]
-            } else {
-                0.0
-            },
+            states: error.filter(|_| worn > 0.0).unwrap_or(0.0),
             contact: over(body.contact_mm2),
             coefficients: coefficients(task, &body.regimes_mm2),
         },
@@ -123,21 +119,17 @@ fn conicity(task: &Evolution, bodies: &[BodyState; 2]) -> Option<f64> {
         };
         Profile::new(body, &own.worn.points_mm, reading).ok()
     };
-    let (rail, wheel) = (
-        profile(Body::Rail, &bodies[0])?,
-        profile(Body::Wheel, &bodies[1])?,
-    );
-    let placement = Placement {
-        rail: RailPlace::Origin(task.geometry.rail_origin()),
-        ..task.geometry.placement
+    let rail = profile(Body::Rail, &bodies[0])?;
+    let wheel = profile(Body::Wheel, &bodies[1])?;
+    let on = |side: Side| {
+        let placement = Placement {
+            rail: RailPlace::Origin(task.geometry.rail_origin()),
+            side,
+            ..task.geometry.placement
+        };
+        WheelRail::new(rail.clone(), wheel.clone(), placement).ok()
     };
-    let own = WheelRail::new(rail, wheel, placement).ok()?;
-    let other = own.mirrored().ok()?;
-    let sides = match placement.side.sign() > 0.0 {
-        true => [own, other],
-        false => [other, own],
-    };
-    let mut pair = PairOfRails::new(sides);
+    let mut pair = PairOfRails::new([on(Side::Left)?, on(Side::Right)?]);
     let [reach, step] = SHIFTS;
     let count = (reach / step) as i32;
     let shifts = (-count..=count).map(|k| step * f64::from(k));

@@ -29,9 +29,8 @@ pub(crate) fn along(points: &[[f64; 2]]) -> Vec<f64> {
 pub(crate) fn lengths(points: &[[f64; 2]]) -> Vec<f64> {
     let along = along(points);
     let last = along.len() - 1;
-    (0..=last)
-        .map(|k| 0.5 * (along[(k + 1).min(last)] - along[k.saturating_sub(1)]))
-        .collect()
+    let length = |k: usize| 0.5 * (along[(k + 1).min(last)] - along[k.saturating_sub(1)]);
+    (0..=last).map(length).collect()
 }
 
 /// Depths of areas.
@@ -43,9 +42,8 @@ pub(crate) fn depths(points: &[[f64; 2]], areas: &[f64]) -> Vec<f64> {
 
 /// Adds values times a factor.
 pub(crate) fn add(to: &mut [f64], factor: f64, from: &[f64]) {
-    to.iter_mut()
-        .zip(from)
-        .for_each(|(to, from)| *to += factor * from);
+    let pairs = to.iter_mut().zip(from);
+    pairs.for_each(|(to, from)| *to += factor * from);
 }
 
 /// Sign of z into the body.
@@ -59,25 +57,21 @@ fn inward(body: Body) -> f64 {
 /// Unit normals into the body.
 fn normals(body: Body, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let last = points.len() - 1;
-    (0..=last)
-        .map(|k| {
-            let (before, after) = (points[k.saturating_sub(1)], points[(k + 1).min(last)]);
-            let [y, z] = [after[0] - before[0], after[1] - before[1]];
-            let length = inward(body) * y.hypot(z);
-            [-z / length, y / length]
-        })
-        .collect()
+    let normal = |k: usize| {
+        let (before, after) = (points[k.saturating_sub(1)], points[(k + 1).min(last)]);
+        let [y, z] = [after[0] - before[0], after[1] - before[1]];
+        let length = inward(body) * y.hypot(z);
+        [-z / length, y / length]
+    };
+    (0..=last).map(normal).collect()
 }
 
 /// Area between a section and a later one with as many points, positive where material is gone.
 pub(crate) fn area_between(body: Body, before: &[[f64; 2]], after: &[[f64; 2]]) -> f64 {
     let outline = before.iter().chain(after.iter().rev());
     let next = outline.clone().skip(1).chain(before.first());
-    let twice: f64 = outline
-        .zip(next)
-        .map(|(a, b)| a[0] * b[1] - b[0] * a[1])
-        .sum();
-    inward(body) * 0.5 * twice
+    let parts = outline.zip(next).map(|(a, b)| a[0] * b[1] - b[0] * a[1]);
+    inward(body) * 0.5 * parts.sum::<f64>()
 }
 
 /// Moves points along their normals by so much that the section loses the sum of `areas`, in mm² for each point. Returns the points and how far
@@ -138,10 +132,8 @@ pub(crate) fn machined(
     let sign = inward(body);
     let normals = normals(body, points);
     let steep = 70_f64.to_radians().cos();
-    let flat = points
-        .iter()
-        .zip(&normals)
-        .filter(|(_, normal)| normal[1].abs() >= steep);
+    let pairs = points.iter().zip(&normals);
+    let flat = pairs.filter(|(_, normal)| normal[1].abs() >= steep);
     let outside = flat.filter_map(|(at, _)| Some(sign * (at[1] - height_at(target, at[0])?)));
     let by = outside.fold(f64::NEG_INFINITY, f64::max) + depth;
     if by == f64::NEG_INFINITY {
@@ -151,44 +143,38 @@ pub(crate) fn machined(
     let cut = |(at, normal): (&[f64; 2], &[f64; 2])| {
         let along = |by: f64| [0, 1].map(|k| at[k] + by * normal[k]);
         let found = distance(&target, along(-CUT_MAX), *normal).map(|ahead| ahead - CUT_MAX);
-        found
-            .filter(|cut| (0.0..CUT_MAX).contains(cut))
-            .map_or(*at, along)
+        let cut = found.filter(|cut| (0.0..CUT_MAX).contains(cut));
+        cut.map_or(*at, along)
     };
     points.iter().zip(&normals).map(cut).collect()
 }
 
 /// z of a section at y: the first place that has it.
 fn height_at(points: &[[f64; 2]], y: f64) -> Option<f64> {
-    let pair = points
-        .windows(2)
-        .find(|pair| pair[0][0] <= y && y <= pair[1][0])?;
-    let width = pair[1][0] - pair[0][0];
+    let mut pairs = points.windows(2).map(|pair| (pair[0], pair[1]));
+    let (from, to) = pairs.find(|(from, to)| from[0] <= y && y <= to[0])?;
+    let width = to[0] - from[0];
     let t = if width > 0.0 {
-        (y - pair[0][0]) / width
+        (y - from[0]) / width
     } else {
         0.0
     };
-    Some(pair[0][1] + t * (pair[1][1] - pair[0][1]))
+    Some(from[1] + t * (to[1] - from[1]))
 }
 
 /// Distance in mm from a place to the section in a direction, of unit length; the nearest place ahead.
 pub(crate) fn distance(points: &[[f64; 2]], from: [f64; 2], direction: [f64; 2]) -> Option<f64> {
     let seen = |at: &[f64; 2]| {
-        let [y, z] = [at[0] - from[0], at[1] - from[1]];
-        [
-            y * direction[0] + z * direction[1],
-            z * direction[0] - y * direction[1],
-        ]
+        let ([y, z], [dy, dz]) = ([at[0] - from[0], at[1] - from[1]], direction);
+        [y * dy + z * dz, z * dy - y * dz]
     };
     let crossings = points.windows(2).filter_map(|pair| {
         let ([near, left], [far, right]) = (seen(&pair[0]), seen(&pair[1]));
         let crosses = (left <= 0.0) != (right <= 0.0);
         crosses.then(|| near + (far - near) * left / (left - right))
     });
-    crossings
-        .filter(|ahead| *ahead > 0.0)
-        .min_by(f64::total_cmp)
+    let ahead = crossings.filter(|ahead| *ahead > 0.0);
+    ahead.min_by(f64::total_cmp)
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use crate::contact::error::SolveError;
-use crate::contact::evolution::pass::{BodyWear, Evaluation, Pass, pass};
+use crate::contact::evolution::pass::{BodyWear, Pass, pass};
 use crate::contact::evolution::record::record;
 use crate::contact::evolution::section::{
     add, area_between, depths, distance, lengths, machined, moved, smoothed,
@@ -97,10 +97,10 @@ impl Evolution {
             })?;
             return Ok((state, None));
         }
-        let now = solver.evaluate(before, &before.bodies)?;
-        state.solves += now.states.len() as u32;
-        state.wheel_y = touched(&now.states, &before.wheel_y);
-        let found = (!before.recorded).then(|| record(self, before, &now));
+        let (now, states) = solver.evaluate(before, &before.bodies)?;
+        state.solves += states.len() as u32;
+        state.wheel_y = touched(&states, &before.wheel_y);
+        let found = (!before.recorded).then(|| record(self, before, states));
         state.recorded = true;
         if self.due(&state).is_some() {
             while let Some(event) = self.due(&state) {
@@ -138,7 +138,7 @@ impl Evolution {
     fn advance(
         &self,
         solver: &Solver,
-        now: &Evaluation,
+        now: &[BodyWear; 2],
         state: &mut EvolutionState,
     ) -> Result<(), SolveError> {
         let (accuracy, begin) = (&self.plan.accuracy, state.share);
@@ -151,7 +151,7 @@ impl Evolution {
             return Err(SolveError::NormalProblem { reason });
         }
         let bodies = state.bodies.clone();
-        let depths = [0, 1].map(|k| depths(&bodies[k].worn.points_mm, &now.wear[k].area));
+        let depths = [0, 1].map(|k| depths(&bodies[k].worn.points_mm, &now[k].area));
         let deepest = depths.iter().flatten().copied().fold(0.0, f64::max);
         let allowed = accuracy.step_depth_mm / deepest.max(f64::MIN_POSITIVE);
         let stop = self.next_stop(begin);
@@ -166,10 +166,10 @@ impl Evolution {
             } else {
                 length
             };
-            let half = [0, 1].map(|k| moved_body(BODIES[k], &bodies[k], &now.wear[k], 0.5 * step));
-            let then = solver.evaluate(state, &half)?;
-            state.solves += then.states.len() as u32;
-            let changes = [0, 1].map(|k| change(&now.wear[k].area, &then.wear[k].area));
+            let half = [0, 1].map(|k| moved_body(BODIES[k], &bodies[k], &now[k], 0.5 * step));
+            let (then, states) = solver.evaluate(state, &half)?;
+            state.solves += states.len() as u32;
+            let changes = [0, 1].map(|k| change(&now[k].area, &then[k].area));
             let error = 0.5 * changes[0].max(changes[1]);
             let better = (0.8 * accuracy.step_tolerance / error.max(1e-6)).clamp(0.4, 2.0);
             if error > accuracy.step_tolerance && step > SHORTEST && attempt < ATTEMPTS {
@@ -178,19 +178,17 @@ impl Evolution {
                 continue;
             }
             state.bodies = [0, 1].map(|k| {
-                let mut body = moved_body(BODIES[k], &bodies[k], &then.wear[k], step);
+                let mut body = moved_body(BODIES[k], &bodies[k], &then[k], step);
                 let lengths = lengths(&body.worn.points_mm);
                 for (i, sum) in body.step_change_mm.iter_mut().enumerate() {
-                    *sum += 0.5 * step * (then.wear[k].area[i] - now.wear[k].area[i]) / lengths[i];
+                    *sum += 0.5 * step * (then[k].area[i] - now[k].area[i]) / lengths[i];
                 }
                 body
             });
             state.steps += 1;
-            state.wheel_y = touched(&then.states, &state.wheel_y);
-            state.next = match step < length {
-                true => length.max(step * better),
-                false => step * better,
-            };
+            state.wheel_y = touched(&states, &state.wheel_y);
+            let least = if step < length { length } else { 0.0 };
+            state.next = least.max(step * better);
             state.share = begin + step;
             if (stop - state.share).abs() < SAME {
                 state.share = stop;
@@ -226,17 +224,17 @@ impl Solver<'_> {
         &self,
         of: &EvolutionState,
         bodies: &[BodyState; 2],
-    ) -> Result<Evaluation, SolveError> {
+    ) -> Result<([BodyWear; 2], Vec<StateContact>), SolveError> {
         let on = sections(bodies, of.friction, radius_change(of, &bodies[1]));
-        let mut wear = on.points.map(|points| BodyWear::none(points.len()));
+        let mut wear = BodyWear::none(on);
         let mut states = Vec::with_capacity(of.traffic.states.len());
         let values: Vec<&[f64]> = of.traffic.states.iter().map(|s| &*s.values).collect();
         let passes = self.passes(on, &values)?;
         for (state, Pass { wear: own, contact }) in of.traffic.states.iter().zip(passes) {
-            for (k, own) in own.into_iter().enumerate() {
-                wear[k].add(state.share, &own.spread(state.spread_mm[k]));
-            }
             let share = state.share;
+            for (k, own) in own.into_iter().enumerate() {
+                wear[k].add(share, &own.spread(state.spread_mm[k]));
+            }
             states.push(StateContact { share, ..contact });
         }
         let mut failed = states.iter().filter(|state| state.failure.is_some());
@@ -250,12 +248,12 @@ impl Solver<'_> {
             );
             return Err(SolveError::NormalProblem { reason });
         }
-        for (wear, amount) in wear.iter_mut().zip(self.task.amounts) {
-            let own = std::mem::replace(wear, BodyWear::none(wear.area.len()));
-            wear.add(amount, &own);
-            wear.area = smoothed(&wear.area, self.task.plan.accuracy.smoothing_mm);
+        let mut all = BodyWear::none(on);
+        for (k, all) in all.iter_mut().enumerate() {
+            all.add(self.task.amounts[k], &wear[k]);
+            all.area = smoothed(&all.area, self.task.plan.accuracy.smoothing_mm);
         }
-        Ok(Evaluation { wear, states })
+        Ok((all, states))
     }
 
     /// Solves the states of these values, each on its own, on the threads of the context.
@@ -325,9 +323,8 @@ fn touched(states: &[StateContact], before: &[f64]) -> Vec<f64> {
     let of_state = |(k, state): (usize, &StateContact)| {
         let patches = state.patches.iter();
         let most = patches.max_by(|a, b| a.normal_force_n.total_cmp(&b.normal_force_n));
-        most.map(|patch| patch.wheel_mm[0])
-            .or(before.get(k).copied())
-            .unwrap_or(0.0)
+        let most = most.map(|patch| patch.wheel_mm[0]);
+        most.or(before.get(k).copied()).unwrap_or(0.0)
     };
     states.iter().enumerate().map(of_state).collect()
 }
@@ -347,11 +344,8 @@ fn radius_change(of: &EvolutionState, wheel: &BodyState) -> f64 {
 /// Difference of two distributions over the second.
 fn change(now: &[f64], then: &[f64]) -> f64 {
     let all: f64 = then.iter().sum();
-    let off: f64 = now
-        .iter()
-        .zip(then)
-        .map(|(now, then)| (then - now).abs())
-        .sum();
+    let pairs = now.iter().zip(then);
+    let off: f64 = pairs.map(|(now, then)| (then - now).abs()).sum();
     if all > 0.0 { off / all } else { 0.0 }
 }
 

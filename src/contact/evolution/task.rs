@@ -105,9 +105,8 @@ impl Evolution {
             }
         };
         let columns = std::mem::take(&mut plan.traffic.columns).into_iter();
-        let (pointers, columns): (Vec<String>, Vec<Vec<f64>>) = columns
-            .map(|(pointer, column)| (pointer, values(column)))
-            .unzip();
+        let columns = columns.map(|(pointer, column)| (pointer, values(column)));
+        let (pointers, columns): (Vec<String>, Vec<Vec<f64>>) = columns.unzip();
         let first: Vec<f64> = columns.iter().map(|column| column[0]).collect();
         let first = filled(&template, &pointers, &first, None)
             .and_then(|case| contact::check(&case, limits))
@@ -175,10 +174,7 @@ impl Evolution {
             };
             self.case(on, &values)
                 .and_then(|case| contact::check_with(&known, &case, &self.limits))
-                .and_then(|checked| match several_answers(&checked) {
-                    Some(fault) => Err(fault.into()),
-                    None => Ok(()),
-                })
+                .and_then(|checked| several_answers(&checked).map_or(Ok(()), |f| Err(f.into())))
                 .map_err(|error| located(error, &self.pointers, row))?;
         }
         Ok(())
@@ -205,10 +201,8 @@ impl Evolution {
         self.mgt = axles * mean.unwrap_or(0.0) / NEWTONS_PER_MGT;
         let distance = extent.wheel_distance_km.unwrap_or(0.0) * 1e6;
         let [rail, wheel] = self.plan.wearing.flags();
-        self.amounts = [
-            if rail { axles } else { 0.0 },
-            if wheel { distance } else { 0.0 },
-        ];
+        let worn = [(rail, axles), (wheel, distance)];
+        self.amounts = worn.map(|(wears, amount)| if wears { amount } else { 0.0 });
         Ok(())
     }
 
@@ -268,8 +262,7 @@ fn not_profiles() -> CaseError {
 /// The template with the outputs that wear needs.
 fn template(plan: &EvolutionWords) -> Result<Value, CaseError> {
     let mut template = plan.template.clone();
-    let kind = template.pointer("/contact/type");
-    if kind.is_none_or(|kind| kind != "profiles") {
+    if template["contact"]["type"] != "profiles" {
         return Err(not_profiles());
     }
     for body in ["rail", "wheel"] {
@@ -301,13 +294,11 @@ fn filled(
     friction: Option<f64>,
 ) -> Result<Value, CaseError> {
     let mut case = template.clone();
-    let columns = pointers
-        .iter()
-        .map(String::as_str)
-        .zip(values.iter().copied());
-    for (pointer, value) in columns.chain(friction.map(|mu| ("/friction/coefficient", mu))) {
-        put(&mut case, &members(pointer), value.into())
-            .map_err(|reason| Fault::new(pointer, reason))?;
+    let columns = pointers.iter().map(String::as_str);
+    let friction = friction.map(|mu| ("/friction/coefficient", mu));
+    for (pointer, value) in columns.zip(values.iter().copied()).chain(friction) {
+        let put = put(&mut case, &members(pointer), value.into());
+        put.map_err(|reason| Fault::new(pointer, reason))?;
     }
     Ok(case)
 }

@@ -81,9 +81,8 @@ pub(crate) fn condensed(
             size(rail) / total[0] + size(wheel) / total[1]
         };
         let weights: Vec<f64> = (0..groups.len()).map(weight).collect();
-        let mut order: Vec<usize> = (0..groups.len())
-            .filter(|k| !groups[*k].halves.is_empty())
-            .collect();
+        let parted = (0..groups.len()).filter(|k| !groups[*k].halves.is_empty());
+        let mut order: Vec<usize> = parted.collect();
         order.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]).then(a.cmp(b)));
         let count = (PARTED * groups.len() as f64).ceil() as usize;
         order.truncate(count.min(most - groups.len()));
@@ -106,16 +105,15 @@ fn part(
     let unparted = groups.iter_mut().enumerate();
     for (k, group) in unparted.filter(|(_, group)| !group.parted) {
         group.parted = true;
-        let relative = |column: usize| match scales[column] > 0.0 {
-            true => variance(task, column, group) / scales[column],
-            false => 0.0,
-        };
+        // 0 where all values of a column are equal.
+        let relative =
+            |column: usize| variance(task, column, group) / scales[column].max(f64::MIN_POSITIVE);
         let spreads: Vec<f64> = (0..scales.len()).map(relative).collect();
         let least = VARIANCE_SMALL * spreads.iter().copied().fold(0.0, f64::max);
         for column in (0..scales.len()).filter(|column| spreads[*column] > least) {
             let below = |row: &usize| task.columns[column][*row] < group.values[column];
-            let (low, high): (Vec<usize>, Vec<usize>) =
-                group.rows.iter().partition(|row| below(row));
+            let parts = group.rows.iter().copied().partition(below);
+            let (low, high): (Vec<usize>, Vec<usize>) = parts;
             if !low.is_empty() && !high.is_empty() {
                 owners.push((k, column));
                 rows.extend([low, high]);
@@ -128,28 +126,23 @@ fn part(
         let halves: Vec<Group> = solved.by_ref().take(2).collect();
         let group = &mut groups[k];
         // Halves along a column have a part of the variance of its values, and of that along the sections.
-        let between = halves
-            .iter()
-            .map(|half| half.share * (half.values[column] - group.values[column]).powi(2));
+        let off = |half: &Group| half.values[column] - group.values[column];
+        let between = halves.iter().map(|half| half.share * off(half).powi(2));
         let factor = variance(task, column, group) / between.sum::<f64>();
         let mut own = 0.0;
         for (body, mean) in group.area.iter().enumerate() {
             let mut both = halves[0].area[body].clone();
             add(&mut both, 1.0, &halves[1].area[body]);
             let added = (along_variance(&both) - along_variance(mean)).max(0.0);
-            let change = |mean: &[f64]| {
-                let mut change = both.clone();
-                add(&mut change, -1.0, mean);
-                change
-            };
-            let (unspread, spread) = (change(mean), change(&smoothed(mean, added.sqrt())));
+            let mut spread = both.clone();
+            add(&mut spread, -1.0, &smoothed(mean, added.sqrt()));
+            let mut change = both;
+            add(&mut change, -1.0, mean);
             // Halves that touch at two places far apart have little in between.
-            let change = if size(&spread) < size(&unspread) {
+            if size(&spread) < size(&change) {
                 group.variance[body] += factor * added;
-                spread
-            } else {
-                unspread
-            };
+                change = spread;
+            }
             add(&mut group.change[body], 1.0, &change);
             own += size(&change) / size(mean).max(f64::MIN_POSITIVE);
         }
@@ -207,10 +200,8 @@ fn along_variance(areas: &[f64]) -> f64 {
         [sums[0] + area, sums[1] + area * s, sums[2] + area * s * s]
     });
     let [all, first, second] = moments;
-    match all > 0.0 {
-        true => second / all - (first / all).powi(2),
-        false => 0.0,
-    }
+    let all = all.max(f64::MIN_POSITIVE);
+    second / all - (first / all).powi(2)
 }
 
 /// Mean of a column over rows.

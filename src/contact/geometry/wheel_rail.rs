@@ -289,21 +289,6 @@ impl WheelRail {
         self.origin[0]
     }
 
-    /// The same pair on the other side of the track.
-    ///
-    /// # Errors
-    /// As [`WheelRail::new`].
-    pub fn mirrored(&self) -> Result<WheelRail, NotPlaced> {
-        let placement = Placement {
-            side: match self.placement.side {
-                Side::Left => Side::Right,
-                Side::Right => Side::Left,
-            },
-            ..self.placement
-        };
-        WheelRail::new((*self.rail_given).clone(), (*self.wheel).clone(), placement)
-    }
-
     /// The same rail and wheel with the wheelset elsewhere: shift to the left in mm, yaw and roll in rad.
     #[must_use]
     pub fn posed(&self, lateral_shift: f64, yaw: f64, roll: f64) -> WheelRail {

@@ -1,5 +1,7 @@
 //! Points that fill a range evenly, and the normal distribution at them.
 
+use crate::contact::numerics::bisection::bisect;
+
 /// Bases of Halton's sequence for its first dimensions.
 pub(crate) const PRIMES: [u32; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
 
@@ -41,15 +43,7 @@ fn normal_probability(x: f64) -> f64 {
 
 /// The value that a standard normal variable exceeds with the probability 1 - `probability`, within ±38, by bisection.
 fn normal_quantile(probability: f64) -> f64 {
-    let (mut low, mut high) = (-38.0, 38.0);
-    for _ in 0..64 {
-        let middle = 0.5 * (low + high);
-        if normal_probability(middle) < probability {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let [low, high] = bisect([-38.0, 38.0], 64, |x| normal_probability(x) < probability);
     0.5 * (low + high)
 }
 

@@ -306,10 +306,9 @@ fn records_table(evolution: &EvolutionAnswer) -> RowTable {
         add("machined_area_mm2", &|b| Some(b.machined_area_mm2));
         add("damage_max", &|b| largest(&b.damage));
         add("depth_max_mm", &|b| largest(&b.depth_mm));
-        add("coefficients_low", &|b| Some(b.uncertainty.coefficients[0]));
-        add("coefficients_high", &|b| {
-            Some(b.uncertainty.coefficients[1])
-        });
+        let factor = |b: &WornBody, k: usize| Some(b.uncertainty.coefficients[k]);
+        add("coefficients_low", &|b| factor(b, 0));
+        add("coefficients_high", &|b| factor(b, 1));
     }
     add("conicity", &|r| r.conicity);
     add("pressure_max_mpa", &|r| Some(r.contact.pressure_max_mpa));
@@ -351,10 +350,8 @@ fn points_table(evolution: &EvolutionAnswer) -> RowTable {
 
 /// A line for each point; y is positive to the field side times `sense`.
 fn lines(points: &[[f64; 2]], sense: f64, between: char) -> String {
-    let points = points.iter();
-    points
-        .map(|[y, z]| format!("{:.6}{between}{z:.6}\n", 0.0 + sense * y))
-        .collect()
+    let line = |[y, z]: &[f64; 2]| format!("{:.6}{between}{z:.6}\n", 0.0 + sense * y);
+    points.iter().map(line).collect()
 }
 
 /// MiniProf's X points to the track centre.

@@ -142,9 +142,7 @@ impl SlicedWork {
     pub(crate) fn done_after_next(&self) -> f64 {
         match self {
             SlicedWork::Case(case) => case.done_after_next(),
-            SlicedWork::Evolution(evolution) => {
-                evolution.state.as_ref().map_or(0.0, |state| state.share)
-            }
+            SlicedWork::Evolution(own) => own.state.as_ref().map_or(0.0, |state| state.share),
         }
     }
 

@@ -1,5 +1,6 @@
 //! What a solver thread does for an evolution: steps up to the next record, again and again, then the whole answer.
 
+use std::error::Error;
 use std::sync::Arc;
 
 use bytes::Bytes;
@@ -12,7 +13,6 @@ use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::attempts::outcome::Outcome;
 use crate::jobs::attempts::slices::{SlicedEvolution, SlicedWork};
 use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;
 use crate::jobs::store::submission::StoredCase;
@@ -77,16 +77,13 @@ pub(crate) fn advance(
         digest: evolution.task.digest.clone(),
         spent,
     };
-    match encoded(&(record, &state)) {
-        Ok(part) => Outcome::Slice {
-            part: Some((note, part)),
-            sliced: {
-                evolution.state = Some(state);
-                Box::new(SlicedWork::Evolution(evolution))
-            },
-        },
-        Err(error) => Outcome::internal(&error),
-    }
+    let part = match encoded(&(record, &state)) {
+        Ok(part) => Some((note, part)),
+        Err(error) => return Outcome::internal(&error),
+    };
+    evolution.state = Some(state);
+    let sliced = Box::new(SlicedWork::Evolution(evolution));
+    Outcome::Slice { sliced, part }
 }
 
 /// Goes on from the stored parts, or puts them together where all is solved.
@@ -134,16 +131,13 @@ fn encoded(answer: &impl Serialize) -> Result<EncodedResult, String> {
 fn read(
     parts: &[EncodedResult],
     count: u32,
-) -> Result<(EvolutionState, Vec<EvolutionRecord>), JobsError> {
+) -> Result<(EvolutionState, Vec<EvolutionRecord>), Box<dyn Error>> {
     let (mut last, mut records) = (None, Vec::new());
     for part in parts {
-        let read = serde_json::from_slice(&part.solution);
-        let (record, state): Part =
-            read.map_err(|error| JobsError::Damaged(format!("a slice: {error}")))?;
+        let (record, state): Part = serde_json::from_slice(&part.solution)?;
         records.extend(record);
         last = Some(state);
     }
-    last.filter(|_| parts.len() == count as usize)
-        .map(|state| (state, records))
-        .ok_or_else(|| JobsError::Damaged("slices are missing".to_owned()))
+    let last = last.filter(|_| parts.len() == count as usize);
+    Ok((last.ok_or("slices are missing")?, records))
 }

@@ -1,11 +1,11 @@
 //! Reads what is asked of an evolution: its plan, and its traffic as columns of numbers and distributions.
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
 use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::object::{Object, join, number, shown};
 use crate::contact::case::read::subsurface::optional;
-use crate::contact::case::read::wheel_rail::section;
+use crate::contact::case::read::wheel_rail::section_of;
 use crate::contact::case::words::damage::DamageModel;
 use crate::contact::case::words::evolution::{
     EvolutionAccuracy, EvolutionEvent, EvolutionExtent, EvolutionWords, Traffic, TrafficColumn,
@@ -39,6 +39,8 @@ const AMOUNT: AllowedRange = AllowedRange::positive(1e12, "");
 const NOT_NEGATIVE: AllowedRange = AllowedRange::closed(0.0, 1e12, "");
 const ANY: AllowedRange = AllowedRange::closed(-1e12, 1e12, "");
 const LOSS: AllowedRange = AllowedRange::positive(100.0, "mm");
+const DEPTH: AllowedRange = AllowedRange::closed(0.0, 20.0, "mm");
+const FRICTION: AllowedRange = AllowedRange::closed(0.0, 2.0, "");
 const SHARE: AllowedRange = AllowedRange::positive(1.0, "");
 /// Events of one evolution.
 const EVENTS_MAX: usize = 100;
@@ -66,21 +68,17 @@ impl EvolutionWords {
 fn words(all: &mut Object) -> Option<EvolutionWords> {
     all.only(&MEMBERS, &[]);
     let template = all.required("template", "a case of one motion").cloned();
-    let traffic = all
-        .child("traffic")
-        .and_then(|mut block| traffic(&mut block));
+    let traffic = all.child("traffic").and_then(traffic);
     let wearing = all.word("wearing", &BODIES, &[]).unwrap_or_default();
-    let extent = all
-        .child("extent")
-        .map(|mut block| extent(&mut block, wearing));
+    let extent = all.child("extent").map(|block| extent(block, wearing));
     let wear_model = all.word("wear_model", &MODELS, &[]);
     let factor = AllowedRange::closed(1.0, 100.0, "");
     Some(EvolutionWords {
         wearing,
         wear_model: wear_model.unwrap_or(DamageModel::UsfdWear),
         records: count_or(all, "records", 500, 10),
-        accuracy: block_or_default(all, "accuracy", accuracy),
-        limits: block_or_default(all, "limits", limits),
+        accuracy: given(all, "accuracy").map(accuracy).unwrap_or_default(),
+        limits: given(all, "limits").map(limits).unwrap_or_default(),
         events: events(all).unwrap_or_default(),
         coefficient_factor: number_or(all, "coefficient_factor", factor, 2.0),
         template: template?,
@@ -89,13 +87,9 @@ fn words(all: &mut Object) -> Option<EvolutionWords> {
     })
 }
 
-fn block_or_default<T: Default>(
-    all: &mut Object,
-    name: &str,
-    read: impl FnOnce(&mut Object) -> T,
-) -> T {
-    let found = optional(all, name, |all, name| Some(read(&mut all.child(name)?)));
-    found.flatten().unwrap_or_default()
+/// An object that may be left out.
+fn given<'v, 'o>(all: &'o mut Object<'v, '_>, name: &str) -> Option<Object<'v, 'o>> {
+    all.value(name).and_then(|_| all.child(name))
 }
 
 fn number_or(block: &mut Object, name: &str, allowed: AllowedRange, usual: f64) -> f64 {
@@ -103,13 +97,12 @@ fn number_or(block: &mut Object, name: &str, allowed: AllowedRange, usual: f64) 
 }
 
 fn count_or(block: &mut Object, name: &str, most: u32, usual: u32) -> u32 {
-    let found = optional(block, name, |block, name| {
-        block.required_count(name, 1, most)
-    });
-    found.flatten().unwrap_or(usual)
+    let found = block.value(name);
+    let found = found.and_then(|_| block.required_count(name, 1, most));
+    found.unwrap_or(usual)
 }
 
-fn extent(block: &mut Object, wearing: WearingBodies) -> EvolutionExtent {
+fn extent(mut block: Object, wearing: WearingBodies) -> EvolutionExtent {
     block.only(&["mgt", "axle_passes", "wheel_distance_km"], &[]);
     let [rail, wheel] = wearing.flags();
     if block.has("mgt") && block.has("axle_passes") {
@@ -128,7 +121,7 @@ fn extent(block: &mut Object, wearing: WearingBodies) -> EvolutionExtent {
     }
 }
 
-fn accuracy(block: &mut Object) -> EvolutionAccuracy {
+fn accuracy(mut block: Object) -> EvolutionAccuracy {
     let names = [
         "states_max",
         "states_tolerance",
@@ -137,21 +130,22 @@ fn accuracy(block: &mut Object) -> EvolutionAccuracy {
         "steps_max",
         "smoothing_mm",
     ];
-    block.only(&names, &[]);
+    let all = &mut block;
+    all.only(&names, &[]);
     let usual = EvolutionAccuracy::default();
     let depth = AllowedRange::positive(1.0, "mm");
     let kernel = AllowedRange::closed(0.0, 5.0, "mm");
     EvolutionAccuracy {
-        states_max: count_or(block, "states_max", 2000, usual.states_max),
-        states_tolerance: number_or(block, "states_tolerance", SHARE, usual.states_tolerance),
-        step_tolerance: number_or(block, "step_tolerance", SHARE, usual.step_tolerance),
-        step_depth_mm: number_or(block, "step_depth_mm", depth, usual.step_depth_mm),
-        steps_max: count_or(block, "steps_max", 100_000, usual.steps_max),
-        smoothing_mm: number_or(block, "smoothing_mm", kernel, usual.smoothing_mm),
+        states_max: count_or(all, "states_max", 2000, usual.states_max),
+        states_tolerance: number_or(all, "states_tolerance", SHARE, usual.states_tolerance),
+        step_tolerance: number_or(all, "step_tolerance", SHARE, usual.step_tolerance),
+        step_depth_mm: number_or(all, "step_depth_mm", depth, usual.step_depth_mm),
+        steps_max: count_or(all, "steps_max", 100_000, usual.steps_max),
+        smoothing_mm: number_or(all, "smoothing_mm", kernel, usual.smoothing_mm),
     }
 }
 
-fn limits(block: &mut Object) -> WearLosses {
+fn limits(mut block: Object) -> WearLosses {
     block.only(&WearLosses::default().named().map(|(name, _)| name), &[]);
     WearLosses {
         height_mm: block.number("height_mm", LOSS),
@@ -171,11 +165,11 @@ fn events(all: &mut Object) -> Option<Vec<EvolutionEvent>> {
         return None;
     };
     let pointer = all.pointer_to("events");
-    let event = |(k, element)| event(&mut Object::open(element, join(&pointer, k), all.faults())?);
+    let event = |(k, element)| event(Object::open(element, join(&pointer, k), all.faults())?);
     Some(elements.iter().enumerate().filter_map(event).collect())
 }
 
-fn event(block: &mut Object) -> Option<EvolutionEvent> {
+fn event(mut block: Object) -> Option<EvolutionEvent> {
     let kinds = ["grind", "reprofile", "friction_coefficient"];
     block.only(&["at", kinds[0], kinds[1], kinds[2], "depth_mm"], &[]);
     if kinds.iter().all(|kind| !block.has(kind)) {
@@ -183,67 +177,58 @@ fn event(block: &mut Object) -> Option<EvolutionEvent> {
     }
     let at = block.required_number("at", NOT_NEGATIVE);
     let [grind, reprofile] =
-        [kinds[0], kinds[1]].map(|kind| optional(block, kind, section).flatten().map(Box::new));
+        [kinds[0], kinds[1]].map(|kind| section_of(&mut given(&mut block, kind)?).map(Box::new));
     Some(EvolutionEvent {
         grind,
         reprofile,
-        depth_mm: number_or(
-            block,
-            "depth_mm",
-            AllowedRange::closed(0.0, 20.0, "mm"),
-            0.0,
-        ),
-        friction_coefficient: block.number(kinds[2], AllowedRange::closed(0.0, 2.0, "")),
+        depth_mm: number_or(&mut block, "depth_mm", DEPTH, 0.0),
+        friction_coefficient: block.number(kinds[2], FRICTION),
         at: at?,
     })
 }
 
-fn traffic(block: &mut Object) -> Option<Traffic> {
+fn traffic(mut block: Object) -> Option<Traffic> {
     block.only(&["columns", "passes", "samples"], &[]);
-    let samples = optional(block, "samples", |block, name| {
+    let samples = optional(&mut block, "samples", |block, name| {
         block.required_count(name, 1, ROWS_MAX)
     })?;
     let value = block.required("columns", "an object of columns")?;
     let members = value.as_object().filter(|members| !members.is_empty());
-    let first = members
-        .into_iter()
-        .flat_map(Map::values)
-        .find_map(Value::as_array);
-    let rows = samples.or(first.map(|first| first.len() as u32));
-    let samples = rows.unwrap_or(SAMPLES_DEFAULT);
-    let detail = match members {
-        None => format!(
-            "{} given; an object with at least one column is needed",
-            shown(value)
-        ),
-        Some(_) => format!("{samples} rows given; 1 to {ROWS_MAX} are allowed"),
-    };
-    let Some(members) = members.filter(|_| (1..=ROWS_MAX).contains(&samples)) else {
+    let Some(members) = members else {
+        let given = shown(value);
+        let detail = format!("{given} given; an object with at least one column is needed");
         block.fault("columns", detail);
         return None;
     };
-    let mut distributions = 0;
+    let first = members.values().find_map(Value::as_array);
+    let rows = samples.or(first.map(|first| first.len() as u32));
+    let samples = rows.unwrap_or(SAMPLES_DEFAULT);
+    if !(1..=ROWS_MAX).contains(&samples) {
+        let detail = format!("{samples} rows given; 1 to {ROWS_MAX} are allowed");
+        block.fault("columns", detail);
+        return None;
+    }
     let mut block_of_columns = block.child("columns")?;
     let column = |(name, value): (&String, &Value)| {
         let column = match value {
             Value::Object(_) => {
-                distributions += 1;
-                distribution(&mut block_of_columns.child(name)?).map(TrafficColumn::Distribution)
+                distribution(block_of_columns.child(name)?).map(TrafficColumn::Distribution)
             }
             _ => numbers(&mut block_of_columns, name, ANY, samples).map(TrafficColumn::Numbers),
         };
         Some((name.clone(), column?))
     };
     let columns = members.iter().filter_map(column).collect();
-    if distributions > PRIMES.len() {
-        let detail = format!(
-            "{distributions} distributions given; at most {} are allowed",
-            PRIMES.len()
-        );
+    let (given, most) = (
+        members.values().filter(|of| of.is_object()).count(),
+        PRIMES.len(),
+    );
+    if given > most {
+        let detail = format!("{given} distributions given; at most {most} are allowed");
         block.fault("columns", detail);
     }
     let passes = match block.has("passes") {
-        true => numbers(block, "passes", NOT_NEGATIVE, samples)?,
+        true => numbers(&mut block, "passes", NOT_NEGATIVE, samples)?,
         false => vec![1.0; samples as usize],
     };
     if passes.iter().sum::<f64>() <= 0.0 {
@@ -256,7 +241,7 @@ fn traffic(block: &mut Object) -> Option<Traffic> {
     })
 }
 
-fn distribution(block: &mut Object) -> Option<TrafficDistribution> {
+fn distribution(mut block: Object) -> Option<TrafficDistribution> {
     block.only(&["min", "max", "mean", "standard_deviation"], &[]);
     let min = block.required_number("min", ANY);
     let max = block.required_number("max", AllowedRange::closed(min.unwrap_or(-1e12), 1e12, ""));

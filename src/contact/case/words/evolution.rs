@@ -8,7 +8,7 @@ use crate::contact::case::words::contact::CrossSection;
 use crate::contact::case::words::damage::DamageModel;
 
 /// Profiles that wear under a traffic.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, ToSchema)]
 #[schema(as = EvolutionRequest)]
 pub struct EvolutionWords {
     /// A case of one motion whose contact is of the type `profiles`. Members that a column holds may be left out; `outputs` is not needed, and
@@ -84,8 +84,8 @@ pub struct TrafficDistribution {
 }
 
 /// The bodies that wear.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ToSchema)]
+#[schema(rename_all = "snake_case")]
 pub enum WearingBodies {
     /// The rail.
     Rail,
@@ -113,18 +113,15 @@ impl WearingBodies {
 }
 
 /// Extent of an evolution. Rail and wheel advance in proportion.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, ToSchema)]
 pub struct EvolutionExtent {
     /// Traffic over the rail in million gross tonnes; a row of the traffic counts twice its wheel load.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub mgt: Option<f64>,
     /// Traffic over the rail as a number of axles, in place of `mgt`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub axle_passes: Option<f64>,
     /// Distance that the wheel rolls under this traffic in km; needed where the wheel wears.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub wheel_distance_km: Option<f64>,
 }
@@ -205,24 +202,21 @@ impl WearLosses {
 }
 
 /// Maintenance at one time.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, ToSchema)]
 pub struct EvolutionEvent {
     /// Time of the event, in the unit of the extent: `mgt` or `axle_passes`, and km where only the wheel wears.
     #[schema(minimum = 0.0)]
     pub at: f64,
     /// Grinds the rail to this section, lowered until it lies nowhere above the present one.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, inline = false)]
     pub grind: Option<Box<CrossSection>>,
     /// Turns the wheel to this section, moved toward the axle until it lies nowhere outside the present one.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, inline = false)]
     pub reprofile: Option<Box<CrossSection>>,
     /// Depth in mm by which grinding or turning goes beyond that; 0 when left out.
     #[schema(required = false, minimum = 0.0)]
     pub depth_mm: f64,
     /// Coefficient of friction of all states from then on, as of a lubricator.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, minimum = 0.0)]
     pub friction_coefficient: Option<f64>,
 }
