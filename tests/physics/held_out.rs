@@ -207,8 +207,10 @@ fn estimates_on_few_given_cells_cover_the_error() {
             totals.collect::<Vec<_>>()
         };
         let fine = forces(json!({ "method": "boundary_element", "target_error": 5e-4 }));
-        for strips in 3..=7 {
-            let coarse = forces(json!({ "mesh": { "strips": strips, "cells": strips } }));
+        let squares = (3..=7).map(|side| [side, side]);
+        let single = [[1, 29], [2, 29], [29, 1], [29, 2]];
+        for [strips, cells] in squares.chain(single) {
+            let coarse = forces(json!({ "mesh": { "strips": strips, "cells": cells } }));
             for ((found, estimate), (truth, _)) in coarse.iter().zip(&fine) {
                 let off = (found[0] - truth[0]).abs().max((found[1] - truth[1]).abs());
                 all += 1;

@@ -30,6 +30,8 @@ const COARSER: f64 = 0.6;
 const CELLS_FEW: f64 = 64.0;
 /// Least relative error on so few cells, times their number: errors of an ellipse 6 mm × 5 mm on 3 × 3 to 8 × 8 cells, 10 creepages each.
 const ERROR_FEW: f64 = 0.6;
+/// Meshes with fewer cells or strips have no coarser one along that axis to be compared with; the least relative error is 1 over the square of their number.
+const SIDE_FEW: u32 = 3;
 /// Relative error where everything slips along the rigid slip.
 const RIGID: f64 = 1e-6;
 /// Error of the resultants from region and pressure of a gap with [`REGION_CELLS`] cells of the normal problem across a patch (100 gaps and 96 patches
@@ -122,8 +124,11 @@ impl Estimate {
         };
         let safety = safety(task);
         let cells = finest.cells();
+        let size = finest.mesh.plan.size;
+        let side = size.cells.min(size.strips);
         let least = match tangential.exit {
             LevelExit::RigidSlip => RIGID,
+            _ if side < SIDE_FEW => f64::from(side).powi(-2),
             _ if cells < CELLS_FEW => ERROR_FEW / cells,
             _ => task.tolerance(index),
         };
