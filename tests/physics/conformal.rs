@@ -519,16 +519,22 @@ fn a_history_on_a_flat_rail_has_the_forces_of_a_plane() {
 
 #[test]
 fn the_history_of_the_left_wheel_is_the_mirror_image_of_the_right_one() {
-    let mut right = usual("curve", -6.0, 0.003);
-    right["motion"] = history([0.0008, 0.001, 2e-4]);
-    let mut left = mirrored(&right);
-    left["motion"] = history([0.0008, -0.001, -2e-4]);
-    let (right, left) = (solve(&right), solve(&left));
-    let limit = limit(&right);
-    for (r, l) in forces_of(&right).iter().zip(&forces_of(&left)) {
-        assert!((r[0] - l[0]).abs() < 2e-4 * limit, "{r:?} {l:?}");
-        assert!((r[1] + l[1]).abs() < 2e-4 * limit, "{r:?} {l:?}");
-        assert!((r[2] - l[2]).abs() < 2e-4 * limit, "{r:?} {l:?}");
+    let corner = usual("curve", -6.0, 0.003);
+    // A light patch on the tread beside a heavy one at the gauge corner.
+    let mut unequal = usual("curve", -4.5, 0.0);
+    unequal["load"] = json!({ "approach_mm": 0.12 });
+    for (mut right, patches) in [(corner, 1), (unequal, 2)] {
+        right["motion"] = history([0.0008, 0.001, 2e-4]);
+        let mut left = mirrored(&right);
+        left["motion"] = history([0.0008, -0.001, -2e-4]);
+        let (right, left) = (solve(&right), solve(&left));
+        assert_eq!(right.patches.len(), patches);
+        let limit = limit(&right);
+        for (r, l) in forces_of(&right).iter().zip(&forces_of(&left)) {
+            assert!((r[0] - l[0]).abs() < 2e-4 * limit, "{r:?} {l:?}");
+            assert!((r[1] + l[1]).abs() < 2e-4 * limit, "{r:?} {l:?}");
+            assert!((r[2] - l[2]).abs() < 2e-4 * limit, "{r:?} {l:?}");
+        }
     }
 }
 

@@ -23,9 +23,9 @@ use crate::contact::rolling::task::precision_of;
 const MOTION_SECONDS: f64 = 3.5e-4;
 const TARGET_USUAL: f64 = 0.005;
 /// Power with which the time grows as the target falls.
-const TARGET_POWER: f64 = 1.0;
-/// Smaller targets cost no more: they end on the largest mesh as well.
-const TARGET_LEAST: f64 = 4e-4;
+const TARGET_POWER: f64 = 1.2;
+/// Smaller targets cost no more: they end on the largest mesh.
+const TARGET_LEAST: f64 = 1e-4;
 /// Time with spin over that without.
 const SPIN_TIMES: f64 = 3.0;
 /// Length over width beyond which the time grows in proportion to it.
@@ -220,11 +220,12 @@ impl CheckedCase {
             return 0.0;
         };
         let extents: Vec<_> = (patches.half.iter().map(|[a, b]| [-a, *a, -b, *b])).collect();
-        let (steps, usual) = usual_work(history, &extents);
-        let cells = match self.run.resolution {
-            Resolution::Target(_) => usual,
-            Resolution::Mesh(_) => self.size_input().cells(),
+        let along = match self.run.resolution {
+            Resolution::Target(_) => None,
+            Resolution::Mesh(size) => Some(f64::from(size.cells)),
         };
+        let (steps, usual) = usual_work(history, &extents, along);
+        let cells = along.map_or(usual, |_| self.size_input().cells());
         let step = STEP_SECONDS + STEP_CELLS_SECONDS * cells * cells;
         SECONDS_MIN + steps * self.solves(0) * step
     }

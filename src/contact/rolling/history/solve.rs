@@ -106,13 +106,13 @@ pub fn too_long(history: &HistoryTask, extents: &[[f64; 4]], steps_max: usize) -
     })
 }
 
-/// Steps of a history on the finest level that a target usually leads to, and cells there along x and across.
+/// Steps of a history with so many cells along x, by default those of the finest level that a target usually leads to, and cells of a patch there.
 #[must_use]
-pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]]) -> (f64, f64) {
+pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]], along: Option<f64>) -> (f64, f64) {
     let Some(half) = half_length(extents) else {
         return (history.distances.len() as f64, CELLS_FIRST * CELLS_FIRST);
     };
-    let cells = CELLS_FIRST * FINER * FINER;
+    let cells = along.unwrap_or(CELLS_FIRST * FINER * FINER);
     let pressed = history.start == HistoryStart::Pressed;
     let steps = plan::count(history, half / (STEPS_PER_CELL * cells));
     if pressed && history.distances.len() == 1 {
@@ -227,7 +227,11 @@ fn level_plans(task: &RollingTask, shape: f64) -> Vec<HistoryLevel> {
         let coarse = plan(even.max(4.0), (cells / FINER).round().max(6.0));
         return vec![coarse, plan(strips, cells)];
     }
-    let [x0, x1, y0, y1] = extents[0];
+    // All patches have the mesh of the one that carries most, whatever their order.
+    let heaviest = patches
+        .iter()
+        .max_by(|a, b| a.normal_force.total_cmp(&b.normal_force));
+    let [x0, x1, y0, y1] = heaviest.map_or([-1.0, 1.0, -1.0, 1.0], |patch| patch.extent);
     let shape = shape * ((x1 - x0) / (y1 - y0)).powf(0.45);
     let patches = (patches.len() as f64).sqrt();
     let levels = (0..LEVELS_MAX).map(|k| {
