@@ -1,8 +1,8 @@
 //! Expected solve time of a case, before it is queued: the time of one motion at its target or on its mesh, times motions and patches, plus
 //! that of the normal problem.
 //!
-//! The figures order the queue and tell cases that take seconds from those that take hours. `/v1/cases/check` solves a case for a moment
-//! instead, which most cases end within. Single cases differ from these figures by a factor of about 2 either way:
+//! The queue is ordered by these times. `/v1/cases/check` measures instead: it solves a case for up to 0.2 s, which most cases need less than.
+//! Single cases differ from the figures here by a factor of about 2 either way:
 //! `cargo bench --bench stress -- --only times` prints the share within a factor of 3, kind by kind. The figures were read off that
 //! bench under the seed 777, and are judged under others.
 
@@ -84,7 +84,7 @@ pub struct SolveTime {
     pub whole: f64,
 }
 
-/// What is known of the patches of a contact before they are found.
+/// Expected shapes of the patches, before the normal problem is solved.
 #[derive(Debug, Clone)]
 struct ExpectedPatches {
     /// Half-length and half-width in mm, patch by patch.

@@ -29,7 +29,7 @@ const TARGET: f64 = 0.02;
 /// Wheel load in N of a million gross tonnes on an axle with one wheel of that load on each rail.
 const NEWTONS_PER_MGT: f64 = 1e9 * 9.80665 / 2.0;
 
-/// The sections that a state is solved on, and what has changed beside them.
+/// Sections and friction that a state is solved with.
 #[derive(Debug, Clone, Copy)]
 pub struct Sections<'a> {
     /// Rail and wheel.
@@ -65,7 +65,7 @@ pub struct Evolution {
     pub columns: Vec<Vec<f64>>,
     /// Shares of the rows, their sum 1.
     pub shares: Vec<f64>,
-    /// The plan, without what is kept beside it.
+    /// The plan: bodies that wear, extent, limits and accuracy.
     pub plan: EvolutionWords,
     /// The events in their order.
     pub events: Vec<PlannedEvent>,

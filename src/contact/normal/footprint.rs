@@ -140,7 +140,7 @@ impl Footprint {
         self.slip.as_deref()
     }
 
-    /// What is added to it by a unit of creepage across, and of spin in 1/mm, where motions share the footprint.
+    /// Additional slip per unit of lateral creepage, and per unit of spin in 1/mm, where motions share the footprint.
     #[must_use]
     pub fn slip_by_motion(&self) -> Option<&[SurfaceSlip; 2]> {
         self.slip_by_motion.as_deref()

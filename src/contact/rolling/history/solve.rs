@@ -106,7 +106,7 @@ pub fn too_long(history: &HistoryTask, extents: &[[f64; 4]], steps_max: usize) -
     })
 }
 
-/// Steps of a history with so many cells along x, by default those of the finest level that a target usually leads to, and cells of a patch there.
+/// Number of steps of a history on a mesh with `along` cells along x, and number of cells of a patch. Without `along`, those of the usual finest level.
 #[must_use]
 pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]], along: Option<f64>) -> (f64, f64) {
     let Some(half) = half_length(extents) else {
