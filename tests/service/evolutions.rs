@@ -191,12 +191,30 @@ async fn faults_are_named_with_their_place_and_what_is_allowed() {
             "is it `lateral_shift [mm]`?",
         ),
         ("/wear_model", json!("rust"), "/wear_model", "archard_wear"),
+        // Columns keep the titles that they were sent with.
+        (
+            "/traffic/columns/wheel_load [kN]",
+            json!([70, 0]),
+            "/traffic/columns/wheel_load [kN]/1",
+            "0.0 given",
+        ),
+        // A place where the wheel misses the rail is the fault of its row.
+        (
+            "/traffic/columns/lateral_shift [cm]",
+            json!([0.1, 90]),
+            "/traffic/columns/lateral_shift [cm]/1",
+            "no part of the wheel",
+        ),
+        (
+            "/template/solver",
+            json!({ "method": "table" }),
+            "/template/solver/method",
+            "values per cell",
+        ),
     ] {
         let mut bad = request(2);
-        *bad.pointer_mut(place).unwrap_or(&mut json!(null)) = value.clone();
-        if place == "/wear_model" {
-            bad["wear_model"] = value;
-        }
+        let (parent, name) = place.rsplit_once('/').unwrap();
+        bad.pointer_mut(parent).unwrap()[name] = value;
         let answer = server.post("/v1/evolutions", &bad).await;
         assert_problem(&answer, 422, "faulty-case", "fault");
         let fault = &answer.json["errors"][0];

@@ -110,7 +110,7 @@ impl Evolution {
         let first: Vec<f64> = columns.iter().map(|column| column[0]).collect();
         let first = filled(&template, &pointers, &first, None)
             .and_then(|case| contact::check(&case, limits))
-            .map_err(|error| located(error, &pointers, 0))?;
+            .map_err(|error| located(error, &pointers, 0, None))?;
         let (NormalTask::Wheel(wheel), Some(damage)) =
             (&first.problem.task, &first.run.after.damage)
         else {
@@ -159,13 +159,15 @@ impl Evolution {
         let known = KnownPair::default();
         let [rail, wheel] = self.start();
         let events = self.events.iter();
-        let friction = events.map(|(event, _)| (0, event.friction_coefficient));
-        let ends = self.columns.iter().flat_map(|column| {
+        let friction = events.map(|(event, _)| (0, event.friction_coefficient, None));
+        let columns = self.columns.iter().zip(&self.pointers);
+        let ends = columns.flat_map(|(column, pointer)| {
             let by = |a: &usize, b: &usize| column[*a].total_cmp(&column[*b]);
             let rows = 0..column.len();
-            [rows.clone().min_by(by), rows.max_by(by)]
+            let ends = [rows.clone().min_by(by), rows.max_by(by)];
+            ends.map(|row| Some((row?, None, Some(pointer))))
         });
-        for (row, friction) in ends.flatten().map(|row| (row, None)).chain(friction) {
+        for (row, friction, tested) in ends.flatten().chain(friction) {
             let values: Vec<f64> = self.columns.iter().map(|column| column[row]).collect();
             let on = Sections {
                 points: [&rail, &wheel],
@@ -175,7 +177,7 @@ impl Evolution {
             self.case(on, &values)
                 .and_then(|case| contact::check_with(&known, &case, &self.limits))
                 .and_then(|checked| several_answers(&checked).map_or(Ok(()), |f| Err(f.into())))
-                .map_err(|error| located(error, &self.pointers, row))?;
+                .map_err(|error| located(error, &self.pointers, row, tested))?;
         }
         Ok(())
     }
@@ -272,6 +274,11 @@ fn template(plan: &EvolutionWords) -> Result<Value, CaseError> {
             return Err(Fault::new(pointer, detail).into());
         }
     }
+    if template["solver"]["method"] == "table" {
+        let detail =
+            "\"table\" given; a method with values per cell, which wear is made from, is needed";
+        return Err(Fault::new("/template/solver/method", detail).into());
+    }
     let mut damage = json!({ "models": ["t_gamma", plan.wear_model, "wlrm"], "across": true });
     if let Some(own) = template.pointer("/damage/parameters") {
         damage["parameters"] = own.clone();
@@ -303,11 +310,16 @@ fn filled(
     Ok(case)
 }
 
-/// Faults of the case of a row, with pointers into the evolution.
-fn located(error: CaseError, pointers: &[String], row: usize) -> CaseError {
+/// Faults of the case of a row, with pointers into the evolution. One that is at no column is put to `tested`, whose value the case has been checked for.
+fn located(
+    error: CaseError,
+    pointers: &[String],
+    row: usize,
+    tested: Option<&String>,
+) -> CaseError {
     in_template(error, |pointer| {
-        let known = pointers.iter().any(|known| known == pointer);
-        known.then(|| format!("/traffic{}/{row}", column_pointer(pointer)))
+        let column = pointers.iter().find(|known| *known == pointer).or(tested)?;
+        Some(format!("/traffic{}/{row}", column_pointer(column)))
     })
 }
 

@@ -58,45 +58,63 @@ pub(crate) async fn submit(
 ) -> Result<Response, ApiError> {
     let jobs = jobs.of_kind(Kind::Evolution);
     let named = named.read_for(&jobs)?;
-    name_columns(&mut value)?;
+    let titles = name_columns(&mut value)?;
     let submitted = jobs.submit_evolution(value, named, idempotency_key, options);
-    let (job, replayed) = submitted.await?;
+    let (job, replayed) = submitted.await.map_err(|error| by_title(error, &titles))?;
     drop(room);
     reply
         .send(&jobs, &memory, (job.into(), replayed), None)
         .await
 }
 
+/// Pointers to a column into the request: as it is named here, and as the client has it.
+type Title = [String; 2];
+
 /// Names the columns of the traffic by JSON pointers, in the units of the case. What is no table is left to the check.
-fn name_columns(request: &mut Value) -> Result<(), ApiError> {
+fn name_columns(request: &mut Value) -> Result<Vec<Title>, ApiError> {
     let columns = request.pointer_mut("/traffic/columns");
+    let (mut titles, mut named, mut faults) = (Vec::new(), Map::new(), Vec::new());
     let Some(Value::Object(columns)) = columns else {
-        return Ok(());
+        return Ok(titles);
     };
-    let (mut named, mut faults) = (Map::new(), Vec::new());
     for (title, mut values) in std::mem::take(columns) {
-        let detail = match place(&title, None) {
-            Ok(Some(Place { pointer, factor })) => {
+        let unknown = || {
+            let allowed = "allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs";
+            let asked = question(&title, None);
+            let detail = format!("names nothing in the case; {allowed}; {asked}");
+            detail.trim_end_matches("; ").to_owned()
+        };
+        let in_request = |name: &str| format!("/traffic{}", column_pointer(name));
+        let detail = match place(&title, None).and_then(|found| found.ok_or_else(unknown)) {
+            Ok(Place { pointer, factor }) => {
                 scale(&mut values, factor);
+                titles.push([&*pointer, &*title].map(in_request));
                 let other = named.insert(pointer.clone(), values);
                 other.map(|_| format!("a second column for `{pointer}`"))
             }
-            Ok(None) => {
-                let allowed = "allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs";
-                let asked = question(&title, None);
-                let detail = format!("names nothing in the case; {allowed}; {asked}");
-                Some(detail.trim_end_matches("; ").to_owned())
-            }
             Err(detail) => Some(detail),
         };
-        let pointer = format!("/traffic{}", column_pointer(&title));
-        faults.extend(detail.map(|detail| Fault::new(pointer, detail)));
+        faults.extend(detail.map(|detail| Fault::new(in_request(&title), detail)));
     }
     *columns = named;
     match faults.is_empty() {
-        true => Ok(()),
+        true => Ok(titles),
         false => Err(JobsError::from(CaseError(faults)).into()),
     }
+}
+
+/// The error with its pointers to columns as the client has them.
+fn by_title(mut error: JobsError, titles: &[Title]) -> JobsError {
+    if let JobsError::Case(CaseError(faults)) = &mut error {
+        for fault in faults {
+            let known = titles.iter().find_map(|[name, title]| {
+                let rest = fault.pointer.strip_prefix(name.as_str())?;
+                (rest.is_empty() || rest.starts_with('/')).then(|| format!("{title}{rest}"))
+            });
+            fault.pointer = known.unwrap_or_else(|| std::mem::take(&mut fault.pointer));
+        }
+    }
+    error
 }
 
 /// Multiplies the numbers of a column, or of its distribution.
