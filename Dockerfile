@@ -7,6 +7,7 @@ WORKDIR /src
 # The dependencies are a layer of their own, compiled for an empty program: a change in src does not build them again.
 COPY Cargo.toml Cargo.lock ./
 COPY src/contact/Cargo.toml src/contact/
+COPY src/macros src/macros
 COPY benches/Cargo.toml benches/
 RUN echo 'fn main() {}' > src/main.rs \
     && touch src/lib.rs src/contact/lib.rs \

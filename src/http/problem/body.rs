@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use railhead_macros::none_is_absent;
 use serde::Serialize;
 use serde_json::{Number, Value};
 use utoipa::ToSchema;
@@ -47,20 +48,21 @@ pub(crate) struct ProblemBody {
 }
 
 /// One fault of a request. Exactly one of `pointer`, `parameter` and `header` says where it is.
+#[none_is_absent]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct Fault {
     /// JSON pointer (RFC 6901) into the body; empty for the body as a whole.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(example = "/material/poisson_ratio")]
+    #[schema(nullable = true)]
     pub pointer: Option<String>,
     /// Name of a query parameter.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = true)]
     pub parameter: Option<String>,
     /// Name of a request header.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = true)]
     pub header: Option<String>,
     /// Line of the body that holds the faulty case of a batch, counted from 1; only of NDJSON.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = true)]
     pub line: Option<u64>,
     /// Kind of the fault: `invalid` where only `detail` tells more, else `missing`, `unknown-member`, `wrong-type`, `out-of-range`,
     /// `unknown-word`, `too-long`, `unknown-parameter`, or `repeated`. There may be more.
@@ -69,24 +71,19 @@ pub struct Fault {
     /// The value given and what is allowed.
     pub detail: String,
     /// The value given, where it is no array, no object and no long text.
-    #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Value>)]
+    #[schema(nullable = true)]
     pub value: Option<Value>,
     /// Smallest number allowed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<f64>, nullable = false)]
+    #[schema(value_type = Option<f64>)]
     pub minimum: Option<Number>,
     /// The smallest number itself is not allowed; absent if it is.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub minimum_excluded: Option<bool>,
     /// Largest number, or number of characters, allowed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<f64>, nullable = false)]
+    #[schema(value_type = Option<f64>)]
     pub maximum: Option<Number>,
     /// Unit of these numbers.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<String>, nullable = false)]
+    #[schema(value_type = Option<String>)]
     pub unit: Option<&'static str>,
     /// The words that are allowed.
     #[serde(skip_serializing_if = "Vec::is_empty")]

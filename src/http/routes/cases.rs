@@ -2,6 +2,7 @@
 
 use axum::Json;
 use axum::extract::State;
+use railhead_macros::none_is_absent;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -20,6 +21,7 @@ use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 
 /// A case that can be solved, and its expected cost.
+#[none_is_absent]
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = CheckedCase)]
 pub(crate) struct CheckReport {
@@ -34,12 +36,8 @@ pub(crate) struct CheckReport {
     /// Expected cost.
     estimate: Estimate,
     /// What the case was understood as; absent where no part of the wheel lies above the rail.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     understood: Option<Understanding>,
     /// How far the points of the profiles can be trusted, as far as that is known without the contact; only for `profiles`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     quality: Option<PairQuality>,
     /// What the client should know before using the numbers.
     remarks: Vec<RemarkEntry>,

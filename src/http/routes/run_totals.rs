@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use axum::Json;
 use axum::extract::State;
 use axum::http::Uri;
+use railhead_macros::none_is_absent;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -66,26 +67,22 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
 }
 
 /// What the answers of a run come to.
+#[none_is_absent]
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct RunTotals {
     /// All rows.
     all: SectionTotals,
     /// Sections in the order of their values; only with `by`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     sections: Option<Vec<SectionTotals>>,
 }
 
 /// What the answers to some rows come to.
+#[none_is_absent]
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct SectionTotals {
     /// The value of `by`; only for texts.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     value: Option<String>,
     /// Where the interval begins; only for numbers.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     from: Option<f64>,
     /// Number of rows.
     rows: u64,

@@ -1,6 +1,7 @@
 //! `/v1/jobs/{id}/subsurface`: stresses below the surface at the points that the case asked for, and the worst point of the patch.
 
 use axum::response::Response;
+use railhead_macros::none_is_absent;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -36,6 +37,7 @@ query! {
 }
 
 /// Stresses below one patch for one motion.
+#[none_is_absent]
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Stresses)]
 pub(crate) struct SubsurfaceAnswer {
@@ -50,12 +52,8 @@ pub(crate) struct SubsurfaceAnswer {
     /// The requested points, in the order of the case.
     points: Vec<StressPoint>,
     /// Where von Mises' stress is largest; absent if the case did not want it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     worst: Option<StressPoint>,
     /// What a point of the body lives through while the contact rolls over it; absent if the case did not want it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     passage: Option<PassageSummary>,
 }
 

@@ -1,11 +1,13 @@
 //! Where the bodies touch, and how hard they are pressed together.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::contact::case::words::motion::{Combine, Swept};
 
 /// Where the bodies touch.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Contact {
@@ -71,16 +73,11 @@ pub enum Contact {
         #[schema(exclusive_minimum = 0.0)]
         rolling_radius_mm: f64,
         /// Distance of the gauge faces of the two rails, in mm; 1435 when left out.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false)]
         gauge_mm: Option<f64>,
         /// Depth at which the gauge is measured, below the highest point of the rail as it lies, in mm; 14 when left out.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false)]
         gauge_height_mm: Option<f64>,
         /// Distance of the origin of the rail's cross-section from the middle of the track, in mm. It places the rail instead of the gauge.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false, minimum = 0.0)]
+        #[schema(minimum = 0.0)]
         rail_origin_mm: Option<f64>,
         /// Turn of the rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
         /// when left out.
@@ -91,8 +88,6 @@ pub enum Contact {
         flange_back_distance_mm: f64,
         /// y of the back of the flange in the wheel's cross-section, in mm. When left out it is found from the points; -70 where they agree with
         /// that or show no flange.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false)]
         flange_back_position_mm: Option<f64>,
         /// Shift of the wheelset to the left, in mm; 0 when left out.
         #[schema(required = false)]
@@ -109,12 +104,8 @@ pub enum Contact {
         #[schema(required = false)]
         accept_rough_profiles: bool,
         /// The surface on which the contact is solved. When left out, the curve where it can be solved, else planes with the remark `on-planes`.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false)]
         reference_surface: Option<SurfaceName>,
         /// How cells of a curved surface act on each other; not with `reference_surface: "plane"`, `angle_corrected` when left out.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false)]
         influence: Option<InfluenceName>,
     },
     /// A wheelset on both rails of a track, by their cross-sections. Its roll and its height are found, and every patch of both wheels.
@@ -126,23 +117,17 @@ pub enum Contact {
         #[schema(inline = false)]
         wheel: Box<CrossSection>,
         /// What differs on the right; nothing when left out.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false, inline = false)]
+        #[schema(inline = false)]
         right: Option<Box<RightSide>>,
         /// Radius of the wheels where z of their cross-section is 0, in mm.
         #[schema(exclusive_minimum = 0.0)]
         rolling_radius_mm: f64,
         /// Distance of the gauge faces of the two rails, in mm; 1435 when left out.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false)]
         gauge_mm: Option<f64>,
         /// Depth at which the gauge is measured, below the highest point of the rail as it lies, in mm; 14 when left out.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false)]
         gauge_height_mm: Option<f64>,
         /// Distance of the origin of the rail's cross-section from the middle of the track, in mm. It places the rail instead of the gauge.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false, minimum = 0.0)]
+        #[schema(minimum = 0.0)]
         rail_origin_mm: Option<f64>,
         /// Turn of each rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
         /// when left out.
@@ -153,8 +138,6 @@ pub enum Contact {
         flange_back_distance_mm: f64,
         /// y of the back of the flange in the wheels' cross-section, in mm. When left out it is found from the points of each wheel; -70 where they
         /// agree with that or show no flange.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false)]
         flange_back_position_mm: Option<f64>,
         /// Shift of the wheelset to the left, in mm: a number, or several; 0 when left out. A shift and a yaw make a position, and every
         /// position has its own patches.
@@ -167,20 +150,15 @@ pub enum Contact {
         #[schema(required = false)]
         combine: Combine,
         /// Asks for the difference of the rolling radii over the shift, and for the equivalent conicity.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false, inline = false)]
+        #[schema(inline = false)]
         kinematics: Option<KinematicsWords>,
         /// As of `profiles`.
         #[serde(skip_serializing_if = "is_false")]
         #[schema(required = false)]
         accept_rough_profiles: bool,
         /// As of `profiles`.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false)]
         reference_surface: Option<SurfaceName>,
         /// As of `profiles`.
-        #[serde(skip_serializing_if = "Option::is_none")]
-        #[schema(nullable = false)]
         influence: Option<InfluenceName>,
     },
 }
@@ -192,37 +170,24 @@ fn is_false(value: &bool) -> bool {
 /// A cross-section of a rail or a wheel, as points or as the text of a file; exactly one of the two.
 ///
 /// y is positive to the field side and z positive down, unless `mirror_y` and `mirror_z`, the shape or the format specify another sense.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct CrossSection {
     /// Points `[y, z]` in order along the cross-section, in mm or in `unit`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub points_mm: Option<Vec<[f64; 2]>>,
     /// Digest of a cross-section that was kept with `POST /v1/profiles`, in place of points or text.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub profile: Option<String>,
     /// Format of `text`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub format: Option<FormatName>,
     /// The content of the file, not its path.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub text: Option<String>,
     /// Unit of the points or of the text. When left out it is the unit that the file names, else mm. All other lengths of a case are in mm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub unit: Option<UnitName>,
     /// `true` if y of the points is positive toward the track centre. When left out, the side of the flange decides for a wheel, and the
     /// format for a rail (points: `false`, MiniProf: `true`). A wheel without a flange needs it, except in Simpack files.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub mirror_y: Option<bool>,
     /// `true` if z of the points is positive upward. When left out, the flange of a wheel or the head of a rail decides. Where the shape does
     /// not show it, the case is refused, except for Simpack files.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub mirror_z: Option<bool>,
     /// Waves along the cross-section that are shorter than about this are smoothed away, in mm; 0 (no smoothing) when left out. `auto` chooses
     /// 0, or 2 to 8 mm, by the noise of the points and the pressure; the answer says what was used.
@@ -231,19 +196,17 @@ pub struct CrossSection {
 }
 
 /// What differs on the right of a wheelset or of the track; at least one member is given.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct RightSide {
     /// Cross-section of the right rail.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, inline = false)]
+    #[schema(inline = false)]
     pub rail: Option<Box<CrossSection>>,
     /// Cross-section of the right wheel.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, inline = false)]
+    #[schema(inline = false)]
     pub wheel: Option<Box<CrossSection>>,
     /// Radius of the right wheel where z of its cross-section is 0, in mm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub rolling_radius_mm: Option<f64>,
 }
 
@@ -319,26 +282,22 @@ impl Contact {
 }
 
 /// How hard the bodies are pressed together; exactly one member is given, for `wheelset` with `left_share` beside it.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct Load {
     /// Normal force in N, more than 0. For `profiles` the sum over all patches, each along its own normal.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub normal_force_n: Option<f64>,
     /// Vertical force of the wheel on the rail in N, more than 0; for `profiles` only. For `wheelset`, which needs it, that of both
     /// wheels together.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub vertical_force_n: Option<f64>,
     /// The part of the vertical force that the left wheel carries; for `wheelset` only, 0.5 when left out.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false, minimum = 0.01, maximum = 0.99)]
+    #[schema(minimum = 0.01, maximum = 0.99)]
     pub left_share: Option<f64>,
     /// Approach of distant points in mm. For `radii` and `ellipse` it is measured from first touch and is more than 0. For gaps it is
     /// measured from gap = 0 of the data and is more than the least gap. For `profiles` it is the vertical distance by which the wheel is
     /// lowered from first touch.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub approach_mm: Option<f64>,
 }
 

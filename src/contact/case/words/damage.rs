@@ -1,9 +1,11 @@
 //! Which damage models a case asks for, and with which figures.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// Which damage models are evaluated, and with which figures.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = Damage)]
 pub struct DamageWords {
@@ -11,8 +13,6 @@ pub struct DamageWords {
     #[schema(required = false)]
     pub models: Vec<DamageModel>,
     /// The name of a set of figures, or figures in place of some of the default set's.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub parameters: Option<DamageParameterWords>,
     /// Wear strip by strip across the patch, from the power of every cell, beside that of the patch as a whole; `false` when left out.
     #[schema(required = false)]
@@ -57,31 +57,23 @@ pub enum DamageSetName {
 }
 
 /// Figures of the client's; those left out are the default set's.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema)]
 pub struct OwnDamageFigures {
     /// Density of the worn material in kg/m³.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub density_kg_per_m3: Option<f64>,
     /// Yield stress in shear in MPa, of the surface fatigue index and the shakedown map.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub shear_yield_mpa: Option<f64>,
     /// Hardness of the worn material in MPa, of Archard's law.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub hardness_mpa: Option<f64>,
     /// The wear map of the University of Sheffield.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub usfd: Option<UsfdFigures>,
     /// The map of Archard's coefficients.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub archard: Option<ArchardFigures>,
     /// The damage function of the Whole Life Rail Model.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub wlrm: Option<WlrmFigures>,
 }
 

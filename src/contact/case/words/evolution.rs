@@ -1,5 +1,6 @@
 //! Request of an evolution: the bodies that wear, the wear model, the extent, events and limits.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -163,27 +164,18 @@ impl Default for EvolutionAccuracy {
 }
 
 /// Losses of the sections in mm, or limits of them; absent where a section has no such place, and where no limit is wanted.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct WearLosses {
     /// W1: height of the rail at y = 0.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub height_mm: Option<f64>,
     /// W2: gauge face of the rail, 14 mm below its top at the start.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub gauge_face_mm: Option<f64>,
     /// W3: gauge corner of the rail, at 45°.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub gauge_corner_mm: Option<f64>,
     /// Tread of the wheel at y = 0.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub tread_mm: Option<f64>,
     /// Flange of the wheel, 10 mm below its tread at the start.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub flange_mm: Option<f64>,
 }
 

@@ -1,47 +1,36 @@
 //! Friction between the bodies, and what lies between them.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`), `across`, `along` and `by_temperature`. `layer` and
 /// `reduction` make the contact softer to tractions and may stand beside each of them.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema)]
 pub struct Friction {
     /// Friction coefficient: 0 (frictionless), or 1e-12 to 100.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, minimum = 0.0, maximum = 100.0)]
+    #[schema(minimum = 0.0, maximum = 100.0)]
     pub coefficient: Option<f64>,
     /// How the coefficient falls with the speed of slip; every motion needs its `speed_mm_per_s`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub law: Option<FallName>,
     /// The coefficient that is left at the highest speeds of slip, 0 to 100; with `law`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, minimum = 0.0, maximum = 100.0)]
+    #[schema(minimum = 0.0, maximum = 100.0)]
     pub limit: Option<f64>,
     /// What falls: one or two terms; with `law`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(required = false, min_items = 1, max_items = 2)]
     pub terms: Vec<FallTermWords>,
     /// A coefficient that varies across the contact.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub across: Option<AcrossWords>,
     /// A coefficient that varies along the track; the case needs a `history`, which rolls over it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub along: Option<AlongWords>,
     /// A coefficient that falls with the temperature of the contact; the case needs `thermal` and every motion its `speed_mm_per_s`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub by_temperature: Option<ByTemperatureWords>,
     /// A layer between the bodies, such as wet leaves, sand or oxides.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub layer: Option<LayerWords>,
     /// Kalker's reduction factor, more than 0 and at most 1: the initial slope of the creep curves is this part of that of clean bodies.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0, maximum = 1.0)]
+    #[schema(exclusive_minimum = 0.0, maximum = 1.0)]
     pub reduction: Option<f64>,
 }
 
@@ -72,16 +61,15 @@ pub struct FallTermWords {
 
 /// A coefficient across the contact: linear between points, constant outside; two points at the same place are a jump. Exactly one of
 /// `y_mm` and `angle_rad` says where the points are.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = FrictionAcross)]
 pub struct AcrossWords {
     /// Places in mm, in order: y in the axes of the case; with `profiles` the y of the rail's profile.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, min_items = 2, max_items = 1000)]
+    #[schema(min_items = 2, max_items = 1000)]
     pub y_mm: Option<Vec<f64>>,
     /// Inclinations of the rail's surface in rad, in order, positive as contact angles are; with `profiles` only.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, min_items = 2, max_items = 1000)]
+    #[schema(min_items = 2, max_items = 1000)]
     pub angle_rad: Option<Vec<f64>>,
     /// The coefficient at each of them, 1e-12 to 100.
     #[schema(min_items = 2, max_items = 1000)]
@@ -117,6 +105,7 @@ pub struct ByTemperatureWords {
 /// An elastic layer between the bodies, so thin that each of its points shears by itself: the surfaces move apart by
 /// thickness/modulus times the traction, beside what the bodies give. With `yield_mpa` it transmits no more than that stress, which grows with
 /// the plastic displacement of the layer.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = Layer)]
 pub struct LayerWords {
@@ -127,12 +116,10 @@ pub struct LayerWords {
     #[schema(exclusive_minimum = 0.0)]
     pub thickness_mm: f64,
     /// Shear stress in MPa at which the layer yields, more than 0; left out, it never does.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub yield_mpa: Option<f64>,
     /// Growth of that stress in MPa per mm of plastic displacement, 0 or more; 0 when left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, minimum = 0.0)]
+    #[schema(minimum = 0.0)]
     pub hardening_mpa_per_mm: Option<f64>,
 }
 

@@ -1,5 +1,6 @@
 //! Rolling that changes, as a client writes it: motions or forces in the distance rolled.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -10,45 +11,29 @@ use crate::contact::case::words::range::Range;
 ///
 /// Where a distance equals the one before, or is 0 at first, the bodies do not roll but are shifted: by `shift_x_mm`, `shift_y_mm` and
 /// `turn_rad`, or until the prescribed forces are reached. Two equal distances are thus also a jump of a creepage or force.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct History {
     /// Distance rolled since the start in mm, never decreasing.
     pub distance_mm: HistoryCourse,
     /// Longitudinal creepage.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub creepage_x: Option<HistoryCourse>,
     /// Lateral creepage.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub creepage_y: Option<HistoryCourse>,
     /// Spin in 1/mm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub spin_per_mm: Option<HistoryCourse>,
     /// Longitudinal force on the lower body in N, in place of `creepage_x`; creepages and shifts that give it are found.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub force_x_n: Option<HistoryCourse>,
     /// Lateral force on the lower body in N, in place of `creepage_y`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub force_y_n: Option<HistoryCourse>,
     /// Rolling speed in mm/s, which friction that falls with slip needs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub speed_mm_per_s: Option<f64>,
     /// Displacement of the upper body against the lower one along x in mm, from the point before; 0 where the bodies roll.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub shift_x_mm: Option<HistoryCourse>,
     /// The same along y.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub shift_y_mm: Option<HistoryCourse>,
     /// Turn of the upper body against the lower one about z in rad, from the point before; 0 where the bodies roll.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub turn_rad: Option<HistoryCourse>,
 }
 

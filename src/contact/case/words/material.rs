@@ -1,5 +1,6 @@
 //! Elastic constants of the bodies.
 
+use railhead_macros::none_is_absent;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -19,15 +20,14 @@ pub enum Material {
 }
 
 /// Isotropic linear elasticity. Exactly one of the two moduli is given.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Elastic {
     /// Shear modulus G in MPa, more than 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub shear_modulus_mpa: Option<f64>,
     /// Young's modulus E in MPa, more than 0.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub young_modulus_mpa: Option<f64>,
     /// Poisson's ratio, 0 to 0.5.
     #[schema(minimum = 0.0, maximum = 0.5)]

@@ -1,5 +1,6 @@
 //! How the bodies roll: one motion, a list, a sweep, a history or a wheelset.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -23,30 +24,22 @@ pub struct MotionWords {
 
 /// A motion as a case gives it: creepages and spin. A tangential force may be given in place of a creepage; the creepage that gives this
 /// force is then found and reported in the answer.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema)]
 pub struct AskedMotion {
     /// Longitudinal creepage, dimensionless; 0 when left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub creepage_x: Option<f64>,
     /// Lateral creepage, dimensionless; 0 when left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub creepage_y: Option<f64>,
     /// Spin in 1/mm.
     #[schema(required = false)]
     pub spin_per_mm: f64,
     /// Longitudinal force on the lower body in N, over all patches, at most μN. Excludes `creepage_x`; with `profiles` in one motion alone.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub force_x_n: Option<f64>,
     /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`; with `profiles` in one motion alone: in track axes, with the normal forces.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub force_y_n: Option<f64>,
     /// Rolling speed in mm/s; only temperatures, Archard's wear and friction that falls with slip depend on it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub speed_mm_per_s: Option<f64>,
 }
 
@@ -90,37 +83,27 @@ pub enum Motions {
 /// With the speed V, the axle e, the angular velocity ω = Ω e + (roll rate, 0, yaw rate) and r from the wheelset's centre to the
 /// patch, the wheel's material moves with v = (V, lateral velocity, 0) + ω × r; the creepages of a patch with the tangent t and the
 /// normal n are v_x / V, v · t / V and the spin ω · n / V.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct Wheelset {
     /// Speed V along x in mm/s, more than 0.
     #[schema(exclusive_minimum = 0.0)]
     pub speed_mm_per_s: f64,
     /// Angular velocity Ω about the axle in rad/s, positive for rolling forward.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub angular_velocity_rad_per_s: Option<f64>,
     /// Radius in mm at which the wheel would roll freely: Ω is the speed divided by it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub free_rolling_radius_mm: Option<f64>,
     /// Torque about the axle that a drive or a brake exerts on the wheelset, in N mm, positive if it drives forward; for the contact
     /// `wheelset` only. The angular velocity is found at which the rails balance it: 0 is a wheelset that rolls freely.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub drive_torque_n_mm: Option<f64>,
     /// Longitudinal force on the rail in N, over all patches of the wheel; for the contact `profiles` only. The angular velocity is found at which
     /// the rail carries it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub force_x_n: Option<f64>,
     /// Velocity of the centre to the left in mm/s; 0 when left out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub lateral_velocity_mm_per_s: Option<f64>,
     /// Lateral force on the rail in N, over all patches of the wheel, in track axes and with the normal forces; for the contact `profiles` only.
     /// The lateral velocity is found at which the rail carries it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub force_y_n: Option<f64>,
     /// Rate of the yaw in rad/s; 0 when left out.
     #[schema(required = false)]
@@ -131,31 +114,21 @@ pub struct Wheelset {
 }
 
 /// Values of the motion's components. A component left out is 0.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Sweep {
     /// Longitudinal creepage.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub creepage_x: Option<Swept>,
     /// Lateral creepage.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub creepage_y: Option<Swept>,
     /// Spin in 1/mm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub spin_per_mm: Option<Swept>,
     /// Longitudinal force on the lower body in N, in place of `creepage_x`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub force_x_n: Option<Swept>,
     /// Lateral force on the lower body in N, in place of `creepage_y`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub force_y_n: Option<Swept>,
     /// Rolling speed in mm/s, the same for all motions; only temperatures, Archard's wear and friction that falls with slip depend on it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub speed_mm_per_s: Option<f64>,
     /// `together` (default): all components that vary have the same number of values, and motion n has value n of each; `grid`: every
     /// combination of values. In a grid, the last component of this list varies fastest; a force takes the position of the creepage it

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use railhead_macros::none_is_absent;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -18,11 +19,10 @@ use crate::contact::case::words::subsurface::SubsurfaceWords;
 use crate::contact::case::words::thermal::ThermalWords;
 
 /// One contact case: two bodies, how they are pressed together and how they roll.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Case {
     /// Free text for people, at most 200 characters, none of them a control character.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub name: Option<String>,
     /// Free key–value pairs to find the case again, at most 32 of them, without control characters; no key has a colon.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
@@ -35,8 +35,6 @@ pub struct Case {
     /// Where and how the bodies touch.
     pub contact: Contact,
     /// How hard they are pressed together; needed unless the contact carries its own pressure.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub load: Option<Load>,
     /// One motion, a list of motions, or a sweep.
     pub motion: Motions,
@@ -47,15 +45,9 @@ pub struct Case {
     #[schema(required = false)]
     pub outputs: Vec<Output>,
     /// Where stresses below the surface are computed; for the output `subsurface`, which finds the worst point without it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub subsurface: Option<SubsurfaceWords>,
     /// Damage models for the output `damage`. When left out, the models with confirmed parameters are evaluated.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub damage: Option<DamageWords>,
     /// What the bodies do with heat; for the output `temperature`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub thermal: Option<ThermalWords>,
 }

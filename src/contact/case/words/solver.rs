@@ -1,9 +1,11 @@
 //! How to solve, how exactly, and what to compute.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// How to solve, and how exactly.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema)]
 pub struct Solver {
     /// The method.
@@ -13,25 +15,17 @@ pub struct Solver {
     ///
     /// Most cases reach 0.001, few 1e-4. One that ends above its target has `target_met: false` and the remark `target-missed`. 0.005 when
     /// left out, except for `fastsim`: its stated error is fixed, so that it has no target, and no `target_met`, unless one is given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, minimum = 0.0001, maximum = 0.5)]
+    #[schema(minimum = 0.0001, maximum = 0.5)]
     pub target_error: Option<f64>,
     /// What the allowed error is relative to; `friction_limit` when left out. With `force` a motion is solved again until its error is
     /// `target_error` of its own tangential force, but at most to 1e-4 of μN. Not allowed with `mesh` and for histories.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub relative_to: Option<RelativeToName>,
     /// An explicit mesh instead of a target.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub mesh: Option<MeshSizeWords>,
     /// The bound of the tractions in `fastsim`; `elliptic` when left out. Not allowed for other methods.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub traction_bound: Option<TractionBoundName>,
     /// Give up after this many seconds of solving.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub time_limit_s: Option<f64>,
 }
 

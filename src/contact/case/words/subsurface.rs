@@ -1,28 +1,22 @@
 //! Where stresses below the surface are asked for.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// Where stresses below the surface are asked for, in the axes of the patch: x along rolling, y to the left, depth positive into the
 /// body. At most one of `points_mm`, `along_depth_at_mm` and `plane`; without any, only the worst point is found.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = Subsurface)]
 pub struct SubsurfaceWords {
     /// Points `[x, y, depth]` in mm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub points_mm: Option<Vec<[f64; 3]>>,
     /// The line straight down from `[x, y]` in mm, or below the `"worst"` point of the patch; needs `depths_mm`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub along_depth_at_mm: Option<DepthLineAt>,
     /// Depths on that line in mm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub depths_mm: Option<Vec<f64>>,
     /// A grid of points, usually in a plane.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub plane: Option<StressGrid>,
     /// The body: `lower` when left out.
     #[schema(required = false)]
@@ -31,8 +25,6 @@ pub struct SubsurfaceWords {
     #[schema(required = false)]
     pub worst: bool,
     /// Judge what a point of the body lives through while the contact rolls over it: Dang Van's criterion and shakedown.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub passage: Option<PassageWords>,
 }
 

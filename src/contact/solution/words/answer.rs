@@ -3,6 +3,7 @@
 //! Forces and tractions act on the lower body (body 2, the rail). Frame: x along rolling (the leading edge is at the
 //! larger x), y to the left, z up; moments and spin refer to [`Solution::origin`].
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -16,6 +17,7 @@ use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileUnce
 use crate::contact::solution::words::wheelset::WheelsetAnswer;
 
 /// The answer to one case, without fields.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Solution {
     /// One entry per contact patch.
@@ -26,24 +28,18 @@ pub struct Solution {
     #[serde(default)]
     pub remarks: Vec<RemarkEntry>,
     /// How region and pressure were found; absent where they were known beforehand. Of several motions of bodies that differ, those of the first.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub normal: Option<NormalReport>,
     /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`. Where bodies differ, it is that of a wheel
     /// without tractions.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub wheel_lowering_mm: Option<f64>,
     /// Angular velocity of the wheelset in rad/s, found for the longitudinal force that was prescribed; only for `profiles` with `wheelset.force_x_n`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub angular_velocity_rad_per_s: Option<f64>,
     /// Velocity of the wheelset's centre to the left in mm/s, found for the lateral force that was prescribed; only for `profiles` with `wheelset.force_y_n`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub lateral_velocity_mm_per_s: Option<f64>,
     /// The positions of the wheelset and its kinematics; only for `wheelset`. `total` then has one entry per position, and every patch
     /// belongs to one side of one position.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub wheelset: Option<Box<WheelsetAnswer>>,
     /// The point that rigid slip and moments refer to, and where it is.
     pub origin: Origin,
@@ -56,16 +52,13 @@ pub struct Solution {
     /// Digest of the canonical case; equal cases have equal digests.
     pub case_digest: String,
     /// What of the case is needed to read the numbers.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub asked: Option<Asked>,
     /// The figures that damage was computed with; only with the output `damage`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub damage_parameters: Option<Box<DamageFiguresUsed>>,
 }
 
 /// What of a case is needed to read its answer.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Asked {
     /// The `type` of the contact.
@@ -77,8 +70,6 @@ pub struct Asked {
     #[schema(required = false)]
     pub friction_varies: bool,
     /// The load; absent where the case has none.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub load: Option<Load>,
 }
 
@@ -127,31 +118,30 @@ pub struct CombinedMaterial {
 
 /// One contact patch with its answers for every motion. Of several motions of bodies that differ its numbers are those of the first; every
 /// point has its own in `region`.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PatchSolution {
     /// Normal force in N.
     pub normal_force_n: f64,
     /// The largest tangential force that friction allows, in N.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub friction_limit_n: Option<f64>,
     /// Approach of distant points in mm; absent where the pressure was given.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub approach_mm: Option<f64>,
     /// Contact area in mm².
     pub area_mm2: f64,
     /// Largest pressure in MPa.
     pub pressure_max_mpa: f64,
     /// Semi-axes along and across rolling in mm; only for elliptic patches.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub semi_axes_mm: Option<[f64; 2]>,
     /// Extent of the patch `[x_min, x_max, y_min, y_max]` in mm.
     pub extent_mm: [f64; 4],
     /// Where the patch lies on wheel and rail; only for `profiles`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub position: Option<Position>,
     /// How far the points of the profiles can be trusted here; only for `profiles`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub quality: Option<PatchQuality>,
     /// One entry per motion, in the order of the case.
     pub points: Vec<PointSolution>,
@@ -178,6 +168,7 @@ pub struct Position {
 }
 
 /// The tangential answer of one patch for one motion.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PointSolution {
     /// The motion this belongs to.
@@ -191,35 +182,30 @@ pub struct PointSolution {
     /// Moment about the origin on the lower body in N·mm.
     pub moment_z_n_mm: f64,
     /// Estimated absolute errors of the three resultants; null where there is nothing to estimate them from.
+    #[or_null]
     pub error_estimate: Option<ErrorEstimate>,
     /// Force of the patch on the lower body in N in track axes, `[x, y, z]`, with the normal force; only for `profiles` and `wheelset`. On the curve of a rail pressures and
     /// tractions of a patch have several directions, so that their sum does not follow from `normal_force_n` and the contact angle.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub force_track_n: Option<[f64; 3]>,
     /// What the measurement of the profiles leaves open; only for `profiles`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub profile_uncertainty: Option<ProfileUncertainty>,
     /// Area that sticks in mm²; absent unless zones were asked for. The method `table` always gives it, right to some hundredths of the
     /// area.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub stick_area_mm2: Option<f64>,
     /// Area that slips in mm²; absent unless zones were asked for, but for `table`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub slip_area_mm2: Option<f64>,
     /// Derivatives of the three resultants; absent unless asked for.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub gradients: Option<Box<Gradients>>,
     /// Number of cells that stick; absent unless zones were asked for.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub stick_cells: Option<u32>,
     /// Number of cells that slip; absent unless zones were asked for.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub slip_cells: Option<u32>,
     /// Largest tangential traction in MPa; absent without a mesh.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub traction_max_mpa: Option<f64>,
     /// Tγ: dissipated power divided by rolling speed, ν_x F_x + ν_y F_y + φ M_z, in N (J/m); of a history the sum over the cells at this
     /// point, where elastic energy grows or falls besides, and 0 of a shift.
@@ -229,44 +215,31 @@ pub struct PointSolution {
     /// How this point was computed.
     pub solver: SolverReport,
     /// The error estimate is not larger than the target; absent with an explicit mesh.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
+    #[schema(nullable = true)]
     pub target_met: Option<bool>,
     /// A prescribed force could not be reached.
     pub saturated: bool,
     /// What a history adds: the distance, shifts, and what was dissipated; only of `motion.history`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub history: Option<HistoryPoint>,
     /// Stresses below the surface in short; only with the output `subsurface`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub subsurface: Option<SubsurfaceSummary>,
     /// Damage of one pass; only with the output `damage`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub damage: Option<Box<Damage>>,
     /// Temperatures in short; only with the output `temperature`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub temperature: Option<TemperatureSummary>,
     /// Region and pressure under this motion; only of several motions of bodies that differ, whose tractions change both.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub region: Option<Box<MotionRegion>>,
 }
 
 /// Region and pressure of a patch under one motion.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct MotionRegion {
     /// Normal force in N.
     pub normal_force_n: f64,
     /// The largest tangential force that friction allows, in N.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub friction_limit_n: Option<f64>,
     /// Approach of distant points in mm.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub approach_mm: Option<f64>,
     /// Contact area in mm².
     pub area_mm2: f64,
@@ -277,37 +250,24 @@ pub struct MotionRegion {
 }
 
 /// A point of a history.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct HistoryPoint {
     /// Distance rolled since the start in mm.
     pub distance_mm: f64,
     /// Displacement of the upper body against the lower one along x from the point before, in mm; only where the bodies did not roll.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub shift_x_mm: Option<f64>,
     /// The same along y.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub shift_y_mm: Option<f64>,
     /// Turn about z in rad; only where the bodies did not roll.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub turn_rad: Option<f64>,
     /// Estimated absolute error of `creepage_x`; only where its force was prescribed.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub creepage_x_error: Option<f64>,
     /// The same of `creepage_y`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub creepage_y_error: Option<f64>,
     /// Estimated absolute error of `shift_x_mm`; only where its force was prescribed.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub shift_x_error_mm: Option<f64>,
     /// The same of `shift_y_mm`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub shift_y_error_mm: Option<f64>,
     /// What friction has dissipated since the start in this patch, in N·mm.
     pub dissipated_n_mm: f64,
@@ -350,6 +310,7 @@ impl ErrorEstimate {
 
 /// Derivatives of the resultants of a patch at constant region and pressure, each by `[creepage_x, creepage_y, spin_per_mm]`: the creep
 /// coefficients.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct Gradients {
     /// Of `force_x_n`, in N, N and N·mm.
@@ -360,16 +321,13 @@ pub struct Gradients {
     pub moment_z_n_mm: [f64; 3],
     /// Of the three resultants by the normal force at constant creepages: dimensionless, dimensionless and in mm. Only of Hertz contacts
     /// of like bodies with a constant coefficient and without a layer, whose patch grows with the load.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub by_normal_force: Option<[f64; 3]>,
     /// Estimated absolute errors; absent for the method `table`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub error_estimate: Option<GradientErrors>,
 }
 
 /// Absolute errors of gradients, each in the unit of its quantity.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct GradientErrors {
     /// Of `force_x_n`.
@@ -379,19 +337,16 @@ pub struct GradientErrors {
     /// Of `moment_z_n_mm`.
     pub moment_z_n_mm: [f64; 3],
     /// Of `by_normal_force`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub by_normal_force: Option<[f64; 3]>,
 }
 
 /// How a point was computed.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SolverReport {
     /// The method that gave the resultants. With `auto` it may be `table`; values per cell are then those of `boundary_element` on `mesh`.
     pub method: MethodName,
     /// The finest mesh: strips of this patch, cells along x in each; absent where none was needed.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub mesh: Option<MeshReport>,
     /// Newton iterations over all levels and rules.
     pub iterations: u32,

@@ -1,5 +1,6 @@
 //! What a solved contact does to the surfaces, as the client reads it.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -8,51 +9,35 @@ use crate::contact::case::words::damage::{
 };
 
 /// A number with the interval that the errors of its inputs leave; without an estimate of these there is none.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Ranged {
     /// The number.
     pub value: f64,
     /// Least value.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub low: Option<f64>,
     /// Largest value.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub high: Option<f64>,
 }
 
 /// Damage of one pass over one patch: what the case asked for. Depths are of the body that is passed once.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = DamageAnswer)]
 pub struct Damage {
     /// Friction power over rolling speed.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub t_gamma: Option<TGamma>,
     /// Wear by the power per area.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub usfd_wear: Option<UsfdWear>,
     /// Wear by Archard's law.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub archard_wear: Option<ArchardWear>,
     /// Rolling contact fatigue by the Whole Life Rail Model.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub wlrm: Option<RailFatigue>,
     /// Surface fatigue index.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub surface_fatigue_index: Option<SurfaceFatigue>,
     /// Place on the shakedown map.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub shakedown: Option<ShakedownPlace>,
     /// Wear strip by strip.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub across: Option<WearAcross>,
 }
 
@@ -119,6 +104,7 @@ pub struct RailFatigue {
 }
 
 /// Surface fatigue index.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SurfaceFatigue {
     /// Tangential over normal force.
@@ -126,8 +112,6 @@ pub struct SurfaceFatigue {
     /// Utilisation less 2 A k/(3 N), with the area A, the yield in shear k and the normal force N: above 0 the surface ratchets.
     pub index: Ranged,
     /// Largest traction less the yield in shear, in MPa: above 0 the surface ratchets there. Absent from methods without tractions.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub traction_excess_mpa: Option<f64>,
 }
 
@@ -147,6 +131,7 @@ pub struct ShakedownPlace {
 }
 
 /// Wear strip by strip, from smaller to larger y.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct WearAcross {
     /// Middle of the strip in mm.
@@ -156,20 +141,12 @@ pub struct WearAcross {
     /// Friction power over rolling speed per width, in N/mm; its sum over the strips, times their widths, is Tγ with spin.
     pub t_gamma_n_per_mm: Vec<f64>,
     /// Depth of one pass by the wear map, in nm.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub usfd_depth_nm: Option<Vec<f64>>,
     /// Depth of one pass by Archard's law, in nm.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub archard_depth_nm: Option<Vec<f64>>,
     /// Its parts from cells where wear is mild, severe, and catastrophic.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub usfd_regimes_nm: Option<Vec<[f64; 3]>>,
     /// The parts of Archard's depth from cells where wear is mild, severe, and seizure.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub archard_regimes_nm: Option<Vec<[f64; 3]>>,
 }
 

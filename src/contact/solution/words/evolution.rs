@@ -1,5 +1,6 @@
 //! The answer of an evolution, and the state between two of its steps.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -29,26 +30,22 @@ pub struct EvolutionAnswer {
 }
 
 /// Progress of an evolution.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = EvolutionProgress)]
 pub struct Progress {
     /// Fraction of the extent that is done.
     pub share: f64,
     /// Traffic over the rail in million gross tonnes; absent where only the wheel wears.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub mgt: Option<f64>,
     /// Axles over the rail.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub axle_passes: Option<f64>,
     /// Distance of the wheel in km; absent where only the rail wears.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub wheel_distance_km: Option<f64>,
 }
 
 /// The profiles and their contact at one time.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EvolutionRecord {
     /// When.
@@ -62,8 +59,6 @@ pub struct EvolutionRecord {
     /// Losses against the sections at the start.
     pub losses: WearLosses,
     /// Equivalent conicity (EN 15302) at 3 mm of a wheelset with this wheel on both sides of a track of this rail; absent where it has none.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub conicity: Option<f64>,
     /// The contact over all states.
     pub contact: ContactRange,
@@ -119,6 +114,7 @@ pub struct ContactRange {
 }
 
 /// The contact of one state.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct StateContact {
     /// Share of the traffic.
@@ -128,8 +124,6 @@ pub struct StateContact {
     /// Its patches; none where it was not solved.
     pub patches: Vec<StatePatch>,
     /// Why it was not solved.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub failure: Option<String>,
 }
 
@@ -175,6 +169,7 @@ pub struct TrafficState {
 }
 
 /// When a limit is reached.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct LimitReached {
     /// The loss, as `limits` names it.
@@ -182,16 +177,10 @@ pub struct LimitReached {
     /// The limit in mm.
     pub limit_mm: f64,
     /// When; absent where the extent ends before.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub reached: Option<Progress>,
     /// The earliest time within the uncertainty of the loss.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub earliest: Option<Progress>,
     /// The latest time within it; absent where the extent ends before.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub latest: Option<Progress>,
 }
 

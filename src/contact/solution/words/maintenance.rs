@@ -1,5 +1,6 @@
 //! What follows from a solved contact, as the client reads it: stresses below the surface, damage and temperatures.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -46,6 +47,7 @@ pub struct StressPoint {
 }
 
 /// Summary of the stresses below a patch. `/subsurface` returns the stresses at the requested points.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SubsurfaceSummary {
     /// The body whose stresses these are.
@@ -54,21 +56,16 @@ pub struct SubsurfaceSummary {
     /// evaluated at this depth.
     pub least_depth_mm: f64,
     /// Where von Mises' stress is largest; absent unless it was asked for.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub worst: Option<StressPoint>,
     /// What a point of the body lives through while the contact rolls over it; absent unless it was asked for.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub passage: Option<PassageSummary>,
 }
 
 /// The worst places of a passage of the contact in steady rolling. A place is a line along x; stresses belong to all of its history.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct PassageSummary {
     /// Where Dang Van's stress is largest; absent without a slope.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub dang_van: Option<PassagePlace>,
     /// Smallest yield stress in shear (von Mises) with which nothing yields although there is no residual stress.
     pub yield_without_residual: PassagePlace,

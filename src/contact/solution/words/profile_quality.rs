@@ -1,5 +1,6 @@
 //! The quality of the profiles as the client reads it.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -16,6 +17,7 @@ pub struct PatchQuality {
 
 /// What the points of a profile are like under a patch. Waviness and ambiguity are pressures, comparable with that of the patch: the
 /// pressure that would flatten the difference between two interpolations of the same points.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ProfileQuality {
     /// The part of the profile under the patch, from and to y in mm (y to the field side, as `position` has it).
@@ -26,8 +28,6 @@ pub struct ProfileQuality {
     /// adds a remark and a value of at least 1.5 fails the job.
     pub spacing_over_width: f64,
     /// Standard deviation of the noise of the points along the normal in µm; absent where they lie too far apart to tell.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub noise_um: Option<f64>,
     /// Root mean square of the pressure that flattens waves shorter than twice the smoothing or 3 mm, in MPa.
     pub waviness_mpa: f64,
@@ -35,8 +35,6 @@ pub struct ProfileQuality {
     /// with a smoothing. The job fails if this reaches half of the largest pressure.
     pub ambiguity_mpa: f64,
     /// Length in mm of a stretch without points near the contact where the bodies may touch as well; absent if there is none.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub hole_mm: Option<f64>,
     /// Smoothing in use, in mm; 0 for none.
     pub smoothing_mm: f64,
@@ -45,6 +43,7 @@ pub struct ProfileQuality {
 }
 
 /// What is known of a profile before its contact is.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct SectionQuality {
     /// Points in use.
@@ -56,12 +55,8 @@ pub struct SectionQuality {
     /// Where that is, from and to y in mm.
     pub y_mm: [f64; 2],
     /// Standard deviation of the noise of the points along the normal in µm; absent where they lie too far apart to tell.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub noise_um: Option<f64>,
     /// Step in mm of which all heights are multiples, if it is 0.001 mm or more.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(nullable = false)]
     pub rounding_mm: Option<f64>,
     /// Smoothing in use, in mm; 0 for none. That of `auto` is settled when the pressure is known.
     pub smoothing_mm: f64,

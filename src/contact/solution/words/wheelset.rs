@@ -1,16 +1,16 @@
 //! The answer for a wheelset as the client reads it: its positions, and what it does as a rigid body over a range of shifts.
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// What is answered of a wheelset beside its patches.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct WheelsetAnswer {
     /// One entry per position, in the order of the case.
     pub positions: Vec<WheelsetPosition>,
     /// The rigid wheelset over a range of shifts; only if `kinematics` was asked for.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub kinematics: Option<Box<Kinematics>>,
 }
 
@@ -59,6 +59,7 @@ pub struct WheelOnRail {
 }
 
 /// A rigid wheelset without yaw over a range of shifts; lists have one entry per shift.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Kinematics {
     /// Shifts to the left in mm. They end where a wheel leaves its rail or touches at the end of a cross-section.
@@ -82,20 +83,14 @@ pub struct Kinematics {
     pub right: TouchLine,
     /// The shift in mm nearest to 0 at which Δr rises through 0: where a free wheelset runs on straight track. The middle of the shifts at which
     /// Δr is 0, if there are several. Absent if there is none.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub equilibrium_shift_mm: Option<f64>,
     /// How much this shift changes with another reading of the cross-sections, in mm.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub equilibrium_uncertainty_mm: Option<f64>,
     /// Distance across of the two places of contact in mm, at the shift nearest to the equilibrium, else to 0.
     pub contact_distance_mm: f64,
     /// Equivalent conicity, one entry per amplitude of the case.
     pub conicity: Vec<EquivalentConicity>,
     /// Why the shifts or values of the lists end early, or why there is no equilibrium.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub reason: Option<String>,
 }
 
@@ -113,45 +108,28 @@ pub struct TouchLine {
 }
 
 /// The equivalent conicity tan γ at one amplitude. `reason` explains every absent member.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EquivalentConicity {
     /// Half the distance of the turning points in mm.
     pub amplitude_mm: f64,
     /// tan γ of EN 15302, by integration of the wheelset's equation of motion with Δr of the level axle. 0 where Δr is 0 over the whole
     /// amplitude.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub conicity: Option<f64>,
     /// tan γ from Δr with the roll. Of a cone the roll adds some percent to the cone's own tangent.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub conicity_with_roll: Option<f64>,
     /// Deprecated name of `conicity`.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub conicity_without_roll: Option<f64>,
     /// tan γ by harmonic linearisation of Δr between the same turning points.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub conicity_harmonic: Option<f64>,
     /// Error of `conicity` from the distance of the shifts.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub error_estimate: Option<f64>,
     /// How much `conicity` changes with another reading of the cross-sections.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub profile_uncertainty: Option<f64>,
     /// Wavelength of the motion in mm.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub wavelength_mm: Option<f64>,
     /// Shifts in mm at which the motion turns.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub turns_mm: Option<[f64; 2]>,
     /// Why members are absent.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    #[schema(nullable = false)]
     pub reason: Option<String>,
 }
