@@ -25,7 +25,12 @@ pub fn none_is_absent(_: TokenStream, item: TokenStream) -> TokenStream {
 
 fn omit_none(field: &mut Field) {
     let Type::Path(path) = &field.ty else { return };
-    if path.path.segments.last().is_none_or(|it| it.ident != "Option") {
+    if path
+        .path
+        .segments
+        .last()
+        .is_none_or(|it| it.ident != "Option")
+    {
         return;
     }
     let or_null = |it: &Attribute| it.path().is_ident("or_null");

@@ -3,6 +3,7 @@
 /// Modules in the order in which they may use each other: each only those before it and its own kind. The longest entry that fits a module
 /// counts; an entry for a whole room fits its page only.
 const ORDER: &[&str] = &[
+    "macros::lib",
     "contact::conventions",
     "contact::monitor",
     "contact::remark",

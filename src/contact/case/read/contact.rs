@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, shown};
+use crate::contact::case::read::object::{Object, names, shown};
 use crate::contact::case::read::samples::{SampleQuantity, axis, line, samples};
 use crate::contact::case::read::wheel_rail;
 use crate::contact::case::read::wheelset;
@@ -51,11 +51,10 @@ const KINDS: [(&str, ContactWord); 7] = [
 /// Reads the required member `contact` of a case.
 pub(crate) fn read(case: &mut Object) -> Option<Contact> {
     let mut block = case.child("contact")?;
-    let words = KINDS.map(|(word, _)| word).join(", ");
-    block.required("type", &format!("one of {words}"))?;
-    match block.word("type", &KINDS, &[])? {
+    block.required("type", &format!("one of {}", names(&KINDS)))?;
+    match block.word("type", &KINDS)? {
         ContactWord::Radii => {
-            block.only(&["type", "rolling_mm", "lateral_mm"], &[]);
+            block.only(&["type", "rolling_mm", "lateral_mm"]);
             let rolling_mm = block.required_number("rolling_mm", RADIUS);
             let lateral_mm = block.required_number("lateral_mm", RADIUS);
             Some(Contact::Radii {
@@ -64,7 +63,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
             })
         }
         ContactWord::Ellipse => {
-            block.only(&["type", "a_mm", "b_mm"], &[]);
+            block.only(&["type", "a_mm", "b_mm"]);
             let a_mm = block.required_number("a_mm", SEMI_AXIS);
             let b_mm = block.required_number("b_mm", SEMI_AXIS);
             Some(Contact::Ellipse {
@@ -73,7 +72,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
             })
         }
         ContactWord::GapProfile => {
-            block.only(&["type", "rolling_mm", "y_mm", "gap_mm"], &[]);
+            block.only(&["type", "rolling_mm", "y_mm", "gap_mm"]);
             let rolling_mm = block.required_number("rolling_mm", RADIUS);
             let y_mm = axis(&mut block, "y_mm");
             let points = given(&block, "y_mm");
@@ -85,7 +84,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
             })
         }
         ContactWord::GapGrid => {
-            block.only(&["type", "x_mm", "y_mm", "gap_mm"], &[]);
+            block.only(&["type", "x_mm", "y_mm", "gap_mm"]);
             let (x_mm, y_mm, gap_mm) = grid(&mut block, GAP);
             Some(Contact::GapGrid {
                 x_mm: x_mm?,
@@ -94,7 +93,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
             })
         }
         ContactWord::PressureGrid => {
-            block.only(&["type", "x_mm", "y_mm", "pressure_mpa"], &[]);
+            block.only(&["type", "x_mm", "y_mm", "pressure_mpa"]);
             let (x_mm, y_mm, pressure_mpa) = grid(&mut block, PRESSURE);
             Some(Contact::PressureGrid {
                 x_mm: x_mm?,
@@ -127,7 +126,7 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
     }
     let mut block = case.child("load")?;
     let names = if of_profiles { &LOADS[..] } else { &LOADS[1..] };
-    block.only(names, &LOADS[..1]);
+    block.only_or(names, &LOADS[..1]);
     if !of_profiles && let Some(value) = block.value(LOADS[0]) {
         let value = shown(value);
         block.fault(
@@ -142,28 +141,16 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
         "approach_mm",
         if of_gap { APPROACH_OF_GAP } else { APPROACH },
     );
-    let given: Vec<&str> = names
-        .iter()
-        .copied()
-        .filter(|name| block.has(name))
-        .collect();
-    match given.as_slice() {
+    let all = names.join(", ");
+    match block.given(names)[..] {
         [] => {
-            block.fault_here(format!(
-                "empty; exactly one of {} is needed",
-                names.join(", ")
-            ));
+            block.fault_here(format!("empty; exactly one of {all} is needed"));
             return None;
         }
         [_] => {}
         [first, second, ..] => {
-            block.fault(
-                second,
-                format!(
-                    "given together with {first}; exactly one of {} is allowed",
-                    names.join(", ")
-                ),
-            );
+            let detail = format!("given together with {first}; exactly one of {all} is allowed");
+            block.fault(second, detail);
             return None;
         }
     }

@@ -3,8 +3,7 @@
 use serde_json::Value;
 
 use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, join, number, shown, word};
-use crate::contact::case::read::subsurface::{flag, optional};
+use crate::contact::case::read::object::{Object, join, names, number, word};
 use crate::contact::case::words::damage::{
     ArchardFigures, DamageModel, DamageParameterWords, DamageSetName, DamageWords,
     OwnDamageFigures, UsfdFigures, WlrmFigures,
@@ -48,10 +47,10 @@ pub(crate) fn read(
         return None;
     }
     let mut block = case.child("damage")?;
-    block.only(&["models", "parameters", "across"], &[]);
-    let models = optional(&mut block, "models", models);
-    let parameters = optional(&mut block, "parameters", parameters);
-    let across = optional(&mut block, "across", flag);
+    block.only(&["models", "parameters", "across"]);
+    let models = block.optional("models", models);
+    let parameters = block.optional("parameters", parameters);
+    let across = block.optional("across", Object::flag);
     if without_fields && across == Some(Some(true)) {
         let detail =
             "true given; the method has no values per cell that wear across the patch is made from";
@@ -66,20 +65,11 @@ pub(crate) fn read(
 }
 
 fn models(block: &mut Object, name: &str) -> Option<Vec<DamageModel>> {
-    let value = block.value(name)?;
-    let elements = value.as_array().filter(|elements| !elements.is_empty());
-    let Some(elements) = elements else {
-        let words = MODELS.map(|(word, _)| word).join(", ");
-        let detail = format!(
-            "{} given; an array with at least one of {words} is needed",
-            shown(value)
-        );
-        block.fault(name, detail);
-        return None;
-    };
+    let what = format!("an array with at least one of {}", names(&MODELS));
+    let elements = block.array(name, 1..=usize::MAX, &what)?;
     let pointer = block.pointer_to(name);
     let faults = block.faults();
-    let one = |(k, element)| word(element, &join(&pointer, k), &MODELS, &[], faults);
+    let one = |(k, element)| word(element, &join(&pointer, k), &MODELS, faults);
     let read: Vec<Option<DamageModel>> = elements.iter().enumerate().map(one).collect();
     let mut models: Vec<DamageModel> = read.into_iter().collect::<Option<_>>()?;
     models.sort_unstable();
@@ -91,9 +81,7 @@ fn parameters(block: &mut Object, name: &str) -> Option<DamageParameterWords> {
     if matches!(block.value(name)?, Value::Object(_)) {
         return own(&mut block.child(name)?).map(|own| DamageParameterWords::Own(Box::new(own)));
     }
-    block
-        .word(name, &SETS, &[])
-        .map(DamageParameterWords::Named)
+    block.word(name, &SETS).map(DamageParameterWords::Named)
 }
 
 fn own(block: &mut Object) -> Option<OwnDamageFigures> {
@@ -105,21 +93,13 @@ fn own(block: &mut Object) -> Option<OwnDamageFigures> {
         "archard",
         "wlrm",
     ];
-    block.only(&names, &[]);
-    let density = optional(block, "density_kg_per_m3", |block, name| {
-        block.number(name, DENSITY)
-    });
-    let shear_yield = optional(block, "shear_yield_mpa", |block, name| {
-        block.number(name, STRESS)
-    });
-    let hardness = optional(block, "hardness_mpa", |block, name| {
-        block.number(name, STRESS)
-    });
-    let usfd = optional(block, "usfd", |block, name| usfd(&mut block.child(name)?));
-    let archard = optional(block, "archard", |block, name| {
-        archard(&mut block.child(name)?)
-    });
-    let wlrm = optional(block, "wlrm", |block, name| wlrm(&mut block.child(name)?));
+    block.only(&names);
+    let density = block.optional_number("density_kg_per_m3", DENSITY);
+    let shear_yield = block.optional_number("shear_yield_mpa", STRESS);
+    let hardness = block.optional_number("hardness_mpa", STRESS);
+    let usfd = block.optional("usfd", |block, name| usfd(&mut block.child(name)?));
+    let archard = block.optional("archard", |block, name| archard(&mut block.child(name)?));
+    let wlrm = block.optional("wlrm", |block, name| wlrm(&mut block.child(name)?));
     Some(OwnDamageFigures {
         density_kg_per_m3: density?,
         shear_yield_mpa: shear_yield?,
@@ -137,7 +117,7 @@ fn usfd(block: &mut Object) -> Option<UsfdFigures> {
         "severe_until",
         "catastrophic_slope",
     ];
-    block.only(&names, &[]);
+    block.only(&names);
     let [slope, mild, severe, steep] = names.map(|name| block.required_number(name, FIGURE));
     let figures = UsfdFigures {
         mild_slope: slope?,
@@ -161,7 +141,7 @@ fn archard(block: &mut Object) -> Option<ArchardFigures> {
         "speeds_mm_per_s",
         "seizure_pressure",
     ];
-    block.only(&names, &[]);
+    block.only(&names);
     let pairs = [0, 1, 2, 3].map(|k| pair(block, names[k]));
     let seizure_pressure = block.required_number(names[4], FIGURE);
     let [mild, severe, seizure, speeds_mm_per_s] = pairs;
@@ -176,7 +156,7 @@ fn archard(block: &mut Object) -> Option<ArchardFigures> {
 
 fn wlrm(block: &mut Object) -> Option<WlrmFigures> {
     let names = ["threshold_n", "peak_at_n", "zero_at_n", "peak"];
-    block.only(&names, &[]);
+    block.only(&names);
     let [threshold, peak_at, zero_at, peak] = names.map(|name| block.required_number(name, FIGURE));
     let figures = WlrmFigures {
         threshold_n: threshold?,
@@ -194,10 +174,7 @@ fn pair(block: &mut Object, name: &str) -> Option<[f64; 2]> {
     let value = block.required(name, "[low, high]")?;
     let pointer = block.pointer_to(name);
     let Some([low, high]) = value.as_array().map(Vec::as_slice) else {
-        block.fault(
-            name,
-            format!("{} given; [low, high] is needed", shown(value)),
-        );
+        block.mistaken(name, "[low, high]");
         return None;
     };
     let faults = block.faults();

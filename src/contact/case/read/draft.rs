@@ -124,23 +124,20 @@ impl CaseDraft {
 }
 
 fn read(case: &mut Object) -> CaseDraft {
-    case.only(
-        &[
-            "name",
-            "labels",
-            "material",
-            "friction",
-            "contact",
-            "load",
-            "motion",
-            "solver",
-            "outputs",
-            "subsurface",
-            "damage",
-            "thermal",
-        ],
-        &[],
-    );
+    case.only(&[
+        "name",
+        "labels",
+        "material",
+        "friction",
+        "contact",
+        "load",
+        "motion",
+        "solver",
+        "outputs",
+        "subsurface",
+        "damage",
+        "thermal",
+    ]);
     let name = case.line("name", NAME_LENGTH_MAX);
     let labels = labels(case);
     let material = material::read(case);

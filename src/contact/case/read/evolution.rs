@@ -4,7 +4,6 @@ use serde_json::Value;
 
 use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::object::{Object, join, number, shown};
-use crate::contact::case::read::subsurface::optional;
 use crate::contact::case::read::wheel_rail::section_of;
 use crate::contact::case::words::damage::DamageModel;
 use crate::contact::case::words::evolution::{
@@ -66,12 +65,12 @@ impl EvolutionWords {
 // A faulty member is read as if it were left out: the fault refuses the evolution.
 
 fn words(all: &mut Object) -> Option<EvolutionWords> {
-    all.only(&MEMBERS, &[]);
+    all.only(&MEMBERS);
     let template = all.required("template", "a case of one motion").cloned();
     let traffic = all.child("traffic").and_then(traffic);
-    let wearing = all.word("wearing", &BODIES, &[]).unwrap_or_default();
+    let wearing = all.word("wearing", &BODIES).unwrap_or_default();
     let extent = all.child("extent").map(|block| extent(block, wearing));
-    let wear_model = all.word("wear_model", &MODELS, &[]);
+    let wear_model = all.word("wear_model", &MODELS);
     let factor = AllowedRange::closed(1.0, 100.0, "");
     Some(EvolutionWords {
         wearing,
@@ -103,7 +102,7 @@ fn count_or(block: &mut Object, name: &str, most: u32, usual: u32) -> u32 {
 }
 
 fn extent(mut block: Object, wearing: WearingBodies) -> EvolutionExtent {
-    block.only(&["mgt", "axle_passes", "wheel_distance_km"], &[]);
+    block.only(&["mgt", "axle_passes", "wheel_distance_km"]);
     let [rail, wheel] = wearing.flags();
     if block.has("mgt") && block.has("axle_passes") {
         block.fault("axle_passes", "given together with mgt; give one of them");
@@ -131,7 +130,7 @@ fn accuracy(mut block: Object) -> EvolutionAccuracy {
         "smoothing_mm",
     ];
     let all = &mut block;
-    all.only(&names, &[]);
+    all.only(&names);
     let usual = EvolutionAccuracy::default();
     let depth = AllowedRange::positive(1.0, "mm");
     let kernel = AllowedRange::closed(0.0, 5.0, "mm");
@@ -146,7 +145,7 @@ fn accuracy(mut block: Object) -> EvolutionAccuracy {
 }
 
 fn limits(mut block: Object) -> WearLosses {
-    block.only(&WearLosses::default().named().map(|(name, _)| name), &[]);
+    block.only(&WearLosses::default().named().map(|(name, _)| name));
     WearLosses {
         height_mm: block.number("height_mm", LOSS),
         gauge_face_mm: block.number("gauge_face_mm", LOSS),
@@ -171,7 +170,7 @@ fn events(all: &mut Object) -> Option<Vec<EvolutionEvent>> {
 
 fn event(mut block: Object) -> Option<EvolutionEvent> {
     let kinds = ["grind", "reprofile", "friction_coefficient"];
-    block.only(&["at", kinds[0], kinds[1], kinds[2], "depth_mm"], &[]);
+    block.only(&["at", kinds[0], kinds[1], kinds[2], "depth_mm"]);
     if kinds.iter().all(|kind| !block.has(kind)) {
         block.fault_here(format!("nothing happens; give one of {}", kinds.join(", ")));
     }
@@ -188,8 +187,8 @@ fn event(mut block: Object) -> Option<EvolutionEvent> {
 }
 
 fn traffic(mut block: Object) -> Option<Traffic> {
-    block.only(&["columns", "passes", "samples"], &[]);
-    let samples = optional(&mut block, "samples", |block, name| {
+    block.only(&["columns", "passes", "samples"]);
+    let samples = block.optional("samples", |block, name| {
         block.required_count(name, 1, ROWS_MAX)
     })?;
     let value = block.required("columns", "an object of columns")?;
@@ -242,7 +241,7 @@ fn traffic(mut block: Object) -> Option<Traffic> {
 }
 
 fn distribution(mut block: Object) -> Option<TrafficDistribution> {
-    block.only(&["min", "max", "mean", "standard_deviation"], &[]);
+    block.only(&["min", "max", "mean", "standard_deviation"]);
     let min = block.required_number("min", ANY);
     let max = block.required_number("max", AllowedRange::closed(min.unwrap_or(-1e12), 1e12, ""));
     let (min, max) = (min?, max?);

@@ -1,10 +1,7 @@
 //! Reads `friction`: a coefficient, a law that falls with slip or temperature or a coefficient across or along, and what lies between the bodies.
 
-use serde_json::Value;
-
 use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, join, shown};
-use crate::contact::case::read::samples::{count_rest, numbers};
+use crate::contact::case::read::object::{Object, join};
 use crate::contact::case::words::friction::{
     AcrossWords, AlongWords, ByTemperatureWords, FallName, FallTermWords, Friction, LayerWords,
 };
@@ -36,9 +33,8 @@ const LAWS: [(&str, FallName); 3] = [
 pub(crate) fn read(case: &mut Object) -> Option<Friction> {
     let mut block = case.child("friction")?;
     let names = [&WAYS[..], &["limit", "terms", "layer", "reduction"]].concat();
-    block.only(&names, &[]);
-    let given: Vec<&str> = WAYS.into_iter().filter(|name| block.has(name)).collect();
-    let mut friction = match given[..] {
+    block.only(&names);
+    let mut friction = match block.given(&WAYS)[..] {
         ["law"] => law(&mut block),
         ["across"] => across(&mut block).map(|across| Friction {
             across: Some(across),
@@ -53,10 +49,8 @@ pub(crate) fn read(case: &mut Object) -> Option<Friction> {
             ..Friction::default()
         }),
         [] | [_] => constant(&mut block),
-        [_, second, ..] => {
-            let first = given[0];
-            let detail = format!("given together with {first}; exactly one of the two is allowed");
-            block.fault(second, detail);
+        [first, second, ..] => {
+            block.exclude(first, second);
             None
         }
     };
@@ -68,14 +62,8 @@ pub(crate) fn read(case: &mut Object) -> Option<Friction> {
             }
         }
     }
-    let layer = match block.has("layer") {
-        true => layer(&mut block).map(Some),
-        false => Some(None),
-    };
-    let reduction = match block.has("reduction") {
-        true => block.number("reduction", REDUCTION).map(Some),
-        false => Some(None),
-    };
+    let layer = block.optional("layer", layer);
+    let reduction = block.optional_number("reduction", REDUCTION);
     let yields = layer
         .flatten()
         .is_some_and(|layer| layer.yield_mpa.is_some());
@@ -112,15 +100,11 @@ fn enough(block: &mut Object, name: &str, coefficient: f64) -> Option<()> {
 }
 
 fn law(block: &mut Object) -> Option<Friction> {
-    let law = block.word("law", &LAWS, &[]);
+    let law = block.word("law", &LAWS);
     let limit = block.required_number("limit", COEFFICIENT);
     let what = "an array of one or two objects with coefficient and half_speed_mm_per_s";
-    let value = block.required("terms", what)?;
-    let elements = value.as_array().filter(|all| (1..=2).contains(&all.len()));
-    let Some(elements) = elements else {
-        block.fault("terms", format!("{} given; {what} is needed", shown(value)));
-        return None;
-    };
+    block.required("terms", what)?;
+    let elements = block.array("terms", 1..=2, what)?;
     let pointer = block.pointer_to("terms");
     let mut terms = Vec::new();
     for (k, element) in elements.iter().enumerate() {
@@ -144,7 +128,7 @@ fn law(block: &mut Object) -> Option<Friction> {
 }
 
 fn fall_term(term: &mut Object) -> Option<FallTermWords> {
-    term.only(&["coefficient", "half_speed_mm_per_s"], &[]);
+    term.only(&["coefficient", "half_speed_mm_per_s"]);
     let coefficient = term.required_number("coefficient", COEFFICIENT);
     let half_speed = term.required_number("half_speed_mm_per_s", SPEED);
     Some(FallTermWords {
@@ -155,13 +139,10 @@ fn fall_term(term: &mut Object) -> Option<FallTermWords> {
 
 fn across(block: &mut Object) -> Option<AcrossWords> {
     let mut across = block.child("across")?;
-    across.only(&["y_mm", "angle_rad", "coefficient"], &[]);
+    across.only(&["y_mm", "angle_rad", "coefficient"]);
     let angles = across.has("angle_rad");
     if angles && across.has("y_mm") {
-        across.fault(
-            "angle_rad",
-            "given together with y_mm; exactly one of the two is allowed",
-        );
+        across.exclude("y_mm", "angle_rad");
         return None;
     }
     let (name, allowed) = match angles {
@@ -184,7 +165,7 @@ fn across(block: &mut Object) -> Option<AcrossWords> {
 
 fn along(block: &mut Object) -> Option<AlongWords> {
     let mut along = block.child("along")?;
-    along.only(&["x_mm", "coefficient"], &[]);
+    along.only(&["x_mm", "coefficient"]);
     let (x_mm, coefficient) = places(&mut along, "x_mm", PLACE)?;
     Some(AlongWords { x_mm, coefficient })
 }
@@ -222,7 +203,7 @@ fn as_many(block: &mut Object, name: &str, places: usize, coefficients: usize) -
 
 fn by_temperature(block: &mut Object) -> Option<ByTemperatureWords> {
     let mut law = block.child("by_temperature")?;
-    law.only(&["temperature_c", "coefficient"], &[]);
+    law.only(&["temperature_c", "coefficient"]);
     let temperature = list(&mut law, "temperature_c", TEMPERATURE);
     let coefficient = list(&mut law, "coefficient", ACROSS);
     let (temperature, coefficient) = (temperature?, coefficient?);
@@ -256,45 +237,24 @@ fn by_temperature(block: &mut Object) -> Option<ByTemperatureWords> {
 
 fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
     let what = format!("an array of {} to {} numbers", POINTS.start(), POINTS.end());
-    let value = block.required(name, &what)?;
-    let elements = value.as_array().filter(|all| POINTS.contains(&all.len()));
-    let Some(elements) = elements else {
-        block.fault(name, format!("{} given; {what} is needed", shown(value)));
-        return None;
-    };
-    numbers_of(block, name, elements, allowed)
+    block.required(name, &what)?;
+    let elements = block.array(name, POINTS, &what)?;
+    block.numbers(name, elements, allowed)
 }
 
-fn numbers_of(
-    block: &mut Object,
-    name: &str,
-    elements: &[Value],
-    allowed: AllowedRange,
-) -> Option<Vec<f64>> {
-    let pointer = block.pointer_to(name);
-    let mut refused = 0;
-    let read = numbers(elements, &pointer, allowed, &mut refused, block.faults());
-    count_rest(&pointer, allowed, refused, block.faults());
-    read
-}
-
-fn layer(block: &mut Object) -> Option<LayerWords> {
-    let mut layer = block.child("layer")?;
+fn layer(block: &mut Object, name: &str) -> Option<LayerWords> {
+    let mut layer = block.child(name)?;
     let names = [
         "shear_modulus_mpa",
         "thickness_mm",
         "yield_mpa",
         "hardening_mpa_per_mm",
     ];
-    layer.only(&names, &[]);
+    layer.only(&names);
     let modulus = layer.required_number(names[0], MODULUS);
     let thickness = layer.required_number(names[1], THICKNESS);
-    let mut optional = |name: &str, allowed| match layer.has(name) {
-        true => layer.number(name, allowed).map(Some),
-        false => Some(None),
-    };
-    let stress = optional(names[2], YIELD);
-    let hardening = optional(names[3], HARDENING);
+    let stress = layer.optional_number(names[2], YIELD);
+    let hardening = layer.optional_number(names[3], HARDENING);
     if layer.has(names[3]) && !layer.has(names[2]) {
         layer.fault(names[3], "given without yield_mpa, to which it belongs");
         return None;

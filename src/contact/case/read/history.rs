@@ -3,8 +3,7 @@
 use serde_json::Value;
 
 use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, join, shown};
-use crate::contact::case::read::samples::{count_rest, numbers};
+use crate::contact::case::read::object::{Object, join};
 use crate::contact::case::words::history::{History, HistoryCourse, HistoryStartName};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::range::Range;
@@ -39,16 +38,14 @@ const EXCLUSIVE: [(&str, [&str; 2]); 2] = [
 
 /// Reads the block `{"history": …, "start": …}`.
 pub(crate) fn read(block: &mut Object) -> Option<Motions> {
-    block.only(&["history", "start"], &[]);
+    block.only(&["history", "start"]);
     let words = [
         ("rest", HistoryStartName::Rest),
         ("steady", HistoryStartName::Steady),
         ("pressed", HistoryStartName::Pressed),
     ];
-    let start = match block.has("start") {
-        true => block.word("start", &words, &[]),
-        false => Some(HistoryStartName::Rest),
-    };
+    let start = block.optional_word("start", &words);
+    let start = start.map(|start| start.unwrap_or(HistoryStartName::Rest));
     let history = history(&mut block.child("history")?, start);
     Some(Motions::History {
         history: history?,
@@ -59,7 +56,7 @@ pub(crate) fn read(block: &mut Object) -> Option<Motions> {
 fn history(block: &mut Object, start: Option<HistoryStartName>) -> Option<History> {
     let names = ["distance_mm", SPEED_NAME].into_iter();
     let names: Vec<&str> = names.chain(COMPONENTS.map(|(name, _)| name)).collect();
-    block.only(&names, &[]);
+    block.only(&names);
     block.required("distance_mm", "an array of distances in mm")?;
     let distance_mm = course(block, "distance_mm", DISTANCE, None);
     let distances = distance_mm.as_ref().map(|course| course.values(1));
@@ -172,33 +169,20 @@ fn course(
     allowed: AllowedRange,
     points: Option<usize>,
 ) -> Option<HistoryCourse> {
-    let pointer = block.pointer_to(name);
     let found = match block.value(name)? {
         Value::Number(_) => return block.number(name, allowed).map(HistoryCourse::Constant),
         Value::Array(elements) if (1..=POINTS_MAX as usize).contains(&elements.len()) => {
-            let mut refused = 0;
-            let values = numbers(elements, &pointer, allowed, &mut refused, block.faults());
-            count_rest(&pointer, allowed, refused, block.faults());
-            HistoryCourse::Values(values?)
+            HistoryCourse::Values(block.numbers(name, elements, allowed)?)
         }
         Value::Object(_) => {
-            let mut block = block.child(name)?;
-            block.only(&["from", "to", "points"], &[]);
-            let from = block.required_number("from", allowed);
-            let to = block.required_number("to", allowed);
-            let points = block.required_count("points", 2, POINTS_MAX);
-            HistoryCourse::Range(Range {
-                from: from?,
-                to: to?,
-                points: points?,
-            })
+            let (from, to, points) = block.child(name)?.range(allowed, 2, POINTS_MAX)?;
+            HistoryCourse::Range(Range { from, to, points })
         }
-        other => {
-            let detail = format!(
-                "{} given; a number, an array of 1 to {POINTS_MAX} numbers or {{\"from\": …, \"to\": …, \"points\": …}} is needed",
-                shown(other)
+        _ => {
+            let what = format!(
+                "a number, an array of 1 to {POINTS_MAX} numbers or {{\"from\": …, \"to\": …, \"points\": …}}"
             );
-            block.fault(name, detail);
+            block.mistaken(name, &what);
             return None;
         }
     };

@@ -13,7 +13,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Material> {
     if !block.has("lower") && !block.has("upper") {
         return elastic(&mut block).map(Material::Same);
     }
-    block.only(&["lower", "upper"], &[]);
+    block.only(&["lower", "upper"]);
     let lower = block.child("lower").and_then(|mut body| elastic(&mut body));
     let upper = block.child("upper").and_then(|mut body| elastic(&mut body));
     Some(Material::Pair {
@@ -23,10 +23,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Material> {
 }
 
 fn elastic(block: &mut Object) -> Option<Elastic> {
-    block.only(
-        &["shear_modulus_mpa", "young_modulus_mpa", "poisson_ratio"],
-        &[],
-    );
+    block.only(&["shear_modulus_mpa", "young_modulus_mpa", "poisson_ratio"]);
     let shear_modulus_mpa = block.number("shear_modulus_mpa", MODULUS);
     let young_modulus_mpa = block.number("young_modulus_mpa", MODULUS);
     let poisson_ratio = block.required_number("poisson_ratio", POISSON_RATIO);
@@ -42,10 +39,7 @@ fn elastic(block: &mut Object) -> Option<Elastic> {
             return None;
         }
         (true, true) => {
-            block.fault(
-                "young_modulus_mpa",
-                "given together with shear_modulus_mpa; exactly one of the two is allowed",
-            );
+            block.exclude("shear_modulus_mpa", "young_modulus_mpa");
             return None;
         }
         _ => {}

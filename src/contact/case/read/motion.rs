@@ -5,7 +5,6 @@ use serde_json::Value;
 use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::history;
 use crate::contact::case::read::object::{Object, join, shown};
-use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::words::motion::{
     AskedMotion, Combine, Motions, Sweep, Swept, ValueList, Wheelset,
 };
@@ -29,6 +28,9 @@ const COMPONENTS: [&str; 5] = [
     "force_x_n",
     "force_y_n",
 ];
+/// How several values are combined.
+pub(crate) const COMBINATIONS: [(&str, Combine); 2] =
+    [("together", Combine::Together), ("grid", Combine::Grid)];
 /// The member beside them.
 const SPEED_NAME: &str = "speed_mm_per_s";
 /// The lateral velocity of a wheelset, and the force that may stand in its place.
@@ -54,7 +56,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
     match value {
         Value::Object(members) if members.contains_key("sweep") && !of_wheelset => {
             let mut block = Object::open(value, pointer, faults)?;
-            block.only(&["sweep"], &[]);
+            block.only(&["sweep"]);
             let sweep = sweep(&mut block.child("sweep")?)?;
             Some(Motions::Sweep { sweep })
         }
@@ -63,7 +65,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
         }
         Value::Object(members) if members.contains_key("wheelset") => {
             let mut block = Object::open(value, pointer, faults)?;
-            block.only(&["wheelset"], &[]);
+            block.only(&["wheelset"]);
             if !of_profiles && !of_wheelset {
                 block.fault(
                     "wheelset",
@@ -113,7 +115,7 @@ fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<AskedMo
     components(&mut block, &[SPEED_NAME], |block, k, name| {
         read[k] = Some(block.number(name, interval(k)));
     })?;
-    let speed_mm_per_s = speed(&mut block)?;
+    let speed_mm_per_s = block.optional_number(SPEED_NAME, SPEED)?;
     // A faulty number has left its fault behind and ends the reading here.
     if read.contains(&Some(None)) {
         return None;
@@ -128,14 +130,6 @@ fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<AskedMo
         force_y_n,
         speed_mm_per_s,
     })
-}
-
-/// The rolling speed, which may be left out; the outer `None` says that it is faulty.
-fn speed(block: &mut Object) -> Option<Option<f64>> {
-    match block.has(SPEED_NAME) {
-        true => block.number(SPEED_NAME, SPEED).map(Some),
-        false => Some(None),
-    }
 }
 
 /// Several motions of a wheelset on both rails.
@@ -177,19 +171,13 @@ fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
         .chain(names)
         .chain(across)
         .collect();
-    block.only(&names, &[]);
+    block.only(&names);
     let speed_mm_per_s = block.required_number(SPEED_NAME, SPEED);
     let mut spin = [None; 3];
     for (k, (name, allowed)) in spins.iter().enumerate() {
         spin[k] = block.number(name, *allowed);
     }
-    let rates = RATES.map(|(name, allowed)| {
-        if block.has(name) {
-            block.number(name, allowed)
-        } else {
-            Some(0.0)
-        }
-    });
+    let rates = RATES.map(|(name, allowed)| block.number_or(name, allowed, 0.0));
     let force_y_n = across_of_wheelset(block, on_both_rails);
     turning_is_said_once(block, spins.map(|(name, _)| name))?;
     let [angular_velocity_rad_per_s, free_rolling_radius_mm, balanced] = spin;
@@ -211,8 +199,7 @@ fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
 
 /// Faults unless exactly one of the members that say how fast a wheelset turns is given.
 fn turning_is_said_once(block: &mut Object, names: [&str; 3]) -> Option<()> {
-    let given: Vec<&str> = names.into_iter().filter(|name| block.has(name)).collect();
-    match given.as_slice() {
+    match block.given(&names)[..] {
         [_] => Some(()),
         [] => {
             let others = names[1..].join(" or ");
@@ -223,10 +210,7 @@ fn turning_is_said_once(block: &mut Object, names: [&str; 3]) -> Option<()> {
             None
         }
         [first, second, ..] => {
-            block.fault(
-                second,
-                format!("given together with {first}; exactly one of the two is allowed"),
-            );
+            block.exclude(first, second);
             None
         }
     }
@@ -239,10 +223,7 @@ fn across_of_wheelset(block: &mut Object, on_both_rails: bool) -> Option<Option<
     }
     let force = block.number(ACROSS_NAME, FORCE);
     if block.has(LATERAL_NAME) {
-        block.fault(
-            ACROSS_NAME,
-            format!("given together with {LATERAL_NAME}; exactly one of the two is allowed"),
-        );
+        block.exclude(LATERAL_NAME, ACROSS_NAME);
         return None;
     }
     force.map(Some)
@@ -253,15 +234,8 @@ fn sweep(block: &mut Object) -> Option<Sweep> {
     components(block, &["combine", SPEED_NAME], |block, k, name| {
         read[k] = Some(swept(block, name, interval(k)));
     })?;
-    let speed_mm_per_s = speed(block)?;
-    let combine = block.word(
-        "combine",
-        &[("together", Combine::Together), ("grid", Combine::Grid)],
-        &[],
-    );
-    if block.has("combine") {
-        combine?;
-    }
+    let speed_mm_per_s = block.optional_number(SPEED_NAME, SPEED)?;
+    let combine = block.optional_word("combine", &COMBINATIONS)?;
     // A faulty component has left its fault behind and ends the reading here.
     if read.contains(&Some(None)) {
         return None;
@@ -313,15 +287,12 @@ fn components(
     mut visit: impl FnMut(&mut Object, usize, &'static str),
 ) -> Option<()> {
     let allowed: Vec<&str> = COMPONENTS.iter().chain(beside).copied().collect();
-    block.only(&allowed, &[]);
+    block.only(&allowed);
     let (creepages, forces) = (&COMPONENTS[..SPIN_AT], &COMPONENTS[FORCES_FROM..]);
     let mut both = false;
     for (creepage, force) in creepages.iter().zip(forces) {
         if block.has(creepage) && block.has(force) {
-            block.fault(
-                force,
-                format!("given together with {creepage}; exactly one of the two is allowed"),
-            );
+            block.exclude(creepage, force);
             both = true;
         }
     }
@@ -349,8 +320,8 @@ pub(crate) fn swept(block: &mut Object, name: &str, allowed: AllowedRange) -> Op
             list(block, name, allowed).map(Swept::List)
         }
         Value::Object(_) => range(block, name, allowed).map(Swept::Range),
-        other => {
-            block.fault(name, format!("{} given; {what} is needed", shown(other)));
+        _ => {
+            block.mistaken(name, what);
             None
         }
     }
@@ -358,33 +329,16 @@ pub(crate) fn swept(block: &mut Object, name: &str, allowed: AllowedRange) -> Op
 
 fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<ValueList> {
     let mut block = block.child(name)?;
-    block.only(&["values"], &[]);
-    let value = block.value("values")?;
-    let elements = value
-        .as_array()
-        .filter(|elements| (1..=POINTS_MAX as usize).contains(&elements.len()));
-    let Some(elements) = elements else {
-        let detail = format!(
-            "{} given; an array of 1 to {POINTS_MAX} numbers is needed",
-            shown(value)
-        );
-        block.fault("values", detail);
-        return None;
-    };
-    let pointer = block.pointer_to("values");
-    let mut refused = 0;
-    let values = numbers(elements, &pointer, allowed, &mut refused, block.faults());
-    count_rest(&pointer, allowed, refused, block.faults());
-    Some(ValueList { values: values? })
+    block.only(&["values"]);
+    let what = format!("an array of 1 to {POINTS_MAX} numbers");
+    let elements = block.array("values", 1..=POINTS_MAX as usize, &what)?;
+    let values = block.numbers("values", elements, allowed)?;
+    Some(ValueList { values })
 }
 
 fn range(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Range> {
     let mut block = block.child(name)?;
-    block.only(&["from", "to", "points"], &[]);
-    let from = block.required_number("from", allowed);
-    let to = block.required_number("to", allowed);
-    let points = block.required_count("points", 1, POINTS_MAX);
-    let (from, to, points) = (from?, to?, points?);
+    let (from, to, points) = block.range(allowed, 1, POINTS_MAX)?;
     if points == 1 && from.to_bits() != to.to_bits() {
         block.fault(
             "points",

@@ -1,11 +1,15 @@
 //! A JSON object under examination: typed members and their faults.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use serde_json::{Map, Value};
 
 use crate::contact::case::read::faults::{AllowedRange, Faults, SHOWN_MAX, code_of, figures};
 use crate::contact::error::{FaultCode, FaultFigures};
+
+/// Faulty values of one array or grid that are listed one by one.
+pub(crate) const LISTED_MAX: usize = 5;
 
 /// An object, where it stands in the case, and the list its faults go to.
 ///
@@ -39,6 +43,18 @@ impl<'v, 'f> Object<'v, 'f> {
     /// Is the member written at all?
     pub(crate) fn has(&self, name: &str) -> bool {
         self.members.contains_key(name)
+    }
+
+    /// Those of the members that are written.
+    pub(crate) fn given<'n>(&self, names: &[&'n str]) -> Vec<&'n str> {
+        let names = names.iter().copied();
+        names.filter(|name| self.has(name)).collect()
+    }
+
+    /// Refuses the second of two members that exclude each other.
+    pub(crate) fn exclude(&mut self, first: &str, second: &str) {
+        let detail = format!("given together with {first}; exactly one of the two is allowed");
+        self.fault(second, detail);
     }
 
     /// The member as it is, if it is written.
@@ -78,8 +94,13 @@ impl<'v, 'f> Object<'v, 'f> {
         self.faults.add(self.pointer.clone(), detail);
     }
 
-    /// Refuses every member that is not in `allowed`; members in `reserved` are left to the caller.
-    pub(crate) fn only(&mut self, allowed: &[&str], reserved: &[&str]) {
+    /// Refuses every member that is not in `allowed`.
+    pub(crate) fn only(&mut self, allowed: &[&str]) {
+        self.only_or(allowed, &[]);
+    }
+
+    /// The same; members in `reserved` are left to the caller.
+    pub(crate) fn only_or(&mut self, allowed: &[&str], reserved: &[&str]) {
         let members = self.members;
         for (name, value) in members {
             if !allowed.contains(&name.as_str()) && !reserved.contains(&name.as_str()) {
@@ -114,6 +135,89 @@ impl<'v, 'f> Object<'v, 'f> {
         number(value, &pointer, allowed, self.faults)
     }
 
+    /// A number that may be left out; the outer `None` is a fault, as of all that may be left out.
+    pub(crate) fn optional_number(
+        &mut self,
+        name: &str,
+        allowed: AllowedRange,
+    ) -> Option<Option<f64>> {
+        self.optional(name, |block, name| block.number(name, allowed))
+    }
+
+    /// A number, or its default where it is left out.
+    pub(crate) fn number_or(
+        &mut self,
+        name: &str,
+        allowed: AllowedRange,
+        default: f64,
+    ) -> Option<f64> {
+        Some(self.optional_number(name, allowed)?.unwrap_or(default))
+    }
+
+    /// Anything that may be left out.
+    pub(crate) fn optional<T>(
+        &mut self,
+        name: &str,
+        read: impl FnOnce(&mut Self, &str) -> Option<T>,
+    ) -> Option<Option<T>> {
+        match self.has(name) {
+            true => read(self, name).map(Some),
+            false => Some(None),
+        }
+    }
+
+    /// A word that may be left out.
+    pub(crate) fn optional_word<T: Copy>(
+        &mut self,
+        name: &str,
+        table: &[(&str, T)],
+    ) -> Option<Option<T>> {
+        self.optional(name, |block, name| block.word(name, table))
+    }
+
+    /// `true` or `false`.
+    pub(crate) fn flag(&mut self, name: &str) -> Option<bool> {
+        let flag = self.value(name)?.as_bool();
+        if flag.is_none() {
+            self.mistaken(name, "true or false");
+        }
+        flag
+    }
+
+    /// An array of so many elements, if it is written.
+    pub(crate) fn array(
+        &mut self,
+        name: &str,
+        lengths: RangeInclusive<usize>,
+        what: &str,
+    ) -> Option<&'v [Value]> {
+        let elements = self.value(name)?.as_array();
+        let elements = elements.filter(|all| lengths.contains(&all.len()));
+        if elements.is_none() {
+            self.mistaken(name, what);
+        }
+        elements.map(Vec::as_slice)
+    }
+
+    /// Elements of an array as numbers; of many faulty ones the first are listed, and the rest is counted.
+    pub(crate) fn numbers(
+        &mut self,
+        name: &str,
+        elements: &[Value],
+        allowed: AllowedRange,
+    ) -> Option<Vec<f64>> {
+        let (pointer, mut refused) = (self.pointer_to(name), 0);
+        let read = numbers(elements, &pointer, allowed, &mut refused, self.faults);
+        count_rest(&pointer, allowed, refused, self.faults);
+        read
+    }
+
+    /// Notes that a member is not what is needed.
+    pub(crate) fn mistaken(&mut self, name: &str, what: &str) {
+        let given = self.value(name).map(shown).unwrap_or_default();
+        self.fault(name, format!("{given} given; {what} is needed"));
+    }
+
     /// A number that has to be there.
     pub(crate) fn required_number(&mut self, name: &str, allowed: AllowedRange) -> Option<f64> {
         if !self.has(name) {
@@ -138,6 +242,20 @@ impl<'v, 'f> Object<'v, 'f> {
                 None
             }
         }
+    }
+
+    /// The members of `{"from": …, "to": …, "points": …}`.
+    pub(crate) fn range(
+        &mut self,
+        allowed: AllowedRange,
+        low: u32,
+        high: u32,
+    ) -> Option<(f64, f64, u32)> {
+        self.only(&["from", "to", "points"]);
+        let from = self.required_number("from", allowed);
+        let to = self.required_number("to", allowed);
+        let points = self.required_count("points", low, high);
+        Some((from?, to?, points?))
     }
 
     /// A text of at most `length_max` characters that may be left out.
@@ -177,16 +295,11 @@ impl<'v, 'f> Object<'v, 'f> {
         None
     }
 
-    /// A word from a table; it may be left out. `later` lists words that a later version may offer, which get a fault that says so.
-    pub(crate) fn word<T: Copy>(
-        &mut self,
-        name: &str,
-        table: &[(&str, T)],
-        later: &[&str],
-    ) -> Option<T> {
+    /// A word from a table; it may be left out.
+    pub(crate) fn word<T: Copy>(&mut self, name: &str, table: &[(&str, T)]) -> Option<T> {
         let value = self.members.get(name)?;
         let pointer = self.pointer_to(name);
-        word(value, &pointer, table, later, self.faults)
+        word(value, &pointer, table, self.faults)
     }
 
     /// A member that has to be an object, opened.
@@ -220,29 +333,13 @@ pub(crate) fn word<T: Copy>(
     value: &Value,
     pointer: &str,
     table: &[(&str, T)],
-    later: &[&str],
     faults: &mut Faults,
 ) -> Option<T> {
-    let offered = || {
-        table
-            .iter()
-            .map(|(word, _)| *word)
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
     let text = value.as_str();
     if let Some((_, meaning)) = table.iter().find(|(word, _)| Some(*word) == text) {
         return Some(*meaning);
     }
-    let detail = if text.is_some_and(|text| later.contains(&text)) {
-        format!(
-            "{} is not offered by this version; offered: {}",
-            shown(value),
-            offered()
-        )
-    } else {
-        format!("{} given; allowed: {}", shown(value), offered())
-    };
+    let detail = format!("{} given; allowed: {}", shown(value), names(table));
     let code = match value {
         Value::String(_) => FaultCode::UnknownWord,
         _ => FaultCode::WrongType,
@@ -253,6 +350,53 @@ pub(crate) fn word<T: Copy>(
     };
     faults.add_with(pointer, detail, figures);
     None
+}
+
+/// The words of a table, for a sentence.
+pub(crate) fn names<T>(table: &[(&str, T)]) -> String {
+    let words: Vec<&str> = table.iter().map(|(word, _)| *word).collect();
+    words.join(", ")
+}
+
+/// Numbers of an array; faulty ones are counted in `refused`, and listed as long as they are few.
+pub(crate) fn numbers(
+    elements: &[Value],
+    pointer: &str,
+    allowed: AllowedRange,
+    refused: &mut usize,
+    faults: &mut Faults,
+) -> Option<Vec<f64>> {
+    let mut read = Vec::with_capacity(elements.len());
+    for (i, value) in elements.iter().enumerate() {
+        let good = value.as_f64().filter(|number| allowed.contains(*number));
+        if let Some(good) = good {
+            read.push(good + 0.0);
+            continue;
+        }
+        *refused += 1;
+        if *refused <= LISTED_MAX {
+            number(value, &join(pointer, i), allowed, faults);
+        }
+    }
+    (read.len() == elements.len()).then_some(read)
+}
+
+/// Says how many faulty numbers were not listed.
+pub(crate) fn count_rest(
+    pointer: &str,
+    allowed: AllowedRange,
+    refused: usize,
+    faults: &mut Faults,
+) {
+    if refused > LISTED_MAX {
+        faults.add(
+            pointer,
+            format!(
+                "{} more values are refused like those before; {allowed} is needed",
+                refused - LISTED_MAX
+            ),
+        );
+    }
 }
 
 /// Appends a reference token to a JSON pointer, escaped as RFC 6901, section 3, asks.

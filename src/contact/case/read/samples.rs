@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::{AllowedRange, Faults};
-use crate::contact::case::read::object::{Object, join, number, shown};
+use crate::contact::case::read::faults::AllowedRange;
+use crate::contact::case::read::object::{Object, count_rest, join, numbers};
 
 const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 /// Points of one axis of a grid.
@@ -15,26 +15,15 @@ const SPACING_MIN: f64 = 1e-9;
 const SPACING_TO_COORDINATE_MIN: f64 = 1e-12;
 /// Neighbouring spacings differ by at most this factor; the edge of the contact cannot be told from more uneven samples.
 const SPACING_RATIO_MAX: f64 = 1000.0;
-/// Faulty values of one grid that are listed one by one.
-const GRID_FAULTS_MAX: usize = 5;
 
 /// An axis of a grid: strictly increasing coordinates.
 pub(crate) fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
     let (low, high) = (AXIS_POINTS.start(), AXIS_POINTS.end());
     let what = format!("an array of {low} to {high} strictly increasing coordinates in mm");
-    let value = block.required(name, &what)?;
-    let elements = value
-        .as_array()
-        .filter(|elements| AXIS_POINTS.contains(&elements.len()));
-    let Some(elements) = elements else {
-        block.fault(name, format!("{} given; {what} is needed", shown(value)));
-        return None;
-    };
+    block.required(name, &what)?;
+    let elements = block.array(name, AXIS_POINTS, &what)?;
+    let axis = block.numbers(name, elements, COORDINATE)?;
     let pointer = block.pointer_to(name);
-    let mut refused = 0;
-    let axis = numbers(elements, &pointer, COORDINATE, &mut refused, block.faults());
-    count_rest(&pointer, COORDINATE, refused, block.faults());
-    let axis = axis?;
     let (first, last) = (axis[0], axis[axis.len() - 1]);
     let largest = first.abs().max(last.abs());
     let least = (SPACING_MIN * (last - first).abs()).max(SPACING_TO_COORDINATE_MIN * largest);
@@ -93,7 +82,7 @@ pub(crate) fn line(
     let what = format!("an array with one {word} per y_mm");
     let value = block.required(member, &what)?;
     let Some(elements) = value.as_array() else {
-        block.fault(member, format!("{} given; {what} is needed", shown(value)));
+        block.mistaken(member, &what);
         return None;
     };
     let n = n.unwrap_or(elements.len());
@@ -107,11 +96,7 @@ pub(crate) fn line(
         );
         return None;
     }
-    let pointer = block.pointer_to(member);
-    let mut refused = 0;
-    let read = numbers(elements, &pointer, allowed, &mut refused, block.faults());
-    count_rest(&pointer, allowed, refused, block.faults());
-    read
+    block.numbers(member, elements, allowed)
 }
 
 /// The samples of a grid with `nx` by `ny` points, where the axes are known.
@@ -133,7 +118,7 @@ pub(crate) fn samples(
         .as_array()
         .and_then(|rows| rows.iter().map(Value::as_array).collect());
     let Some(rows) = rows.filter(|rows| !rows.is_empty()) else {
-        block.fault(member, format!("{} given; {what} is needed", shown(value)));
+        block.mistaken(member, &what);
         return None;
     };
     let pointer = block.pointer_to(member);
@@ -173,45 +158,4 @@ pub(crate) fn samples(
         .collect();
     count_rest(&pointer, allowed, refused, faults);
     read.into_iter().collect()
-}
-
-/// Numbers of an array; faulty ones are counted in `refused`, and listed as long as they are few.
-pub(crate) fn numbers(
-    elements: &[Value],
-    pointer: &str,
-    allowed: AllowedRange,
-    refused: &mut usize,
-    faults: &mut Faults,
-) -> Option<Vec<f64>> {
-    let mut read = Vec::with_capacity(elements.len());
-    for (i, value) in elements.iter().enumerate() {
-        let good = value.as_f64().filter(|number| allowed.contains(*number));
-        if let Some(good) = good {
-            read.push(good + 0.0);
-            continue;
-        }
-        *refused += 1;
-        if *refused <= GRID_FAULTS_MAX {
-            number(value, &join(pointer, i), allowed, faults);
-        }
-    }
-    (read.len() == elements.len()).then_some(read)
-}
-
-/// Says how many faulty numbers were not listed.
-pub(crate) fn count_rest(
-    pointer: &str,
-    allowed: AllowedRange,
-    refused: usize,
-    faults: &mut Faults,
-) {
-    if refused > GRID_FAULTS_MAX {
-        faults.add(
-            pointer,
-            format!(
-                "{} more values are refused like those before; {allowed} is needed",
-                refused - GRID_FAULTS_MAX
-            ),
-        );
-    }
 }

@@ -1,7 +1,7 @@
 //! Reads `solver` and `outputs`: how to solve, how exactly, and what to answer.
 
 use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, join, shown, word};
+use crate::contact::case::read::object::{Object, join, names, shown, word};
 use crate::contact::case::resolution::TARGET_ERROR_DEFAULT;
 use crate::contact::case::words::solver::{
     MeshSizeWords, MethodName, Output, RelativeToName, Solver, TractionBoundName,
@@ -62,17 +62,13 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
         });
     }
     let mut block = case.child("solver")?;
-    block.only(&MEMBERS, &[]);
-    let method = block.word("method", &METHODS, &[]);
+    block.only(&MEMBERS);
+    let method = block.word("method", &METHODS);
     let target_error = block.number("target_error", TARGET_ERROR);
-    let mesh = if block.has("mesh") {
-        mesh(&mut block)
-    } else {
-        None
-    };
-    let traction_bound = block.word("traction_bound", &TRACTION_BOUNDS, &[]);
+    let mesh = block.optional("mesh", mesh).flatten();
+    let traction_bound = block.word("traction_bound", &TRACTION_BOUNDS);
     let time_limit_s = block.number("time_limit_s", TIME_LIMIT);
-    let relative_to = block.word("relative_to", &RELATIVE_TO, &[]);
+    let relative_to = block.word("relative_to", &RELATIVE_TO);
     let read = [
         traction_bound.is_some(),
         mesh.is_some(),
@@ -149,23 +145,13 @@ pub(crate) fn read_outputs(
     case: &mut Object,
     without_fields: Option<MethodName>,
 ) -> Option<Vec<Output>> {
-    let Some(value) = case.value("outputs") else {
+    if !case.has("outputs") {
         let mut usual = vec![Output::Resultants, Output::Zones];
         usual.retain(|output| without_fields.is_none() || !output.needs_fields());
         return Some(usual);
-    };
-    let elements = value.as_array().filter(|elements| !elements.is_empty());
-    let Some(elements) = elements else {
-        let words = OUTPUTS.map(|(word, _)| word).join(", ");
-        case.fault(
-            "outputs",
-            format!(
-                "{} given; an array with at least one of {words} is needed",
-                shown(value)
-            ),
-        );
-        return None;
-    };
+    }
+    let what = format!("an array with at least one of {}", names(&OUTPUTS));
+    let elements = case.array("outputs", 1..=usize::MAX, &what)?;
     let pointer = case.pointer_to("outputs");
     let faults = case.faults();
     let read: Vec<Option<Output>> = elements
@@ -173,7 +159,7 @@ pub(crate) fn read_outputs(
         .enumerate()
         .map(|(k, element)| {
             let pointer = join(&pointer, k);
-            let output = word(element, &pointer, &OUTPUTS, &[], faults)?;
+            let output = word(element, &pointer, &OUTPUTS, faults)?;
             let detail = match without_fields {
                 Some(method) if output.needs_fields() => format!(
                     "{} given; \"method\": \"{}\" computes only \"resultants\", \"gradients\" and \"damage\"",
@@ -192,9 +178,9 @@ pub(crate) fn read_outputs(
     Some(outputs)
 }
 
-fn mesh(block: &mut Object) -> Option<MeshSizeWords> {
-    let mut block = block.child("mesh")?;
-    block.only(&["strips", "cells"], &[]);
+fn mesh(block: &mut Object, name: &str) -> Option<MeshSizeWords> {
+    let mut block = block.child(name)?;
+    block.only(&["strips", "cells"]);
     let strips = block.required_count("strips", 1, MESH_SIDE_MAX);
     let cells = block.required_count("cells", 1, MESH_SIDE_MAX);
     Some(MeshSizeWords {

@@ -55,21 +55,20 @@ fn words(block: &mut Object) -> Option<SubsurfaceWords> {
         "worst",
         "passage",
     ];
-    block.only(&names, &[]);
-    let given: Vec<&str> = PLACES.into_iter().filter(|name| block.has(name)).collect();
-    if let [first, second, ..] = given[..] {
+    block.only(&names);
+    if let [first, second, ..] = block.given(&PLACES)[..] {
         let detail = format!("given together with {first}; at most one of the two is allowed");
         block.fault(second, detail);
         return None;
     }
-    let points_mm = optional(block, "points_mm", points);
-    let along_depth_at_mm = optional(block, "along_depth_at_mm", line_at);
-    let depths_mm = optional(block, "depths_mm", |block, name| list(block, name, DEPTH));
-    let plane = optional(block, "plane", |block, name| grid(&mut block.child(name)?));
+    let points_mm = block.optional("points_mm", points);
+    let along_depth_at_mm = block.optional("along_depth_at_mm", line_at);
+    let depths_mm = block.optional("depths_mm", |block, name| list(block, name, DEPTH));
+    let plane = block.optional("plane", |block, name| grid(&mut block.child(name)?));
     let bodies = [("lower", BodyName::Lower), ("upper", BodyName::Upper)];
-    let body = optional(block, "body", |block, name| block.word(name, &bodies, &[]));
-    let worst = optional(block, "worst", flag);
-    let passage = optional(block, "passage", passage);
+    let body = block.optional_word("body", &bodies);
+    let worst = block.optional("worst", Object::flag);
+    let passage = block.optional("passage", passage);
     match (block.has("along_depth_at_mm"), block.has("depths_mm")) {
         (true, false) => {
             block.required("depths_mm", "an array of depths in mm")?;
@@ -94,17 +93,13 @@ fn words(block: &mut Object) -> Option<SubsurfaceWords> {
 
 fn passage(block: &mut Object, name: &str) -> Option<PassageWords> {
     let mut block = block.child(name)?;
-    block.only(&["dang_van_slope"], &[]);
-    let dang_van_slope = optional(&mut block, "dang_van_slope", |block, name| {
-        block.number(name, DANG_VAN_SLOPE)
-    });
-    Some(PassageWords {
-        dang_van_slope: dang_van_slope?,
-    })
+    block.only(&["dang_van_slope"]);
+    let dang_van_slope = block.optional_number("dang_van_slope", DANG_VAN_SLOPE)?;
+    Some(PassageWords { dang_van_slope })
 }
 
 fn grid(block: &mut Object) -> Option<StressGrid> {
-    block.only(&["x_mm", "y_mm", "depths_mm"], &[]);
+    block.only(&["x_mm", "y_mm", "depths_mm"]);
     let x_mm = axis(block, "x_mm", COORDINATE);
     let y_mm = axis(block, "y_mm", COORDINATE);
     let depths_mm = axis(block, "depths_mm", DEPTH);
@@ -115,39 +110,9 @@ fn grid(block: &mut Object) -> Option<StressGrid> {
     })
 }
 
-/// A member that may be left out; the outer `None` says that it is faulty.
-pub(crate) fn optional<T>(
-    block: &mut Object,
-    name: &str,
-    read: impl FnOnce(&mut Object, &str) -> Option<T>,
-) -> Option<Option<T>> {
-    if !block.has(name) {
-        return Some(None);
-    }
-    read(block, name).map(Some)
-}
-
-/// `true` or `false`.
-pub(crate) fn flag(block: &mut Object, name: &str) -> Option<bool> {
-    let value = block.value(name)?;
-    let flag = value.as_bool();
-    if flag.is_none() {
-        block.fault(
-            name,
-            format!("{} given; true or false is needed", shown(value)),
-        );
-    }
-    flag
-}
-
 fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 3]>> {
     let what = "an array of points [x, y, depth] in mm";
-    let value = block.value(name)?;
-    let elements = value.as_array().filter(|elements| !elements.is_empty());
-    let Some(elements) = elements else {
-        block.fault(name, format!("{} given; {what} is needed", shown(value)));
-        return None;
-    };
+    let elements = block.array(name, 1..=usize::MAX, what)?;
     let pointer = block.pointer_to(name);
     let faults = block.faults();
     let mut read = Vec::with_capacity(elements.len());
@@ -185,25 +150,12 @@ fn line_at(block: &mut Object, name: &str) -> Option<DepthLineAt> {
         let y = number(y, &join(&pointer, 1), COORDINATE, faults);
         return Some(DepthLineAt::Place([x?, y?]));
     }
-    let detail = format!(
-        "{} given; [x, y] in mm or \"worst\" is needed",
-        shown(value)
-    );
-    block.fault(name, detail);
+    block.mistaken(name, "[x, y] in mm or \"worst\"");
     None
 }
 
 fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
-    let value = block.value(name)?;
-    let elements = value.as_array().filter(|elements| !elements.is_empty());
-    let Some(elements) = elements else {
-        let detail = format!(
-            "{} given; an array of numbers in mm is needed",
-            shown(value)
-        );
-        block.fault(name, detail);
-        return None;
-    };
+    let elements = block.array(name, 1..=usize::MAX, "an array of numbers in mm")?;
     let pointer = block.pointer_to(name);
     let faults = block.faults();
     let one = |(k, value)| number(value, &join(&pointer, k), allowed, faults);
@@ -216,16 +168,8 @@ fn axis(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<GridAxi
     match block.required(name, what)? {
         Value::Array(_) => list(block, name, allowed).map(GridAxis::List),
         Value::Object(_) => {
-            let mut block = block.child(name)?;
-            block.only(&["from", "to", "points"], &[]);
-            let from = block.required_number("from", allowed);
-            let to = block.required_number("to", allowed);
-            let points = block.required_count("points", 2, COUNT_MAX);
-            Some(GridAxis::Spaced {
-                from: from?,
-                to: to?,
-                points: points?,
-            })
+            let (from, to, points) = block.child(name)?.range(allowed, 2, COUNT_MAX)?;
+            Some(GridAxis::Spaced { from, to, points })
         }
         _ => block.number(name, allowed).map(GridAxis::One),
     }

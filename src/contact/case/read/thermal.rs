@@ -40,7 +40,7 @@ pub(crate) fn read(
     if !block.has("lower") && !block.has("upper") {
         return body(&mut block).map(|body| Some(ThermalWords::Same(body)));
     }
-    block.only(&["lower", "upper"], &[]);
+    block.only(&["lower", "upper"]);
     let lower = block.child("lower").and_then(|mut block| body(&mut block));
     let upper = block.child("upper").and_then(|mut block| body(&mut block));
     Some(Some(ThermalWords::Pair {
@@ -56,7 +56,7 @@ fn body(block: &mut Object) -> Option<ThermalBodyWords> {
         "specific_heat_j_per_kgk",
         "bulk_c",
     ];
-    block.only(&names, &[]);
+    block.only(&names);
     let conductivity = block.required_number(names[0], CONDUCTIVITY);
     let density = block.required_number(names[1], DENSITY);
     let specific_heat = block.required_number(names[2], SPECIFIC_HEAT);

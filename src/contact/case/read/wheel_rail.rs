@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, join, number, shown};
+use crate::contact::case::read::object::{LISTED_MAX, Object, join, names, number, shown};
 use crate::contact::case::words::contact::{
     Contact, CrossSection, FormatName, InfluenceName, SideName, Smoothing, SmoothingWord,
     SurfaceName, UnitName,
@@ -39,8 +39,6 @@ const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const SMOOTHING: AllowedRange = AllowedRange::closed(0.0, 50.0, "mm");
 /// Characters of a file.
 const TEXT_MAX: usize = 4_000_000;
-/// Faulty points of one cross-section that are listed one by one.
-const POINT_FAULTS_MAX: usize = 5;
 const MEMBERS: [&str; 17] = [
     "type",
     "rail",
@@ -63,27 +61,20 @@ const MEMBERS: [&str; 17] = [
 
 /// Reads the members of the contact; whether the cross-sections are sound is told when they are laid over each other.
 pub(crate) fn read(block: &mut Object) -> Option<Contact> {
-    block.only(&MEMBERS, &[]);
+    block.only(&MEMBERS);
     let rail = section(block, "rail");
     let wheel = section(block, "wheel");
     let what = "left or right";
     let side = block
         .required("side", what)
-        .and_then(|_| block.word("side", &SIDES, &[]));
+        .and_then(|_| block.word("side", &SIDES));
     let rolling_radius_mm = block.required_number("rolling_radius_mm", ROLLING_RADIUS);
-    let mut or = |name: &str, allowed: AllowedRange, default: f64| {
-        if block.has(name) {
-            block.number(name, allowed)
-        } else {
-            Some(default)
-        }
-    };
-    let cant_rad = or("cant_rad", CANT, 0.0);
-    let flange_back_distance_mm = or("flange_back_distance_mm", DISTANCE, 1360.0);
-    let lateral_shift_mm = or("lateral_shift_mm", PLACE, 0.0);
-    let yaw_rad = or("yaw_rad", ANGLE, 0.0);
-    let roll_rad = or("roll_rad", ANGLE, 0.0);
-    let flange_back_position_mm = optional_place(block, "flange_back_position_mm");
+    let cant_rad = block.number_or("cant_rad", CANT, 0.0);
+    let flange_back_distance_mm = block.number_or("flange_back_distance_mm", DISTANCE, 1360.0);
+    let lateral_shift_mm = block.number_or("lateral_shift_mm", PLACE, 0.0);
+    let yaw_rad = block.number_or("yaw_rad", ANGLE, 0.0);
+    let roll_rad = block.number_or("roll_rad", ANGLE, 0.0);
+    let flange_back_position_mm = block.optional_number("flange_back_position_mm", PLACE);
     let place = rail_place(block);
     let accept_rough_profiles = flag(block, "accept_rough_profiles");
     let (reference_surface, influence) = surface(block)?;
@@ -109,14 +100,8 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
 
 /// Reads the surface of a contact of profiles.
 pub(crate) fn surface(block: &mut Object) -> Option<(Option<SurfaceName>, Option<InfluenceName>)> {
-    let surface = match block.has("reference_surface") {
-        true => Some(block.word("reference_surface", &SURFACES, &[])?),
-        false => None,
-    };
-    let influence = match block.has("influence") {
-        true => Some(block.word("influence", &INFLUENCES, &[])?),
-        false => None,
-    };
+    let surface = block.optional_word("reference_surface", &SURFACES)?;
+    let influence = block.optional_word("influence", &INFLUENCES)?;
     if surface == Some(SurfaceName::Plane) && influence.is_some() {
         block.fault(
             "influence",
@@ -142,8 +127,7 @@ pub(crate) fn rail_place(block: &mut Object) -> Option<RailPlaceWords> {
         ("gauge_height_mm", DEPTH, 14.0),
     ];
     if block.has("rail_origin_mm") {
-        let names = BY_GAUGE.iter().map(|(name, ..)| *name);
-        let both: Vec<&str> = names.filter(|name| block.has(name)).collect();
+        let both = block.given(&BY_GAUGE.map(|(name, ..)| name));
         if !both.is_empty() {
             block.fault(
                 "rail_origin_mm",
@@ -161,26 +145,13 @@ pub(crate) fn rail_place(block: &mut Object) -> Option<RailPlaceWords> {
             rail_origin_mm: Some(block.number("rail_origin_mm", DISTANCE)?),
         });
     }
-    let [gauge, height] = BY_GAUGE.map(|(name, allowed, default)| {
-        if block.has(name) {
-            block.number(name, allowed)
-        } else {
-            Some(default)
-        }
-    });
+    let [gauge, height] =
+        BY_GAUGE.map(|(name, allowed, default)| block.number_or(name, allowed, default));
     Some(RailPlaceWords {
         gauge_mm: Some(gauge?),
         gauge_height_mm: Some(height?),
         rail_origin_mm: None,
     })
-}
-
-/// A place in mm that may be left out; the outer `None` is a fault.
-pub(crate) fn optional_place(block: &mut Object, name: &str) -> Option<Option<f64>> {
-    match block.has(name) {
-        true => block.number(name, PLACE).map(Some),
-        false => Some(None),
-    }
 }
 
 /// Reads a cross-section that is needed.
@@ -190,25 +161,19 @@ pub(crate) fn section(contact: &mut Object, name: &str) -> Option<CrossSection> 
 
 /// Reads the members of a cross-section.
 pub(crate) fn section_of(block: &mut Object) -> Option<CrossSection> {
-    block.only(
-        &[
-            "points_mm",
-            "format",
-            "text",
-            "unit",
-            "mirror_y",
-            "mirror_z",
-            "smoothing_mm",
-        ],
-        &[],
-    );
+    block.only(&[
+        "points_mm",
+        "format",
+        "text",
+        "unit",
+        "mirror_y",
+        "mirror_z",
+        "smoothing_mm",
+    ]);
     let mirror_y = flag(block, "mirror_y");
     let mirror_z = flag(block, "mirror_z");
     let smoothing_mm = smoothing(block);
-    let unit = match block.has("unit") {
-        true => block.word("unit", &UNITS, &[]).map(Some),
-        false => Some(None),
-    };
+    let unit = block.optional_word("unit", &UNITS);
     let (points_mm, format, text) = match (block.has("points_mm"), block.has("text")) {
         (true, false) => {
             if block.has("format") {
@@ -221,9 +186,8 @@ pub(crate) fn section_of(block: &mut Object) -> Option<CrossSection> {
             (Some(points(block)?), None, None)
         }
         (false, true) => {
-            let words = FORMATS.map(|(word, _)| word).join(", ");
-            block.required("format", &format!("one of {words}"))?;
-            let format = block.word("format", &FORMATS, &[]);
+            block.required("format", &format!("one of {}", names(&FORMATS)))?;
+            let format = block.word("format", &FORMATS);
             let text = block.text("text", TEXT_MAX);
             (None, Some(format?), Some(text?))
         }
@@ -235,10 +199,7 @@ pub(crate) fn section_of(block: &mut Object) -> Option<CrossSection> {
             return None;
         }
         (true, true) => {
-            block.fault(
-                "text",
-                "given together with points_mm; exactly one of the two is allowed",
-            );
+            block.exclude("points_mm", "text");
             return None;
         }
     };
@@ -293,17 +254,7 @@ pub(crate) fn flag(block: &mut Object, name: &str) -> Option<Option<bool>> {
 
 fn points(block: &mut Object) -> Option<Vec<[f64; 2]>> {
     let what = format!("an array of {POINTS_MIN} to {POINTS_MAX} points [y, z] in mm");
-    let value = block.value("points_mm")?;
-    let elements = value
-        .as_array()
-        .filter(|elements| (POINTS_MIN..=POINTS_MAX).contains(&elements.len()));
-    let Some(elements) = elements else {
-        block.fault(
-            "points_mm",
-            format!("{} given; {what} is needed", shown(value)),
-        );
-        return None;
-    };
+    let elements = block.array("points_mm", POINTS_MIN..=POINTS_MAX, &what)?;
     let pointer = block.pointer_to("points_mm");
     let mut read = Vec::with_capacity(elements.len());
     let mut refused = 0;
@@ -313,16 +264,16 @@ fn points(block: &mut Object) -> Option<Vec<[f64; 2]>> {
             continue;
         }
         refused += 1;
-        if refused <= POINT_FAULTS_MAX {
+        if refused <= LISTED_MAX {
             fault_of_point(element, &join(&pointer, k), block);
         }
     }
-    if refused > POINT_FAULTS_MAX {
+    if refused > LISTED_MAX {
         block.faults().add(
             pointer,
             format!(
                 "{} more points are refused like those before; each has to be a pair [y, z], both {COORDINATE}",
-                refused - POINT_FAULTS_MAX
+                refused - LISTED_MAX
             ),
         );
     }

@@ -1,12 +1,10 @@
 //! Reads a contact of the type `wheelset`, and the load that goes with it.
 
 use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::motion::swept;
+use crate::contact::case::read::motion::{COMBINATIONS, swept};
 use crate::contact::case::read::object::{Object, shown};
-use crate::contact::case::read::samples::{count_rest, numbers};
 use crate::contact::case::read::wheel_rail::{
-    ANGLE, CANT, DISTANCE, PLACE, ROLLING_RADIUS, flag, optional_place, rail_place, section,
-    surface,
+    ANGLE, CANT, DISTANCE, PLACE, ROLLING_RADIUS, flag, rail_place, section, surface,
 };
 use crate::contact::case::words::contact::{Contact, KinematicsWords, Load, RightSide};
 use crate::contact::case::words::motion::{Combine, Swept};
@@ -40,21 +38,14 @@ const MEMBERS: [&str; 18] = [
 
 /// Reads the members of the contact.
 pub(crate) fn read(block: &mut Object) -> Option<Contact> {
-    block.only(&MEMBERS, &[]);
+    block.only(&MEMBERS);
     let rail = section(block, "rail");
     let wheel = section(block, "wheel");
     let right = right(block);
     let rolling_radius_mm = block.required_number("rolling_radius_mm", ROLLING_RADIUS);
-    let mut or = |name: &str, allowed: AllowedRange, default: f64| {
-        if block.has(name) {
-            block.number(name, allowed)
-        } else {
-            Some(default)
-        }
-    };
-    let cant_rad = or("cant_rad", CANT, 0.0);
-    let flange_back_distance_mm = or("flange_back_distance_mm", DISTANCE, 1360.0);
-    let flange_back_position_mm = optional_place(block, "flange_back_position_mm");
+    let cant_rad = block.number_or("cant_rad", CANT, 0.0);
+    let flange_back_distance_mm = block.number_or("flange_back_distance_mm", DISTANCE, 1360.0);
+    let flange_back_position_mm = block.optional_number("flange_back_position_mm", PLACE);
     let place = rail_place(block);
     let (shifts, yaws, combine) = poses(block)?;
     let kinematics = kinematics(block);
@@ -84,19 +75,12 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
 /// Shifts, yaws, and how they are combined.
 fn poses(block: &mut Object) -> Option<(Swept, Swept, Combine)> {
     let mut values = |name: &str, allowed: AllowedRange| {
-        if block.has(name) {
-            swept(block, name, allowed)
-        } else {
-            Some(Swept::Constant(0.0))
-        }
+        let read = block.optional(name, |block, name| swept(block, name, allowed))?;
+        Some(read.unwrap_or(Swept::Constant(0.0)))
     };
     let shifts = values("lateral_shift_mm", PLACE);
     let yaws = values("yaw_rad", ANGLE);
-    let words = [("together", Combine::Together), ("grid", Combine::Grid)];
-    let combine = block.word("combine", &words, &[]);
-    if block.has("combine") {
-        combine?;
-    }
+    let combine = block.optional_word("combine", &COMBINATIONS)?;
     let (shifts, yaws, combine) = (shifts?, yaws?, combine.unwrap_or_default());
     let [a, b] = [&shifts, &yaws].map(Swept::points);
     if combine == Combine::Together && a != b && a > 1 && b > 1 {
@@ -119,25 +103,19 @@ fn right(block: &mut Object) -> Option<Option<RightSide>> {
         return Some(None);
     }
     let mut side = block.child("right")?;
-    side.only(&MEMBERS, &[]);
+    side.only(&MEMBERS);
     if !MEMBERS.iter().any(|name| side.has(name)) {
         let names = MEMBERS.join(", ");
         side.fault_here(format!("empty; at least one of {names} is needed"));
         return None;
     }
-    let mut own = |name: &str| match side.has(name) {
-        true => section(&mut side, name).map(|section| Some(Box::new(section))),
-        false => Some(None),
-    };
+    let mut own = |name| side.optional(name, |side, name| section(side, name).map(Box::new));
     let (rail, wheel) = (own("rail"), own("wheel"));
-    let radius = side.number("rolling_radius_mm", ROLLING_RADIUS);
-    if side.has("rolling_radius_mm") {
-        radius?;
-    }
+    let radius = side.optional_number("rolling_radius_mm", ROLLING_RADIUS);
     Some(Some(RightSide {
         rail: rail?,
         wheel: wheel?,
-        rolling_radius_mm: radius,
+        rolling_radius_mm: radius?,
     }))
 }
 
@@ -147,16 +125,9 @@ fn kinematics(block: &mut Object) -> Option<Option<KinematicsWords>> {
         return Some(None);
     }
     let mut asked = block.child("kinematics")?;
-    asked.only(&["reach_mm", "step_mm", "amplitudes_mm"], &[]);
-    let mut or = |name: &str, allowed: AllowedRange, default: f64| {
-        if asked.has(name) {
-            asked.number(name, allowed)
-        } else {
-            Some(default)
-        }
-    };
-    let reach_mm = or("reach_mm", REACH, 10.0);
-    let step_mm = or("step_mm", STEP, 0.1);
+    asked.only(&["reach_mm", "step_mm", "amplitudes_mm"]);
+    let reach_mm = asked.number_or("reach_mm", REACH, 10.0);
+    let step_mm = asked.number_or("step_mm", STEP, 0.1);
     let amplitudes_mm = amplitudes(&mut asked);
     let (reach_mm, step_mm) = (reach_mm?, step_mm?);
     if reach_mm / step_mm > SHIFTS_MAX || reach_mm / step_mm < 2.0 {
@@ -174,24 +145,12 @@ fn kinematics(block: &mut Object) -> Option<Option<KinematicsWords>> {
 }
 
 fn amplitudes(asked: &mut Object) -> Option<Vec<f64>> {
-    let Some(value) = asked.value("amplitudes_mm") else {
+    if !asked.has("amplitudes_mm") {
         return Some((1..=7).map(f64::from).collect());
-    };
-    let elements = value
-        .as_array()
-        .filter(|elements| (1..=AMPLITUDES_MAX).contains(&elements.len()));
-    let Some(elements) = elements else {
-        let detail = format!(
-            "{} given; an array of 1 to {AMPLITUDES_MAX} amplitudes in mm is needed",
-            shown(value)
-        );
-        asked.fault("amplitudes_mm", detail);
-        return None;
-    };
-    let (pointer, mut refused) = (asked.pointer_to("amplitudes_mm"), 0);
-    let values = numbers(elements, &pointer, REACH, &mut refused, asked.faults());
-    count_rest(&pointer, REACH, refused, asked.faults());
-    values
+    }
+    let what = format!("an array of 1 to {AMPLITUDES_MAX} amplitudes in mm");
+    let elements = asked.array("amplitudes_mm", 1..=AMPLITUDES_MAX, &what)?;
+    asked.numbers("amplitudes_mm", elements, REACH)
 }
 
 /// Reads the load of a wheelset: the vertical force of both wheels, and the part of the left one.
@@ -209,12 +168,9 @@ pub(crate) fn read_load(case: &mut Object, force: AllowedRange) -> Option<Load> 
             return None;
         }
     }
-    block.only(&["vertical_force_n", "left_share"], &[]);
+    block.only(&["vertical_force_n", "left_share"]);
     let vertical_force_n = block.required_number("vertical_force_n", force);
-    let left_share = block.number("left_share", SHARE);
-    if block.has("left_share") {
-        left_share?;
-    }
+    let left_share = block.optional_number("left_share", SHARE)?;
     Some(Load {
         normal_force_n: None,
         vertical_force_n: Some(vertical_force_n?),
