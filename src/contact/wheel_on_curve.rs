@@ -30,6 +30,7 @@ use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelConta
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::post::damage::evaluate::{DamagedPatch, damage};
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::problem::coupled::negligible;
 use crate::contact::problem::run::Run;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
@@ -45,6 +46,7 @@ use crate::contact::solution::words::answer::{
 use crate::contact::solution::words::damage::Damage;
 use crate::contact::solution::words::fields::{Fields, PatchFields};
 use crate::contact::time_limit::TimeLimit;
+use crate::contact::unlike_bodies::LEFT_BY_PRESSURE;
 use crate::contact::unlike_motions::tell_region;
 use crate::contact::vertical_equilibrium::{next_share, tolerance};
 
@@ -71,6 +73,10 @@ const CHANGE_POOR: f64 = 5e-3;
 /// fitted to.
 const OPEN_BY_TURN: f64 = 0.2;
 const OPEN_MAX: f64 = 0.035;
+/// They grow by this times the difference of the parts that the two bodies have of the displacements: by the turn, one has a larger and the other a smaller
+/// influence than both together, as boundary elements of each body tell. Where that changes the influence as much as the factor for the gap does, it is
+/// about 2 in lateral forces. No boundary elements of unequal pairs were compared.
+const OPEN_BY_UNEQUAL: f64 = 2.5;
 /// Lateral forces of pressures count as under this coefficient of friction at least.
 const FRICTION_OPEN: f64 = 0.3;
 /// Axes, origins and signs in words.
@@ -299,6 +305,7 @@ impl<'a> CurveSolve<'a> {
                     .map(|(mut wheel, found)| {
                         let remark = Remark::NormalForcesAloneBalance {};
                         wheel.remarks.push(remark.into());
+                        wheel.remarks.extend(self.first_order());
                         (wheel, found)
                     }),
                 Err(error) => Err(error),
@@ -333,6 +340,13 @@ impl<'a> CurveSolve<'a> {
         Ok((wheel, solution, fields))
     }
 
+    /// The remark that pressures do not feel the tractions of differing bodies, where that matters.
+    fn first_order(&self) -> Option<RemarkEntry> {
+        let CheckedCase { problem, run, .. } = self.case;
+        let matters = problem.first_order_error(run.method) > negligible(run);
+        matters.then(|| problem.first_order_remark(run.method).into())
+    }
+
     /// Pressures and tractions in turn: on a coarse grid until friction is known about, then on the fine one. `before` is asked of the wheel at rest
     /// on the fine grid. Unless they are `together`, tractions are solved once, on pressures without friction.
     fn rounds(
@@ -344,7 +358,8 @@ impl<'a> CurveSolve<'a> {
         let run = &self.case.run;
         let coupled = together
             && (matches!(self.contact.loading, WheelLoad::Vertical(_))
-                || self.influence == Influence::AngleCorrected)
+                || self.influence == Influence::AngleCorrected
+                || self.case.problem.elasticity.difference != 0.0)
             && !self.case.problem.friction.is_frictionless();
         let task = self.task();
         let (mut friction, coarse) = self.coarse(coupled, workspace)?;
@@ -355,13 +370,18 @@ impl<'a> CurveSolve<'a> {
         let exact = with_tractions(run, &run.outputs);
         let target = run.resolution.target_or_usual();
         let balance = tolerance(run.resolution);
+        let problem = &self.case.problem;
+        let open = match together {
+            true => LEFT_BY_PRESSURE * problem.elasticity.difference.abs(),
+            false => problem.first_order_error(run.method),
+        };
         let mut earlier = None;
         for round in 1..=ROUNDS_MAX {
-            let parts = self.tractions(&contact, &exact, workspace)?;
+            let parts = self.tractions(&contact, &exact, open, workspace)?;
             let (mut next, mut change) = (Friction::default(), 0.0);
             if coupled {
                 next = self.friction(&contact, &parts, workspace);
-                let [by_lift, by_gap] = contact.change_by(&friction, &next);
+                let [by_lift, by_gap] = contact.change_by(&friction, &next, self.shared());
                 let by_gap = by_gap * contact.normal_force() / limit(&parts);
                 change = (by_lift / balance).max(by_gap / (CHANGE * target));
             }
@@ -427,7 +447,7 @@ impl<'a> CurveSolve<'a> {
                 lift: 0.0,
                 opened: contact.operator.opened_by_traction(&traction, workspace),
             };
-            let [_, by_gap] = contact.change_by(&still, &friction);
+            let [_, by_gap] = contact.change_by(&still, &friction, 0.0);
             changes.push(by_gap);
             if by_gap > largest.0 {
                 largest = (by_gap, friction);
@@ -468,7 +488,7 @@ impl<'a> CurveSolve<'a> {
         for _ in 0..if coupled { ROUNDS_MAX } else { 0 } {
             let limit = problem.friction.largest() * coarse.normal_force();
             let by_gap = |from: &Friction, to: &Friction| {
-                let [by_lift, by_gap] = coarse.change_by(from, to);
+                let [by_lift, by_gap] = coarse.change_by(from, to, self.shared());
                 (by_lift, by_gap * coarse.normal_force() / limit)
             };
             let forecast = match by_table {
@@ -480,7 +500,7 @@ impl<'a> CurveSolve<'a> {
             let next = match forecast {
                 Some(next) => next,
                 None => {
-                    let parts = self.tractions(&coarse, &rough, workspace)?;
+                    let parts = self.tractions(&coarse, &rough, 0.0, workspace)?;
                     self.friction(&coarse, &parts, workspace)
                 }
             };
@@ -562,11 +582,21 @@ impl<'a> CurveSolve<'a> {
         }
     }
 
-    /// The tractions of all parts of a contact.
+    /// How much of a change of the pressures the tractions take, relative to the normal forces: where bodies differ, pressures make them slip.
+    fn shared(&self) -> f64 {
+        let CheckedCase { problem, .. } = self.case;
+        match problem.elasticity.difference == 0.0 {
+            true => 0.0,
+            false => problem.friction.largest(),
+        }
+    }
+
+    /// The tractions of all parts of a contact. The forces of differing bodies have an error of `open`, relative to the friction limit, by the pressures.
     fn tractions(
         &self,
         contact: &CurveContact,
         run: &Run,
+        open: f64,
         workspace: &mut Workspace,
     ) -> Result<Vec<Part>, SolveError> {
         let slip = contact
@@ -588,7 +618,7 @@ impl<'a> CurveSolve<'a> {
         }
         let mut solved = Vec::with_capacity(parts.len());
         for patches in parts {
-            solved.push(self.part(contact, patches, slip.as_ref(), run, &watch)?);
+            solved.push(self.part(contact, patches, slip.as_ref(), (run, open), &watch)?);
         }
         Ok(solved)
     }
@@ -599,7 +629,7 @@ impl<'a> CurveSolve<'a> {
         contact: &CurveContact,
         patches: Vec<GridPressure>,
         slip: Option<&[Vec<f64>; 2]>,
-        run: &Run,
+        (run, open): (&Run, f64),
         watch: &TimeLimit,
     ) -> Result<Part, SolveError> {
         let CheckedCase { problem, label, .. } = self.case;
@@ -660,7 +690,7 @@ impl<'a> CurveSolve<'a> {
                 centres.iter().map(|centre| minus(*centre, origin)),
             ),
             report: Some(report),
-            coupling_error: 0.0,
+            coupling_error: open,
             remarks: Vec::new(),
         };
         let part = CheckedCase {
@@ -730,7 +760,7 @@ impl<'a> CurveSolve<'a> {
 
     /// The slip of the surface beyond a motion about an origin `[x, s]`.
     ///
-    /// Pressed together, like bodies meet halfway between their undeformed surfaces. The rolling radius of a strip is taken there, less what the
+    /// Pressed together, like bodies meet halfway between their undeformed surfaces, others nearer to that of the stiffer one. The rolling radius of a strip is taken there, less what the
     /// deepest strip loses, so that this one keeps the radius of the undeformed wheel, to which creepages refer. Along x half-spaces lack other terms of
     /// the size of the wheel's roundness, so that it is left out: a flat surface has the slip of a plane.
     fn surface_slip(
@@ -752,11 +782,12 @@ impl<'a> CurveSolve<'a> {
             (0..extents.len()).min_by(|a, b| far(a).total_cmp(&far(b)))
         };
         let deepest = least(&contact.gap);
+        let share = self.case.problem.elasticity.lower_share;
         let mut slip = [Vec::new(), Vec::new()];
         for (j, place) in grid.places.iter().enumerate() {
             let rigid = &rigid[patch_of(place.s).unwrap_or(0)];
             let row = &contact.gap[j * grid.x.len()..(j + 1) * grid.x.len()];
-            let gap = 0.5 * (deepest + least(row).min(0.0));
+            let gap = (1.0 - share) * deepest + share * least(row).min(0.0);
             // It is linear in x.
             let [at, by_x] = [0.0, 1.0].map(|x| rigid.slip(place.point(x, gap), place));
             for (i, x) in grid.x.iter().enumerate() {
@@ -885,7 +916,8 @@ impl<'a> CurveSolve<'a> {
         match self.influence {
             Influence::AngleCorrected => {
                 let [_, deviation] = contact.angles();
-                (OPEN_BY_TURN * deviation).min(OPEN_MAX)
+                let unequal = (2.0 * self.case.problem.elasticity.lower_share - 1.0).abs();
+                (1.0 + OPEN_BY_UNEQUAL * unequal) * (OPEN_BY_TURN * deviation).min(OPEN_MAX)
             }
             Influence::HalfSpace => 0.0,
         }

@@ -4,7 +4,7 @@ use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::solution::words::answer::{PatchSolution, Solution};
 use serde_json::{Value, json};
 
-use crate::profile_cases::{generated, put};
+use crate::profile_cases::{generated, on_planes, put};
 use crate::profile_laws::cone_on_arc;
 use crate::reference::solve;
 
@@ -65,26 +65,28 @@ fn a_wheel_of_another_material_is_coupled_as_its_radii_are() {
             let mut case = soft(&cone_on_arc(), body);
             case["load"] = json!({ "vertical_force_n": LOAD });
             case["motion"] = motion.clone();
-            let began = std::time::Instant::now();
-            let (solution, _) = solve(&case);
-            let seconds = began.elapsed().as_secs_f64();
-            not_of_first_order(&solution);
-            let patch = &solution.patches[0];
-            let load = json!({ "normal_force_n": patch.normal_force_n });
-            let known = by_radii(patch, &case, load, &motion);
-            let known = &known.patches[0];
-            let off = apart(patch, known, 0);
-            let area = patch.area_mm2 / known.area_mm2 - 1.0;
-            let pressure = patch.pressure_max_mpa / known.pressure_max_mpa - 1.0;
-            let approach = patch.approach_mm.unwrap() / known.approach_mm.unwrap() - 1.0;
-            println!(
-                "{body:?} {creepage:?}: forces apart {off:.4} ({:.4} estimated), area {area:.4}, pressure {pressure:.4}, approach {approach:.5}, {seconds:.3} s",
-                estimate(patch, 0)
-            );
-            assert!(off < estimate(patch, 0) && off < 0.005, "{off}");
-            assert!(area.abs() < 0.01 && pressure.abs() < 0.015 && approach.abs() < 2e-3);
-            let vertical = -solution.total[0].force_z_n.expect("a vertical force");
-            assert!((vertical / LOAD - 1.0).abs() < 1e-3, "{vertical}");
+            for case in [on_planes(&case), case] {
+                let began = std::time::Instant::now();
+                let (solution, _) = solve(&case);
+                let seconds = began.elapsed().as_secs_f64();
+                not_of_first_order(&solution);
+                let patch = &solution.patches[0];
+                let load = json!({ "normal_force_n": patch.normal_force_n });
+                let known = by_radii(patch, &case, load, &motion);
+                let known = &known.patches[0];
+                let off = apart(patch, known, 0);
+                let area = patch.area_mm2 / known.area_mm2 - 1.0;
+                let pressure = patch.pressure_max_mpa / known.pressure_max_mpa - 1.0;
+                let approach = patch.approach_mm.unwrap() / known.approach_mm.unwrap() - 1.0;
+                println!(
+                    "{body:?} {creepage:?}: forces apart {off:.4} ({:.4} estimated), area {area:.4}, pressure {pressure:.4}, approach {approach:.5}, {seconds:.3} s",
+                    estimate(patch, 0)
+                );
+                assert!(off < estimate(patch, 0) && off < 0.005, "{off}");
+                assert!(area.abs() < 0.01 && pressure.abs() < 0.015 && approach.abs() < 2e-3);
+                let vertical = -solution.total[0].force_z_n.expect("a vertical force");
+                assert!((vertical / LOAD - 1.0).abs() < 1e-3, "{vertical}");
+            }
         }
     }
 }
@@ -112,9 +114,9 @@ fn motions_of_a_wheel_of_another_material_are_those_of_cases_of_their_own() {
     }
 }
 
-/// At a height that is asked for tractions would change the load, which is kept: the estimate counts it.
+/// At a height that is asked for tractions change the load a little, as they do by radii.
 #[test]
-fn the_load_kept_at_a_height_is_within_the_estimate() {
+fn the_load_at_a_height_is_that_by_radii() {
     for body in SOFT {
         let motion = json!({ "creepage_x": 0.003, "creepage_y": 0.0, "spin_per_mm": 0.0 });
         let mut case = soft(&cone_on_arc(), body);
@@ -131,13 +133,13 @@ fn the_load_kept_at_a_height_is_within_the_estimate() {
             estimate(patch, 0)
         );
         assert!(
-            load.abs() < 0.015 && off < estimate(patch, 0),
+            load.abs() < 0.001 && off < estimate(patch, 0),
             "{load} {off}"
         );
     }
 }
 
-/// Several patches share the load as they do without tractions, and together they carry all of it.
+/// Together several patches carry all of the load.
 #[test]
 fn patches_of_another_material_carry_the_load_together() {
     let mut several = 0;
@@ -174,7 +176,8 @@ fn patches_of_another_material_carry_the_load_together() {
 /// Both wheels of a wheelset of another material: forces as those of the wheels alone, without the remark.
 #[test]
 fn a_wheel_that_moves_with_its_wheelset_is_coupled_too() {
-    let mut case = soft(&generated(), SOFT[0]);
+    // On a curve slips are those of every place, on planes those of the creepages at one.
+    let mut case = on_planes(&soft(&generated(), SOFT[0]));
     case["load"] = json!({ "normal_force_n": LOAD });
     case["motion"] =
         json!({ "wheelset": { "speed_mm_per_s": 1e4, "angular_velocity_rad_per_s": 21.7 } });

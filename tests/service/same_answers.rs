@@ -286,8 +286,11 @@ async fn a_wheel_is_solved_on_the_same_surface_on_every_route() {
     let mut differ = usual.clone();
     differ["material"] = json!({ "upper": soft, "lower": steel });
     let planes = at_gauge_corner(json!({ "contact": { "reference_surface": "plane" } }));
+    let fastsim =
+        at_gauge_corner(json!({ "solver": { "method": "fastsim", "target_error": 0.2 } }));
     let mut surfaces = Vec::new();
-    for (case, on_planes) in [(usual, false), (planes, false), (differ, true)] {
+    let cases = [usual, planes, differ, fastsim].into_iter();
+    for (case, on_planes) in cases.zip([false, false, false, true]) {
         let mut alone = Vec::new();
         for single in singles(&case) {
             let job = server.solve(&single).await;

@@ -79,9 +79,8 @@ impl CheckedParts {
         let task = normal_task(given.contact, given.load, elasticity.as_ref(), limits);
         let task = match (task, given.contact) {
             (None, Some(contact)) if contact.has_profiles() => {
-                let surface = surface(&given, elasticity);
-                let (surface, remark) = surface.unwrap_or_else(|found| {
-                    faults.extend(found);
+                let (surface, remark) = surface(&given).unwrap_or_else(|found| {
+                    faults.push(found);
                     (ReferenceSurface::Planes, None)
                 });
                 let task = on_rails(contact, &given, elasticity, surface, limits);
@@ -152,11 +151,8 @@ impl CheckedParts {
 /// curve does not support is solved on planes, with a remark.
 ///
 /// # Errors
-/// Parts of the case that the requested curve does not support.
-fn surface(
-    given: &PartialCase,
-    elasticity: Option<Elasticity>,
-) -> Result<(ReferenceSurface, Option<Remark>), Vec<Fault>> {
+/// A method that the requested curve does not support.
+fn surface(given: &PartialCase) -> Result<(ReferenceSurface, Option<Remark>), Fault> {
     let (asked, influence) = given.contact.map_or((None, None), Contact::surface);
     if asked == Some(SurfaceName::Plane) {
         return Ok((ReferenceSurface::Planes, None));
@@ -167,34 +163,14 @@ fn surface(
         method,
         None | Some(MethodName::Auto | MethodName::BoundaryElement)
     );
-    let differ = elasticity.is_some_and(|pair| pair.difference != 0.0);
-    let refused = [
-        (differ, "/material", "bodies that differ are not solved"),
-        (
-            other_method,
-            "/solver/method",
-            "only boundary_element is solved",
-        ),
-    ];
-    let refused: Vec<_> = refused
-        .into_iter()
-        .filter(|(applies, ..)| *applies)
-        .collect();
-    if !refused.is_empty() && !required {
-        let reasons: Vec<&str> = refused.iter().map(|(.., what)| *what).collect();
-        let remark = Remark::OnPlanes {
-            reason: format!("{} on the curve of the rail", reasons.join(", ")),
-        };
-        return Ok((ReferenceSurface::Planes, Some(remark)));
-    }
-    if !refused.is_empty() {
-        let fault = |(_, pointer, what): (bool, &str, &str)| {
-            let detail = format!(
-                "{what} on the curve of the rail; give contact.reference_surface \"plane\" for it"
-            );
-            Fault::new(pointer, detail)
-        };
-        return Err(refused.into_iter().map(fault).collect());
+    if other_method {
+        let reason = "only boundary_element is solved on the curve of the rail";
+        if required {
+            let detail = format!("{reason}; give contact.reference_surface \"plane\" for it");
+            return Err(Fault::new("/solver/method", detail));
+        }
+        let reason = reason.to_owned();
+        return Ok((ReferenceSurface::Planes, Some(Remark::OnPlanes { reason })));
     }
     let influence = match influence.unwrap_or_default() {
         InfluenceName::AngleCorrected => Influence::AngleCorrected,

@@ -14,7 +14,7 @@ use crate::contact::rolling::resolution::Resolution;
 pub const SOLVER_REVISION: u32 = 60;
 
 /// The same for bodies that differ alone.
-const COUPLING_REVISION: u32 = 1;
+const COUPLING_REVISION: u32 = 2;
 
 /// Hexadecimal BLAKE3 digest of the canonical case.
 pub(crate) fn digest(
@@ -36,7 +36,9 @@ pub(crate) fn digest(
             elasticity.poisson_ratio,
             elasticity.difference,
         ],
-        coupling: (elasticity.difference != 0.0).then_some(COUPLING_REVISION),
+        coupling: elasticity
+            .differs()
+            .then_some((COUPLING_REVISION, elasticity.lower_share)),
         friction: (&case.friction).into(),
         contact: &case.contact,
         load: case.load.as_ref(),

@@ -8,7 +8,7 @@ use crate::contact::remark::list::Remark;
 
 /// Largest |K| that methods which solve pressure and traction one after the other take.
 const DIFFERENCE_UNCOUPLED: f64 = 0.05;
-/// |K| below this is rounding of equal materials written in two ways.
+/// Differences below this are rounding of equal materials written in two ways.
 const DIFFERENCE_NOISE: f64 = 1e-12;
 
 impl Elasticity {
@@ -28,15 +28,18 @@ impl Elasticity {
                 shear_modulus: g1,
                 poisson_ratio: nu1,
                 difference: 0.0,
+                lower_share: 0.5,
             };
         }
         let g = 2.0 / (1.0 / g1 + 1.0 / g2);
         let nu = 0.5 * g * (nu1 / g1 + nu2 / g2);
+        let lower_share = 0.5 * g * (1.0 - nu2) / (g2 * (1.0 - nu));
         let k = 0.25 * g * ((1.0 - 2.0 * nu1) / g1 - (1.0 - 2.0 * nu2) / g2);
         Elasticity {
             shear_modulus: g,
             poisson_ratio: nu.clamp(0.0, 0.5),
-            difference: if k.abs() < DIFFERENCE_NOISE { 0.0 } else { k },
+            difference: rounded(k, 0.0),
+            lower_share: rounded(lower_share, 0.5),
         }
     }
 
@@ -60,6 +63,14 @@ impl Elasticity {
         neglected.then_some(Remark::CouplingNeglected {
             difference_parameter,
         })
+    }
+}
+
+/// A number of a pair, or what it is for like bodies where only rounding tells them apart.
+fn rounded(of_pair: f64, of_like_bodies: f64) -> f64 {
+    match (of_pair - of_like_bodies).abs() < DIFFERENCE_NOISE {
+        true => of_like_bodies,
+        false => of_pair,
     }
 }
 
@@ -122,6 +133,7 @@ mod tests {
         let (ab, ba) = (pair(a, b), pair(b, a));
         assert!((ab.shear_modulus - ba.shear_modulus).abs() < 1e-9);
         assert!((ab.difference + ba.difference).abs() < 1e-16 && ab.difference != 0.0);
+        assert!((ab.lower_share + ba.lower_share - 1.0).abs() < 1e-15 && ab.lower_share > 0.5);
     }
 
     #[test]
@@ -132,7 +144,7 @@ mod tests {
             poisson_ratio: 0.28,
         };
         let e = pair(young, body(82_000.0, 0.28));
-        assert_eq!(e.difference, 0.0);
+        assert!(!e.differs());
         assert!((e.shear_modulus - 82_000.0).abs() < 1e-9);
         assert_eq!(e.remark(Method::Fastsim), None);
     }

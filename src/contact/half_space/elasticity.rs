@@ -9,9 +9,17 @@ pub struct Elasticity {
     pub poisson_ratio: f64,
     /// Difference parameter K (Kalker 1990, eq. 1.44); 0 for like bodies.
     pub difference: f64,
+    /// Part of the normal displacement of both bodies that is the lower one's; ½ for like bodies.
+    pub lower_share: f64,
 }
 
 impl Elasticity {
+    /// Do the bodies differ?
+    #[must_use]
+    pub fn differs(&self) -> bool {
+        self.difference != 0.0 || self.lower_share != 0.5
+    }
+
     /// Contact modulus `E* = G/(1−ν)` in MPa, that is `1/E* = (1−ν₁²)/E₁ + (1−ν₂²)/E₂`.
     #[must_use]
     pub fn contact_modulus(&self) -> f64 {

@@ -44,6 +44,20 @@ fn of_segment(
     }
 }
 
+/// The corner sums of a cell of a size about the origin at a place.
+fn of_cell([x, y]: [f64; 2], size: [f64; 2]) -> [f64; 2] {
+    let [dx, dy] = size.map(|size| 0.5 * size);
+    let [a, b, c, d] =
+        [(dx, dy), (dx, -dy), (-dx, dy), (-dx, -dy)].map(|(p, q)| corner(x + p, y + q));
+    [0, 1].map(|k| a[k] - b[k] - (c[k] - d[k]))
+}
+
+/// Displacements along x and across at a place from a unit pressure on a cell of a size about the origin, times G.
+#[must_use]
+pub fn displacement_by_cell(difference: f64, at: [f64; 2], size: [f64; 2]) -> [f64; 2] {
+    of_cell(at, size).map(|sum| difference / PI * sum)
+}
+
 /// Displacements along x and across at a place from pressures on all cells, times G.
 #[must_use]
 pub fn displacement(mesh: &Mesh, difference: f64, pressure: &[f64], at: [f64; 2]) -> [f64; 2] {

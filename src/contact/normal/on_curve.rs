@@ -96,7 +96,8 @@ struct WheelOverGrid {
     gap: Vec<f64>,
     /// Its change with the height of the wheel's centre.
     lift: Vec<f64>,
-    /// Mean angles of rail and wheel of each strip, where the wheel is nearest; both bodies bend, and each deforms as its own surface does.
+    /// Mean angles of rail and wheel of each strip, where the wheel is nearest; both bodies bend, and each deforms as its own surface does, the softer one
+    /// more.
     angle: Vec<f64>,
 }
 
@@ -219,7 +220,9 @@ impl CurveGrid {
     }
 
     /// The wheel over the cells at a height of its centre. Along x the gap is that of a polynomial through some points.
-    fn over(&self, curve: &ReferenceCurve, centre: f64) -> WheelOverGrid {
+    fn over(&self, task: &CurveTask, centre: f64) -> WheelOverGrid {
+        let curve = task.curve;
+        let of_both = |rail: f64, wheel: f64| task.of_both(rail, wheel);
         let [nx, ny] = self.cells();
         let [first, last] = [self.x[0], self.x[nx - 1]];
         let nodes = curve.nodes([first, last]);
@@ -236,7 +239,7 @@ impl CurveGrid {
             let start = before.take().filter(|_| adjoins);
             before = curve.over_line(place, &nodes, centre, start.as_deref());
             let Some(line) = &before else {
-                self.one_by_one(curve, place, &mut over);
+                self.one_by_one(task, place, &mut over);
                 continue;
             };
             let values = |of: fn(&WheelOver) -> f64| {
@@ -255,7 +258,7 @@ impl CurveGrid {
             let of_wheel = values(|wheel| wheel.angle).nth(nearest);
             if gaps[nearest] < APART {
                 over.angle
-                    .push(0.5 * (place.angle + of_wheel.unwrap_or(place.angle)));
+                    .push(of_both(place.angle, of_wheel.unwrap_or(place.angle)));
             } else {
                 over.angle.push(place.angle);
                 over.gap[row..].fill(NO_CONTACT);
@@ -265,8 +268,8 @@ impl CurveGrid {
     }
 
     /// The wheel over a strip above whose ends along x it may end.
-    fn one_by_one(&self, curve: &ReferenceCurve, place: &CurvePlace, over: &mut WheelOverGrid) {
-        let centre = over.centre;
+    fn one_by_one(&self, task: &CurveTask, place: &CurvePlace, over: &mut WheelOverGrid) {
+        let (curve, centre) = (task.curve, over.centre);
         let row = over.gap.len();
         over.gap.resize(row + self.x.len(), NO_CONTACT);
         over.lift.resize(row + self.x.len(), place.angle.cos());
@@ -275,7 +278,7 @@ impl CurveGrid {
             over.angle.push(place.angle);
             return;
         };
-        over.angle.push(0.5 * (place.angle + nearest.angle));
+        over.angle.push(task.of_both(place.angle, nearest.angle));
         let from = self.x.partition_point(|centre| *centre < x);
         let mut go = |cells: &mut dyn Iterator<Item = usize>| {
             let mut start = Some(nearest);
@@ -439,6 +442,12 @@ fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
 }
 
 impl CurveTask<'_> {
+    /// The mean of two angles of rail and wheel, with the parts that they have of the displacements.
+    fn of_both(&self, rail: f64, wheel: f64) -> f64 {
+        let share = self.elasticity.lower_share;
+        share * rail + (1.0 - share) * wheel
+    }
+
     /// Finds the contact on a coarse grid, without friction.
     ///
     /// # Errors
@@ -456,7 +465,7 @@ impl CurveTask<'_> {
         for _ in 0..GRIDS_MAX {
             let grid = self.over_overlaps(lowering)?;
             let centre = self.touch - lowering;
-            let over = grid.over(self.curve, centre);
+            let over = grid.over(self, centre);
             let runs = match self.influence {
                 Influence::AngleCorrected => vec![[0, grid.places.len() - 1]],
                 // Overlaps are wider than contacts, so that runs of strips that touch may only be found with what acts alone.
@@ -727,7 +736,7 @@ impl CurveTask<'_> {
             mut iterations,
         } = start;
         let nx = grid.x.len();
-        let mut over = over.unwrap_or_else(|| grid.over(self.curve, centre));
+        let mut over = over.unwrap_or_else(|| grid.over(self, centre));
         let operator = operator.unwrap_or_else(|| self.operator(&grid, &over, &runs, workspace));
         let wanted = self.wanted_force(friction)?;
         let weight = |place: &CurvePlace| match wanted {
@@ -810,7 +819,7 @@ impl CurveTask<'_> {
             }
             sum = sum.map(|sum| sum / (1.0 + missed));
             if !is_linear {
-                over = grid.over(self.curve, centre);
+                over = grid.over(self, centre);
             }
         }
         unreachable!("the last height ends the search")
@@ -1018,8 +1027,8 @@ impl CurveContact {
     }
 
     /// About what changes with the friction: the vertical force on the rail, relative to it; and, by the gap that tractions open, the lateral force relative
-    /// to all normal forces.
-    pub(crate) fn change_by(&self, from: &Friction, to: &Friction) -> [f64; 2] {
+    /// to all normal forces. That changes by the turn of the surface, and by `shared`, the part of a change of the pressures that the tractions take.
+    pub(crate) fn change_by(&self, from: &Friction, to: &Friction, shared: f64) -> [f64; 2] {
         let (mut depth, mut opened) = (0.0, 0.0);
         for (k, p) in self.pressure.iter().enumerate().filter(|(_, p)| **p > 0.0) {
             let [before, after] = [from, to].map(|friction| {
@@ -1033,7 +1042,7 @@ impl CurveContact {
         let [_, deviation] = self.angles();
         [
             (to.lift - from.lift).abs() / (vertical - to.lift).abs().max(f64::MIN_POSITIVE),
-            deviation * opened / depth.max(f64::MIN_POSITIVE),
+            (deviation + shared) * opened / depth.max(f64::MIN_POSITIVE),
         ]
     }
 

@@ -52,7 +52,10 @@ impl Problem {
 
     /// The remark if the pressure should feel the tractions and does not.
     pub(crate) fn first_order(&self, run: &Run) -> Option<Remark> {
-        let needed = self.first_order_error(run.method) > negligible(run) && !self.is_coupled(run);
+        // The points of a history of a wheel share the pressures without tractions.
+        let is_wheel = matches!(self.task, NormalTask::Wheel(_) | NormalTask::Wheelset(_));
+        let coupled = self.is_coupled(run) && !(is_wheel && self.history.is_some());
+        let needed = self.first_order_error(run.method) > negligible(run) && !coupled;
         needed.then(|| self.first_order_remark(run.method))
     }
 

@@ -216,7 +216,7 @@ impl StripMesh {
             normalised: Arc::new(normalised),
             bound,
             layer: task.interface.layer * scale.shear_modulus / scale.length,
-            surface_slip: of_pressure.or(own_slip),
+            surface_slip: sum(of_pressure, own_slip),
             slip_by_motion,
             poisson_ratio,
             precision,
@@ -310,6 +310,17 @@ fn surface_slips(mesh: &Mesh, slip: &SurfaceSlip, unit: f64) -> [Vec<f64>; 2] {
     let of = |i: usize| slip.mean([mesh.left[i], mesh.right[i]], y[i]);
     let slips: Vec<[f64; 2]> = (0..mesh.cells()).map(of).collect();
     [0, 1].map(|k| slips.iter().map(|slip| slip[k] / unit).collect())
+}
+
+/// The sum of slips, where there are any.
+fn sum(one: Option<[Vec<f64>; 2]>, other: Option<[Vec<f64>; 2]>) -> Option<[Vec<f64>; 2]> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some([0, 1].map(|axis| {
+            let cells = one[axis].iter().zip(&other[axis]);
+            cells.map(|(a, b)| a + b).collect()
+        })),
+        (one, other) => one.or(other),
+    }
 }
 
 /// Samples across a strip where friction varies.

@@ -21,9 +21,10 @@ pub(crate) struct Canonical<'a> {
     pub(crate) solver_version: &'static str,
     pub(crate) solver_revision: u32,
     pub(crate) elasticity: [f64; 3],
-    /// How bodies that differ are solved; like bodies have no such number, and their answers stay what they are.
+    /// How bodies that differ are solved, and the lower one's part of the displacement; like bodies have no such numbers, and their answers stay what they
+    /// are.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) coupling: Option<u32>,
+    pub(crate) coupling: Option<(u32, f64)>,
     pub(crate) friction: FrictionForm<'a>,
     pub(crate) contact: &'a Contact,
     pub(crate) load: Option<&'a Load>,

@@ -317,7 +317,7 @@ pub enum SideName {
 #[serde(rename_all = "snake_case")]
 #[schema(as = ReferenceSurface)]
 pub enum SurfaceName {
-    /// A plane of contact for each patch, or for patches near each other: for comparison, and for bodies that differ.
+    /// A plane of contact for each patch, or for patches near each other: for comparison.
     Plane,
     /// The cross-section of the rail: normals, slips and influences follow the bend of its surface, and all patches of a wheel are one problem. For
     /// bodies that do not differ.

@@ -98,7 +98,7 @@ macro_rules! wheel_remarks {
             /// The case does not ask for a reference surface, and the curve of the rail does not solve it: it is solved on planes of contact.
             OnPlanes {
                 /// Why.
-                reason: String = "bodies that differ are not solved on the curve of the rail".to_owned(),
+                reason: String = "only boundary_element is solved on the curve of the rail".to_owned(),
             }
             code: "on-planes",
             severity: Warning,

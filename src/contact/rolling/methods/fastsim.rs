@@ -143,6 +143,7 @@ impl EllipseMesh {
                 shear_modulus: 1.0,
                 poisson_ratio: 0.0,
                 difference: 0.0,
+                lower_share: 0.5,
             },
             friction: &FrictionLaw::Constant(1.0),
             interface: Interface::default(),

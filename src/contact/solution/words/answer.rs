@@ -30,8 +30,8 @@ pub struct Solution {
     /// How region and pressure were found; absent where they were known beforehand. Of several motions of bodies that differ, those of the first.
     #[schema(nullable = true)]
     pub normal: Option<NormalReport>,
-    /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`. Where bodies differ, it is that of a wheel
-    /// without tractions.
+    /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`. On planes, where bodies
+    /// differ, it is that of a wheel without tractions.
     #[schema(nullable = true)]
     pub wheel_lowering_mm: Option<f64>,
     /// Angular velocity of the wheelset in rad/s, found for the longitudinal force that was prescribed; only for `profiles` with `wheelset.force_x_n`.
