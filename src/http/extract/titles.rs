@@ -135,18 +135,18 @@ const MEMBER_UNITS: [(&str, &Units); 10] = [
     ("_s", &TIME),
 ];
 
-/// A quantity that columns vary.
+/// A quantity that columns vary. Lists of names are parted by spaces.
 #[derive(Debug)]
 struct Quantity {
     /// Where it stands in the case.
     pointer: &'static str,
     units: &'static Units,
     /// Its names here.
-    names: &'static [&'static str],
+    names: &'static str,
     /// Names in vehicle-dynamics codes that mean this quantity if the column has one of its units.
-    codes: &'static [&'static str],
+    codes: &'static str,
     /// Names that may mean this quantity or another one. They are refused, and the quantity is suggested.
-    doubtful: &'static [&'static str],
+    doubtful: &'static str,
 }
 
 /// Symbols of creepages in codes and papers: ν (Simpack, GENSYS), ξ (Universal Mechanism, Kalker), γ (VAMPIRE, Wickens). Greek letters are
@@ -155,271 +155,96 @@ const QUANTITIES: [Quantity; 13] = [
     Quantity {
         pointer: "/load/normal_force_n",
         units: &FORCE,
-        names: &["normal_force"],
-        codes: &[
-            "n",
-            "fn",
-            "f_n",
-            "normal_load",
-            "normal_contact_force",
-            "contact_normal_force",
-        ],
-        doubtful: &[
-            "q",
-            "fz",
-            "f_z",
-            "f_q",
-            "q_force",
-            "load",
-            "force",
-            "contact_force",
-            "vertical",
-        ],
+        names: "normal_force",
+        codes: "n fn f_n normal_load normal_contact_force contact_normal_force",
+        doubtful: "q fz f_z f_q q_force load force contact_force vertical",
     },
     Quantity {
         pointer: "/load/vertical_force_n",
         units: &FORCE,
-        names: &["vertical_force", "wheel_load"],
-        codes: &["vertical_wheel_force", "vertical_load"],
-        doubtful: &[
-            "q",
-            "fz",
-            "f_z",
-            "f_q",
-            "q_force",
-            "load",
-            "force",
-            "wheel_force",
-            "vertical",
-        ],
+        names: "vertical_force wheel_load",
+        codes: "vertical_wheel_force vertical_load",
+        doubtful: "q fz f_z f_q q_force load force wheel_force vertical",
     },
     Quantity {
         pointer: "/load/approach_mm",
         units: &LENGTH,
-        names: &["approach"],
-        codes: &[],
-        doubtful: &["penetration", "interpenetration", "indentation"],
+        names: "approach",
+        codes: "",
+        doubtful: "penetration interpenetration indentation",
     },
     Quantity {
         pointer: "/motion/creepage_x",
         units: &RATIO,
-        names: &["creepage_x", "longitudinal_creepage"],
-        codes: &[
-            "nu_x",
-            "nux",
-            "xi_x",
-            "xix",
-            "xsi_x",
-            "ksi_x",
-            "ksix",
-            "gamma_x",
-            "gammax",
-            "creep_x",
-            "creepx",
-            "x_creep",
-            "x_creepage",
-            "vx_creep",
-            "creep_vx",
-            "longitudinal_creep",
-            "long_creep",
-            "long_creepage",
-            "creepage_long",
-            "creepage_longitudinal",
-            "creep_longitudinal",
-        ],
-        doubtful: &[
-            "nu_1",
-            "nu1",
-            "xi_1",
-            "xi1",
-            "gamma_1",
-            "gamma1",
-            "vx",
-            "v_x",
-            "slip_x",
-            "slipx",
-            "sx",
-            "s_x",
-            "cx",
-            "longitudinal_slip",
-            "long_slip",
-            "creepage",
-            "creep",
-            "slip",
-        ],
+        names: "creepage_x longitudinal_creepage",
+        codes: "nu_x nux xi_x xix xsi_x ksi_x ksix gamma_x gammax creep_x creepx x_creep x_creepage vx_creep creep_vx \
+                    longitudinal_creep long_creep long_creepage creepage_long creepage_longitudinal creep_longitudinal",
+        doubtful: "nu_1 nu1 xi_1 xi1 gamma_1 gamma1 vx v_x slip_x slipx sx s_x cx longitudinal_slip long_slip creepage creep slip",
     },
     Quantity {
         pointer: "/motion/creepage_y",
         units: &RATIO,
-        names: &["creepage_y", "lateral_creepage"],
-        codes: &[
-            "nu_y",
-            "nuy",
-            "xi_y",
-            "xiy",
-            "xsi_y",
-            "ksi_y",
-            "ksiy",
-            "gamma_y",
-            "gammay",
-            "creep_y",
-            "creepy",
-            "y_creep",
-            "y_creepage",
-            "vy_creep",
-            "creep_vy",
-            "lateral_creep",
-            "lat_creep",
-            "lat_creepage",
-            "creepage_lat",
-            "creepage_lateral",
-            "creep_lateral",
-        ],
-        doubtful: &[
-            "nu_2",
-            "nu2",
-            "xi_2",
-            "xi2",
-            "gamma_2",
-            "gamma2",
-            "vy",
-            "v_y",
-            "slip_y",
-            "slipy",
-            "sy",
-            "s_y",
-            "cy",
-            "lateral_slip",
-            "lat_slip",
-            "creepage",
-            "creep",
-            "slip",
-        ],
+        names: "creepage_y lateral_creepage",
+        codes: "nu_y nuy xi_y xiy xsi_y ksi_y ksiy gamma_y gammay creep_y creepy y_creep y_creepage vy_creep creep_vy lateral_creep \
+                    lat_creep lat_creepage creepage_lat creepage_lateral creep_lateral",
+        doubtful: "nu_2 nu2 xi_2 xi2 gamma_2 gamma2 vy v_y slip_y slipy sy s_y cy lateral_slip lat_slip creepage creep slip",
     },
     Quantity {
         pointer: "/motion/spin_per_mm",
         units: &CURVATURE,
-        names: &["spin", "spin_creepage"],
-        codes: &[
-            "phi",
-            "phi_z",
-            "phi_spin",
-            "spin_creep",
-            "creep_spin",
-            "creepage_spin",
-            "nu_z",
-            "nuz",
-            "nu_phi",
-            "nu_sp",
-            "nu_spin",
-            "xi_z",
-            "xi_phi",
-            "xi_sp",
-            "xi_spin",
-            "ksi_sp",
-            "ksi_spin",
-            "gamma_sp",
-            "gamma_spin",
-            "gamma_z",
-            "omega_spin",
-        ],
-        doubtful: &[
-            "nu_3", "nu3", "xi_3", "xi3", "gamma_3", "gamma3", "gamma_s", "omega_z", "spin_z",
-        ],
+        names: "spin spin_creepage",
+        codes: "phi phi_z phi_spin spin_creep creep_spin creepage_spin nu_z nuz nu_phi nu_sp nu_spin xi_z xi_phi xi_sp xi_spin ksi_sp \
+                    ksi_spin gamma_sp gamma_spin gamma_z omega_spin",
+        doubtful: "nu_3 nu3 xi_3 xi3 gamma_3 gamma3 gamma_s omega_z spin_z",
     },
     Quantity {
         pointer: "/motion/force_x_n",
         units: &FORCE,
-        names: &["force_x"],
-        codes: &[],
-        doubtful: &[
-            "fx",
-            "f_x",
-            "tx",
-            "t_x",
-            "longitudinal_force",
-            "long_force",
-            "creep_force_x",
-            "force",
-            "traction",
-        ],
+        names: "force_x",
+        codes: "",
+        doubtful: "fx f_x tx t_x longitudinal_force long_force creep_force_x force traction",
     },
     Quantity {
         pointer: "/motion/force_y_n",
         units: &FORCE,
-        names: &["force_y"],
-        codes: &[],
-        doubtful: &[
-            "fy",
-            "f_y",
-            "ty",
-            "t_y",
-            "lateral_force",
-            "lat_force",
-            "creep_force_y",
-            "force",
-            "y",
-            "y_force",
-            "guiding_force",
-        ],
+        names: "force_y",
+        codes: "",
+        doubtful: "fy f_y ty t_y lateral_force lat_force creep_force_y force y y_force guiding_force",
     },
     Quantity {
         pointer: "/friction/coefficient",
         units: &RATIO,
-        names: &["friction_coefficient", "friction", "mu"],
-        codes: &["mue", "cof", "coefficient_of_friction", "friction_coeff"],
-        doubtful: &["f", "my", "adhesion", "adhesion_coefficient"],
+        names: "friction_coefficient friction mu",
+        codes: "mue cof coefficient_of_friction friction_coeff",
+        doubtful: "f my adhesion adhesion_coefficient",
     },
     Quantity {
         pointer: "/motion/speed_mm_per_s",
         units: &SPEED,
-        names: &["speed", "rolling_speed"],
-        codes: &[
-            "v",
-            "velocity",
-            "vehicle_speed",
-            "vehicle_velocity",
-            "running_speed",
-            "train_speed",
-            "rolling_velocity",
-            "v_vehicle",
-            "v_train",
-        ],
-        doubtful: &["vx", "v_x", "v0", "v_0", "vkmh", "vel", "v_rel"],
+        names: "speed rolling_speed",
+        codes: "v velocity vehicle_speed vehicle_velocity running_speed train_speed rolling_velocity v_vehicle v_train",
+        doubtful: "vx v_x v0 v_0 vkmh vel v_rel",
     },
     Quantity {
         pointer: "/contact/lateral_shift_mm",
         units: &LENGTH,
-        names: &["lateral_shift", "lateral_displacement"],
-        codes: &["y_rel", "yrel", "rel_y", "y_shift", "shift_y", "shift"],
-        doubtful: &[
-            "y",
-            "dy",
-            "d_y",
-            "y_w",
-            "y_ws",
-            "y_wheelset",
-            "y_wr",
-            "y_wheel",
-            "u_y",
-            "lateral_position",
-            "lateral",
-            "displacement",
-        ],
+        names: "lateral_shift lateral_displacement",
+        codes: "y_rel yrel rel_y y_shift shift_y shift",
+        doubtful: "y dy d_y y_w y_ws y_wheelset y_wr y_wheel u_y lateral_position lateral displacement",
     },
     Quantity {
         pointer: "/contact/yaw_rad",
         units: &ANGLE,
-        names: &["yaw", "yaw_angle"],
-        codes: &["psi", "angle_of_attack", "attack_angle", "aoa"],
-        doubtful: &["alpha", "attack", "p"],
+        names: "yaw yaw_angle",
+        codes: "psi angle_of_attack attack_angle aoa",
+        doubtful: "alpha attack p",
     },
     Quantity {
         pointer: "/contact/roll_rad",
         units: &ANGLE,
-        names: &["roll", "roll_angle"],
-        codes: &[],
-        doubtful: &["phi", "phi_x"],
+        names: "roll roll_angle",
+        codes: "",
+        doubtful: "phi phi_x",
     },
 ];
 
@@ -446,110 +271,17 @@ const SHORT_NAMES: [(&str, &str); 18] = [
 ];
 
 /// Names of places along the track and of times, which are carried along with or without a unit of length or time.
-const PLACES_AND_TIMES: &[&str] = &[
-    "t",
-    "time",
-    "clock",
-    "hour",
-    "step",
-    "time_step",
-    "timestep",
-    "s",
-    "s_track",
-    "track_s",
-    "km",
-    "kp",
-    "pk",
-    "kilometre",
-    "kilometer",
-    "kilometrage",
-    "chainage",
-    "station",
-    "stationing",
-    "mile",
-    "mileage",
-    "milepost",
-    "position",
-    "pos",
-    "place",
-    "location",
-    "distance",
-    "dist",
-    "distance_travelled",
-    "distance_traveled",
-    "track_position",
-    "track_distance",
-    "position_along_track",
-    "distance_along_track",
-    "track_km",
-    "track_chainage",
-    "arc_length",
-    "latitude",
-    "longitude",
-    "date",
-    "datetime",
-    "timestamp",
-];
+const PLACES_AND_TIMES: &str = "t time clock hour step time_step timestep s s_track track_s km kp pk kilometre kilometer kilometrage chainage station \
+    stationing mile mileage milepost position pos place location distance dist distance_travelled distance_traveled \
+    track_position track_distance position_along_track distance_along_track track_km track_chainage arc_length latitude \
+    longitude date datetime timestamp";
 
 /// Names of sections of a line, of vehicles and their parts, and of rows, which are carried along; also with an end of [`NUMBERED`].
-const SECTIONS_AND_THINGS: &[&str] = &[
-    "section",
-    "segment",
-    "track",
-    "track_section",
-    "line",
-    "route",
-    "curve",
-    "region",
-    "direction",
-    "site",
-    "switch",
-    "side",
-    "rail",
-    "rail_side",
-    "left_right",
-    "id",
-    "uuid",
-    "key",
-    "name",
-    "title",
-    "label",
-    "tag",
-    "comment",
-    "remark",
-    "note",
-    "description",
-    "case",
-    "run",
-    "scenario",
-    "variant",
-    "simulation",
-    "train",
-    "vehicle",
-    "car",
-    "wagon",
-    "coach",
-    "locomotive",
-    "bogie",
-    "wheelset",
-    "axle",
-    "wheel",
-    "wheel_side",
-    "contact_point",
-    // The answers have columns of these three names, so that one that is carried along is refused for its name.
-    "row",
-    "status",
-    "method",
-    "record",
-    "frame",
-    "sample",
-    "index",
-    "number",
-    "no",
-    "nr",
-    "num",
-    "passage",
-];
+/// The answers have columns `row`, `status` and `method`, so that one that is carried along is refused for its name.
+const SECTIONS_AND_THINGS: &str = "section segment track track_section line route curve region direction site switch side rail rail_side left_right id \
+    uuid key name title label tag comment remark note description case run scenario variant simulation train vehicle car \
+    wagon coach locomotive bogie wheelset axle wheel wheel_side contact_point row status method record frame sample index \
+    number no nr num passage";
 
 /// Ends of names such as `axle_no`.
 const NUMBERED: &[&str] = &[
@@ -601,8 +333,8 @@ pub fn place(title: &str, below: Option<&str>) -> Result<Option<Place>, String> 
     }
     let stem = normal(bare);
     for quantity in &QUANTITIES {
-        let names = quantity.names.iter().map(|name| (name, true));
-        let codes = quantity.codes.iter().map(|name| (name, false));
+        let names = quantity.names.split_whitespace().map(|name| (name, true));
+        let codes = quantity.codes.split_whitespace().map(|name| (name, false));
         for (name, own) in names.chain(codes) {
             if let Some(factor) = quantity.factor(&stem, name, own, unit)? {
                 return Ok(Some(Place {
@@ -659,7 +391,7 @@ impl Quantity {
         units.dedup();
         format!(
             "allowed as in `{} [{}]`: {}",
-            self.names[0],
+            self.first_name(),
             self.units.usual,
             units.join(", ")
         )
@@ -668,14 +400,22 @@ impl Quantity {
     /// The quantity as a client may write it, in this unit if it has it.
     fn written(&self, unit: Option<&str>) -> String {
         let unit = unit.filter(|unit| self.units.factor(unit).is_some());
-        format!("{} [{}]", self.names[0], unit.unwrap_or(self.units.usual))
+        format!(
+            "{} [{}]",
+            self.first_name(),
+            unit.unwrap_or(self.units.usual)
+        )
+    }
+
+    fn first_name(&self) -> &'static str {
+        self.names.split_whitespace().next().unwrap_or_default()
     }
 
     /// Does the quantity have this name, or may it?
     fn may_be(&self, name: &str) -> bool {
         [self.names, self.codes, self.doubtful]
             .iter()
-            .any(|names| names.contains(&name))
+            .any(|names| is_among(name, names))
     }
 }
 
@@ -726,6 +466,11 @@ pub fn short_names() -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
+/// Is this one of the names of a list that are parted by spaces?
+fn is_among(name: &str, names: &str) -> bool {
+    names.split_whitespace().any(|known| known == name)
+}
+
 /// Is this a name of a place, a time, a section or a thing, which says nothing of the contact?
 fn is_carried(title: &str, below: Option<&str>) -> bool {
     let (bare, in_title) = parted(title);
@@ -738,8 +483,8 @@ fn is_carried(title: &str, below: Option<&str>) -> bool {
         let (before, end) = stem.rsplit_once('_')?;
         ends.contains(&end).then(|| before.to_owned())
     };
-    let is = |list: &[&str], ends: &[&str]| {
-        list.contains(&&*stem) || cut(ends).is_some_and(|before| list.contains(&&*before))
+    let is = |list: &str, ends: &[&str]| {
+        is_among(&stem, list) || cut(ends).is_some_and(|before| is_among(&before, list))
     };
     // A label has this name in a table of a batch.
     title.starts_with("label:")
@@ -782,12 +527,12 @@ fn suggested(title: &str, below: Option<&str>) -> Vec<String> {
             }
         }
     }
-    let near = |name: &&&str| {
+    let near = |name: &str| {
         name.len() >= MISSPELT_LENGTH && strsim::levenshtein(name, &stem) <= MISSPELT_LETTERS
     };
     let misspelt = QUANTITIES
         .iter()
-        .filter(|quantity| quantity.names.iter().any(|name| near(&name)));
+        .filter(|quantity| quantity.names.split_whitespace().any(near));
     let misspelt: Vec<&Quantity> = misspelt.collect();
     if !misspelt.is_empty() {
         return written(misspelt);
@@ -903,7 +648,7 @@ fn place_of(
             match place.map_err(|detail| format!("`{what}` {detail}"))? {
                 Some(place) => Ok(Some(place)),
                 None => {
-                    let known = QUANTITIES.iter().map(|quantity| quantity.names[0]);
+                    let known = QUANTITIES.iter().map(|quantity| quantity.first_name());
                     let known: Vec<&str> = known.collect();
                     Err(format!(
                         "`{what}` is named in `column`, which is no place in a case; allowed: a JSON pointer, a short name, or one of {} with a unit",
