@@ -8,9 +8,8 @@
 //! Explicit steps stay stable where the wear of a step is smoothed over a length of about a tenth of what E* over the pressure makes of its
 //! depth; the defaults of `smoothing_mm` and `step_depth_mm` belong together.
 
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
+use rayon::ThreadPoolBuilder;
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 use crate::contact::error::SolveError;
 use crate::contact::evolution::pass::{BodyWear, Pass, pass};
@@ -258,37 +257,21 @@ impl Solver<'_> {
 
     /// Solves the states of these values, each on its own, on the threads of the context.
     fn passes(&self, on: Sections, states: &[&[f64]]) -> Result<Vec<Pass>, SolveError> {
-        let found: Vec<_> = states.iter().map(|_| OnceLock::new()).collect();
-        let next = AtomicUsize::new(0);
-        let work = || {
+        let solve = |values: &&[f64]| {
             let monitor = MonitorPart {
                 inner: self.monitor,
                 before: self.share,
                 own: 0.0,
             };
-            loop {
-                let k = next.fetch_add(1, Ordering::Relaxed);
-                let (Some(values), Some(found)) = (states.get(k), found.get(k)) else {
-                    return;
-                };
-                let pass = || pass(self.task, self.context, on, values, &monitor);
-                if found.get_or_init(pass).is_err() {
-                    // After an error no further state is begun.
-                    next.store(states.len(), Ordering::Relaxed);
-                }
-            }
+            pass(self.task, self.context, on, values, &monitor)
         };
-        thread::scope(|scope| {
-            for _ in 1..self.context.threads {
-                let builder = thread::Builder::new().stack_size(STACK_BYTES);
-                // Without another thread this one does all.
-                drop(builder.spawn_scoped(scope, work));
-            }
-            work();
-        });
-        // Only an error leaves states without a pass.
-        let found = found.into_iter().filter_map(OnceLock::into_inner);
-        found.collect()
+        let threads = self.context.threads;
+        let pool = ThreadPoolBuilder::new().num_threads(threads);
+        match pool.stack_size(STACK_BYTES).build() {
+            Ok(pool) if threads > 1 => pool.install(|| states.par_iter().map(solve).collect()),
+            // Without other threads this one does all.
+            _ => states.iter().map(solve).collect(),
+        }
     }
 }
 

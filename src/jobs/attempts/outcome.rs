@@ -40,6 +40,28 @@ impl Outcome {
     }
 }
 
+/// The outcome of work. One that ends the work early is the error, so that `?` passes it on.
+pub(crate) type Ended = Result<Outcome, Box<Outcome>>;
+
+impl From<SolveError> for Box<Outcome> {
+    fn from(error: SolveError) -> Box<Outcome> {
+        Box::new(Outcome::Unsolved(error))
+    }
+}
+
+impl From<CaseError> for Box<Outcome> {
+    fn from(error: CaseError) -> Box<Outcome> {
+        Box::new(Outcome::Refused(error))
+    }
+}
+
+/// A fault of the service.
+impl From<String> for Box<Outcome> {
+    fn from(reason: String) -> Box<Outcome> {
+        Box::new(Outcome::internal(&reason))
+    }
+}
+
 /// What is to be done for a job.
 #[derive(Debug)]
 pub(crate) enum Work {

@@ -3,19 +3,18 @@
 use std::error::Error;
 use std::sync::Arc;
 
-use bytes::Bytes;
-use serde::Serialize;
+use serde_json::Value;
 
 use crate::contact::error::SolveError;
 use crate::contact::evolution::task::{Evolution, SolveContext};
 use crate::contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
 use crate::jobs::attempts::attempt_control::AttemptControl;
-use crate::jobs::attempts::outcome::Outcome;
+use crate::jobs::attempts::outcome::{Ended, Outcome};
 use crate::jobs::attempts::slices::{SlicedEvolution, SlicedWork};
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;
-use crate::jobs::store::submission::StoredCase;
+use crate::jobs::worker::solve::as_json;
 
 /// Steps that are stored together, unless a record ends them before.
 const STEPS: u32 = 16;
@@ -27,17 +26,10 @@ type Part = (Option<EvolutionRecord>, EvolutionState);
 pub(crate) fn begin(
     shared: &Shared,
     control: &AttemptControl,
-    stored: &StoredCase,
+    request: &Value,
     notes: &[SliceRecord],
-) -> Outcome {
-    let request = match stored.value() {
-        Ok(request) => request,
-        Err(error) => return Outcome::internal(&error.to_string()),
-    };
-    let task = match Evolution::check(&request, &shared.options.limits) {
-        Ok(task) => task,
-        Err(error) => return Outcome::Refused(error),
-    };
+) -> Ended {
+    let task = Evolution::check(request, &shared.options.limits)?;
     control.set_memory_bytes(task.memory_bytes);
     advance(shared, control, SlicedEvolution::new(task, notes))
 }
@@ -47,17 +39,17 @@ pub(crate) fn advance(
     shared: &Shared,
     control: &AttemptControl,
     mut evolution: SlicedEvolution,
-) -> Outcome {
+) -> Ended {
     let state = evolution.state.take();
     let Some(state) = state.filter(|state| !evolution.task.is_over(state)) else {
         let sliced = Box::new(SlicedWork::Evolution(evolution));
-        return Outcome::Slice { sliced, part: None };
+        return Ok(Outcome::Slice { sliced, part: None });
     };
     if evolution.spent >= shared.options.time_limit {
-        return Outcome::Unsolved(SolveError::OutOfTime {
+        return Ok(Outcome::Unsolved(SolveError::OutOfTime {
             limit_s: None,
             motions: None,
-        });
+        }));
     }
     let context = SolveContext {
         threads: shared.options.workers,
@@ -67,23 +59,17 @@ pub(crate) fn advance(
     control.begin(evolution.spent);
     let solved = evolution.task.steps(&context, state, STEPS, control);
     let spent = control.pause();
-    let (state, record) = match solved {
-        Ok(solved) => solved,
-        Err(error) => return Outcome::Unsolved(error),
-    };
+    let (state, record) = solved?;
     let note = SliceRecord {
         number: evolution.done,
         motions: state.steps,
         digest: evolution.task.digest.clone(),
         spent,
     };
-    let part = match encoded(&(record, &state)) {
-        Ok(part) => Some((note, part)),
-        Err(error) => return Outcome::internal(&error),
-    };
+    let part = Some((note, as_json(&(record, &state))?));
     evolution.state = Some(state);
     let sliced = Box::new(SlicedWork::Evolution(evolution));
-    Outcome::Slice { sliced, part }
+    Ok(Outcome::Slice { sliced, part })
 }
 
 /// Goes on from the stored parts, or puts them together where all is solved.
@@ -92,18 +78,15 @@ pub(crate) fn join(
     control: &AttemptControl,
     mut evolution: SlicedEvolution,
     parts: &[EncodedResult],
-) -> Outcome {
+) -> Ended {
     match read(parts, evolution.done) {
         Ok((state, records)) if evolution.task.is_over(&state) => {
             let answer = evolution.task.answer(&state, records);
-            match encoded(&answer) {
-                Ok(result) => Outcome::Solved {
-                    result,
-                    remarks: answer.remarks,
-                    field_patches: 0,
-                },
-                Err(error) => Outcome::internal(&error),
-            }
+            Ok(Outcome::Solved {
+                result: as_json(&answer)?,
+                remarks: answer.remarks,
+                field_patches: 0,
+            })
         }
         Ok((state, _)) => {
             evolution.state = Some(state);
@@ -115,16 +98,6 @@ pub(crate) fn join(
             advance(shared, control, evolution)
         }
     }
-}
-
-/// A part or the whole of an answer in its stored form.
-fn encoded(answer: &impl Serialize) -> Result<EncodedResult, String> {
-    let text = serde_json::to_vec(answer);
-    let text = text.map_err(|error| format!("an evolution cannot be written as JSON: {error}"))?;
-    Ok(EncodedResult {
-        solution: Bytes::from(text),
-        fields: None,
-    })
 }
 
 /// The state after the last of this many stored parts, and all their records.

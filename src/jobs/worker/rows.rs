@@ -11,27 +11,19 @@ use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::attempts::attempt_control::AttemptControl;
-use crate::jobs::attempts::outcome::{INTERNAL, Outcome};
+use crate::jobs::attempts::outcome::{Ended, Outcome};
 use crate::jobs::codec::parquet::encode;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::error::JobsError;
-use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::run::chunk::{RunChunk, parted};
 use crate::jobs::run::head::{REASON, RunHead};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::submission::StoredCase;
 
 /// Solves a chunk; its answers are a Parquet file.
-pub(crate) fn solve_chunk(
-    shared: &Shared,
-    control: &AttemptControl,
-    stored: &StoredCase,
-) -> Outcome {
-    let (head, chunk) = match read(stored) {
-        Ok(read) => read,
-        Err(error) => return broken(&error),
-    };
+pub(crate) fn solve_chunk(shared: &Shared, control: &AttemptControl, stored: &StoredCase) -> Ended {
+    let (head, chunk) = read(stored).map_err(|error| error.to_string())?;
     let first_row = chunk.first_row;
     let (varied, carried) = parted(&head, chunk);
     let limits = &shared.options.limits;
@@ -51,26 +43,20 @@ pub(crate) fn solve_chunk(
         |checked: &CheckedCase, monitor: &dyn Monitor| shared.engine.solve_whole(checked, monitor);
     let solved = solve_many(&task, &solve, control);
     control.pause();
-    let answer = match solved {
-        Ok(answer) => answer,
-        Err(error) => return Outcome::Unsolved(error),
-    };
+    let answer = solved?;
     let rows = answer.status.len();
     let without = answer.without_answer();
     shared.metrics.rows_ended(&answer);
-    match encode(&table(&head, first_row, carried, answer)) {
-        Ok(file) => Outcome::Solved {
-            result: EncodedResult {
-                solution: Bytes::from(
-                    json!({ "rows": rows, "without_answer": without }).to_string(),
-                ),
-                fields: Some(Bytes::from(file)),
-            },
-            remarks: Vec::new(),
-            field_patches: u32::try_from(without).unwrap_or(u32::MAX),
+    let file = encode(&table(&head, first_row, carried, answer));
+    let file = file.map_err(|error| format!("a chunk of rows cannot be written: {error}"))?;
+    Ok(Outcome::Solved {
+        result: EncodedResult {
+            solution: Bytes::from(json!({ "rows": rows, "without_answer": without }).to_string()),
+            fields: Some(Bytes::from(file)),
         },
-        Err(error) => broken(&JobsError::Damaged(error.to_string())),
-    }
+        remarks: Vec::new(),
+        field_patches: u32::try_from(without).unwrap_or(u32::MAX),
+    })
 }
 
 fn read(stored: &StoredCase) -> Result<(RunHead, RunChunk), JobsError> {
@@ -107,9 +93,4 @@ fn table(
         columns.push((REASON.to_owned(), TableColumn::Texts(reasons.collect())));
     }
     RowTable { columns }
-}
-
-fn broken(error: &JobsError) -> Outcome {
-    tracing::error!(%error, "a chunk of rows fails inside the service");
-    Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
 }

@@ -5,13 +5,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use bytes::Bytes;
+use serde::Serialize;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::{Fields, PatchFields};
 use crate::jobs::attempts::attempt_control::AttemptControl;
-use crate::jobs::attempts::outcome::{Outcome, Work};
+use crate::jobs::attempts::outcome::{Ended, Outcome, Work};
 use crate::jobs::attempts::slices::{SlicedCase, SlicedWork};
 use crate::jobs::codec::encode::encode;
 use crate::jobs::codec::result::EncodedResult;
@@ -36,12 +37,13 @@ pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Wor
             SlicedWork::Evolution(own) => evolution::join(shared, control, own, &parts),
         },
     }));
-    done.unwrap_or_else(|payload| {
+    let ended = done.unwrap_or_else(|payload| {
         // What a defect says of the program is for the log, not for clients.
         tracing::error!(reason = panic_text(payload.as_ref()), "the solver panicked");
         let detail = "the solver stopped on a defect of its own; the service's log has the reason";
-        Outcome::Broken(Failure::new(FailureKind::Panic, detail))
-    })
+        Ok(Outcome::Broken(Failure::new(FailureKind::Panic, detail)))
+    });
+    ended.unwrap_or_else(|early| *early)
 }
 
 fn check_and_solve(
@@ -49,20 +51,15 @@ fn check_and_solve(
     control: &AttemptControl,
     stored: &StoredCase,
     notes: &[SliceRecord],
-) -> Outcome {
-    match stored.kind {
-        Kind::Rows => return rows::solve_chunk(shared, control, stored),
-        Kind::Evolution => return evolution::begin(shared, control, stored, notes),
-        Kind::Case | Kind::Cases => {}
+) -> Ended {
+    if stored.kind == Kind::Rows {
+        return rows::solve_chunk(shared, control, stored);
     }
-    let case = match stored.value() {
-        Ok(case) => case,
-        Err(error) => return Outcome::internal(&error.to_string()),
-    };
-    let mut checked = match (shared.engine.check)(&case, &shared.options.limits) {
-        Ok(checked) => checked,
-        Err(error) => return Outcome::Refused(error),
-    };
+    let case = stored.value().map_err(|error| error.to_string())?;
+    if stored.kind == Kind::Evolution {
+        return evolution::begin(shared, control, &case, notes);
+    }
+    let mut checked = (shared.engine.check)(&case, &shared.options.limits)?;
     let limit = shared.options.time_limit;
     checked.run.time_limit = Some(checked.run.time_limit.map_or(limit, |time| time.min(limit)));
     control.set_memory_bytes(checked.cost().own_bytes());
@@ -70,28 +67,22 @@ fn check_and_solve(
     solve_next(shared, control, SlicedCase::new(checked, slices, notes))
 }
 
-fn solve_next(shared: &Shared, control: &AttemptControl, sliced: SlicedCase) -> Outcome {
+fn solve_next(shared: &Shared, control: &AttemptControl, sliced: SlicedCase) -> Ended {
     let Some(slice) = sliced.next() else {
         let sliced = Box::new(SlicedWork::Case(sliced));
-        return Outcome::Slice { sliced, part: None };
+        return Ok(Outcome::Slice { sliced, part: None });
     };
     control.begin(sliced.spent);
     let solved = (shared.engine.solve)(&sliced.checked, slice, control);
     let spent = control.pause();
-    let (solution, fields) = match solved {
-        Ok(answer) => answer,
-        Err(error) => return Outcome::Unsolved(error),
-    };
+    let (solution, fields) = solved?;
     if sliced.is_one() {
         return whole(shared, &sliced, spent, solution, &fields);
     }
-    match encoded(&solution, &fields) {
-        Ok(part) => Outcome::Slice {
-            part: Some((sliced.note(spent), part)),
-            sliced: Box::new(SlicedWork::Case(sliced)),
-        },
-        Err(reason) => Outcome::internal(&reason),
-    }
+    Ok(Outcome::Slice {
+        part: Some((sliced.note(spent), encoded(&solution, &fields)?)),
+        sliced: Box::new(SlicedWork::Case(sliced)),
+    })
 }
 
 fn join_parts(
@@ -99,7 +90,7 @@ fn join_parts(
     control: &AttemptControl,
     mut sliced: SlicedCase,
     parts: &[EncodedResult],
-) -> Outcome {
+) -> Ended {
     let joined = match sliced.is_whole(parts.len()) {
         true => join(parts, || control.tick(1.0).is_continue()),
         false => Err(JobsError::Damaged(
@@ -108,35 +99,42 @@ fn join_parts(
     };
     match joined {
         Ok(Some((solution, fields))) => whole(shared, &sliced, sliced.spent, solution, &fields),
-        Ok(None) => Outcome::Unsolved(SolveError::Cancelled),
+        Ok(None) => Ok(Outcome::Unsolved(SolveError::Cancelled)),
         Err(error) => {
             tracing::error!(%error, "the slices of a sweep cannot be used; it is solved again");
             sliced.begin_again();
             let sliced = Box::new(SlicedWork::Case(sliced));
-            Outcome::Slice { sliced, part: None }
+            Ok(Outcome::Slice { sliced, part: None })
         }
     }
 }
 
 /// The outcome of a case that is solved whole.
-pub(crate) fn whole(
+fn whole(
     shared: &Shared,
     sliced: &SlicedCase,
     spent: Duration,
     solution: Solution,
     fields: &Fields,
-) -> Outcome {
+) -> Ended {
     let seconds = spent.as_secs_f64();
     let method = sliced.checked.run.method_asked;
     shared.metrics.solved(method, &solution, seconds);
-    match encoded(&solution, fields) {
-        Ok(result) => Outcome::Solved {
-            result,
-            field_patches: u32::try_from(fields.patches.len()).unwrap_or(u32::MAX),
-            remarks: solution.remarks,
-        },
-        Err(reason) => Outcome::internal(&reason),
-    }
+    Ok(Outcome::Solved {
+        result: encoded(&solution, fields)?,
+        field_patches: u32::try_from(fields.patches.len()).unwrap_or(u32::MAX),
+        remarks: solution.remarks,
+    })
+}
+
+/// An answer without fields, or a part of one, in its stored form.
+pub(crate) fn as_json(answer: &impl Serialize) -> Result<EncodedResult, String> {
+    let text = serde_json::to_vec(answer);
+    let text = text.map_err(|error| format!("the answer cannot be written as JSON: {error}"))?;
+    Ok(EncodedResult {
+        solution: Bytes::from(text),
+        fields: None,
+    })
 }
 
 /// An answer, or a part of one, in its stored form.
@@ -145,11 +143,9 @@ fn encoded(solution: &Solution, fields: &Fields) -> Result<EncodedResult, String
         0 => None,
         _ => Some(encode(fields).map_err(|e| format!("the fields cannot be packed: {e}"))?),
     };
-    let json = serde_json::to_vec(solution)
-        .map_err(|error| format!("the solution cannot be written as JSON: {error}"))?;
     Ok(EncodedResult {
-        solution: Bytes::from(json),
         fields: packed.map(Bytes::from),
+        ..as_json(solution)?
     })
 }
 
