@@ -648,7 +648,7 @@ fn place_of(
             match place.map_err(|detail| format!("`{what}` {detail}"))? {
                 Some(place) => Ok(Some(place)),
                 None => {
-                    let known = QUANTITIES.iter().map(|quantity| quantity.first_name());
+                    let known = QUANTITIES.iter().map(Quantity::first_name);
                     let known: Vec<&str> = known.collect();
                     Err(format!(
                         "`{what}` is named in `column`, which is no place in a case; allowed: a JSON pointer, a short name, or one of {} with a unit",
