@@ -212,92 +212,42 @@ pub(crate) fn grid(samples_max: usize) -> Reader<(usize, usize)> {
     })
 }
 
-/// Tangential tractions of a succeeded job.
-///
-/// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
-#[utoipa::path(
-    get,
-    path = "/v1/jobs/{id}/tractions",
-    tag = "results",
-    operation_id = "get_tractions",
-    params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
-    responses((status = 200, description = "Tractions on the lower body, in MPa", content(
-        (Field = "application/json"),
-        (String = "text/csv"),
-        (File = "application/x-npz"),
-        (File = "application/x-vtk"),
-        (String = "image/svg+xml"),
-        (File = "image/png")
-    )), FieldProblems)
-)]
-pub(crate) async fn tractions(request: PartRequest) -> Result<Response, ApiError> {
-    answer(&request, Output::Tractions).await
+/// A route for each field: its summary, path, operation, output and what it answers.
+macro_rules! field_routes {
+    ($($(#[doc = $summary:tt])* $name:ident($path:tt, $operation:tt, $output:ident, $described:tt);)*) => {$(
+        $(#[doc = $summary])*
+        ///
+        /// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
+        #[utoipa::path(
+            get,
+            path = $path,
+            tag = "results",
+            operation_id = $operation,
+            params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
+            responses((status = 200, description = $described, content(
+                (Field = "application/json"),
+                (String = "text/csv"),
+                (File = "application/x-npz"),
+                (File = "application/x-vtk"),
+                (String = "image/svg+xml"),
+                (File = "image/png")
+            )), FieldProblems)
+        )]
+        pub(crate) async fn $name(request: PartRequest) -> Result<Response, ApiError> {
+            answer(&request, Output::$output).await
+        }
+    )*};
 }
 
-/// Pressure of a succeeded job; the same for every motion.
-///
-/// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
-#[utoipa::path(
-    get,
-    path = "/v1/jobs/{id}/pressure",
-    tag = "results",
-    operation_id = "get_pressure",
-    params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
-    responses((status = 200, description = "Pressure in MPa", content(
-        (Field = "application/json"),
-        (String = "text/csv"),
-        (File = "application/x-npz"),
-        (File = "application/x-vtk"),
-        (String = "image/svg+xml"),
-        (File = "image/png")
-    )), FieldProblems)
-)]
-pub(crate) async fn pressure(request: PartRequest) -> Result<Response, ApiError> {
-    answer(&request, Output::Pressure).await
-}
-
-/// Slip of a succeeded job: the upper body relative to the lower one, divided by rolling speed.
-///
-/// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
-#[utoipa::path(
-    get,
-    path = "/v1/jobs/{id}/slip",
-    tag = "results",
-    operation_id = "get_slip",
-    params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
-    responses((status = 200, description = "Relative slip, dimensionless", content(
-        (Field = "application/json"),
-        (String = "text/csv"),
-        (File = "application/x-npz"),
-        (File = "application/x-vtk"),
-        (String = "image/svg+xml"),
-        (File = "image/png")
-    )), FieldProblems)
-)]
-pub(crate) async fn slip(request: PartRequest) -> Result<Response, ApiError> {
-    answer(&request, Output::Slip).await
-}
-
-/// Temperature of both surfaces in the contact of a succeeded job; both bodies have the same there.
-///
-/// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
-#[utoipa::path(
-    get,
-    path = "/v1/jobs/{id}/temperature",
-    tag = "results",
-    operation_id = "get_temperature",
-    params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
-    responses((status = 200, description = "Temperature at the middle of every cell, in °C", content(
-        (Field = "application/json"),
-        (String = "text/csv"),
-        (File = "application/x-npz"),
-        (File = "application/x-vtk"),
-        (String = "image/svg+xml"),
-        (File = "image/png")
-    )), FieldProblems)
-)]
-pub(crate) async fn temperature(request: PartRequest) -> Result<Response, ApiError> {
-    answer(&request, Output::Temperature).await
+field_routes! {
+    /// Tangential tractions of a succeeded job.
+    tractions("/v1/jobs/{id}/tractions", "get_tractions", Tractions, "Tractions on the lower body, in MPa");
+    /// Pressure of a succeeded job; the same for every motion.
+    pressure("/v1/jobs/{id}/pressure", "get_pressure", Pressure, "Pressure in MPa");
+    /// Slip of a succeeded job: the upper body relative to the lower one, divided by rolling speed.
+    slip("/v1/jobs/{id}/slip", "get_slip", Slip, "Relative slip, dimensionless");
+    /// Temperature of both surfaces in the contact of a succeeded job; both bodies have the same there.
+    temperature("/v1/jobs/{id}/temperature", "get_temperature", Temperature, "Temperature at the middle of every cell, in °C");
 }
 
 async fn answer(request: &PartRequest, output: Output) -> Result<Response, ApiError> {
