@@ -8,7 +8,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use railhead::contact::case::limits::Limits;
 use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator::{OperatorScratch, StripOperator};
-use railhead::contact::mesh::chord::Chord;
+use railhead::contact::mesh::strips::Chord;
 use railhead::contact::mesh::strips::{Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};

@@ -122,7 +122,7 @@ fn one_mesh(
     cells: u32,
 ) -> Result<(Resultants, usize), SolveError> {
     let mut exact = checked.clone();
-    exact.run.resolution = Resolution::Mesh(contact::mesh::size::MeshSize {
+    exact.run.resolution = Resolution::Mesh(contact::mesh::strips::MeshSize {
         strips: 8,
         cells: 8,
     });

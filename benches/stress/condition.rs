@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use faer::Mat;
 use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
-use railhead::contact::mesh::size::MeshSize;
+use railhead::contact::mesh::strips::MeshSize;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal_stage;
 use railhead::contact::rolling::slip_equations::SlipEquations;

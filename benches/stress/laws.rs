@@ -3,8 +3,8 @@
 use railhead::contact::case::words::solver::MethodName;
 use railhead::contact::rolling::resultants::Resultants;
 use railhead::contact::solution::words::answer::{PatchSolution, Solution};
+use railhead::contact::solution::words::fields::Zone;
 use railhead::contact::solution::words::fields::{Fields, PatchCells, PatchFields, PointFields};
-use railhead::contact::solution::words::zone::Zone;
 use serde_json::Value;
 
 /// Rounding, relative to the largest value of its kind.

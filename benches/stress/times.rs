@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use railhead::contact::case::limits::Limits;
-use railhead::contact::solution::words::found_by::FoundBy;
+use railhead::contact::solution::words::understanding::FoundBy;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

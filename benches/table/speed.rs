@@ -3,7 +3,7 @@
 use cpu_time::ThreadTime;
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::evaluate::column::Column;
+use railhead::contact::evaluate::rows::Column;
 use railhead::contact::evaluate::rows::Rows;
 use railhead::contact::rolling::methods::table::file::table;
 use serde_json::{Value, json};

@@ -9,7 +9,7 @@
 //! | motions, from coarse to fine levels | footprint, [`friction`] | [`MotionAnswer`](rolling::motion_answer::MotionAnswer) | [`rolling_stage`], [`rolling`], [`mesh`], [`half_space`] |
 //! | answer | answers of motions | [`Solution`], [`Fields`] | [`post`], [`solution`] |
 //!
-//! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`] (in `unlike_motions`), [`wheel_on_rail`] (in [`profile_trust`]), on the curve of the rail in
+//! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`] (in `unlike_motions`), [`wheel_on_rail`] (in [`profile_assessment`]), on the curve of the rail in
 //! `wheel_on_curve`, [`wheelset`].
 //! Frame, signs, units and words: [`conventions`].
 //!
@@ -37,7 +37,6 @@ pub mod evaluate;
 pub mod evolution;
 pub mod facade;
 pub mod forecast;
-pub(crate) mod free_rolling;
 pub mod friction;
 pub mod geometry;
 pub mod half_space;
@@ -50,7 +49,7 @@ pub mod normal_stage;
 pub mod numerics;
 pub mod post;
 pub mod problem;
-pub mod profile_trust;
+pub mod profile_assessment;
 pub mod remark;
 pub mod rolling;
 pub mod rolling_stage;
@@ -78,7 +77,7 @@ use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::profile_trust::trust;
+use crate::contact::profile_assessment::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::slices::slices;
 use crate::contact::solution::finish::finish;

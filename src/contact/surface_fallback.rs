@@ -6,7 +6,7 @@ use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::profile_trust::trust;
+use crate::contact::profile_assessment::trust;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::answer::Solution;

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use crate::contact::error::SolveError;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::half_space::unlike_bodies::opening;
-use crate::contact::mesh::size::MeshSize;
+use crate::contact::mesh::strips::MeshSize;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::grid::GridFineness;
 use crate::contact::normal::gap::preview::PreviewCache;

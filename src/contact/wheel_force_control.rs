@@ -11,21 +11,22 @@
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
-use crate::contact::free_rolling::{FreeRollingState, angle_of};
+use crate::contact::geometry::wheel_rail::Placement;
+use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::numerics::bracketed_root::{FRACTION_MAX, RootExit, find_root};
 use crate::contact::numerics::pair_root::{PairRoot, find_pair};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::run::Run;
-use crate::contact::profile_trust::{settle, trust};
+use crate::contact::profile_assessment::trust;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::cubic_law::CubicLaw;
+use crate::contact::rolling::force_places::CubicLaw;
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::resolution::RelativeTo;
-use crate::contact::solution::words::answer::Solution;
+use crate::contact::solution::words::answer::{PatchSolution, Solution};
 use crate::contact::solution::words::fields::Fields;
 use crate::contact::vertical_equilibrium::BALANCE;
 use crate::contact::wheel_on_rail::SolvedWheel;
@@ -55,7 +56,7 @@ pub(crate) fn solve(
     forces: PrescribedForces,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
-    let settled = settle::settled(case, contact, monitor)?;
+    let settled = trust::settled(case, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
     let search = ForceSearch {
         operators,
@@ -394,4 +395,72 @@ impl ForceSearch<'_> {
         }
         Ok((solution, found.fields))
     }
+}
+
+/// The motion of a wheelset without mean creepage, weighted with the loads of the patches.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FreeRollingState {
+    /// Rolling radius in mm.
+    radius: f64,
+    /// Lateral velocity over the speed.
+    drift: f64,
+    /// Lateral creepage over the rest of the lateral velocity: the cosine of the contact angle.
+    across: f64,
+}
+
+impl FreeRollingState {
+    /// What is known before patches are: near the tread lateral creepage is that of the yaw.
+    pub(crate) fn about(placement: &Placement) -> FreeRollingState {
+        FreeRollingState {
+            radius: placement.rolling_radius,
+            drift: placement.yaw,
+            across: 1.0,
+        }
+    }
+
+    /// The same from patches at the motion of this one.
+    pub(crate) fn of(self, patches: &[PatchSolution]) -> FreeRollingState {
+        let (mut load, mut moment, mut sliding, mut across) = (0.0, 0.0, 0.0, 0.0);
+        for patch in patches {
+            let force = patch.normal_force_n;
+            let creepage = patch.points.first().map(|point| point.motion.creepage_y);
+            load += force;
+            moment += force * radius_of(patch);
+            sliding += force * creepage.unwrap_or(0.0);
+            across += force * angle_of(patch).cos();
+        }
+        FreeRollingState {
+            radius: moment / load,
+            drift: self.drift - sliding / across,
+            across: across / load,
+        }
+    }
+
+    /// A motion with creepages on the mean where its forces are prescribed.
+    pub(crate) fn at(
+        &self,
+        mut wheelset: WheelsetMotion,
+        creepages: [f64; 2],
+        forces: PrescribedForces,
+    ) -> WheelsetMotion {
+        let [along, across] = forces.map(|force| force.is_some());
+        if along {
+            wheelset.angular_velocity = wheelset.speed * (1.0 - creepages[0]) / self.radius;
+        }
+        if across {
+            wheelset.lateral_velocity = wheelset.speed * (self.drift + creepages[1] / self.across);
+        }
+        wheelset
+    }
+}
+
+/// The contact angle of a patch in rad.
+pub(crate) fn angle_of(patch: &PatchSolution) -> f64 {
+    let position = patch.position.as_ref();
+    position.map_or(0.0, |position| position.contact_angle_rad)
+}
+
+fn radius_of(patch: &PatchSolution) -> f64 {
+    let position = patch.position.as_ref();
+    position.map_or(1.0, |position| position.rolling_radius_mm)
 }

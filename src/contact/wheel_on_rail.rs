@@ -7,7 +7,7 @@ use crate::contact::error::SolveError;
 use crate::contact::forecast::{can_forecast, forecast, motion_in};
 use crate::contact::friction::on_rail::in_frame;
 use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::surface_exit::SurfaceMissed;
+use crate::contact::geometry::frame::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;

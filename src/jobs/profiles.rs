@@ -10,7 +10,7 @@ use tokio::runtime::Handle;
 
 use crate::contact::case::section_check::{SectionReport, check_section};
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::sections::{named_and_given, named_sections, put_section};
+use crate::contact::evaluate::varied::{named_and_given, named_sections, put_section};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::{Jobs, PAGE_MAX};
 use crate::jobs::idempotency;

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use crate::contact::error::SolveError;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::solution::words::found_by::FoundBy;
+use crate::contact::solution::words::understanding::FoundBy;
 
 /// Largest memory of its own, in bytes, of a case that is probed: probes run outside the memory budget of the workers.
 const BYTES_MAX: u64 = 128 << 20;

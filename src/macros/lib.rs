@@ -1,8 +1,10 @@
 //! Attributes of the types that are exchanged as JSON.
 
 use proc_macro::TokenStream;
-use quote::ToTokens;
-use syn::{Attribute, Field, Item, Type, parse_macro_input, parse_quote};
+use quote::{ToTokens, quote};
+use syn::{
+    Attribute, Field, Item, ItemEnum, LitStr, Type, Variant, parse_macro_input, parse_quote,
+};
 
 /// Omits the `Option` members of a struct, or of the variants of an enum, from the JSON while they are `None`, and declares them in the
 /// contract as never `null`.
@@ -45,4 +47,44 @@ fn omit_none(field: &mut Field) {
     if !field.attrs.iter().any(nullable) {
         field.attrs.push(parse_quote!(#[schema(nullable = false)]));
     }
+}
+
+/// Gives an enum of unit variants `WORDS`: the words of a request and what they mean, in the order of the variants. A word is the name of its
+/// variant in snake case, as by `#[serde(rename_all = "snake_case")]`, or that of `#[serde(rename = …)]`.
+#[proc_macro_derive(Words)]
+pub fn words(item: TokenStream) -> TokenStream {
+    let item = parse_macro_input!(item as ItemEnum);
+    let (name, variants) = (&item.ident, item.variants.iter().map(|it| &it.ident));
+    let words = item.variants.iter().map(word);
+    quote! {
+        impl #name {
+            /// The words of a request and what they mean.
+            pub(crate) const WORDS: &'static [(&'static str, #name)] = &[#((#words, #name::#variants)),*];
+        }
+    }
+    .into()
+}
+
+fn word(variant: &Variant) -> String {
+    let mut word = String::new();
+    for letter in variant.ident.to_string().chars() {
+        if letter.is_uppercase() && !word.is_empty() {
+            word.push('_');
+        }
+        word.extend(letter.to_lowercase());
+    }
+    for attribute in variant
+        .attrs
+        .iter()
+        .filter(|it| it.path().is_ident("serde"))
+    {
+        // What is not a new name is for serde to judge.
+        let _ = attribute.parse_nested_meta(|meta| {
+            if meta.path.is_ident("rename") {
+                word = meta.value()?.parse::<LitStr>()?.value();
+            }
+            Ok(())
+        });
+    }
+    word
 }

@@ -2,8 +2,8 @@
 
 use railhead::contact::mesh::strips::Grading;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::rolling::methods::liu_hsu::active_set::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::active_set::{ZonesExit, ZonesRun};
-use railhead::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::solve::{
     coarse_pole, solve_by_upwind, solve_with,
 };

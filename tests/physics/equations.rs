@@ -4,7 +4,7 @@
 use railhead::contact::half_space::kernels::{Rectangle, rectangle};
 use railhead::contact::mesh::strips::Grading;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
+use railhead::contact::rolling::methods::liu_hsu::active_set::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::solve::solve_with;
 use railhead::contact::rolling::slip_equations::SlipScratch;
 use railhead::contact::rolling::slip_rules::Rule;

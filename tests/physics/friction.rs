@@ -2,7 +2,7 @@
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::mesh::size::MeshSize;
+use railhead::contact::mesh::strips::MeshSize;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal_stage;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
@@ -115,7 +115,7 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
     for (i, zone) in zones.iter().enumerate() {
         // The last cell of a strip may stick on the whole and slip at its trailing end.
         let last = i % n as usize == 0;
-        if last && *zone == contact::solution::words::zone::Zone::Stick {
+        if last && *zone == contact::solution::words::fields::Zone::Stick {
             slip.iter_mut().for_each(|slip| slip[i] = 0.0);
         }
     }
@@ -131,7 +131,7 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
             .as_ref()
             .expect("was asked for")
             .iter()
-            .map(|z| *z == contact::solution::words::zone::Zone::Slip)
+            .map(|z| *z == contact::solution::words::fields::Zone::Slip)
             .collect(),
         largest: [
             vx.hypot(vy) + phi.abs() * contact.a_mm.max(contact.b_mm),

@@ -5,7 +5,7 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::answer::{PatchSolution, PointSolution};
-use railhead::contact::solution::words::zone::Zone;
+use railhead::contact::solution::words::fields::Zone;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -2,7 +2,7 @@
 
 use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::solution::words::fields::Fields;
-use railhead::contact::solution::words::zone::Zone;
+use railhead::contact::solution::words::fields::Zone;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, with};

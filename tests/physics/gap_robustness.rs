@@ -16,7 +16,7 @@ use railhead::contact::error::SolveError;
 use railhead::contact::half_space::kernels::{Rectangle, rectangle};
 use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::normal::gap::surface::GapSurface;
-use railhead::contact::remark::figure::Figure;
+use railhead::contact::remark::kind::Figure;
 use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::solution::words::fields::Fields;
 use serde_json::{Value, json};

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::mesh::size::MeshSize;
+use railhead::contact::mesh::strips::MeshSize;
 use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::normal_stage;
 use railhead::contact::rolling::history::level_run::LevelRun;

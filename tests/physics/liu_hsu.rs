@@ -9,8 +9,8 @@ use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::Convergence;
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use railhead::contact::rolling::methods::liu_hsu::active_set::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::active_set::ZonesExit;
-use railhead::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::solve::{
     ZonesOutcome, coarse_pole, solve, solve_by_upwind, solve_with,
 };

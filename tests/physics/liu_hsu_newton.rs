@@ -2,8 +2,8 @@
 
 use railhead::contact::mesh::strips::Grading;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
 use railhead::contact::rolling::methods::liu_hsu::newton_raphson::newton_step;
+use railhead::contact::rolling::methods::liu_hsu::stick_block::DenseTask;
 use railhead::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
 };

@@ -16,9 +16,9 @@ use railhead::contact::{self};
 use serde_json::{Value, json};
 
 use crate::gap_samples::steel;
+use crate::profile_assessment::on_rail;
 use crate::profile_cases::generated;
 use crate::profile_shapes::rail_60e1;
-use crate::profile_trust::on_rail;
 
 pub fn case(method: &str) -> Value {
     let contact = json!({ "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 });

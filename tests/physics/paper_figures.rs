@@ -3,7 +3,7 @@
 use railhead::contact::post::outlines::outline::outlines;
 use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::solution::words::fields::Fields;
-use railhead::contact::solution::words::zone::Zone;
+use railhead::contact::solution::words::fields::Zone;
 use serde_json::{Value, json};
 
 use crate::reference::solve;

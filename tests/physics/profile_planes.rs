@@ -1,7 +1,7 @@
 //! Does what is stated of the plane of contact cover its error? Against CONTACT's planar and curved surfaces of contact, which need the
 //! reference files, and where the plane leaves nothing open.
 
-use railhead::contact::remark::figure::Figure;
+use railhead::contact::remark::kind::Figure;
 use railhead::contact::solution::words::answer::{Solution, Total};
 use serde_json::{Value, json};
 

@@ -1,12 +1,12 @@
 //! Remarks on profiles by their codes: each kind of damage gets its own, at the profile that has it.
 
 use railhead::contact::remark::entry::RemarkEntry;
-use railhead::contact::remark::figure::Figure;
+use railhead::contact::remark::kind::Figure;
 use serde_json::json;
 
 use crate::damaged::{Damage, with};
+use crate::profile_assessment::{CROWN, accepted, has, on_rail, solved, tread};
 use crate::profile_shapes::{rail_60e1, s1002};
-use crate::profile_trust::{CROWN, accepted, has, on_rail, solved, tread};
 use crate::random::Random;
 
 #[test]

@@ -5,7 +5,7 @@ use railhead::contact::case::limits::Limits;
 use railhead::contact::check;
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::remark::entry::RemarkEntry;
-use railhead::contact::remark::figure::Figure;
+use railhead::contact::remark::kind::Figure;
 use serde_json::{Value, json};
 
 use crate::profile_cases::{generated, put};

@@ -8,8 +8,8 @@ use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
 use crate::damaged::{Points, normal, off_normal, resampled, with};
+use crate::profile_assessment::tread;
 use crate::profile_shapes::{rail_60e1, s1002};
-use crate::profile_trust::tread;
 use crate::random::Random;
 
 /// Seeds that the judgement was developed with, and others.

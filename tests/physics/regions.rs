@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator::StripOperator;
-use railhead::contact::mesh::chord::Chord;
+use railhead::contact::mesh::strips::Chord;
 use railhead::contact::mesh::strips::{Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
@@ -13,8 +13,8 @@ use railhead::contact::rolling::methods::boundary_element::task::{
     Convergence, NewtonTask, STEPS_MAX,
 };
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use railhead::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
 use railhead::contact::rolling::methods::liu_hsu::solve::ZonesOutcome;
+use railhead::contact::rolling::methods::liu_hsu::stick_block::DenseTask;
 use railhead::contact::rolling::motion::Motion;
 use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;

@@ -40,7 +40,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
 fn on_level<T>(contact: &Ellipse, work: impl FnOnce(&RollingTask, LevelTask) -> T) -> T {
     let case = contact.case(STRIPS, CELLS);
     let checked = contact::check(&case, &Limits::default()).expect("a valid case");
-    let size = contact::mesh::size::MeshSize {
+    let size = contact::mesh::strips::MeshSize {
         strips: STRIPS,
         cells: CELLS,
     };

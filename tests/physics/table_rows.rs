@@ -2,7 +2,7 @@
 
 use railhead::contact::error::Fault;
 use railhead::contact::evaluate::answer::{RowStatus, RowsAnswer};
-use railhead::contact::evaluate::column::Column;
+use railhead::contact::evaluate::rows::Column;
 use railhead::contact::evaluate::rows::Rows;
 use railhead::contact::{self, case::limits::Limits};
 use serde_json::{Value, json};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use railhead::contact::case::limits::Limits;
 use railhead::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
-use railhead::contact::mesh::size::MeshSize;
+use railhead::contact::mesh::strips::MeshSize;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal_stage;
 use railhead::contact::problem::checked_case::CheckedCase;

@@ -4,15 +4,15 @@ use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::subsurface;
 use crate::contact::case::words::damage::{DamageModel, DamageWords};
+use crate::contact::case::words::material::{ThermalBodyWords, ThermalWords};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::SubsurfaceWords;
-use crate::contact::case::words::thermal::{ThermalBodyWords, ThermalWords};
 use crate::contact::error::Fault;
 use crate::contact::post::damage::figures::DamageTask;
 use crate::contact::post::heat::{ThermalBody, ThermalTask};
-use crate::contact::problem::after_tasks::AfterTasks;
+use crate::contact::problem::run::AfterTasks;
 
 impl Case {
     /// The words of what it asks for.

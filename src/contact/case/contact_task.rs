@@ -10,7 +10,7 @@ use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::rounded::short;
+use crate::contact::remark::kind::short;
 
 /// Largest pressure of a patch in MPa; a larger one is a mistake rather than a contact.
 const PRESSURE_MAX: f64 = 1e12;

@@ -1,6 +1,10 @@
-//! What one case may use.
+//! What one case may use, and the faults of a case that uses more.
 
+use crate::contact::error::Fault;
+use crate::contact::method::Method;
+use crate::contact::problem::memory::SizeInput;
 use crate::contact::rolling::operator_store::BYTES_DEFAULT;
+use crate::contact::rolling::resolution::Resolution;
 
 /// What one solve may use.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,5 +27,54 @@ impl Default for Limits {
             motions_max: 10_000,
             samples_max: 1_000_000,
         }
+    }
+}
+
+/// Largest length over width of a patch for the fast solver. Its preconditioner treats every strip by itself, so that linear systems no
+/// longer converge where strips lie closer than the cells in them are long. Of ellipses under 20 loads and motions all converged up
+/// to 70, and from 100 on some did not (`cargo bench --bench stress` goes to 50). Wide patches need no bound: b/a 1000 converges in
+/// a few steps.
+const LENGTH_OVER_WIDTH_MAX: f64 = 60.0;
+/// Most cells of the dense method, whose matrices of 2000 unknowns take 32 MB each and 5 Gflop to factor. Chosen by judgement; how much it
+/// matters was not measured.
+const LIU_HSU_CELLS_MAX: f64 = 1000.0;
+
+impl SizeInput {
+    /// Faults of a case that is too large for the limits or for its method.
+    pub(crate) fn faults(&self, limits: &Limits) -> Vec<Fault> {
+        let pointer = match self.resolution {
+            Resolution::Mesh(_) => "/solver/mesh",
+            Resolution::Target(_) => "/contact",
+        };
+        let mut faults = Vec::new();
+        let (cells, _) = self.finest();
+        if self.method == Method::LiuHsu && cells > LIU_HSU_CELLS_MAX {
+            faults.push(Fault::new(pointer, format!(
+                    "{cells:.0} cells over all patches; at most {LIU_HSU_CELLS_MAX} are allowed with liu_hsu, \
+                     use boundary_element for more"
+                )));
+        }
+        let fast = matches!(self.method, Method::BoundaryElement);
+        if let Some(ratio) = self
+            .ellipse
+            .filter(|ratio| fast && *ratio > LENGTH_OVER_WIDTH_MAX)
+        {
+            faults.push(Fault::new("/contact", format!(
+                    "a patch {ratio:.1} times as long along rolling as wide; boundary_element solves up to \
+                     {LENGTH_OVER_WIDTH_MAX} times, fastsim any"
+                )));
+        }
+        let bytes = self.bytes() as u64;
+        if bytes > limits.memory_bytes {
+            let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+            faults.push(Fault::new(pointer, format!(
+                    "{cells:.0} cells over all patches and {} motions need about {:.0} MiB; at most {:.0} MiB are \
+                     allowed for one case",
+                    self.motions,
+                    mebibytes(bytes),
+                    mebibytes(limits.memory_bytes)
+                )));
+        }
+        faults
     }
 }

@@ -300,8 +300,8 @@ pub(crate) fn swept_values(swept: &Swept) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::case::words::history::Range;
     use crate::contact::case::words::motion::ValueList;
-    use crate::contact::case::words::range::Range;
 
     fn range(from: f64, to: f64, points: u32) -> Option<Swept> {
         Some(Swept::Range(Range { from, to, points }))

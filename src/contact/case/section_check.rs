@@ -10,10 +10,12 @@ use crate::contact::error::{CaseError, Fault};
 use crate::contact::geometry::orientation::SureBody;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::points::advised_smoothing;
+use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
-use crate::contact::solution::words::profile_quality::SectionQuality;
+use crate::contact::solution::words::profile_quality::{PairQuality, SectionQuality};
 
 /// Contact modulus G/(1 − ν) of steel on steel in MPa, for the smoothing that is suggested.
 const STEEL_MPA: f64 = 82_000.0 / (1.0 - 0.28);
@@ -72,4 +74,18 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
             .map(|remark| remark.clone().at_pointer(""))
             .collect(),
     })
+}
+
+impl CheckedCase {
+    /// How far the points of the profiles can be trusted, as far as that is known without the contact; only of a wheel on a rail.
+    #[must_use]
+    pub fn quality(&self) -> Option<PairQuality> {
+        let NormalTask::Wheel(contact) = &self.problem.task else {
+            return None;
+        };
+        Some(profile_points::quality(
+            &contact.geometry,
+            contact.contact_modulus,
+        ))
+    }
 }

@@ -7,7 +7,7 @@ use crate::contact::case::words::subsurface::{
     BodyName, DepthLineAt, FoundPlace, GridAxis, StressGrid, SubsurfaceWords,
 };
 use crate::contact::error::Fault;
-use crate::contact::post::subsurface::task::{
+use crate::contact::post::subsurface::states::{
     LoadedBody, PassageTask, StressPlaces, SubsurfaceTask,
 };
 

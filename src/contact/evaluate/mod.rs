@@ -2,13 +2,10 @@
 //! any column with any method.
 
 pub mod answer;
-pub mod column;
 pub mod many;
 pub mod many_answer;
 pub mod placing;
 pub mod request_faults;
 pub mod rows;
-mod rows_checks;
-pub mod sections;
 pub mod variable;
 pub mod varied;

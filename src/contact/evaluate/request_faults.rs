@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::contact::error::{CaseError, Fault, FaultCode};
-use crate::contact::evaluate::rows_checks::FAULTS_MAX;
+use crate::contact::evaluate::rows::FAULTS_MAX;
 use crate::contact::evaluate::variable::Variable;
 use crate::contact::evaluate::varied::Values;
 

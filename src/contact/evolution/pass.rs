@@ -10,7 +10,7 @@ use crate::contact::evolution::task::{Evolution, Sections, SolveContext};
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::wheel_height::task::ReferenceSurface;
-use crate::contact::post::units::NANOMETRES;
+use crate::contact::post::heat::NANOMETRES;
 use crate::contact::solution::words::answer::PatchSolution;
 use crate::contact::solution::words::evolution::{StateContact, StatePatch};
 use crate::contact::surface_fallback::is_on_planes;

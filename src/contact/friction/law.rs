@@ -7,8 +7,8 @@
 
 use std::borrow::Borrow;
 
-use crate::contact::friction::across::AcrossLaw;
-use crate::contact::friction::along::AlongLaw;
+use crate::contact::friction::coefficient_table::AcrossLaw;
+use crate::contact::friction::coefficient_table::AlongLaw;
 use crate::contact::friction::path_dependent::HeatedLaw;
 use crate::contact::friction::velocity_weakening::{FallingLaw, Softening};
 use crate::contact::normal::footprint::Footprint;

@@ -1,6 +1,6 @@
 //! Friction of a rail in the axes of one of its patches.
 
-use crate::contact::friction::across::{AcrossLaw, AcrossPlace};
+use crate::contact::friction::coefficient_table::{AcrossLaw, AcrossPlace};
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::wheel_rail::WheelRail;

@@ -1,8 +1,8 @@
 //! The gap of one patch in its own frame: the wheel as surface of revolution over the rail as cylinder.
 
 use crate::contact::geometry::frame::Frame;
+use crate::contact::geometry::frame::SurfaceMissed;
 use crate::contact::geometry::rail_in_frame::RailInFrame;
-use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::geometry::wheel_in_frame::WheelInFrame;
 use crate::contact::geometry::wheel_rail::WheelRail;
 

@@ -2,11 +2,9 @@
 
 pub mod conicity;
 pub mod contact_locus;
-pub mod corner;
 pub mod crossing;
 pub mod curve_place;
 pub mod envelope;
-mod estimated_force;
 pub mod formats;
 pub mod frame;
 pub mod grouping;
@@ -22,7 +20,6 @@ pub mod profile_quality;
 pub mod rail_in_frame;
 pub mod reference_curve;
 pub mod rigid_touch;
-pub mod surface_exit;
 pub mod wheel_in_frame;
 pub mod wheel_rail;
 pub mod wheelset;

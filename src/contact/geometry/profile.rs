@@ -11,9 +11,9 @@ use crate::contact::geometry::orientation::{
     self, Flange, FormatSenses, FoundSenses, StatedSenses, SureBody,
 };
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
+use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead};
 use crate::contact::geometry::profile_quality::samples::{KnownPoints, Points};
-use crate::contact::geometry::profile_quality::{noise, shape};
 use crate::contact::lazy_field::LazyField;
 use crate::contact::remark::list::Remark;
 
@@ -348,7 +348,7 @@ fn orient(
         mirror_y: reading.mirror_y,
         mirror_z: reading.mirror_z,
     };
-    let [first, last] = shape::stray_ends(points).map(|stray| stray.map_or(0, |(count, _)| count));
+    let [first, last] = noise::stray_ends(points).map(|stray| stray.map_or(0, |(count, _)| count));
     // A section in another unit than stated shows its senses all the same.
     let scale = likely_unit(body, points).map_or(1.0, |(_, unit)| unit.mm());
     let shown: Vec<[f64; 2]> = points[first..points.len() - last]
@@ -438,7 +438,7 @@ fn straighten(
 
 /// Drops one or two points at an end that a long chord separates from all others, as they occur in measurements.
 fn cut_stray_ends(body: Body, points: &mut Vec<[f64; 2]>, remarks: &mut Vec<Remark>) {
-    let [first, last] = shape::stray_ends(points);
+    let [first, last] = noise::stray_ends(points);
     let profile = body.name();
     if let Some((count, distance_mm)) = last {
         points.truncate(points.len() - count);

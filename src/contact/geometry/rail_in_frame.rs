@@ -1,8 +1,8 @@
 //! The rail over the plane of a frame: its height and the parameter of its curve there.
 
 use crate::contact::geometry::frame::{Frame, Plane};
+use crate::contact::geometry::frame::{SurfaceExit, SurfaceMissed};
 use crate::contact::geometry::plane_curve::CurvePoint;
-use crate::contact::geometry::surface_exit::{SurfaceExit, SurfaceMissed};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// The rail belongs to a patch as far as the component of its tangent along the plane of the frame is at least this.

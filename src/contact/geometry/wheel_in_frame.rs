@@ -1,7 +1,7 @@
 //! The wheel over the plane of a frame: a surface of revolution, seen along the normal.
 
 use crate::contact::geometry::frame::Frame;
-use crate::contact::geometry::surface_exit::{SurfaceExit, SurfaceMissed};
+use crate::contact::geometry::frame::{SurfaceExit, SurfaceMissed};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// Where a surface has no point, it is taken to be this much farther away than at the neighbouring place, in mm.

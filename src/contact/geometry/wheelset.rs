@@ -7,7 +7,7 @@
 //! Source: Kalker 1990, section 1.3; the same as in the Manchester contact benchmark.
 
 use crate::contact::geometry::frame::Frame;
-use crate::contact::geometry::surface_exit::SurfaceMissed;
+use crate::contact::geometry::frame::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 
 /// How a wheelset moves; mm, s and rad.

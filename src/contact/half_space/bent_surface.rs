@@ -21,7 +21,7 @@ use pulp::NullaryFnOnce;
 use rustfft::num_complex::Complex;
 
 use crate::contact::half_space::elasticity::Elasticity;
-use crate::contact::half_space::grid_coefficients::{coefficients, lines};
+use crate::contact::half_space::grid_operator::{coefficients, lines};
 use crate::contact::half_space::transforms::{FftPlanners, FftPlans};
 use crate::contact::half_space::unlike_bodies::displacement_by_cell;
 use crate::contact::lazy_field::LazyField;

@@ -2,7 +2,6 @@
 
 pub mod bent_surface;
 pub mod elasticity;
-pub mod grid_coefficients;
 pub mod grid_operator;
 pub mod kernels;
 pub mod line_sums;

@@ -107,7 +107,7 @@ pub fn opening(mesh: &Mesh, difference: f64, traction: &[Vec<f64>; 2], at: [f64;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::chord::Chord;
+    use crate::contact::mesh::strips::Chord;
     use crate::contact::mesh::strips::Grading;
 
     /// Corner sums of the rectangle |x| ≤ 0.5, |y| ≤ 0.3, computed with 40 digits and written with 12.

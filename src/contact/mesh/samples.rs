@@ -1,6 +1,6 @@
 //! Meshes for unit tests.
 
-use crate::contact::mesh::chord::Chord;
+use crate::contact::mesh::strips::Chord;
 use crate::contact::mesh::strips::{Grading, Mesh, equal_strips};
 
 /// A patch from y = −`half_width` to `half_width` with cosine-graded cells; `ends` returns the trailing and leading end of the chord at y.

@@ -4,11 +4,10 @@
 //! trailing end (smaller x) to the leading end (larger x).
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
-use crate::contact::mesh::chord::Chord;
 use crate::contact::numerics::monotone_root;
 use crate::contact::numerics::monotone_root::{CloseEnough, Course};
-use std::ops::Range;
 
 /// How cells and nodes divide a chord that is mapped to `−1 … 1`.
 #[derive(Debug, Clone, PartialEq)]
@@ -340,6 +339,65 @@ pub fn strips_about(pole: f64, low: f64, high: f64, count: usize) -> Vec<(f64, f
         .windows(2)
         .map(|e| (middle + 0.5 * half * (e[0] + e[1]), half * (e[1] - e[0])))
         .collect()
+}
+
+/// The number of strips across every patch and of cells in each strip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MeshSize {
+    /// Strips across each patch.
+    pub strips: u32,
+    /// Cells along x in each strip.
+    pub cells: u32,
+}
+
+/// The part of a strip's mid-line that lies in a patch, in mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chord {
+    /// The patch it belongs to, counted from 0.
+    pub patch: usize,
+    /// The strip of the patch, counted from 0 in the direction of y.
+    pub strip: usize,
+    /// y of the strip's mid-line.
+    pub y: f64,
+    /// Width of the strip.
+    pub dy: f64,
+    /// Trailing end.
+    pub left: f64,
+    /// Leading end.
+    pub right: f64,
+}
+
+impl Chord {
+    /// x in mm of the place `−half · cosine` from the middle.
+    #[must_use]
+    pub fn along(&self, cosine: f64) -> f64 {
+        0.5 * (self.left + self.right) - 0.5 * (self.right - self.left) * cosine
+    }
+}
+
+/// The observation points of a segment: its nodes, its leading edge, and its last two nodes reflected in that edge.
+#[must_use]
+pub fn observation_points(mesh: &Mesh, segment: &Segment) -> Vec<f64> {
+    let mut points = Vec::with_capacity(segment.cells.len() + 3);
+    observe(mesh, segment, &mut points);
+    points
+}
+
+/// As [`observation_points`], but written into `points`, whose contents are replaced.
+pub fn observe(mesh: &Mesh, segment: &Segment, points: &mut Vec<f64>) {
+    let nodes = &mesh.node[segment.cells.clone()];
+    let edge = segment.chord.right;
+    let n = nodes.len();
+    let last = nodes[n - 1];
+    let before = if n > 1 {
+        nodes[n - 2]
+    } else {
+        segment.chord.left
+    };
+    points.clear();
+    points.reserve(n + 3);
+    points.extend_from_slice(nodes);
+    points.extend([edge, 2.0 * edge - last, 2.0 * edge - before]);
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::contact::lazy_field::LazyField;
-use crate::contact::mesh::chord::Chord;
+use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::load_across::LoadAcross;
 use crate::contact::normal::patch::Patch;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::mesh::chord::Chord;
+use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::axis_ratio::{axis_ratio, axis_ratio_and_integral, complete_integrals};
 use crate::contact::normal::patch::Patch;
 

@@ -5,9 +5,9 @@
 //! | a root between two bounds, with slopes | [`monotone_root`] |
 //! | a root of an increasing function without bounds, without slopes | [`bracketed_root`] |
 //! | two arguments at which two values are 0, without bounds, without slopes | [`pair_root`] |
-//! | the boundary of a condition | [`bisection`] |
+//! | the boundary of a condition | [`bracketed_root`] |
 //! | where something that falls to 0 ends | [`vanishing`] |
-//! | the largest value in an interval | [`maximum`] |
+//! | the largest value in an interval | [`bracketed_root`] |
 //! | values between nodes | [`cubic`] (one interval), [`hermite`] (given slopes, or slopes without overshoot), [`spline`] (smoothing), [`lagrange`] (one polynomial) |
 //! | integrals | [`quadrature`] |
 //! | evenly spread samples, normal distribution | [`sampling`] |
@@ -31,7 +31,6 @@
 //! - The [search](crate::contact::rolling::history::search) of a history looks for two creepages at once as [`pair_root`] does, and keeps its
 //!   compliance from step to step.
 
-pub mod bisection;
 pub mod bracketed_root;
 pub mod cubic;
 pub mod dense_lu;
@@ -41,7 +40,6 @@ pub mod hermite;
 pub mod lagrange;
 pub mod least_squares;
 pub mod length;
-pub mod maximum;
 pub mod monotone_root;
 pub mod pair_root;
 pub mod quadrature;

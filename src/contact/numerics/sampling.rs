@@ -1,6 +1,6 @@
 //! Points that fill a range evenly, and the normal distribution at them.
 
-use crate::contact::numerics::bisection::bisect;
+use crate::contact::numerics::bracketed_root::bisect;
 
 /// Bases of Halton's sequence for its first dimensions.
 pub(crate) const PRIMES: [u32; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];

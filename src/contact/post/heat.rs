@@ -5,8 +5,6 @@
 //! `B = β₁ + β₂`, `β = √(λρc)` of each body. Both surfaces have one temperature in the contact; without heat that is the mean of the
 //! bulk temperatures weighted with β, which is also how q is shared (Jaeger 1942; Carslaw and Jaeger 1959, §2.4 and 10.7).
 
-use crate::contact::post::units::METRES;
-
 /// What a body does with heat.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThermalBody {
@@ -119,6 +117,11 @@ fn slopes(edges: &[f64], heat: &[f64]) -> Vec<f64> {
         })
         .collect()
 }
+
+/// m in a mm.
+pub(crate) const METRES: f64 = 1e-3;
+/// nm in a mm.
+pub(crate) const NANOMETRES: f64 = 1e6;
 
 #[cfg(test)]
 mod tests {

@@ -297,7 +297,7 @@ fn carry(power: &mut [f64], slips: &[bool], cells: Range<usize>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::chord::Chord;
+    use crate::contact::mesh::strips::Chord;
     use crate::contact::mesh::strips::{Grading, strips_about};
     use crate::contact::monitor::Unmonitored;
 

@@ -8,4 +8,3 @@ pub mod resample;
 pub mod smooth;
 pub mod strip_segments;
 pub mod subsurface;
-pub mod units;

@@ -2,7 +2,7 @@
 
 use crate::contact::post::strip_segments::{StoredSegment, Strips};
 use crate::contact::solution::words::fields::PatchCells;
-use crate::contact::solution::words::zone::Zone;
+use crate::contact::solution::words::fields::Zone;
 
 /// Values on a regular grid; `None` outside the patch.
 #[derive(Debug, Clone, PartialEq)]

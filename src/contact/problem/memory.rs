@@ -1,11 +1,11 @@
 //! How much memory a case will take, estimated from its finest mesh and from the operators that it leaves in the store of the process.
 
 use crate::contact::error::SolveError;
-use crate::contact::mesh::size::MeshSize;
+use crate::contact::mesh::strips::MeshSize;
 use crate::contact::method::Method;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::post::subsurface::task::SubsurfaceTask;
+use crate::contact::post::subsurface::states::SubsurfaceTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::history::solve::{pressed_bytes, pressed_cells_max};
 use crate::contact::rolling::history::task::HistoryStart;

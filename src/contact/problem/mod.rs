@@ -1,6 +1,5 @@
 //! The checked question: physics, run and label, as numbers. Every stage after the check takes its task from here.
 
-pub mod after_tasks;
 pub mod checked_case;
 pub mod coupled;
 pub mod memory;

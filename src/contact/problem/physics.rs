@@ -4,8 +4,8 @@
 
 use std::sync::Arc;
 
-use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
+use crate::contact::friction::path_dependent::Interface;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::hertz::Ellipse;

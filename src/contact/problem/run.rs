@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::method::{Method, TractionBound};
-use crate::contact::problem::after_tasks::AfterTasks;
+use crate::contact::post::damage::figures::DamageTask;
+use crate::contact::post::heat::ThermalTask;
+use crate::contact::post::subsurface::states::SubsurfaceTask;
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::resolution::{RelativeTo, Resolution, TARGET_LEAST};
 
@@ -94,5 +96,25 @@ impl Run {
     #[must_use]
     pub fn wants(&self, output: Output) -> bool {
         self.outputs.contains(&output)
+    }
+}
+
+/// What is computed from solved motions; nothing where a case does not ask for it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AfterTasks {
+    /// Stresses below the surface.
+    pub subsurface: Option<SubsurfaceTask>,
+    /// Damage.
+    pub damage: Option<DamageTask>,
+    /// Temperatures.
+    pub thermal: Option<ThermalTask>,
+}
+
+impl AfterTasks {
+    /// Is the power of every cell needed?
+    #[must_use]
+    pub fn needs_power(&self, outputs: &[Output]) -> bool {
+        let across = self.damage.as_ref().is_some_and(|task| task.across);
+        across || self.thermal.is_some() || outputs.contains(&Output::Slip)
     }
 }

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::remark::figure::{AsFigure, Figure};
 use crate::contact::remark::kind::Severity;
+use crate::contact::remark::kind::{AsFigure, Figure};
 use crate::contact::remark::list::Remark;
 
 /// Number of motions with the same remark for which the figures are kept; of the others only the index is kept.

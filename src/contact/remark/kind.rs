@@ -1,4 +1,7 @@
-//! How severe a remark is, and its entry in the list of all codes.
+//! Severity, figures and rounded numbers of remarks, and the entry of a remark in the list of all codes.
+
+use std::borrow::Borrow;
+use std::fmt::{Display, Formatter, Result};
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -32,4 +35,88 @@ pub struct RemarkKind {
     pub figures: &'static [&'static str],
     /// The `detail` of a remark of this kind with figures made up.
     pub example: String,
+}
+
+/// A number or a word in a remark.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(untagged)]
+pub enum Figure {
+    /// A finite number.
+    Number(f64),
+    /// Several numbers.
+    Numbers(Vec<f64>),
+    /// A word.
+    Word(String),
+}
+
+/// Types that can be a figure of a remark.
+pub(crate) trait AsFigure {
+    /// The figure; `None` for a number that is absent or not finite.
+    fn figure(&self) -> Option<Figure>;
+}
+
+impl AsFigure for [f64; 2] {
+    fn figure(&self) -> Option<Figure> {
+        let finite = self.iter().all(|part| part.is_finite());
+        finite.then(|| Figure::Numbers(self.to_vec()))
+    }
+}
+
+impl AsFigure for &'static str {
+    fn figure(&self) -> Option<Figure> {
+        Some(Figure::Word((*self).to_owned()))
+    }
+}
+
+/// A number that is written with this many significant digits.
+#[derive(Debug, Clone, Copy)]
+pub struct Rounded(f64, i32);
+
+/// A number with three significant digits.
+pub fn short(value: impl Borrow<f64>) -> Rounded {
+    Rounded(*value.borrow(), 3)
+}
+
+/// Decimal exponents of the numbers that are written without an exponent.
+const PLAIN: std::ops::Range<i32> = -4..7;
+
+impl Display for Rounded {
+    fn fmt(&self, out: &mut Formatter<'_>) -> Result {
+        let Rounded(value, digits) = *self;
+        let exponent = value.abs().log10().floor() as i32;
+        if value == 0.0 || !value.is_finite() {
+            write!(out, "{value}")
+        } else if PLAIN.contains(&exponent) {
+            let scale = 10_f64.powi(digits - 1 - exponent);
+            let decimals = usize::try_from(digits - 1 - exponent).unwrap_or(0);
+            let text = format!("{:.decimals$}", (value * scale).round() / scale);
+            out.write_str(match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.'),
+                false => &text,
+            })
+        } else {
+            let decimals = usize::try_from(digits - 1).unwrap_or(0);
+            write!(out, "{value:.decimals$e}")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_usual_size_have_no_exponent() {
+        let text = |value| Rounded(value, 3).to_string();
+        assert_eq!(text(0.19764), "0.198");
+        assert_eq!(text(6973.3), "6970");
+        assert_eq!(text(-0.5), "-0.5");
+        assert_eq!(text(460.0), "460");
+        assert_eq!(text(9.999), "10");
+        assert_eq!(text(0.00012345), "0.000123");
+        assert_eq!(text(0.0), "0");
+        assert_eq!(text(1.5e-9), "1.50e-9");
+        assert_eq!(text(-2.5e12), "-2.50e12");
+        assert_eq!(text(f64::INFINITY), "inf");
+    }
 }

@@ -12,14 +12,14 @@ mod wheel_on_rail;
 
 use std::collections::BTreeMap;
 
-use crate::contact::remark::figure::{AsFigure, Figure};
+use crate::contact::remark::kind::short;
+use crate::contact::remark::kind::{AsFigure, Figure};
 use crate::contact::remark::kind::{RemarkKind, Severity};
 use crate::contact::remark::list::case::case_remarks;
 use crate::contact::remark::list::motions::motion_remarks;
 use crate::contact::remark::list::normal::normal_remarks;
 use crate::contact::remark::list::profile_quality::profile_remarks;
 use crate::contact::remark::list::wheel_on_rail::wheel_remarks;
-use crate::contact::remark::rounded::short;
 use crate::contact::remark::table::remarks;
 
 // Each macro adds its group and calls the next one; the last declares the enum.

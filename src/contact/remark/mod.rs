@@ -4,8 +4,6 @@
 //! is known; the motion is added when the solution is assembled. All remarks are declared in `list`.
 
 pub mod entry;
-pub mod figure;
 pub mod kind;
 pub mod list;
-pub mod rounded;
 pub mod table;

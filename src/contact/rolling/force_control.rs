@@ -15,13 +15,13 @@ use crate::contact::numerics::pair_root::find_pair;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::force_places::{ForcePlaces, total};
-use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::adapt;
 use crate::contact::rolling::refinement::mesh_family::MeshFamily;
 use crate::contact::rolling::refinement::on_mesh::MotionTask;
 use crate::contact::rolling::refinement::state::RefinementState;
+use crate::contact::rolling::resolution::MeshPlan;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::task::RollingTask;
 

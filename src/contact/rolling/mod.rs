@@ -6,23 +6,20 @@
 //! | which creepages give a prescribed force | [`force_control`], with its unknowns in [`force_places`] |
 //! | on which meshes, until when | [`refinement`] |
 //! | how one mesh is solved | [`methods`] |
-//! | which equations they solve | [`slip_equations`], [`slip_rules`], [`layer_slip`] |
+//! | which equations they solve | [`slip_equations`], [`slip_rules`] |
 //! | mesh, pressures and bounds of one level | [`strip_mesh`], [`strip_chords`] |
 //! | operators kept for later cases | [`operator_store`], [`own_blocks`] |
 //! | rolling that changes, step by step | [`history`], with [`displacement_memory`] |
-//! | what comes out | [`answer`] (one level), [`motion_answer`] (one motion), [`resultants`], [`vortex`] |
-//! | closed forms | [`linear_theory`], [`cubic_law`], [`load_ellipse`] |
+//! | what comes out | [`answer`] (one level), [`motion_answer`] (one motion), [`resultants`] |
+//! | closed forms | [`linear_theory`], [`load_ellipse`] |
 
 pub mod answer;
-pub mod cubic_law;
 pub mod displacement_memory;
 pub mod force_control;
 pub mod force_places;
 pub mod history;
-pub(crate) mod layer_slip;
 pub mod linear_theory;
 pub mod load_ellipse;
-pub mod mesh_plan;
 pub mod methods;
 pub mod motion;
 pub mod motion_answer;
@@ -31,10 +28,8 @@ pub mod own_blocks;
 pub mod refinement;
 pub mod resolution;
 pub mod resultants;
-pub mod skip;
 pub mod slip_equations;
 pub mod slip_rules;
 pub mod strip_chords;
 pub mod strip_mesh;
 pub mod task;
-pub mod vortex;

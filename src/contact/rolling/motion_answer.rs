@@ -2,10 +2,10 @@
 
 use crate::contact::method::Method;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::answer::Skip;
 use crate::contact::rolling::answer::{LevelAnswer, Work};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::resultants::Resultants;
-use crate::contact::rolling::skip::Skip;
 
 /// Relative errors of every patch, then of the sum over them; nothing where there is nothing to compare with.
 pub type RelativeErrors = Vec<Option<f64>>;

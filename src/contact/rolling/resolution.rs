@@ -1,6 +1,6 @@
-//! How fine a solution is to be.
+//! How fine a solution is to be, and the size and grading of a mesh.
 
-use crate::contact::mesh::size::MeshSize;
+use crate::contact::mesh::strips::MeshSize;
 
 /// The target that stands for an explicit mesh where a search needs one. Chosen by judgement; how much it matters was not measured.
 const TARGET_OF_MESH: f64 = 0.005;
@@ -55,5 +55,21 @@ impl Resolution {
             }
             unchanged => unchanged,
         }
+    }
+}
+
+/// The size of a mesh and where it is graded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshPlan {
+    /// Strips and cells.
+    pub size: MeshSize,
+    /// The point about which strips and cells gather, along the chords and across the patch, each from −1 to 1. Without one, strips are equal
+    /// and cells are cosine-graded.
+    pub pole: Option<[f64; 2]>,
+}
+
+impl From<MeshSize> for MeshPlan {
+    fn from(size: MeshSize) -> Self {
+        MeshPlan { size, pole: None }
     }
 }

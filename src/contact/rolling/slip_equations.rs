@@ -3,16 +3,15 @@
 //! Everything is dimensionless: lengths by the scale of the patch, tractions by a reference traction P, slips by P/G.
 //! Vectors hold all x components, then all y components, each padded with zeros to the operator's length.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::half_space::strip_operator::operator::{
     OperatorScratch, StripOperator, rows_of,
 };
-use crate::contact::mesh::strips::Mesh;
+use crate::contact::mesh::strips::{Mesh, Segment};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::displacement_memory::DisplacementMemory;
-use crate::contact::rolling::layer_slip::LayerSlip;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_rules::{Rule, Stencils};
 
@@ -30,8 +29,8 @@ pub struct SlipEquations<'a> {
     /// What the change of the displacements in time adds, where rolling is not steady.
     memory: Option<DisplacementMemory<'a>>,
     /// Cells and rows of every segment that has unknowns.
-    cells: Vec<std::ops::Range<usize>>,
-    rows: Vec<std::ops::Range<usize>>,
+    cells: Vec<Range<usize>>,
+    rows: Vec<Range<usize>>,
     padded: usize,
     row_count: usize,
     /// y of every segment, for the rigid slip.
@@ -144,7 +143,7 @@ impl<'a> SlipEquations<'a> {
 
     /// Cells of a segment.
     #[must_use]
-    pub fn segment(&self, j: usize) -> std::ops::Range<usize> {
+    pub fn segment(&self, j: usize) -> Range<usize> {
         self.cells[j].clone()
     }
 
@@ -359,11 +358,72 @@ impl<'a> SlipEquations<'a> {
     }
 }
 
+/// The layer on the segments of a mesh under one rule.
+#[derive(Debug)]
+pub(crate) struct LayerSlip {
+    /// Dimensionless: displacement over traction.
+    flexibility: f64,
+    stencils: Stencils,
+}
+
+impl LayerSlip {
+    pub(crate) fn new(
+        rule: Rule,
+        mesh: &Mesh,
+        segments: &[Segment],
+        flexibility: f64,
+    ) -> LayerSlip {
+        LayerSlip {
+            flexibility,
+            stencils: Stencils::ending_at_the_edge(rule, mesh, segments),
+        }
+    }
+
+    /// Adds the slip of the tractions of a segment to those of the whole mesh.
+    pub(crate) fn add(
+        &self,
+        cells: Range<usize>,
+        traction: &[f64],
+        slip: &mut [f64],
+        [differences, own]: &mut [Vec<f64>; 2],
+    ) {
+        let n = traction.len();
+        differences.clear();
+        differences.extend(
+            traction
+                .windows(2)
+                .map(|t| self.flexibility * (t[1] - t[0])),
+        );
+        differences.push(-self.flexibility * traction[n - 1]);
+        differences.resize(n + 2, 0.0);
+        own.resize(n, 0.0);
+        self.stencils.elastic(cells.clone(), differences, own);
+        for (slip, own) in slip[cells].iter_mut().zip(&own[..n]) {
+            *slip += own;
+        }
+    }
+
+    /// Adds the slips of a unit traction on one cell of a segment, along x and across.
+    pub(crate) fn add_column(&self, cells: Range<usize>, cell: usize, slips: [&mut [f64]; 2]) {
+        let n = cells.len();
+        let mut unit = vec![0.0; n];
+        unit[cell] = 1.0;
+        let (mut slip, mut buffers) = (vec![0.0; cells.end], [Vec::new(), Vec::new()]);
+        self.add(cells.clone(), &unit, &mut slip, &mut buffers);
+        for slips in slips {
+            for (to, from) in slips.iter_mut().zip(&slip[cells.clone()]) {
+                *to += from;
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::contact::half_space::strip_operator::kind::Precision;
     use crate::contact::mesh::samples::mesh_between;
+    use crate::contact::mesh::strips::{Chord, Grading};
     use crate::contact::monitor::Unmonitored;
 
     fn parabolic_mesh() -> Mesh {
@@ -429,6 +489,31 @@ mod tests {
                         "{rule:?} {parity:?} {row}: {product} {}",
                         slip[place(row)]
                     );
+                }
+            }
+        }
+    }
+
+    /// A layer alone, in full stick: `w + L dT/dx = 0` gives tractions that grow from the leading edge, as in Kalker's simplified theory.
+    #[test]
+    fn tractions_that_grow_evenly_from_the_leading_edge_slip_evenly() {
+        let chord = Chord {
+            patch: 0,
+            strip: 0,
+            y: 0.0,
+            dy: 1.0,
+            left: -2.0,
+            right: 1.0,
+        };
+        for rule in [Rule::Upwind, Rule::ThreePoint, Rule::Trapezoid] {
+            for n in [1, 2, 3, 8] {
+                let mesh = Mesh::new(&[chord], &Grading::cosine(n));
+                let layer = LayerSlip::new(rule, &mesh, &mesh.segments, 0.4);
+                let traction: Vec<f64> = mesh.node.iter().map(|x| 0.7 * (1.0 - x)).collect();
+                let mut slip = vec![0.0; n];
+                layer.add(0..n, &traction, &mut slip, &mut Default::default());
+                for slip in slip {
+                    assert!((slip + 0.28).abs() < 1e-12, "{rule:?} {n}: {slip}");
                 }
             }
         }

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use crate::contact::mesh::observation::observe;
+use crate::contact::mesh::strips::observe;
 use crate::contact::mesh::strips::{Mesh, Segment};
 
 /// The rules offered.
@@ -160,9 +160,9 @@ fn three_point(points: &[f64], i: usize, n: usize) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::chord::Chord;
-    use crate::contact::mesh::observation::observation_points;
+    use crate::contact::mesh::strips::Chord;
     use crate::contact::mesh::strips::Grading;
+    use crate::contact::mesh::strips::observation_points;
 
     fn mesh(n: usize) -> Mesh {
         let chord = Chord {

@@ -1,6 +1,6 @@
 //! Chords that stand for their whole strip, not only for its mid-line.
 
-use crate::contact::mesh::chord::Chord;
+use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::footprint::{Footprint, LineAngles};
 use crate::contact::numerics::quadrature::FOUR_POINTS;
 

@@ -8,17 +8,17 @@ use crate::contact::friction::path_dependent::{PathDependentFriction, PathDepend
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
 use crate::contact::half_space::unlike_bodies::pressure_slips;
-use crate::contact::mesh::chord::Chord;
+use crate::contact::mesh::strips::Chord;
 use crate::contact::mesh::strips::{Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::surface_slip::SurfaceSlip;
-use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::{
     CaseOperators, LevelOperator, OperatorKind, OperatorStore,
 };
+use crate::contact::rolling::resolution::MeshPlan;
 use crate::contact::rolling::strip_chords;
 use crate::contact::rolling::strip_chords::StripChord;
 use crate::contact::rolling::task::RollingTask;

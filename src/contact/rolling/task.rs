@@ -1,7 +1,7 @@
 //! What the tangential problem of one footprint asks: physics, method and accuracy.
 
-use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
+use crate::contact::friction::path_dependent::Interface;
 use crate::contact::friction::path_dependent::PathDependentLaws;
 use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::half_space::elasticity::Elasticity;

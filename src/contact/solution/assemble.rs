@@ -10,12 +10,14 @@ use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::answer::Skip;
 use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::motion_answer::{MotionAnswer, PatchGradients, SolvedFields};
+use crate::contact::rolling::motion_answer::{
+    HistoryAnswer, MotionAnswer, PatchGradients, SolvedFields,
+};
 use crate::contact::rolling::refinement::levels::Levels;
 use crate::contact::rolling::resolution::RelativeTo;
 use crate::contact::rolling::resultants::Resultants;
-use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::cell_values::{patch_cells, point_fields, traction_max};
 use crate::contact::solution::maintain;
@@ -565,4 +567,25 @@ fn error_large(case: &CheckedCase, point: &MotionAnswer, limit: f64) -> Option<R
         force_over_limit: point.force_share(limit),
         usual_max: LARGE_FOR_FORCE,
     })
+}
+
+impl HistoryPoint {
+    /// What a history says of a patch at a point.
+    pub(crate) fn of(history: &HistoryAnswer, patch: usize) -> HistoryPoint {
+        let [creepage_x_error, creepage_y_error] = history.creepage_errors;
+        let [shift_x_error_mm, shift_y_error_mm] = history.shift_errors;
+        let rolled = |error: Option<f64>| error.filter(|_| history.shift.is_none());
+        let shifted = |error: Option<f64>| error.filter(|_| history.shift.is_some());
+        HistoryPoint {
+            distance_mm: history.distance,
+            shift_x_mm: history.shift.map(|shift| shift.creepage_x),
+            shift_y_mm: history.shift.map(|shift| shift.creepage_y),
+            turn_rad: history.shift.map(|shift| shift.spin_per_mm),
+            creepage_x_error: rolled(creepage_x_error),
+            creepage_y_error: rolled(creepage_y_error),
+            shift_x_error_mm: shifted(shift_x_error_mm),
+            shift_y_error_mm: shifted(shift_y_error_mm),
+            dissipated_n_mm: history.dissipated[patch],
+        }
+    }
 }

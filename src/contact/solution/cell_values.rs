@@ -6,8 +6,8 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::motion_answer::SolvedFields;
 use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::solution::words::fields::Zone;
 use crate::contact::solution::words::fields::{PatchCells, PointFields};
-use crate::contact::solution::words::zone::Zone;
 
 /// The cells of a patch.
 pub(crate) fn patch_cells(case: &CheckedCase, level: &StripMesh, patch: usize) -> PatchCells {

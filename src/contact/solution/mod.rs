@@ -5,7 +5,6 @@ pub mod cell_values;
 pub mod conformality_error;
 pub mod finish;
 pub mod finite;
-pub(crate) mod history_point;
 pub mod maintain;
 pub(crate) mod moved;
 pub mod track_axes;

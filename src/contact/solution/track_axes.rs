@@ -1,7 +1,7 @@
 //! Merges the answers for the parts of a wheel–rail contact, with their positions and the sums in track axes.
 
 use crate::contact::geometry::frame::Frame;
-use crate::contact::geometry::surface_exit::SurfaceMissed;
+use crate::contact::geometry::frame::SurfaceMissed;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::problem::checked_case::CheckedCase;

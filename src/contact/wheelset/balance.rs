@@ -14,7 +14,7 @@ use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
 use crate::contact::numerics::bracketed_root::find_root;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::profile_trust::trust;
+use crate::contact::profile_assessment::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::answer::{PatchSolution, Solution};
 use crate::contact::surface_fallback;

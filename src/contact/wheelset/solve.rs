@@ -8,7 +8,7 @@ use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::profile_trust::settle;
+use crate::contact::profile_assessment::trust;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
@@ -69,7 +69,7 @@ fn settled(
 ) -> Result<[WheelTask; 2], SolveError> {
     let settle = |k: usize| {
         let side = &task.sides[k];
-        let settled = settle::settled(case, side, monitor)?;
+        let settled = trust::settled(case, side, monitor)?;
         Ok::<_, SolveError>(settled.unwrap_or_else(|| side.clone()))
     };
     Ok([settle(0)?, settle(1)?])

@@ -6,8 +6,8 @@ use utoipa::ToSchema;
 use crate::contact::case::words::solver::Output;
 use crate::contact::post::outlines::outline::{outlines, patch_outline};
 use crate::contact::post::resample::{resample, resample_zone};
+use crate::contact::solution::words::fields::Zone;
 use crate::contact::solution::words::fields::{PatchCells, PointFields};
-use crate::contact::solution::words::zone::Zone;
 
 /// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run
 /// counter-clockwise, holes clockwise.

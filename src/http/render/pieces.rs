@@ -6,7 +6,7 @@ use std::ops::Range;
 use axum::body::{Body, Bytes};
 use futures_util::stream;
 
-use crate::contact::solution::words::zone::Zone;
+use crate::contact::solution::words::fields::Zone;
 use crate::http::render::csv;
 use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table};
 

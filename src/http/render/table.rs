@@ -3,7 +3,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::solution::words::zone::Zone;
+use crate::contact::solution::words::fields::Zone;
 use crate::http::dto::cells::{Cells, GriddedField};
 
 /// A file, byte for byte.

@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use crate::contact::case::known_pair::KnownPair;
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::sections::named_sections;
+use crate::contact::evaluate::varied::named_sections;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::batch::staging::{StagedCase, Staging};
 use crate::jobs::batch::template::{self, Cell};

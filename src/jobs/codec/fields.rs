@@ -17,8 +17,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use crate::contact::solution::words::fields::Zone;
 use crate::contact::solution::words::fields::{PatchCells, PatchFields, PointFields};
-use crate::contact::solution::words::zone::Zone;
 
 pub(crate) const MAGIC: &[u8; 8] = b"RHFIELD2";
 

@@ -10,17 +10,8 @@ use crate::contact::case::words::damage::{
 };
 use crate::contact::case::words::solver::Output;
 
-const MODELS: [(&str, DamageModel); 6] = [
-    ("t_gamma", DamageModel::TGamma),
-    ("usfd_wear", DamageModel::UsfdWear),
-    ("archard_wear", DamageModel::ArchardWear),
-    ("wlrm", DamageModel::Wlrm),
-    ("surface_fatigue_index", DamageModel::SurfaceFatigueIndex),
-    ("shakedown", DamageModel::Shakedown),
-];
 /// Evaluated where none is named: those whose figures are confirmed.
 const DEFAULT_MODELS: [DamageModel; 2] = [DamageModel::TGamma, DamageModel::UsfdWear];
-const SETS: [(&str, DamageSetName); 1] = [("900a-r8t-1", DamageSetName::Rail900aWheelR8t)];
 const DENSITY: AllowedRange = AllowedRange::positive(1e5, "kg/m³");
 const STRESS: AllowedRange = AllowedRange::positive(1e6, "MPa");
 const FIGURE: AllowedRange = AllowedRange::positive(1e12, "");
@@ -65,11 +56,14 @@ pub(crate) fn read(
 }
 
 fn models(block: &mut Object, name: &str) -> Option<Vec<DamageModel>> {
-    let what = format!("an array with at least one of {}", names(&MODELS));
+    let what = format!(
+        "an array with at least one of {}",
+        names(DamageModel::WORDS)
+    );
     let elements = block.array(name, 1..=usize::MAX, &what)?;
     let pointer = block.pointer_to(name);
     let faults = block.faults();
-    let one = |(k, element)| word(element, &join(&pointer, k), &MODELS, faults);
+    let one = |(k, element)| word(element, &join(&pointer, k), DamageModel::WORDS, faults);
     let read: Vec<Option<DamageModel>> = elements.iter().enumerate().map(one).collect();
     let mut models: Vec<DamageModel> = read.into_iter().collect::<Option<_>>()?;
     models.sort_unstable();
@@ -81,7 +75,9 @@ fn parameters(block: &mut Object, name: &str) -> Option<DamageParameterWords> {
     if matches!(block.value(name)?, Value::Object(_)) {
         return own(&mut block.child(name)?).map(|own| DamageParameterWords::Own(Box::new(own)));
     }
-    block.word(name, &SETS).map(DamageParameterWords::Named)
+    block
+        .word(name, DamageSetName::WORDS)
+        .map(DamageParameterWords::Named)
 }
 
 fn own(block: &mut Object) -> Option<OwnDamageFigures> {

@@ -20,11 +20,11 @@ use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::damage::DamageWords;
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
+use crate::contact::case::words::material::ThermalWords;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::question::Case;
 use crate::contact::case::words::solver::{Output, Solver};
 use crate::contact::case::words::subsurface::SubsurfaceWords;
-use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::method::Method;
 

@@ -23,11 +23,6 @@ const HARDENING: AllowedRange = AllowedRange::closed(0.0, 1e9, "MPa/mm");
 const POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// The ways to give a coefficient.
 const WAYS: [&str; 5] = ["coefficient", "law", "across", "along", "by_temperature"];
-const LAWS: [(&str, FallName); 3] = [
-    ("exponential", FallName::Exponential),
-    ("rational", FallName::Rational),
-    ("linear", FallName::Linear),
-];
 
 /// Reads the required member `friction` of a case.
 pub(crate) fn read(case: &mut Object) -> Option<Friction> {
@@ -100,7 +95,7 @@ fn enough(block: &mut Object, name: &str, coefficient: f64) -> Option<()> {
 }
 
 fn law(block: &mut Object) -> Option<Friction> {
-    let law = block.word("law", &LAWS);
+    let law = block.word("law", FallName::WORDS);
     let limit = block.required_number("limit", COEFFICIENT);
     let what = "an array of one or two objects with coefficient and half_speed_mm_per_s";
     block.required("terms", what)?;

@@ -4,9 +4,9 @@ use serde_json::Value;
 
 use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join};
+use crate::contact::case::words::history::Range;
 use crate::contact::case::words::history::{History, HistoryCourse, HistoryStartName};
 use crate::contact::case::words::motion::Motions;
-use crate::contact::case::words::range::Range;
 
 const DISTANCE: AllowedRange = AllowedRange::closed(0.0, 1e9, "mm");
 const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");
@@ -39,12 +39,7 @@ const EXCLUSIVE: [(&str, [&str; 2]); 2] = [
 /// Reads the block `{"history": …, "start": …}`.
 pub(crate) fn read(block: &mut Object) -> Option<Motions> {
     block.only(&["history", "start"]);
-    let words = [
-        ("rest", HistoryStartName::Rest),
-        ("steady", HistoryStartName::Steady),
-        ("pressed", HistoryStartName::Pressed),
-    ];
-    let start = block.optional_word("start", &words);
+    let start = block.optional_word("start", HistoryStartName::WORDS);
     let start = start.map(|start| start.unwrap_or(HistoryStartName::Rest));
     let history = history(&mut block.child("history")?, start);
     Some(Motions::History {

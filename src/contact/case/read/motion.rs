@@ -5,10 +5,10 @@ use serde_json::Value;
 use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::history;
 use crate::contact::case::read::object::{Object, join, shown};
+use crate::contact::case::words::history::Range;
 use crate::contact::case::words::motion::{
     AskedMotion, Combine, Motions, Sweep, Swept, ValueList, Wheelset,
 };
-use crate::contact::case::words::range::Range;
 
 const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");
 const SPIN: AllowedRange = AllowedRange::closed(-1e6, 1e6, "1/mm");
@@ -28,9 +28,6 @@ const COMPONENTS: [&str; 5] = [
     "force_x_n",
     "force_y_n",
 ];
-/// How several values are combined.
-pub(crate) const COMBINATIONS: [(&str, Combine); 2] =
-    [("together", Combine::Together), ("grid", Combine::Grid)];
 /// The member beside them.
 const SPEED_NAME: &str = "speed_mm_per_s";
 /// The lateral velocity of a wheelset, and the force that may stand in its place.
@@ -235,7 +232,7 @@ fn sweep(block: &mut Object) -> Option<Sweep> {
         read[k] = Some(swept(block, name, interval(k)));
     })?;
     let speed_mm_per_s = block.optional_number(SPEED_NAME, SPEED)?;
-    let combine = block.optional_word("combine", &COMBINATIONS)?;
+    let combine = block.optional_word("combine", Combine::WORDS)?;
     // A faulty component has left its fault behind and ends the reading here.
     if read.contains(&Some(None)) {
         return None;

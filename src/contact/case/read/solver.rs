@@ -13,33 +13,6 @@ const TIME_LIMIT: AllowedRange = AllowedRange::positive(86_400.0, "s");
 /// Most strips, and cells in one, of an explicit mesh.
 const MESH_SIDE_MAX: u32 = 1000;
 
-const METHODS: [(&str, MethodName); 5] = [
-    ("auto", MethodName::Auto),
-    ("boundary_element", MethodName::BoundaryElement),
-    ("liu_hsu", MethodName::LiuHsu),
-    ("fastsim", MethodName::Fastsim),
-    ("table", MethodName::Table),
-];
-const TRACTION_BOUNDS: [(&str, TractionBoundName); 2] = [
-    ("elliptic", TractionBoundName::Elliptic),
-    ("parabolic", TractionBoundName::Parabolic),
-];
-const RELATIVE_TO: [(&str, RelativeToName); 2] = [
-    ("friction_limit", RelativeToName::FrictionLimit),
-    ("force", RelativeToName::Force),
-];
-const OUTPUTS: [(&str, Output); 9] = [
-    ("resultants", Output::Resultants),
-    ("zones", Output::Zones),
-    ("tractions", Output::Tractions),
-    ("pressure", Output::Pressure),
-    ("slip", Output::Slip),
-    ("subsurface", Output::Subsurface),
-    ("damage", Output::Damage),
-    ("temperature", Output::Temperature),
-    ("gradients", Output::Gradients),
-];
-
 const MEMBERS: [&str; 6] = [
     "method",
     "target_error",
@@ -63,12 +36,12 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
     }
     let mut block = case.child("solver")?;
     block.only(&MEMBERS);
-    let method = block.word("method", &METHODS);
+    let method = block.word("method", MethodName::WORDS);
     let target_error = block.number("target_error", TARGET_ERROR);
     let mesh = block.optional("mesh", mesh).flatten();
-    let traction_bound = block.word("traction_bound", &TRACTION_BOUNDS);
+    let traction_bound = block.word("traction_bound", TractionBoundName::WORDS);
     let time_limit_s = block.number("time_limit_s", TIME_LIMIT);
-    let relative_to = block.word("relative_to", &RELATIVE_TO);
+    let relative_to = block.word("relative_to", RelativeToName::WORDS);
     let read = [
         traction_bound.is_some(),
         mesh.is_some(),
@@ -150,7 +123,7 @@ pub(crate) fn read_outputs(
         usual.retain(|output| without_fields.is_none() || !output.needs_fields());
         return Some(usual);
     }
-    let what = format!("an array with at least one of {}", names(&OUTPUTS));
+    let what = format!("an array with at least one of {}", names(Output::WORDS));
     let elements = case.array("outputs", 1..=usize::MAX, &what)?;
     let pointer = case.pointer_to("outputs");
     let faults = case.faults();
@@ -159,7 +132,7 @@ pub(crate) fn read_outputs(
         .enumerate()
         .map(|(k, element)| {
             let pointer = join(&pointer, k);
-            let output = word(element, &pointer, &OUTPUTS, faults)?;
+            let output = word(element, &pointer, Output::WORDS, faults)?;
             let detail = match without_fields {
                 Some(method) if output.needs_fields() => format!(
                     "{} given; \"method\": \"{}\" computes only \"resultants\", \"gradients\" and \"damage\"",

@@ -65,8 +65,7 @@ fn words(block: &mut Object) -> Option<SubsurfaceWords> {
     let along_depth_at_mm = block.optional("along_depth_at_mm", line_at);
     let depths_mm = block.optional("depths_mm", |block, name| list(block, name, DEPTH));
     let plane = block.optional("plane", |block, name| grid(&mut block.child(name)?));
-    let bodies = [("lower", BodyName::Lower), ("upper", BodyName::Upper)];
-    let body = block.optional_word("body", &bodies);
+    let body = block.optional_word("body", BodyName::WORDS);
     let worst = block.optional("worst", Object::flag);
     let passage = block.optional("passage", passage);
     match (block.has("along_depth_at_mm"), block.has("depths_mm")) {

@@ -3,8 +3,8 @@
 use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::Object;
 use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::material::{ThermalBodyWords, ThermalWords};
 use crate::contact::case::words::solver::Output;
-use crate::contact::case::words::thermal::{ThermalBodyWords, ThermalWords};
 
 const CONDUCTIVITY: AllowedRange = AllowedRange::positive(1e6, "W/(m K)");
 const DENSITY: AllowedRange = AllowedRange::positive(1e6, "kg/m³");

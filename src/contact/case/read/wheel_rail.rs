@@ -10,18 +10,6 @@ use crate::contact::case::words::contact::{
 };
 use crate::contact::geometry::profile::{POINTS_MAX, POINTS_MIN};
 
-const SIDES: [(&str, SideName); 2] = [("left", SideName::Left), ("right", SideName::Right)];
-const FORMATS: [(&str, FormatName); 3] = [
-    ("columns", FormatName::Columns),
-    ("simpack", FormatName::Simpack),
-    ("miniprof", FormatName::Miniprof),
-];
-const UNITS: [(&str, UnitName); 4] = [
-    ("mm", UnitName::Mm),
-    ("cm", UnitName::Cm),
-    ("m", UnitName::M),
-    ("inch", UnitName::Inch),
-];
 pub(crate) const ROLLING_RADIUS: AllowedRange = AllowedRange::positive(1e5, "mm");
 pub(crate) const GAUGE: AllowedRange = AllowedRange::positive(1e5, "mm");
 pub(crate) const DISTANCE: AllowedRange = AllowedRange::closed(0.0, 1e5, "mm");
@@ -29,12 +17,6 @@ pub(crate) const PLACE: AllowedRange = AllowedRange::closed(-1e3, 1e3, "mm");
 pub(crate) const DEPTH: AllowedRange = AllowedRange::closed(0.0, 100.0, "mm");
 pub(crate) const CANT: AllowedRange = AllowedRange::closed(-0.5, 0.5, "rad");
 pub(crate) const ANGLE: AllowedRange = AllowedRange::closed(-0.3, 0.3, "rad");
-const SURFACES: [(&str, SurfaceName); 2] =
-    [("plane", SurfaceName::Plane), ("curve", SurfaceName::Curve)];
-const INFLUENCES: [(&str, InfluenceName); 2] = [
-    ("angle_corrected", InfluenceName::AngleCorrected),
-    ("half_space", InfluenceName::HalfSpace),
-];
 const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const SMOOTHING: AllowedRange = AllowedRange::closed(0.0, 50.0, "mm");
 /// Characters of a file.
@@ -67,7 +49,7 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
     let what = "left or right";
     let side = block
         .required("side", what)
-        .and_then(|_| block.word("side", &SIDES));
+        .and_then(|_| block.word("side", SideName::WORDS));
     let rolling_radius_mm = block.required_number("rolling_radius_mm", ROLLING_RADIUS);
     let cant_rad = block.number_or("cant_rad", CANT, 0.0);
     let flange_back_distance_mm = block.number_or("flange_back_distance_mm", DISTANCE, 1360.0);
@@ -100,8 +82,8 @@ pub(crate) fn read(block: &mut Object) -> Option<Contact> {
 
 /// Reads the surface of a contact of profiles.
 pub(crate) fn surface(block: &mut Object) -> Option<(Option<SurfaceName>, Option<InfluenceName>)> {
-    let surface = block.optional_word("reference_surface", &SURFACES)?;
-    let influence = block.optional_word("influence", &INFLUENCES)?;
+    let surface = block.optional_word("reference_surface", SurfaceName::WORDS)?;
+    let influence = block.optional_word("influence", InfluenceName::WORDS)?;
     if surface == Some(SurfaceName::Plane) && influence.is_some() {
         block.fault(
             "influence",
@@ -173,7 +155,7 @@ pub(crate) fn section_of(block: &mut Object) -> Option<CrossSection> {
     let mirror_y = flag(block, "mirror_y");
     let mirror_z = flag(block, "mirror_z");
     let smoothing_mm = smoothing(block);
-    let unit = block.optional_word("unit", &UNITS);
+    let unit = block.optional_word("unit", UnitName::WORDS);
     let (points_mm, format, text) = match (block.has("points_mm"), block.has("text")) {
         (true, false) => {
             if block.has("format") {
@@ -186,8 +168,8 @@ pub(crate) fn section_of(block: &mut Object) -> Option<CrossSection> {
             (Some(points(block)?), None, None)
         }
         (false, true) => {
-            block.required("format", &format!("one of {}", names(&FORMATS)))?;
-            let format = block.word("format", &FORMATS);
+            block.required("format", &format!("one of {}", names(FormatName::WORDS)))?;
+            let format = block.word("format", FormatName::WORDS);
             let text = block.text("text", TEXT_MAX);
             (None, Some(format?), Some(text?))
         }

@@ -1,7 +1,7 @@
 //! Reads a contact of the type `wheelset`, and the load that goes with it.
 
 use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::motion::{COMBINATIONS, swept};
+use crate::contact::case::read::motion::swept;
 use crate::contact::case::read::object::{Object, shown};
 use crate::contact::case::read::wheel_rail::{
     ANGLE, CANT, DISTANCE, PLACE, ROLLING_RADIUS, flag, rail_place, section, surface,
@@ -80,7 +80,7 @@ fn poses(block: &mut Object) -> Option<(Swept, Swept, Combine)> {
     };
     let shifts = values("lateral_shift_mm", PLACE);
     let yaws = values("yaw_rad", ANGLE);
-    let combine = block.optional_word("combine", &COMBINATIONS)?;
+    let combine = block.optional_word("combine", Combine::WORDS)?;
     let (shifts, yaws, combine) = (shifts?, yaws?, combine.unwrap_or_default());
     let [a, b] = [&shifts, &yaws].map(Swept::points);
     if combine == Combine::Together && a != b && a > 1 && b > 1 {

@@ -7,12 +7,12 @@ use crate::contact::case::words::damage::DamageWords;
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::history::{History, HistoryStartName};
 use crate::contact::case::words::material::Material;
+use crate::contact::case::words::material::ThermalWords;
 use crate::contact::case::words::motion::{MotionWords, Wheelset};
 use crate::contact::case::words::solver::{
     MeshSizeWords, MethodName, Output, RelativeToName, TractionBoundName,
 };
 use crate::contact::case::words::subsurface::SubsurfaceWords;
-use crate::contact::case::words::thermal::ThermalWords;
 use crate::contact::rolling::motion::PrescribedForces;
 
 /// Everything that determines the answer, in a fixed order; name and labels do not.

@@ -1,6 +1,6 @@
 //! Where the bodies touch, and how hard they are pressed together.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -302,7 +302,7 @@ pub struct Load {
 }
 
 /// Left or right rail, seen in the rolling direction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Side)]
 pub enum SideName {
@@ -313,7 +313,7 @@ pub enum SideName {
 }
 
 /// The surface on which the contact of a wheel on a rail is solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = ReferenceSurface)]
 pub enum SurfaceName {
@@ -325,7 +325,7 @@ pub enum SurfaceName {
 }
 
 /// How cells of a curved contact surface act on each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = SurfaceInfluence)]
 pub enum InfluenceName {
@@ -337,7 +337,7 @@ pub enum InfluenceName {
 }
 
 /// A file format of cross-sections.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Format)]
 pub enum FormatName {
@@ -350,7 +350,7 @@ pub enum FormatName {
 }
 
 /// A unit of length of cross-sections.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = LengthUnit)]
 pub enum UnitName {

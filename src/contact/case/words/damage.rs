@@ -1,6 +1,6 @@
 //! Which damage models a case asks for, and with which figures.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -20,7 +20,9 @@ pub struct DamageWords {
 }
 
 /// A damage model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema, Words,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum DamageModel {
     /// Friction power over rolling speed, with and without spin.
@@ -48,7 +50,7 @@ pub enum DamageParameterWords {
 }
 
 /// Named sets of figures; a set that is changed gets another name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
 pub enum DamageSetName {
     /// Rail UIC 900A, wheel R8T.
     #[default]

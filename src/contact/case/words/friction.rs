@@ -1,6 +1,6 @@
 //! Friction between the bodies, and what lies between them.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -36,7 +36,7 @@ pub struct Friction {
 
 /// How a coefficient falls with the speed of slip v: with f₀ the `limit`, f₁, f₂ the `coefficient` and v₁, v₂ the
 /// `half_speed_mm_per_s` of the terms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 pub enum FallName {
     /// f₀ + f₁ exp(−ln 2 v/v₁) + f₂ exp(−ln 2 v/v₂). Polach's μ₀((1 − A) exp(−B v) + A) is f₀ = A μ₀, f₁ = (1 − A) μ₀, v₁ = ln 2/B.

@@ -1,10 +1,8 @@
 //! Rolling that changes, as a client writes it: motions or forces in the distance rolled.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
-
-use crate::contact::case::words::range::Range;
 
 /// A motion that changes as the bodies roll. Creepages, spin and forces change linearly from one distance to the next; before the first
 /// distance they are those of the first. The points of the answer are the distances.
@@ -73,7 +71,7 @@ impl HistoryCourse {
 }
 
 /// The state in which a history begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 pub enum HistoryStartName {
     /// Pressed together without tangential tractions.
@@ -83,4 +81,36 @@ pub enum HistoryStartName {
     Steady,
     /// Pressed together under friction without rolling: bodies that differ have tangential tractions then. For `radii` and `ellipse`.
     Pressed,
+}
+
+/// Equally spaced values, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct Range {
+    /// First value.
+    pub from: f64,
+    /// Last value.
+    pub to: f64,
+    /// Number of values, at least 1.
+    #[schema(minimum = 1)]
+    pub points: u32,
+}
+
+impl Range {
+    /// The values; the ends are exact.
+    #[must_use]
+    pub fn values(&self) -> Vec<f64> {
+        let last = self.points.saturating_sub(1);
+        (0..self.points)
+            .map(|n| {
+                if n == 0 {
+                    self.from
+                } else if n == last {
+                    self.to
+                } else {
+                    let t = f64::from(n) / f64::from(last);
+                    self.from * (1.0 - t) + self.to * t
+                }
+            })
+            .collect()
+    }
 }

@@ -9,7 +9,5 @@ pub mod history;
 pub mod material;
 pub mod motion;
 pub mod question;
-pub mod range;
 pub mod solver;
 pub mod subsurface;
-pub mod thermal;

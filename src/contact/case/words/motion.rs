@@ -1,11 +1,11 @@
 //! How the bodies roll: one motion, a list, a sweep, a history or a wheelset.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::contact::case::words::history::Range;
 use crate::contact::case::words::history::{History, HistoryStartName};
-use crate::contact::case::words::range::Range;
 
 /// Rolling motion of the upper body relative to the lower one, divided by the rolling speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -138,7 +138,7 @@ pub struct Sweep {
 }
 
 /// How several components of a sweep are combined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 pub enum Combine {
     /// Motion n has value n of every component; all components that vary have the same number of values.

@@ -13,10 +13,10 @@ use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::damage::DamageWords;
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::Material;
+use crate::contact::case::words::material::ThermalWords;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{Output, Solver};
 use crate::contact::case::words::subsurface::SubsurfaceWords;
-use crate::contact::case::words::thermal::ThermalWords;
 
 /// One contact case: two bodies, how they are pressed together and how they roll.
 #[none_is_absent]

@@ -1,6 +1,6 @@
 //! How to solve, how exactly, and what to compute.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -30,7 +30,7 @@ pub struct Solver {
 }
 
 /// The methods a client can choose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Method)]
 pub enum MethodName {
@@ -49,7 +49,7 @@ pub enum MethodName {
 }
 
 /// What an error is relative to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = RelativeTo)]
 pub enum RelativeToName {
@@ -61,7 +61,7 @@ pub enum RelativeToName {
 }
 
 /// Where `fastsim` lets tractions slip.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = TractionBound)]
 pub enum TractionBoundName {
@@ -85,7 +85,9 @@ pub struct MeshSizeWords {
 }
 
 /// What a case may ask for. What is not asked for is not part of the answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema, Words,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Output {
     /// Forces, moment, dissipated power.

@@ -1,6 +1,6 @@
 //! Where stresses below the surface are asked for.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -88,7 +88,7 @@ pub enum GridAxis {
 }
 
 /// One of the two bodies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Body)]
 pub enum BodyName {

@@ -1,5 +1,4 @@
 //! Many rows with any column and any method: what they are, and how they are solved.
 
-mod row_solver;
 pub mod solve;
 pub mod task;

@@ -1,8 +1,8 @@
 //! The quality of a profile under a contact, and the smoothing that its noise requires.
 
-use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::noise::Oddity;
+use crate::contact::geometry::profile_quality::readings::noise_pressure;
 use crate::contact::geometry::profile_quality::readings::{
     KnownStretches, PointsRead, REFERENCE_MIN, Roughness,
 };

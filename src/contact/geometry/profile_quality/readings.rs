@@ -1,9 +1,12 @@
 //! Compares two readings of the same points: the spline in use with a smoother one, and with Akima's curve.
 
+use std::cell::RefCell;
+use std::f64::consts::{PI, TAU};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use realfft::RealFftPlanner;
+
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
-use crate::contact::geometry::profile_quality::flattening::flattening;
 use crate::contact::geometry::profile_quality::noise::{MEDIAN_OF_NORMAL, median};
 use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::numerics::hermite::{akima_slopes, value};
@@ -182,6 +185,60 @@ fn above(CurvePoint { at, slope, .. }: &CurvePoint, [other_y, other_z]: [f64; 2]
     (slope[0] * (at[1] - other_z) - slope[1] * (at[0] - other_y)) / length
 }
 
+/// Length in mm over which heights are tapered to 0 at both ends.
+const TAPER: f64 = 2.0;
+/// Padded length relative to that of the heights; the zeros keep the periodic transform from coupling the two ends.
+const PADDING: usize = 2;
+
+thread_local! {
+    /// Plans of the transforms, which take longer to make than to use. They follow from their lengths alone; there are a dozen at most.
+    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+}
+
+/// Pressure in MPa that flattens `heights` in mm, `step` mm apart, with the contact modulus in MPa; one value per height.
+pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
+    let count = heights.len();
+    let padded = (PADDING * count).max(2).next_power_of_two();
+    let mut values = vec![0.0; padded];
+    for (k, height) in heights.iter().enumerate() {
+        let from_end = step * k.min(count - 1 - k) as f64;
+        values[k] = if from_end < TAPER {
+            height * 0.5 * (1.0 - (PI * from_end / TAPER).cos())
+        } else {
+            *height
+        };
+    }
+    let (forward, backward) = PLANNER.with_borrow_mut(|planner| {
+        (
+            planner.plan_fft_forward(padded),
+            planner.plan_fft_inverse(padded),
+        )
+    });
+    let mut spectrum = forward.make_output_vec();
+    // The buffers have the lengths of the plans, so that neither transform can fail.
+    let done = forward.process(&mut values, &mut spectrum);
+    debug_assert!(done.is_ok());
+    for (m, entry) in spectrum.iter_mut().enumerate() {
+        let wavenumber = TAU * m as f64 / (padded as f64 * step);
+        *entry *= 0.5 * modulus * wavenumber / padded as f64;
+    }
+    if let Some(last) = spectrum.last_mut() {
+        last.im = 0.0;
+    }
+    spectrum[0].im = 0.0;
+    let done = backward.process(&mut spectrum, &mut values);
+    debug_assert!(done.is_ok());
+    values.truncate(count);
+    values
+}
+
+/// Pressure in MPa that white noise of deviation `noise` mm at a spacing of `spacing` mm leaves after a smoothing that halves
+/// waves of `cut` mm: `2.34 E* s √(h/L³)`, from `2 (π E*)² s² h / L³ · ∫ x²/(1+x⁴)² dx` with the integral `π√2/16`.
+#[must_use]
+pub fn noise_pressure(modulus: f64, noise: f64, spacing: f64, cut: f64) -> f64 {
+    2.34 * modulus * noise * (spacing / cut.powi(3)).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -233,10 +290,10 @@ mod tests {
     fn a_wave_is_worth_the_pressure_that_flattens_it_as_far_as_the_reference_takes_it_away() {
         let amplitude = 0.002;
         for length in [1.0, 2.0, 3.0, 4.0] {
-            let wave = |s: f64| amplitude * (std::f64::consts::TAU * s / length).cos();
+            let wave = |s: f64| amplitude * (TAU * s / length).cos();
             let found = of(0.0, wave).waviness;
             let taken = 1.0 - 1.0 / (1.0 + (3.0 / length).powi(4));
-            let flat = std::f64::consts::PI * MODULUS * amplitude / length;
+            let flat = PI * MODULUS * amplitude / length;
             let expected = taken * flat / 2.0_f64.sqrt();
             assert!(
                 (found / expected - 1.0).abs() < 0.1,

@@ -4,8 +4,8 @@ use std::ops::{ControlFlow, Range};
 
 use pulp::NullaryFnOnce;
 
-use crate::contact::mesh::observation::observe;
 use crate::contact::mesh::strips::Mesh;
+use crate::contact::mesh::strips::observe;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd;
 use crate::contact::numerics::simd_ln::Float;

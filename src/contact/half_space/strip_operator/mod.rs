@@ -2,6 +2,5 @@
 
 pub mod assembly;
 pub mod kind;
-pub mod matrix;
 pub mod operator;
 pub mod product;

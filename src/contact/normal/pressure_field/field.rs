@@ -1,6 +1,6 @@
 //! The pressure of a whole contact: on one grid, or on a grid per patch where patches differ much in size.
 
-use crate::contact::mesh::chord::Chord;
+use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::jump::Jump;

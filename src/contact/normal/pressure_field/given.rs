@@ -7,7 +7,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::contact::mesh::chord::Chord;
+use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;

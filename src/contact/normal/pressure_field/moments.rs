@@ -125,7 +125,7 @@ impl GridPressure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::chord::Chord;
+    use crate::contact::mesh::strips::Chord;
 
     fn two_bumps() -> GridPressure {
         let x: Vec<f64> = (-20..=20).map(|k| 0.2 * f64::from(k)).collect();

@@ -7,7 +7,7 @@ use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::patch_cells::{PatchShape, SampledLoad};
 use crate::contact::normal::pressure_field::sample_grid::{PADDING, SampleGrid};
-use crate::contact::numerics::maximum::maximum;
+use crate::contact::numerics::bracketed_root::maximum;
 use crate::contact::numerics::vanishing;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;

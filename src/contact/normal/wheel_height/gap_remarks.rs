@@ -1,7 +1,7 @@
 //! What a client should know of the gap of a patch, beyond its region and its pressure.
 
+use crate::contact::geometry::frame::{SurfaceExit, SurfaceMissed};
 use crate::contact::geometry::local_gap::LocalGap;
-use crate::contact::geometry::surface_exit::{SurfaceExit, SurfaceMissed};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::remark::entry::RemarkEntry;

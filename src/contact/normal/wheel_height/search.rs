@@ -6,8 +6,8 @@
 //! and solved coarsely.
 
 use crate::contact::geometry::contact_locus::ContactLocus;
+use crate::contact::geometry::frame::SurfaceMissed;
 use crate::contact::geometry::grouping::LoadedPatch;
-use crate::contact::geometry::surface_exit::SurfaceMissed;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::contact::geometry::frame::Frame;
 use crate::contact::geometry::local_gap::LocalGap;
-use crate::contact::mesh::chord::Chord;
+use crate::contact::mesh::strips::Chord;
 use crate::contact::normal::gap::answer::NormalWork;
 use crate::contact::normal::gap::patch_grid::PatchGrid;
 use crate::contact::normal::gap::start::GapStart;

@@ -2,8 +2,8 @@
 
 use crate::contact::post::smooth::contour::signed_area;
 use crate::contact::post::smooth::sheet::{AtBorder, Sheet, SheetStrip};
+use crate::contact::solution::words::fields::Zone;
 use crate::contact::solution::words::fields::{PatchCells, PointFields};
-use crate::contact::solution::words::zone::Zone;
 
 impl Sheet {
     /// Closed curves around the stick zone in mm, counter-clockwise, holes clockwise; `None` where zones are not known.

@@ -2,15 +2,10 @@
 
 pub mod enclosing_ball;
 pub mod load_parts;
-pub(crate) mod loaded_cell;
 pub(crate) mod loaded_run;
-pub mod outline;
 pub mod passage;
-pub mod piece;
-pub mod principal;
 pub mod seen_parts;
 pub mod states;
 pub mod surface_load;
-pub mod task;
 pub mod worst;
 pub mod worst_passage;

@@ -13,7 +13,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 use crate::contact::half_space::point_loads::Stress;
 use crate::contact::post::subsurface::enclosing_ball::{Deviator, enclosing_ball};
-use crate::contact::post::subsurface::principal::principal;
+use crate::contact::post::subsurface::states::principal;
 
 /// Weights of points that hold the ball, from which on the places beside them are looked at. Chosen by judgement.
 const HOLDING: f64 = 0.02;

@@ -9,9 +9,9 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::post::subsurface::passage::{PassageMeasure, judge};
 use crate::contact::post::subsurface::seen_parts::LoadResolution;
+use crate::contact::post::subsurface::states::PassageTask;
 use crate::contact::post::subsurface::states::von_mises;
 use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
-use crate::contact::post::subsurface::task::PassageTask;
 use crate::contact::solution::words::maintenance::{PassagePlace, PassageSummary};
 
 // The numbers below are chosen by judgement; `cargo test --test physics -- shakes_down` holds what they give against closed forms.

@@ -8,8 +8,6 @@ pub(crate) mod press;
 pub mod record;
 pub(crate) mod search;
 pub(crate) mod self_similar;
-pub(crate) mod slip_friction;
 pub mod solve;
 pub(crate) mod step_equations;
 pub mod task;
-pub(crate) mod track_friction;

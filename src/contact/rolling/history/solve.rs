@@ -1,7 +1,7 @@
 //! A history on finer and finer levels until two in a row agree.
 
 use crate::contact::error::SolveError;
-use crate::contact::mesh::size::MeshSize;
+use crate::contact::mesh::strips::MeshSize;
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::history::level_run::LevelRun;

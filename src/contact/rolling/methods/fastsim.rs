@@ -8,10 +8,10 @@
 use std::f64::consts::PI;
 
 use crate::contact::error::SolveError;
-use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
+use crate::contact::friction::path_dependent::Interface;
 use crate::contact::half_space::elasticity::Elasticity;
-use crate::contact::mesh::size::MeshSize;
+use crate::contact::mesh::strips::MeshSize;
 use crate::contact::method::{Method, TractionBound};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};

@@ -4,7 +4,6 @@ use crate::contact::error::SolveError;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::rolling::answer::Work;
-use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::motion_answer::{MotionAnswer, SolvedFields};
 use crate::contact::rolling::refinement::error_estimate::{Estimate, coarser};
@@ -13,6 +12,7 @@ use crate::contact::rolling::refinement::on_mesh::{
     DiscreteSolution, MotionTask, add_smooth_slips, solve_on_mesh,
 };
 use crate::contact::rolling::refinement::state::RefinementState;
+use crate::contact::rolling::resolution::MeshPlan;
 use crate::contact::rolling::task::RollingTask;
 
 /// Next mesh over the last one.

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
-use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::operator_store::{CaseOperators, OperatorStore};
+use crate::contact::rolling::resolution::MeshPlan;
 use crate::contact::rolling::strip_chords::StripChord;
 use crate::contact::rolling::strip_mesh::{StripMesh, fitted_chords};
 use crate::contact::rolling::task::RollingTask;

@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::mesh::size::MeshSize;
+use crate::contact::mesh::strips::MeshSize;
 use crate::contact::method::Method;
-use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::fastsim;
 use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::resolution::MeshPlan;
 use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::task::RollingTask;
 

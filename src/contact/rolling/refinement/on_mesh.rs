@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
-use crate::contact::mesh::size::MeshSize;
+use crate::contact::mesh::strips::MeshSize;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::patch::Patch;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit, LevelFailure, Work};
-use crate::contact::rolling::mesh_plan::MeshPlan;
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
 use crate::contact::rolling::methods::boundary_element::task::LevelTask;
 use crate::contact::rolling::methods::liu_hsu::on_level;
@@ -16,6 +15,7 @@ use crate::contact::rolling::methods::{fastsim, full_slip};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::refinement::interpolate::prolonged;
 use crate::contact::rolling::refinement::state::RefinementState;
+use crate::contact::rolling::resolution::MeshPlan;
 use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;

@@ -2,7 +2,8 @@
 //!
 //! Frame and signs are those of [`answer`](crate::contact::solution::words::answer).
 
-use crate::contact::solution::words::zone::Zone;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// The values per cell of all patches: what was asked for, nothing else.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -66,4 +67,25 @@ pub struct PointFields {
     pub temperature_c: Option<Vec<f64>>,
     /// Stresses at the requested points, as [`stored`](crate::contact::post::subsurface::states::stored).
     pub subsurface: Option<Vec<f64>>,
+}
+
+/// What a cell of the contact patch does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Zone {
+    /// No relative slip.
+    Stick,
+    /// The friction bound is reached and the surfaces slip.
+    Slip,
+}
+
+impl Zone {
+    /// The word for this zone in every text.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Zone::Stick => "stick",
+            Zone::Slip => "slip",
+        }
+    }
 }

@@ -64,3 +64,17 @@ pub struct FirstTouch {
     /// Inclination of the surfaces there in rad, as `contact_angle_rad` of a patch.
     pub contact_angle_rad: f64,
 }
+
+/// How a time was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FoundBy {
+    /// The case was solved.
+    Solve,
+    /// The case was solved up to an error, with which a job would end as well.
+    FailedSolve,
+    /// The solve had begun when the time ran out.
+    PartOfSolve,
+    /// Nothing was solved.
+    Formulas,
+}

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::contact::post::outlines::outline::{outlines, patch_outline};
 use crate::contact::post::smooth::sheet::{AtBorder, Sheet};
 use crate::contact::solution::words::fields::PatchCells;
-use crate::contact::solution::words::zone::Zone;
+use crate::contact::solution::words::fields::Zone;
 use crate::http::render::picture::colour::{SLIP, STICK, at};
 use crate::http::render::picture::frame::Frame;
 use crate::http::render::picture::scene::{Heat, Scene, extent, zones_present};

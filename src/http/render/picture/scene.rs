@@ -2,8 +2,8 @@
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::post::smooth::sheet::AtBorder;
+use crate::contact::solution::words::fields::Zone;
 use crate::contact::solution::words::fields::{PatchCells, PointFields};
-use crate::contact::solution::words::zone::Zone;
 
 /// What a picture shows.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::contact::rolling::methods::boundary_element::falling_rows::FallingRow;
+use crate::contact::friction::velocity_weakening::Slipping;
 
 /// The state of one Newton step: which cells slip, and in which direction.
 #[derive(Debug, Default)]
@@ -85,5 +85,77 @@ impl Linearisation {
     pub(crate) fn take_over(&mut self, other: &Linearisation, cells: Range<usize>) {
         self.direction[cells.clone()].copy_from_slice(&other.direction[cells.clone()]);
         self.stiffness[cells.clone()].copy_from_slice(&other.stiffness[cells]);
+    }
+}
+
+/// The law of such a cell linearised at `z = T + r s`, `d = z/|z|` and `t ⟂ d`: `t·δs − D t·δT = D t·T − t·s` turns the traction with
+/// the slip, and `d·(T + δT) = g + g′ (d·(s + δs) − σ)` keeps its size on the bound, σ being the slip of the resolvent. The second is
+/// divided by −r, so that both have the size and the sign of the rows of sticking cells.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FallingRow {
+    /// The cell.
+    pub(crate) cell: usize,
+    /// d.
+    along: [f64; 2],
+    /// D.
+    stiffness: f64,
+    /// `g′/r`.
+    slope: f64,
+    /// `1/r`.
+    inverse: f64,
+    /// `(g − g′ σ)/r`.
+    rest: f64,
+}
+
+impl FallingRow {
+    /// The row of a cell that slips at `z` of this length.
+    pub(crate) fn new(
+        cell: usize,
+        z: [f64; 2],
+        length: f64,
+        r: f64,
+        found: &Slipping,
+    ) -> FallingRow {
+        FallingRow {
+            cell,
+            along: z.map(|z| z / length),
+            stiffness: (length - found.bound) / (found.bound.max(1e-12 * length) * r),
+            slope: found.slope / r,
+            inverse: 1.0 / r,
+            rest: (found.bound - found.slope * found.slip) / r,
+        }
+    }
+
+    /// Both rows applied to a slip and a traction.
+    pub(crate) fn apply(&self, slip: [f64; 2], traction: [f64; 2]) -> [f64; 2] {
+        let [dx, dy] = self.along;
+        let turned = |v: [f64; 2]| dx * v[1] - dy * v[0];
+        let along = |v: [f64; 2]| dx * v[0] + dy * v[1];
+        [
+            turned(slip) - self.stiffness * turned(traction),
+            self.slope * along(slip) - self.inverse * along(traction),
+        ]
+    }
+
+    /// The right-hand sides at an iterate.
+    pub(crate) fn right(&self, slip: [f64; 2], traction: [f64; 2]) -> [f64; 2] {
+        let [turning, size] = self.apply(slip, traction);
+        [-turning, -size - self.rest]
+    }
+}
+
+/// Turns the rows of cells in a block of the preconditioner, which so far are the slips themselves.
+///
+/// `block` is a square matrix of `size`, column by column. `places` are the rows, and the columns, of the two components of each cell.
+pub(crate) fn turn_rows(
+    block: &mut [f64],
+    size: usize,
+    rows: impl Iterator<Item = (FallingRow, [usize; 2])>,
+) {
+    for (row, [x, y]) in rows {
+        for (k, column) in block.chunks_exact_mut(size).enumerate() {
+            let traction = [f64::from(u8::from(k == x)), f64::from(u8::from(k == y))];
+            [column[x], column[y]] = row.apply([column[x], column[y]], traction);
+        }
     }
 }

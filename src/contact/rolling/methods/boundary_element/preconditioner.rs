@@ -9,8 +9,8 @@ use faer::{MatMut, Par};
 
 use crate::contact::numerics::small_lu;
 use crate::contact::numerics::small_lu::SMALL;
-use crate::contact::rolling::methods::boundary_element::falling_rows::{FallingRow, turn_rows};
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
+use crate::contact::rolling::methods::boundary_element::linearisation::{FallingRow, turn_rows};
 use crate::contact::rolling::methods::boundary_element::strip_blocks::StripBlocks;
 use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::SlipEquations;

@@ -7,11 +7,11 @@
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::Monitor;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::answer::Skip;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit, LevelFailure, project_on_bound};
 use crate::contact::rolling::methods::boundary_element::rule_sequence::{Control, RuleSequence};
 use crate::contact::rolling::methods::boundary_element::task::{FEW_STEPS, LevelTask, STEPS_MAX};
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::skip::Skip;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
 /// Solves one motion on one level, from a start or from zero tractions.

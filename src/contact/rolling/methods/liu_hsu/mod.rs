@@ -9,10 +9,10 @@
 //! 2. Stick cells at or above their bound and slip cells whose traction opposes their slip (eq. 10) change zones
 //!    ([`active_set`]).
 //! 3. The stick tractions are eliminated (eq. 13, [`stick_block`]); Newton–Raphson gives the slip tractions
-//!    (eq. 8 and 9, [`newton_raphson`]) from an initial guess (eq. 14 or 15, [`initial_guess`]). Steps 2 and 3 are repeated
+//!    (eq. 8 and 9, [`newton_raphson`]) from an initial guess (eq. 14 or 15, [`active_set`]). Steps 2 and 3 are repeated
 //!    until no cell changes.
 //! 4. The first run uses guess 1. If it fails, a solution on a coarse mesh with guess 1 gives the spin pole
-//!    ([`vortex`](crate::contact::rolling::vortex)) for guess 2.
+//!    ([`vortex`](crate::contact::rolling::methods::liu_hsu::solve)) for guess 2.
 //!
 //! # What the paper leaves open
 //!
@@ -35,7 +35,7 @@
 //!
 //! The paper says always. Measured, that is true only of the upwind rule without spin. Most failures are divisions that
 //! repeat, because Newton–Raphson converges to a root of eq. 9 at which some tractions oppose their slips. If both guesses
-//! fail, a third run follows, which is not in the paper ([`Guess::Continued`](crate::contact::rolling::methods::liu_hsu::initial_guess::InitialGuess::Continued)): tractions start from those of the
+//! fail, a third run follows, which is not in the paper ([`Guess::Continued`](crate::contact::rolling::methods::liu_hsu::active_set::InitialGuess::Continued)): tractions start from those of the
 //! previous division and keep their magnitudes, and where a root has tractions that oppose their slips, the iteration is
 //! repeated with these reversed. Rules of second order start the third run from an upwind solution ([`solve_by_upwind`](crate::contact::rolling::methods::liu_hsu::solve::solve_by_upwind)). The table
 //! counts how many of 109 motions converge (normalised creepage 0 to 3 in four directions, spin 0 to 20). The pole of guess 2
@@ -64,8 +64,6 @@
 //! cells take seconds and more than 100 MB, and the checks of a case allow no more cells than that.
 
 pub mod active_set;
-pub mod dense_task;
-pub mod initial_guess;
 pub mod newton_raphson;
 pub mod on_level;
 pub mod solve;

@@ -7,8 +7,8 @@ use crate::contact::rolling::answer::{
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use crate::contact::rolling::methods::full_slip;
-use crate::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
 use crate::contact::rolling::methods::liu_hsu::solve::{ZonesOutcome, solve_by_upwind};
+use crate::contact::rolling::methods::liu_hsu::stick_block::DenseTask;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::slip_equations::SlipEquations;

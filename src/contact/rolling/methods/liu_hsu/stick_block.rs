@@ -5,8 +5,9 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::dense_lu::{DenseLu, check, subtract_product};
-use crate::contact::rolling::methods::liu_hsu::dense_task::DenseTask;
+use crate::contact::rolling::methods::boundary_element::task::NewtonTask;
 use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
 
 /// The discrete problem as dense arrays over the cells without padding, x components before y components.
@@ -189,4 +190,17 @@ fn add_product(to: &mut [f64], a: MatRef<'_, f64>, x: &[f64], factor: f64) {
         factor,
         Par::Seq,
     );
+}
+
+/// The problem on one mesh. All values are dimensionless, as in [`SlipEquations`].
+#[derive(Debug, Clone, Copy)]
+pub struct DenseTask<'a> {
+    /// The discrete equations over the whole mesh, without parity.
+    pub equations: &'a SlipEquations<'a>,
+    /// Friction bound, rigid slip, tolerance.
+    pub law: NewtonTask<'a>,
+    /// x and y of every cell's node.
+    pub nodes: (&'a [f64], &'a [f64]),
+    /// The motion, of which only the direction of rigid slip is used.
+    pub motion: Motion,
 }

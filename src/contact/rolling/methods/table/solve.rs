@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use crate::contact::error::SolveError;
-use crate::contact::friction::interface::Interface;
 use crate::contact::friction::law::FrictionLaw;
+use crate::contact::friction::path_dependent::Interface;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;

@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Profile;
-use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::points::SMOOTHING_ADVISED;
+use crate::contact::geometry::profile_quality::readings::noise_pressure;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::wheel_height::task::WheelTask;
 use crate::contact::normal::wheel_height::wheel_contact::WheelContact;

@@ -1,15 +1,15 @@
 //! Examines the points of both profiles under the patches found, and reports their defects.
 
+use crate::contact::geometry::frame::SurfaceMissed;
 use crate::contact::geometry::profile::{Body, Profile};
-use crate::contact::geometry::profile_quality::flattening::noise_pressure;
 use crate::contact::geometry::profile_quality::noise::Oddity;
 use crate::contact::geometry::profile_quality::points::{
     Grain, UnderContact, advised_smoothing, under_contact,
 };
-use crate::contact::geometry::surface_exit::SurfaceMissed;
+use crate::contact::geometry::profile_quality::readings::noise_pressure;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::wheel_contact::GapContact;
-use crate::contact::profile_trust::finding::{AMBIGUOUS, Cause, Finding, LIGHT};
+use crate::contact::profile_assessment::finding::{AMBIGUOUS, Cause, Finding, LIGHT};
 use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileQuality};
 
 /// Share of the roughness of both bodies from which that of one body is reported.

@@ -3,6 +3,5 @@
 
 pub mod finding;
 pub mod judge;
-pub mod settle;
 pub mod trust;
 pub mod uncertainty;
