@@ -47,7 +47,7 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprin
             let began = monitor.elapsed();
             let workspace = &mut GridWorkspace::default();
             let fineness = GridFineness::for_answer(case.run.target());
-            let mut found = solve_gap(case, task, fineness, 0.0, workspace, monitor)?;
+            let mut found = solve_gap(case, task, fineness, workspace, monitor)?;
             found.coupling_error = first_order_error;
             found.report = found.report.map(|report| NormalReport {
                 seconds: monitor.elapsed().saturating_sub(began).as_secs_f64(),
@@ -61,7 +61,7 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprin
     }
 }
 
-/// Patches and pressures of a gap on grids as fine as told, whose load may be off by a part `load_error`, checked against the memory allowed;
+/// Patches and pressures of a gap on grids as fine as told, checked against the memory allowed;
 /// coupling error and time are left 0.
 ///
 /// # Errors
@@ -70,13 +70,12 @@ pub(crate) fn solve_gap(
     case: &CheckedCase,
     task: &GapTask,
     fineness: GridFineness,
-    load_error: f64,
     workspace: &mut GridWorkspace<f32>,
     monitor: &dyn Monitor,
 ) -> Result<SolvedFootprint, SolveError> {
     let found = task.solve_as(fineness, workspace, monitor)?;
     let solved = SolvedFootprint {
-        footprint: Footprint::computed(found.field, load_error),
+        footprint: Footprint::computed(found.field, 0.0),
         report: Some(found.report.with_time(0.0)),
         coupling_error: 0.0,
         remarks: found.remarks,

@@ -53,8 +53,6 @@ const LEFT: f64 = 0.25;
 pub(crate) const LEFT_BY_PRESSURE: f64 = 0.02;
 /// The change that is left has to be below this part of the target. Chosen by judgement; how much it matters was not measured.
 const PART_OF_TARGET: f64 = 0.3;
-/// Forces grow as this power of approaches, as in Hertz's contacts.
-const FORCE_POWER: f64 = 1.5;
 /// The opening is sampled on so many points along each axis, over the patches and by a part of their size around them; beyond it
 /// is taken as constant. It is smooth but for the edges of the cells. On the 12 contacts of `tests/physics/unlike.rs` 81 points move forces by at
 /// most 0.0014 of μN; 25 take half the time, and the estimate of one contact no longer covers its error.
@@ -71,20 +69,6 @@ pub(crate) struct UnlikeGap {
     pub(crate) task: GapTask,
     /// Region and pressure without tractions.
     pub(crate) without: SolvedFootprint,
-    /// By how much, relatively, their load may differ from the one wanted.
-    pub(crate) load_error: f64,
-    /// What the load is that is kept.
-    pub(crate) kept: KeptLoad,
-}
-
-/// The load of a gap that region and pressure keep while tractions change them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum KeptLoad {
-    /// The one that was asked for.
-    Asked,
-    /// What the contact carries of a wheel at rest without tractions: others carry the rest, or the height was asked for, so that tractions
-    /// would change it a little.
-    OfWheel,
 }
 
 impl UnlikeGap {
@@ -99,8 +83,6 @@ impl UnlikeGap {
         Ok(UnlikeGap {
             task: gap_task(case),
             without: normal_stage::solve(case, monitor)?,
-            load_error: 0.0,
-            kept: KeptLoad::Asked,
         })
     }
 
@@ -139,12 +121,7 @@ impl UnlikeGap {
                 ..self.task.clone()
             };
             found = Some(normal_stage::solve_gap(
-                case,
-                &task,
-                fineness,
-                self.load_error,
-                workspace,
-                watch,
+                case, &task, fineness, workspace, watch,
             )?);
             if let Some(change) = change {
                 left = LEFT * change;
@@ -156,9 +133,7 @@ impl UnlikeGap {
         let Some(mut solved) = found else {
             unreachable!("there is a first round")
         };
-        solved.coupling_error = left
-            .hypot(LEFT_BY_PRESSURE * case.problem.elasticity.difference)
-            .hypot(self.load_unshared(&solved));
+        solved.coupling_error = left.hypot(LEFT_BY_PRESSURE * case.problem.elasticity.difference);
         if left > PART_OF_TARGET * target {
             let remark = rounds_used_up(left, PART_OF_TARGET * target);
             solved.remarks.push(remark.into());
@@ -175,25 +150,6 @@ impl UnlikeGap {
             .report
             .map(|report| NormalReport { seconds, ..report });
         Ok(solved)
-    }
-}
-
-impl UnlikeGap {
-    /// By how much, relatively, the load would be another if approaches were kept in place of loads. Those of several contacts of one wheel
-    /// change together, so that this is a bound.
-    fn load_unshared(&self, solved: &SolvedFootprint) -> f64 {
-        let approach = |solved: &SolvedFootprint| {
-            let patches = solved.footprint.patches().iter();
-            patches
-                .filter_map(|patch| patch.approach)
-                .fold(0.0, f64::max)
-        };
-        match self.kept {
-            KeptLoad::Asked => 0.0,
-            KeptLoad::OfWheel => {
-                FORCE_POWER * (approach(solved) / approach(&self.without) - 1.0).abs()
-            }
-        }
     }
 }
 

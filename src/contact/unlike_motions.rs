@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
-use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::operator_store::OperatorStore;
@@ -25,8 +24,6 @@ pub(crate) fn solve(
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
     let several = case.problem.part.all > 1;
-    // Of a wheel the places of its patches are known before their tractions are.
-    let patches_known = several || matches!(case.problem.task, NormalTask::Wheel(_));
     let mut neighbour: Option<SolvedFootprint> = None;
     let mut answer: Option<(Solution, Fields)> = None;
     for index in 0..case.problem.motions.len() {
@@ -34,7 +31,7 @@ pub(crate) fn solve(
         let solved = gap
             .solve(operators, &part, neighbour.as_ref(), watch)
             .map_err(|error| watch.explained(error, &part))?;
-        let solved = if patches_known {
+        let solved = if several {
             with_patches_of(gap, solved, &part)
         } else {
             solved

@@ -12,7 +12,6 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::wheel_height::search::HeightStart;
 use crate::contact::normal::wheel_height::task::{
     Accuracy, NormalPass, ReferenceSurface, WheelLoad, WheelTask,
@@ -21,17 +20,13 @@ use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelConta
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::run::Run;
-use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling_stage;
 use crate::contact::solution::track_axes::in_track;
 use crate::contact::solution::words::answer::{NormalReport, Solution};
 use crate::contact::solution::words::fields::Fields;
 use crate::contact::time_limit::TimeLimit;
-use crate::contact::unlike_bodies::{KeptLoad, UnlikeGap};
-use crate::contact::unlike_motions;
 use crate::contact::vertical_equilibrium::{
     BALANCE, EquilibriumExit, ROUNDS_MAX, next_share, tolerance,
 };
@@ -42,9 +37,6 @@ use crate::contact::wheel_on_curve;
 const CARRIED_MIN: f64 = 0.1;
 /// Allowed error of the resultants in the first round, relative to μN. Chosen by judgement; how much it matters was not measured.
 const TARGET_FIRST: f64 = 0.05;
-/// Largest change of a patch's force by its neighbours, relative to the load, that is not remarked on where no target is given. Chosen by
-/// judgement; how much it matters was not measured.
-const UNCOUPLED: f64 = 0.01;
 /// Tolerance of the force at the first height: friction's share hardly depends on it.
 const TOLERANCE_FIRST: f64 = 0.1;
 
@@ -202,7 +194,6 @@ impl<'a> WheelSolve<'a> {
         let (wheel, geometry) = (&at_rest.wheel, &self.contact.geometry);
         let count = wheel.patches.len();
         let watch = TimeLimit::new(self.monitor, run.time_limit, count * problem.motions.len());
-        let tasks = self.coupled_tasks(wheel, run)?;
         let mut answers = Vec::with_capacity(count);
         for (k, gap) in wheel.patches.iter().enumerate() {
             // What all gaps share is charged to the first.
@@ -232,38 +223,10 @@ impl<'a> WheelSolve<'a> {
                 remarks: Vec::new(),
             };
             part.fits(&solved.footprint)?;
-            let answered = match tasks.get(k) {
-                None => rolling_stage::solve(self.operators, &part, &solved, &watch),
-                Some(task) => {
-                    let unlike = UnlikeGap {
-                        task: task.clone(),
-                        without: solved,
-                        load_error,
-                        kept: self.kept(count),
-                    };
-                    unlike_motions::solve(self.operators, &part, &unlike, &watch)
-                }
-            };
+            let answered = rolling_stage::solve(self.operators, &part, &solved, &watch);
             answers.push(answered.map_err(|error| of_gap(error, gap, geometry))?);
         }
         Ok(answers)
-    }
-
-    /// The gaps of all contacts where bodies differ so much that tractions change their pressures; otherwise none.
-    fn coupled_tasks(&self, wheel: &WheelContact, run: &Run) -> Result<Vec<GapTask>, SolveError> {
-        if !self.case.problem.is_coupled(run) {
-            return Ok(Vec::new());
-        }
-        let tasks = self.contact.gap_tasks(&self.search, wheel);
-        tasks.map_err(|reason| SolveError::NormalProblem { reason })
-    }
-
-    /// What of a contact is kept while its pressure changes with the tractions.
-    fn kept(&self, contacts: usize) -> KeptLoad {
-        match self.contact.loading {
-            WheelLoad::Vertical(_) | WheelLoad::Normal(_) if contacts == 1 => KeptLoad::Asked,
-            _ => KeptLoad::OfWheel,
-        }
     }
 
     /// The first rest with friction's share in it, and whether it is an exact one: the share is that of nearly the same profiles, or
@@ -388,17 +351,11 @@ struct RestingWheel {
 
 impl RestingWheel {
     fn found(
-        mut self,
+        self,
         case: &CheckedCase,
         contact: &WheelTask,
         answers: Vec<(Solution, Fields)>,
     ) -> Result<SolvedWheel, SolveError> {
-        let part = match case.run.resolution {
-            Resolution::Target(target) => target,
-            Resolution::Mesh(_) => UNCOUPLED,
-        };
-        let remark = contact.uncoupled(&self.wheel, part);
-        self.wheel.remarks.extend(remark.map(RemarkEntry::from));
         let (solution, fields) = in_track(case, &contact.geometry, &self.wheel, answers)?;
         Ok(SolvedWheel {
             wheel: self.wheel,

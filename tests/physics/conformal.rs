@@ -373,37 +373,6 @@ fn soft(case: &Value, [modulus, poisson_ratio]: [f64; 2]) -> Value {
 /// Aluminium, rubber and a wheel without lateral contraction: K = 0.10, 0.10 and 0.25.
 const SOFT: [[f64; 2]; 3] = [[23_000.0, 0.31], [800.0, 0.4], [800.0, 0.25]];
 
-#[test]
-fn differing_bodies_on_a_flat_rail_have_the_forces_of_a_plane() {
-    for body in SOFT {
-        for radius in [460.0, 460.3, 459.6] {
-            let with = |surface: &str, influence: Option<&str>| {
-                let mut case = soft(&flat(surface, influence), body);
-                case["motion"]["wheelset"]["free_rolling_radius_mm"] = json!(radius);
-                solve(&case)
-            };
-            let plane = with("plane", None);
-            let limit = limit(&plane);
-            for influence in ["half_space", "angle_corrected"] {
-                let curve = with("curve", Some(influence));
-                let (found, known) = (&curve.total[0], &plane.total[0]);
-                let off = [
-                    found.force_x_n - known.force_x_n,
-                    found.force_y_n - known.force_y_n,
-                    found.force_z_n.unwrap() - known.force_z_n.unwrap(),
-                ]
-                .map(|off| off / limit);
-                let pressure = pressure(&curve) / pressure(&plane) - 1.0;
-                let area = curve.patches[0].area_mm2 / plane.patches[0].area_mm2 - 1.0;
-                assert!(off.iter().all(|off| off.abs() < 0.005), "{off:?}");
-                assert!(area.abs() < 0.002, "{area}");
-                // Peaks of both are known within 1.9 % where K is 0.25.
-                assert!(pressure.abs() < 0.015, "{pressure}");
-            }
-        }
-    }
-}
-
 /// The forces of a wheel change from like to differing bodies as those of its patch by its radii do.
 #[test]
 fn differing_bodies_change_forces_as_they_do_by_radii() {
@@ -413,9 +382,13 @@ fn differing_bodies_change_forces_as_they_do_by_radii() {
         case["material"] = body;
         case
     };
-    let mut case = soft(&flat("curve", None), SOFT[2]);
-    let load = case["load"]["vertical_force_n"].clone();
-    for creepages in [[0.0, 0.0], [0.001, 0.0], [0.0, 0.001]] {
+    for (influence, creepages) in [
+        ("angle_corrected", [0.0, 0.0]),
+        ("angle_corrected", [0.001, 0.0]),
+        ("half_space", [0.0, 0.001]),
+    ] {
+        let mut case = soft(&flat("curve", Some(influence)), SOFT[2]);
+        let load = case["load"]["vertical_force_n"].clone();
         case["motion"] =
             json!({ "creepage_x": creepages[0], "creepage_y": creepages[1], "spin_per_mm": 0.0 });
         let radii = json!({

@@ -202,30 +202,6 @@ fn a_wheel_on_two_patches_side_by_side_always_comes_to_rest() {
     }
 }
 
-/// The gaps of two overlaps that lie more than 8 mm apart know nothing of each other, and the answer says what that is worth.
-#[test]
-fn patches_in_gaps_of_their_own_are_told_with_what_they_would_exchange() {
-    let path = concat!(
-        concat!(env!("CARGO_MANIFEST_DIR"), "/../.."),
-        "/api/examples/wheel-rail-flange.case.json"
-    );
-    let text = std::fs::read_to_string(path).expect("an example");
-    let two: Value = serde_json::from_str(&text).expect("a case");
-    let solution = solved(&on_planes(&two)).expect("an answer");
-    assert!(solution.patches.len() > 1, "gauge corner and flange");
-    let told = |solution: &Solution| {
-        let code = solution
-            .remarks
-            .iter()
-            .find(|r| r.code == "patches-uncoupled");
-        code.map(|remark| remark.detail.clone())
-    };
-    let text = told(&solution).expect("a remark");
-    assert!(text.contains("% of the load"), "{text}");
-    let one = put(&generated(), "contact", json!({ "lateral_shift_mm": -1.0 }));
-    assert_eq!(told(&solved(&on_planes(&one)).expect("an answer")), None);
-}
-
 /// Places of a patch across the track: its ends along the rail in mm, and the inclination of the rail there in rad.
 struct Place {
     /// The load centre of its gap.

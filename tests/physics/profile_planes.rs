@@ -1,15 +1,13 @@
-//! Does what is stated of the plane of contact cover its error? Against CONTACT's planar and curved surfaces of contact, which need the
-//! reference files, and where the plane leaves nothing open.
+//! Are forces on planes of contact those of CONTACT's planes, as far as the curve has the same? Needs the reference files.
 
-use railhead::contact::remark::kind::Figure;
-use railhead::contact::solution::words::answer::{Solution, Total};
+use railhead::contact::solution::words::answer::Total;
 use serde_json::{Value, json};
 
-use crate::profile_cases::{by_origin, generated, on_planes, put, wheel_on_rail};
+use crate::profile_cases::{put, wheel_on_rail};
 use crate::profile_reference_files::reference_file;
 use crate::reference::solve;
 
-/// What is allowed of a total relative to μN beside the uncertainty of the reference, if nothing is stated.
+/// What is allowed of a total relative to μN beside the uncertainty of the reference.
 const RESULTANT: f64 = 0.01;
 
 fn number(value: &Value) -> f64 {
@@ -74,8 +72,9 @@ fn expected(record: &Value) -> [[f64; 2]; 2] {
     })
 }
 
+/// Where planes differ from the curve, the place and the inclination of a plane matter, which programs choose in their own ways.
 #[test]
-fn totals_are_as_near_the_reference_as_is_stated() {
+fn totals_are_as_near_the_reference_as_the_curve() {
     let Some(text) = reference_file("extended/profile_module1b.json") else {
         return;
     };
@@ -92,12 +91,18 @@ fn totals_are_as_near_the_reference_as_is_stated() {
             .iter()
             .filter_map(|p| p.friction_limit_n)
             .sum();
-        let stated = total.error_estimate.expect("an estimate").force_x_n
-            + told(&solution).unwrap_or(0.0) * limit;
+        let (curve, _) = solve(&put(
+            &question,
+            "contact",
+            json!({ "reference_surface": "curve" }),
+        ));
+        let bent = (total.force_x_n - curve.total[0].force_x_n)
+            .hypot(total.force_y_n - curve.total[0].force_y_n);
+        let estimate = total.error_estimate.expect("an estimate").force_x_n;
         let found = [total.force_x_n, total.force_y_n];
         for (found, [value, unc]) in found.into_iter().zip(expected(record)) {
             let off = (found - value).abs();
-            if off > (RESULTANT * limit).max(stated) + unc {
+            if off > (RESULTANT * limit).max(estimate + bent) + unc {
                 far.push(format!("{}: {found} for {value}", record["id"]));
             }
         }
@@ -105,86 +110,4 @@ fn totals_are_as_near_the_reference_as_is_stated() {
     assert_eq!(records.len(), 22);
     // At y = 14.6 mm a second patch of 0.6 % of the load decides: here it shares a half-space with the first, which lifts it off.
     assert!(far.len() <= 1, "{far:?}");
-}
-
-/// The share of μN that the remark on the plane states.
-fn told(solution: &Solution) -> Option<f64> {
-    let remark = solution
-        .remarks
-        .iter()
-        .find(|remark| remark.code == "plane-of-contact");
-    match remark?.figures.get("share") {
-        Some(Figure::Number(share)) => Some(*share),
-        _ => None,
-    }
-}
-
-/// On a cone the rolling radius is linear along the plane, wherever the rail bends.
-#[test]
-fn a_cone_leaves_nothing_open_and_a_hollow_wheel_does() {
-    let arc: Vec<[f64; 2]> = (-60..=60)
-        .map(|k| 0.5 * f64::from(k))
-        .map(|y| [y, 80.0 - (6400.0 - y * y).sqrt()])
-        .collect();
-    let cone: Vec<[f64; 2]> = (-60..=60).map(f64::from).map(|y| [y, -0.1 * y]).collect();
-    let stated = |points: Vec<[f64; 2]>| json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
-    let mut cone = by_origin(wheel_on_rail(stated(arc), stated(cone), 0.0), 747.5);
-    let mut hollow = put(
-        &generated(),
-        "contact",
-        json!({ "lateral_shift_mm": -5.3, "roll_rad": -0.00043 }),
-    );
-    for case in [&mut cone, &mut hollow] {
-        *case = on_planes(case);
-        case["motion"] =
-            json!({ "wheelset": { "speed_mm_per_s": 2000, "free_rolling_radius_mm": 461 } });
-    }
-    assert_eq!(told(&solve(&cone).0), None);
-    let share = told(&solve(&hollow).0).expect("a remark");
-    assert!((0.02..0.1).contains(&share), "{share}");
-}
-
-/// A figure of the remark on the plane.
-fn figure(solution: &Solution, name: &str) -> f64 {
-    let remark = solution
-        .remarks
-        .iter()
-        .find(|remark| remark.code == "plane-of-contact");
-    match remark.and_then(|remark| remark.figures.get(name).cloned()) {
-        Some(Figure::Number(value)) => value,
-        _ => 0.0,
-    }
-}
-
-/// Creepages that the case gives are those of the plane, but its normals are not those of a gauge corner.
-#[test]
-fn the_normals_are_open_where_creepages_are_given_as_well() {
-    let corner = put(
-        &generated(),
-        "contact",
-        json!({ "lateral_shift_mm": -5.9, "roll_rad": -0.0006, "reference_surface": "plane" }),
-    );
-    let mut given = corner.clone();
-    given["motion"] = json!({ "creepage_x": 0.001 });
-    let found = solve(&given).0;
-    assert_eq!(figure(&found, "share"), figure(&found, "of_normals"));
-    assert!(figure(&found, "share") > 0.02, "{:?}", found.remarks);
-    // The same normals as with the motion of the wheelset.
-    let mut moving = corner;
-    moving["motion"] =
-        json!({ "wheelset": { "speed_mm_per_s": 2000, "free_rolling_radius_mm": 461 } });
-    let found_moving = solve(&moving).0;
-    let share = figure(&found_moving, "of_normals");
-    assert!(
-        (share / figure(&found, "of_normals") - 1.0).abs() < 0.3,
-        "{share}"
-    );
-    // On the tread nothing is open.
-    let mut tread = put(
-        &on_planes(&generated()),
-        "contact",
-        json!({ "lateral_shift_mm": 3.0 }),
-    );
-    tread["motion"] = json!({ "creepage_x": 0.001 });
-    assert_eq!(told(&solve(&tread).0), None);
 }

@@ -65,28 +65,26 @@ fn a_wheel_of_another_material_is_coupled_as_its_radii_are() {
             let mut case = soft(&cone_on_arc(), body);
             case["load"] = json!({ "vertical_force_n": LOAD });
             case["motion"] = motion.clone();
-            for case in [on_planes(&case), case] {
-                let began = std::time::Instant::now();
-                let (solution, _) = solve(&case);
-                let seconds = began.elapsed().as_secs_f64();
-                not_of_first_order(&solution);
-                let patch = &solution.patches[0];
-                let load = json!({ "normal_force_n": patch.normal_force_n });
-                let known = by_radii(patch, &case, load, &motion);
-                let known = &known.patches[0];
-                let off = apart(patch, known, 0);
-                let area = patch.area_mm2 / known.area_mm2 - 1.0;
-                let pressure = patch.pressure_max_mpa / known.pressure_max_mpa - 1.0;
-                let approach = patch.approach_mm.unwrap() / known.approach_mm.unwrap() - 1.0;
-                println!(
-                    "{body:?} {creepage:?}: forces apart {off:.4} ({:.4} estimated), area {area:.4}, pressure {pressure:.4}, approach {approach:.5}, {seconds:.3} s",
-                    estimate(patch, 0)
-                );
-                assert!(off < estimate(patch, 0) && off < 0.005, "{off}");
-                assert!(area.abs() < 0.01 && pressure.abs() < 0.015 && approach.abs() < 2e-3);
-                let vertical = -solution.total[0].force_z_n.expect("a vertical force");
-                assert!((vertical / LOAD - 1.0).abs() < 1e-3, "{vertical}");
-            }
+            let began = std::time::Instant::now();
+            let (solution, _) = solve(&case);
+            let seconds = began.elapsed().as_secs_f64();
+            not_of_first_order(&solution);
+            let patch = &solution.patches[0];
+            let load = json!({ "normal_force_n": patch.normal_force_n });
+            let known = by_radii(patch, &case, load, &motion);
+            let known = &known.patches[0];
+            let off = apart(patch, known, 0);
+            let area = patch.area_mm2 / known.area_mm2 - 1.0;
+            let pressure = patch.pressure_max_mpa / known.pressure_max_mpa - 1.0;
+            let approach = patch.approach_mm.unwrap() / known.approach_mm.unwrap() - 1.0;
+            println!(
+                "{body:?} {creepage:?}: forces apart {off:.4} ({:.4} estimated), area {area:.4}, pressure {pressure:.4}, approach {approach:.5}, {seconds:.3} s",
+                estimate(patch, 0)
+            );
+            assert!(off < estimate(patch, 0) && off < 0.005, "{off}");
+            assert!(area.abs() < 0.01 && pressure.abs() < 0.015 && approach.abs() < 2e-3);
+            let vertical = -solution.total[0].force_z_n.expect("a vertical force");
+            assert!((vertical / LOAD - 1.0).abs() < 1e-3, "{vertical}");
         }
     }
 }
@@ -176,8 +174,8 @@ fn patches_of_another_material_carry_the_load_together() {
 /// Both wheels of a wheelset of another material: forces as those of the wheels alone, without the remark.
 #[test]
 fn a_wheel_that_moves_with_its_wheelset_is_coupled_too() {
-    // On a curve slips are those of every place, on planes those of the creepages at one.
-    let mut case = on_planes(&soft(&generated(), SOFT[0]));
+    // A cone on a crown, where the slips of a wheelset are nearly those of the creepages at one place.
+    let mut case = soft(&cone_on_arc(), SOFT[0]);
     case["load"] = json!({ "normal_force_n": LOAD });
     case["motion"] =
         json!({ "wheelset": { "speed_mm_per_s": 1e4, "angular_velocity_rad_per_s": 21.7 } });
@@ -189,7 +187,7 @@ fn a_wheel_that_moves_with_its_wheelset_is_coupled_too() {
     let (known, _) = solve(&case);
     assert_eq!(solution.patches.len(), 1);
     let off = apart(&solution.patches[0], &known.patches[0], 0);
-    assert!(off < 1e-6, "{off}");
+    assert!(off < 0.005, "{off}");
 }
 
 /// A lobe beside another one, `height` mm lower.
@@ -244,4 +242,17 @@ fn a_motion_whose_tractions_take_a_patch_away_says_that_it_is_of_first_order() {
         }
     }
     assert!(told > 0);
+}
+
+/// On planes, which are for comparison, tractions do not change pressures.
+#[test]
+fn on_planes_a_wheel_of_another_material_is_of_first_order() {
+    let mut case = soft(&cone_on_arc(), SOFT[1]);
+    case["load"] = json!({ "normal_force_n": LOAD });
+    case["motion"] = json!({ "creepage_x": 0.001, "creepage_y": 0.0, "spin_per_mm": 0.0 });
+    let [plane, curve] = [on_planes(&case), case].map(|case| solve(&case).0);
+    let mut remarks = plane.remarks.iter();
+    assert!(remarks.any(|remark| remark.code == "coupling-first-order"));
+    let off = apart(&plane.patches[0], &curve.patches[0], 0);
+    assert!(off < estimate(&plane.patches[0], 0), "{off}");
 }

@@ -14,7 +14,7 @@ use crate::contact::rolling::resolution::Resolution;
 pub const SOLVER_REVISION: u32 = 60;
 
 /// The same for bodies that differ alone.
-const COUPLING_REVISION: u32 = 2;
+const COUPLING_REVISION: u32 = 3;
 
 /// Hexadecimal BLAKE3 digest of the canonical case.
 pub(crate) fn digest(

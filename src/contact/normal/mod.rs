@@ -5,7 +5,6 @@ pub mod footprint;
 pub mod gap;
 pub mod hertz;
 pub mod load_across;
-pub mod neighbours;
 pub mod normal_task;
 pub(crate) mod on_curve;
 pub mod patch;

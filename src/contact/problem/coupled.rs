@@ -30,7 +30,8 @@ impl Problem {
     }
 
     /// Is the pressure found together with the tractions? It is on the curve of a rail. Where bodies differ it is of motions and of one pressing alone,
-    /// where the gap is known. Points of a history that goes on share their patches.
+    /// where the gap is known. Points of a history that goes on share their patches. On planes tractions do not change how a
+    /// wheel rests.
     #[must_use]
     pub fn is_coupled(&self, run: &Run) -> bool {
         let on_curve = |wheel: &WheelTask| matches!(wheel.surface, ReferenceSurface::Curve { .. });
@@ -40,12 +41,11 @@ impl Problem {
             _ => {}
         }
         let solved = match (&self.task, &self.history) {
-            (NormalTask::Given(_), _) => false,
-            (_, None) => true,
+            (NormalTask::Hertz(_) | NormalTask::Gap(_), None) => true,
             (NormalTask::Hertz(_) | NormalTask::Gap(_), Some(history)) => {
                 history.only_presses() && self.forces == [[None; 2]]
             }
-            (NormalTask::Wheel(_) | NormalTask::Wheelset(_), Some(_)) => false,
+            (NormalTask::Given(_) | NormalTask::Wheel(_) | NormalTask::Wheelset(_), _) => false,
         };
         solved && self.first_order_error(run.method) > negligible(run)
     }

@@ -2,7 +2,6 @@
 
 pub mod assemble;
 pub mod cell_values;
-pub mod conformality_error;
 pub mod finish;
 pub mod finite;
 pub mod maintain;

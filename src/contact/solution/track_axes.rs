@@ -6,15 +6,11 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::remark::list::Remark;
-use crate::contact::solution::conformality_error;
 use crate::contact::solution::words::answer::{
     ErrorEstimate, NormalReport, Origin, Position, Solution, Total,
 };
 use crate::contact::solution::words::fields::Fields;
 
-/// A patch over which the rail turns by more than this, in rad, is remarked on.
-const TURN_USUAL_MAX: f64 = 0.35;
 /// Axes, origins and signs in words.
 const FRAME: &str = "every patch in its own axes: x along rolling (leading edge at larger x), y to the left in the plane of \
                      contact, z out of the rail, origin at its load centre; total in track axes: x along rolling, y to the left, \
@@ -29,7 +25,7 @@ const FRAME: &str = "every patch in its own axes: x along rolling (leading edge 
 /// `M_z cos α` and its forces times their distance.
 ///
 /// # Errors
-/// Rail or wheel were not found over the load centre of a patch, or the rail over its ends.
+/// Rail or wheel were not found over the load centre of a patch.
 pub fn in_track(
     case: &CheckedCase,
     geometry: &WheelRail,
@@ -38,11 +34,9 @@ pub fn in_track(
 ) -> Result<(Solution, Fields), SurfaceMissed> {
     let parts: Vec<FramedLoad> = wheel.patches.iter().map(FramedLoad::new).collect();
     let origin = load_centre(&parts);
-    let plane = conformality_error::of_wheel(case, geometry, wheel, &answers);
     let total = totals(&parts, origin, &answers);
     let mut remarks = case.remarks.clone();
     remarks.extend_from_slice(&wheel.remarks);
-    remarks.extend(plane.remark(case).map(RemarkEntry::from));
     let alone = answers.len() == 1;
     let mut whole: Option<(Solution, Fields)> = None;
     for (gap, (mut solution, fields)) in wheel.patches.iter().zip(answers) {
@@ -55,19 +49,12 @@ pub fn in_track(
             patch.position = Some(position(geometry, &place, &gap.frame));
             let (sin, cos) = gap.frame.angle.sin_cos();
             for point in &mut patch.points {
-                let region = point.region.as_ref();
-                let normal = region.map_or(patch.normal_force_n, |region| region.normal_force_n);
+                let normal = patch.normal_force_n;
                 point.force_track_n = Some([
                     point.force_x_n,
                     point.force_y_n * cos + normal * sin,
                     point.force_y_n * sin - normal * cos,
                 ]);
-            }
-            let [.., y_min, y_max] = patch.extent_mm;
-            let turn = turn(geometry, gap, [y_min, y_max])?;
-            if turn > TURN_USUAL_MAX {
-                let remark = Remark::ContactTurns { turn_rad: turn };
-                remarks.push(remark.at_patch(before + k));
             }
         }
         match &mut whole {
@@ -123,17 +110,6 @@ fn in_wheel(remark: &RemarkEntry, first: usize, alone: bool) -> RemarkEntry {
         patch,
         ..remark.clone()
     }
-}
-
-/// Change of the rail's inclination over a patch, in rad.
-fn turn(geometry: &WheelRail, gap: &GapContact, across: [f64; 2]) -> Result<f64, SurfaceMissed> {
-    let inclination = |y: f64| {
-        let rail = geometry.rail_over(&gap.frame, y)?;
-        let [y, z] = geometry.rail_at(rail).tangent();
-        Ok((z / y).atan())
-    };
-    let [low, high] = across;
-    Ok((inclination(high)? - inclination(low)?).abs())
 }
 
 /// A part of the contact in track axes.

@@ -2,7 +2,6 @@
 
 pub mod bracket;
 pub mod gap_remarks;
-pub(crate) mod gap_tasks;
 pub mod lowered;
 pub mod search;
 pub mod task;

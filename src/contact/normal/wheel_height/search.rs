@@ -11,13 +11,11 @@ use crate::contact::geometry::grouping::LoadedPatch;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::gap::answer::NormalError;
-use crate::contact::normal::neighbours::{Neighbour, neglected};
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::wheel_height::bracket::{Bracket, HeightExit};
 use crate::contact::normal::wheel_height::lowered::Fineness;
 use crate::contact::normal::wheel_height::task::{Accuracy, NormalPass, WheelLoad, WheelTask};
 use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
-use crate::contact::remark::list::Remark;
 
 /// Heights after which the search is given up. Keeps the numbers safe; not tuned.
 const HEIGHTS_MAX: u32 = 40;
@@ -307,19 +305,5 @@ impl WheelTask {
             }
             found => found,
         }
-    }
-
-    /// A remark if the patches in gaps of their own would change each other's forces by more than a part of the load.
-    #[must_use]
-    pub fn uncoupled(&self, wheel: &WheelContact, part: f64) -> Option<Remark> {
-        let gaps = wheel.patches.iter().map(|gap| Neighbour {
-            frame: gap.frame,
-            force: gap.normal_force(),
-            approach: gap.approach,
-        });
-        let keeps_load = !matches!(self.loading, WheelLoad::Lowering(_));
-        let gaps: Vec<Neighbour> = gaps.collect();
-        let [share, distance_mm] = neglected(&gaps, self.contact_modulus, keeps_load)?;
-        (share > part).then_some(Remark::PatchesUncoupled { share, distance_mm })
     }
 }

@@ -67,34 +67,6 @@ macro_rules! wheel_remarks {
                  pressure there come from that division"
             ),
 
-            /// The rail turns so much over the contact that a plane of contact and half-spaces describe it only roughly.
-            ContactTurns {
-                /// Change of the rail's inclination over the patch.
-                turn_rad: f64 = 0.5,
-            }
-            code: "contact-turns",
-            severity: Warning,
-            advice: "Take pressures and the direction of forces as approximate: conformal contact is not modelled.",
-            detail: format!(
-                "the rail turns by {turn_rad:.2} rad over the contact, which a plane of contact and half-spaces describe only roughly"
-            ),
-
-            /// The rail bends so much under the patches of one plane of contact that forces depend on it by some percent.
-            PlaneOfContact {
-                /// Error of the forces due to the plane, relative to μN.
-                share: f64 = 0.02,
-                /// The part of it due to the direction of the normals; the rest is due to the creepages.
-                of_normals: f64 = 0.01,
-                /// Largest inclination of the rail under a patch to the plane of contact.
-                turn_rad: f64 = 0.2,
-            }
-            code: "plane-of-contact",
-            severity: Info,
-            advice: "Take this share of μN as a further error of the forces; `error_estimate` does not have it.",
-            detail: format!(
-                "the rail is inclined to the plane of contact by up to {turn_rad:.2} rad under the patches, which leaves forces uncertain by {:.1} % of μN ({:.1} % by the direction of the normals)", 100.0 * share, 100.0 * of_normals
-            ),
-
             /// The case does not ask for a reference surface, and the curve of the rail does not solve it: it is solved on planes of contact.
             OnPlanes {
                 /// Why.
@@ -129,21 +101,6 @@ macro_rules! wheel_remarks {
             advice: "Vary the lateral place of the wheel a little to see how far the answer depends on it.",
             detail: format!(
                 "the force jumps at this height of the wheel, where patches merge; forces were scaled by {factor:.4}"
-            ),
-
-            /// Patches were solved in separate gaps, without the deflection that one causes at the other, which could matter.
-            PatchesUncoupled {
-                /// By how much the force of a patch would change, relative to the load.
-                share: f64 = 0.012,
-                /// Least distance of two load centres.
-                distance_mm: f64 = 38.0,
-            }
-            code: "patches-uncoupled",
-            severity: Warning,
-            advice: "Expect that this part of the load is on the wrong patch; the error estimate does not include it.",
-            detail: format!(
-                "patches {distance_mm:.1} mm apart were solved as if each were alone; with the deflection that one causes at the other, {:.1} % of the load would move between them",
-                100.0 * share
             ),
 
             /// Several motions, or the points of a history, share their patches, so that the vertical load is balanced by normal forces alone.
