@@ -1,6 +1,7 @@
 //! A result in its stored form.
 
 use bytes::Bytes;
+use serde::Serialize;
 
 use crate::contact::solution::words::fields::PatchFields;
 use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
@@ -17,6 +18,20 @@ pub struct EncodedResult {
 }
 
 impl EncodedResult {
+    /// An answer without fields, or a part of one.
+    ///
+    /// # Errors
+    /// The answer cannot be written as JSON, and why.
+    pub fn as_json(answer: &impl Serialize) -> Result<EncodedResult, String> {
+        let text = serde_json::to_vec(answer);
+        let text =
+            text.map_err(|error| format!("the answer cannot be written as JSON: {error}"))?;
+        Ok(EncodedResult {
+            solution: Bytes::from(text),
+            fields: None,
+        })
+    }
+
     /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {

@@ -14,7 +14,6 @@ use crate::jobs::attempts::slices::{SlicedEvolution, SlicedWork};
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::ending::SliceRecord;
-use crate::jobs::worker::solve::as_json;
 
 /// Steps that are stored together, unless a record ends them before.
 const STEPS: u32 = 16;
@@ -66,7 +65,7 @@ pub(crate) fn advance(
         digest: evolution.task.digest.clone(),
         spent,
     };
-    let part = Some((note, as_json(&(record, &state))?));
+    let part = Some((note, EncodedResult::as_json(&(record, &state))?));
     evolution.state = Some(state);
     let sliced = Box::new(SlicedWork::Evolution(evolution));
     Ok(Outcome::Slice { sliced, part })
@@ -83,7 +82,7 @@ pub(crate) fn join(
         Ok((state, records)) if evolution.task.is_over(&state) => {
             let answer = evolution.task.answer(&state, records);
             Ok(Outcome::Solved {
-                result: as_json(&answer)?,
+                result: EncodedResult::as_json(&answer)?,
                 remarks: answer.remarks,
                 field_patches: 0,
             })

@@ -5,7 +5,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use bytes::Bytes;
-use serde::Serialize;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
@@ -127,16 +126,6 @@ fn whole(
     })
 }
 
-/// An answer without fields, or a part of one, in its stored form.
-pub(crate) fn as_json(answer: &impl Serialize) -> Result<EncodedResult, String> {
-    let text = serde_json::to_vec(answer);
-    let text = text.map_err(|error| format!("the answer cannot be written as JSON: {error}"))?;
-    Ok(EncodedResult {
-        solution: Bytes::from(text),
-        fields: None,
-    })
-}
-
 /// An answer, or a part of one, in its stored form.
 fn encoded(solution: &Solution, fields: &Fields) -> Result<EncodedResult, String> {
     let packed = match fields.patches.len() {
@@ -145,7 +134,7 @@ fn encoded(solution: &Solution, fields: &Fields) -> Result<EncodedResult, String
     };
     Ok(EncodedResult {
         fields: packed.map(Bytes::from),
-        ..as_json(solution)?
+        ..EncodedResult::as_json(solution)?
     })
 }
 
