@@ -215,6 +215,7 @@ test('two patches have one scale of colours, and stand on the profiles', () => o
   // Pressures with tractions may be a little larger than those of the patch.
   assert.ok(ranges[0][1] > 0.9999 * bound && ranges[0][1] < 1.1 * bound, `${ranges[0][1]}: ${bound}`);
   await page.locator('svg .patch .comb').nth(1).waitFor();
+  await page.getByText(/^\d+ notes$/).click();
   const remarks = await page.locator('.remark').allInnerTexts();
   assert.equal(remarks.length, result.remarks.length);
   assert.ok(remarks.some((text) => text.startsWith('patch 0')));
