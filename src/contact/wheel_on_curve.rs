@@ -73,9 +73,9 @@ const CHANGE_POOR: f64 = 5e-3;
 /// fitted to.
 const OPEN_BY_TURN: f64 = 0.2;
 const OPEN_MAX: f64 = 0.035;
-/// They grow by this times the difference of the parts that the two bodies have of the displacements: by the turn, one has a larger and the other a smaller
-/// influence than both together, as boundary elements of each body tell. Where that changes the influence as much as the factor for the gap does, it is
-/// about 2 in lateral forces. No boundary elements of unequal pairs were compared.
+/// The errors by the turn grow with the difference of the two bodies' shares of the displacement, times this. On a bent surface the stiffness of a convex and
+/// of a concave body changes in opposite directions, by boundary elements of each body alone; the factors hold for their mean. The value was derived from these
+/// single-body results (about 2 in lateral forces); it was not compared with boundary elements of unequal pairs.
 const OPEN_BY_UNEQUAL: f64 = 2.5;
 /// Lateral forces of pressures count as under this coefficient of friction at least.
 const FRICTION_OPEN: f64 = 0.3;
@@ -340,7 +340,7 @@ impl<'a> CurveSolve<'a> {
         Ok((wheel, solution, fields))
     }
 
-    /// The remark that pressures do not feel the tractions of differing bodies, where that matters.
+    /// The remark that the effect of tractions on pressures is left out, if bodies differ enough for it to matter.
     fn first_order(&self) -> Option<RemarkEntry> {
         let CheckedCase { problem, run, .. } = self.case;
         let matters = problem.first_order_error(run.method) > negligible(run);
@@ -582,7 +582,7 @@ impl<'a> CurveSolve<'a> {
         }
     }
 
-    /// How much of a change of the pressures the tractions take, relative to the normal forces: where bodies differ, pressures make them slip.
+    /// Change of the tangential forces caused by a change of the pressures, relative to the normal force; 0 for equal bodies.
     fn shared(&self) -> f64 {
         let CheckedCase { problem, .. } = self.case;
         match problem.elasticity.difference == 0.0 {
@@ -591,7 +591,8 @@ impl<'a> CurveSolve<'a> {
         }
     }
 
-    /// The tractions of all parts of a contact. The forces of differing bodies have an error of `open`, relative to the friction limit, by the pressures.
+    /// Solves the tractions of all parts of a contact. For bodies that differ, `open` is the error of the forces due to the pressures, relative to the
+    /// friction limit.
     fn tractions(
         &self,
         contact: &CurveContact,
@@ -760,8 +761,8 @@ impl<'a> CurveSolve<'a> {
 
     /// The slip of the surface beyond a motion about an origin `[x, s]`.
     ///
-    /// Pressed together, like bodies meet halfway between their undeformed surfaces, others nearer to that of the stiffer one. The rolling radius of a strip is taken there, less what the
-    /// deepest strip loses, so that this one keeps the radius of the undeformed wheel, to which creepages refer. Along x half-spaces lack other terms of
+    /// The deformed surface of equal bodies lies halfway between the undeformed surfaces, that of other bodies nearer to the stiffer one. The rolling radius of a
+    /// strip is taken there, less what the deepest strip loses, so that this one keeps the radius of the undeformed wheel, to which creepages refer. Along x half-spaces lack other terms of
     /// the size of the wheel's roundness, so that it is left out: a flat surface has the slip of a plane.
     fn surface_slip(
         &self,

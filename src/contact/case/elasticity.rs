@@ -66,7 +66,7 @@ impl Elasticity {
     }
 }
 
-/// A number of a pair, or what it is for like bodies where only rounding tells them apart.
+/// A constant of two bodies; that of equal bodies if the two differ by rounding only.
 fn rounded(of_pair: f64, of_like_bodies: f64) -> f64 {
     match (of_pair - of_like_bodies).abs() < DIFFERENCE_NOISE {
         true => of_like_bodies,

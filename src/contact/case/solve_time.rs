@@ -299,7 +299,7 @@ const DAMAGE_SECONDS: f64 = 3e-6;
 const PASSAGE_SECONDS: f64 = 0.03;
 
 impl CheckedCase {
-    /// Estimated time in s for what follows from one solved motion, for so many patches.
+    /// Estimated time in s of the outputs computed from one solved motion (damage, subsurface stresses, temperature) for a number of patches.
     pub(crate) fn after_seconds(&self, patches: usize) -> f64 {
         let after = &self.run.after;
         let patches = patches as f64;
@@ -334,8 +334,7 @@ impl CheckedCase {
 }
 
 impl CheckedCase {
-    /// Estimated cost of solving this: the operators of its meshes and what stands beside them, the matrices of the dense method, the
-    /// answer. Seconds are rough.
+    /// Estimated time and memory of this solve: operators of the meshes, matrices of the dense method, and the answer. The time is rough.
     #[must_use]
     pub fn cost(&self) -> Cost {
         let size = self.size_input();

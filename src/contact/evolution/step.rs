@@ -269,7 +269,7 @@ impl Solver<'_> {
         let pool = ThreadPoolBuilder::new().num_threads(threads);
         match pool.stack_size(STACK_BYTES).build() {
             Ok(pool) if threads > 1 => pool.install(|| states.par_iter().map(solve).collect()),
-            // Without other threads this one does all.
+            // With one thread, or if no pool can be built, the calling thread solves all states.
             _ => states.iter().map(solve).collect(),
         }
     }

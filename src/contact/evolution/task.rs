@@ -310,7 +310,7 @@ fn filled(
     Ok(case)
 }
 
-/// Faults of the case of a row, with pointers into the evolution. One that is at no column is put to `tested`, whose value the case has been checked for.
+/// Faults of the case of a row, with pointers into the evolution. A fault outside of all columns gets the pointer of the column `tested`.
 fn located(
     error: CaseError,
     pointers: &[String],

@@ -126,7 +126,7 @@ impl AlongLaw {
         }
     }
 
-    /// The same table in axes whose origin lies at x in mm of these.
+    /// This table with its origin moved to `x` in mm.
     #[must_use]
     pub fn about(&self, x: f64) -> AlongLaw {
         let (at, coefficient): (Vec<f64>, Vec<f64>) = self

@@ -355,7 +355,7 @@ impl BentOperator {
         Some(gap)
     }
 
-    /// Factors of what differing bodies add along x, and along s, where the influence is the opposite at the negative distance.
+    /// Factors of the coupling between pressures and tractions of bodies that differ: along x, and along s, where the coefficients are odd in the distance.
     fn unlike_factors(&self) -> [StripFactors; 2] {
         let even = self.pressure_factors();
         let StripFactors(mut odd) = even.clone();

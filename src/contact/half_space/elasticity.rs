@@ -14,7 +14,7 @@ pub struct Elasticity {
 }
 
 impl Elasticity {
-    /// Do the bodies differ?
+    /// Have the bodies different elastic constants?
     #[must_use]
     pub fn differs(&self) -> bool {
         self.difference != 0.0 || self.lower_share != 0.5

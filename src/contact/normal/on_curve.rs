@@ -96,8 +96,7 @@ struct WheelOverGrid {
     gap: Vec<f64>,
     /// Its change with the height of the wheel's centre.
     lift: Vec<f64>,
-    /// Mean angles of rail and wheel of each strip, where the wheel is nearest; both bodies bend, and each deforms as its own surface does, the softer one
-    /// more.
+    /// Mean angles of rail and wheel of each strip where the wheel is nearest, weighted with the shares of the displacement of both bodies.
     angle: Vec<f64>,
 }
 

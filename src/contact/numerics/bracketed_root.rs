@@ -111,8 +111,8 @@ pub(crate) fn find_root<E>(
     ended(best[0], RootExit::TrialsUsedUp)
 }
 
-/// The bracket that remains of `low` to `high` (in either order) after the given number of halvings. `is_low` tells on which side of
-/// the boundary a point lies: true at `low`, false at `high`. Never fails; the bracket shrinks to `2^-halvings` of its length.
+/// Bisects the interval between `low` and `high` (in either order) and returns the bracket after the given number of halvings, `2^-halvings` times as
+/// long. `is_low` is true on the side of `low` and false on that of `high`.
 pub(crate) fn bisect(
     [mut low, mut high]: [f64; 2],
     halvings: u32,

@@ -135,7 +135,7 @@ const MEMBER_UNITS: [(&str, &Units); 10] = [
     ("_s", &TIME),
 ];
 
-/// A quantity that columns vary. Lists of names are parted by spaces.
+/// A quantity that columns vary. Names in a list are separated by spaces.
 #[derive(Debug)]
 struct Quantity {
     /// Where it stands in the case.
@@ -277,7 +277,7 @@ const PLACES_AND_TIMES: &str = "t time clock hour step time_step timestep s s_tr
     longitude date datetime timestamp";
 
 /// Names of sections of a line, of vehicles and their parts, and of rows, which are carried along; also with an end of [`NUMBERED`].
-/// The answers have columns `row`, `status` and `method`, so that one that is carried along is refused for its name.
+/// `row`, `status` and `method` are also columns of the answers; a carried column of that name is refused.
 const SECTIONS_AND_THINGS: &str = "section segment track track_section line route curve region direction site switch side rail rail_side left_right id \
     uuid key name title label tag comment remark note description case run scenario variant simulation train vehicle car \
     wagon coach locomotive bogie wheelset axle wheel wheel_side contact_point row status method record frame sample index \
@@ -466,7 +466,7 @@ pub fn short_names() -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
-/// Is this one of the names of a list that are parted by spaces?
+/// Does a list of names, separated by spaces, have this name?
 fn is_among(name: &str, names: &str) -> bool {
     names.split_whitespace().any(|known| known == name)
 }

@@ -67,7 +67,7 @@ pub(crate) async fn submit(
         .await
 }
 
-/// Pointers to a column into the request: as it is named here, and as the client has it.
+/// Pointers to a column of the request: with its JSON pointer as the name, and with the client's title as the name.
 type Title = [String; 2];
 
 /// Names the columns of the traffic by JSON pointers, in the units of the case. What is no table is left to the check.
@@ -103,7 +103,7 @@ fn name_columns(request: &mut Value) -> Result<Vec<Title>, ApiError> {
     }
 }
 
-/// The error with its pointers to columns as the client has them.
+/// Replaces the names of columns in the pointers of an error by the client's titles.
 fn by_title(mut error: JobsError, titles: &[Title]) -> JobsError {
     if let JobsError::Case(CaseError(faults)) = &mut error {
         for fault in faults {

@@ -212,7 +212,7 @@ pub(crate) fn grid(samples_max: usize) -> Reader<(usize, usize)> {
     })
 }
 
-/// A route for each field: its summary, path, operation, output and what it answers.
+/// Defines the route of each field from its summary, path, operation id, output and description of the answer.
 macro_rules! field_routes {
     ($($(#[doc = $summary:tt])* $name:ident($path:tt, $operation:tt, $output:ident, $described:tt);)*) => {$(
         $(#[doc = $summary])*

@@ -40,7 +40,7 @@ impl Outcome {
     }
 }
 
-/// The outcome of work. One that ends the work early is the error, so that `?` passes it on.
+/// The outcome of work. An outcome that ends the work early is the `Err`, so that `?` returns it.
 pub(crate) type Ended = Result<Outcome, Box<Outcome>>;
 
 impl From<SolveError> for Box<Outcome> {
@@ -55,7 +55,7 @@ impl From<CaseError> for Box<Outcome> {
     }
 }
 
-/// A fault of the service.
+/// The reason of an internal error.
 impl From<String> for Box<Outcome> {
     fn from(reason: String) -> Box<Outcome> {
         Box::new(Outcome::internal(&reason))

@@ -18,7 +18,7 @@ pub struct EncodedResult {
 }
 
 impl EncodedResult {
-    /// An answer without fields, or a part of one.
+    /// Encodes an answer, or a part of one, that has no fields.
     ///
     /// # Errors
     /// The answer cannot be written as JSON, and why.

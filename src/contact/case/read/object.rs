@@ -45,7 +45,7 @@ impl<'v, 'f> Object<'v, 'f> {
         self.members.contains_key(name)
     }
 
-    /// Those of the members that are written.
+    /// The names in `names` that the object has.
     pub(crate) fn given<'n>(&self, names: &[&'n str]) -> Vec<&'n str> {
         let names = names.iter().copied();
         names.filter(|name| self.has(name)).collect()
@@ -99,7 +99,7 @@ impl<'v, 'f> Object<'v, 'f> {
         self.only_or(allowed, &[]);
     }
 
-    /// The same; members in `reserved` are left to the caller.
+    /// Refuses every member that is neither in `allowed` nor in `reserved`. The fault does not list `reserved`.
     pub(crate) fn only_or(&mut self, allowed: &[&str], reserved: &[&str]) {
         let members = self.members;
         for (name, value) in members {
@@ -135,7 +135,7 @@ impl<'v, 'f> Object<'v, 'f> {
         number(value, &pointer, allowed, self.faults)
     }
 
-    /// A number that may be left out; the outer `None` is a fault, as of all that may be left out.
+    /// Reads an optional number. The outer `None` means a fault, the inner one an absent member.
     pub(crate) fn optional_number(
         &mut self,
         name: &str,
@@ -154,7 +154,7 @@ impl<'v, 'f> Object<'v, 'f> {
         Some(self.optional_number(name, allowed)?.unwrap_or(default))
     }
 
-    /// Anything that may be left out.
+    /// Reads an optional member with `read`.
     pub(crate) fn optional<T>(
         &mut self,
         name: &str,
@@ -184,7 +184,7 @@ impl<'v, 'f> Object<'v, 'f> {
         flag
     }
 
-    /// An array of so many elements, if it is written.
+    /// The member as an array with an allowed number of elements; `None` if it is absent or faulty.
     pub(crate) fn array(
         &mut self,
         name: &str,
@@ -212,7 +212,7 @@ impl<'v, 'f> Object<'v, 'f> {
         read
     }
 
-    /// Notes that a member is not what is needed.
+    /// Adds the fault that a member has the wrong value or type.
     pub(crate) fn mistaken(&mut self, name: &str, what: &str) {
         let given = self.value(name).map(shown).unwrap_or_default();
         self.fault(name, format!("{given} given; {what} is needed"));

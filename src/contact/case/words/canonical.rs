@@ -21,8 +21,8 @@ pub(crate) struct Canonical<'a> {
     pub(crate) solver_version: &'static str,
     pub(crate) solver_revision: u32,
     pub(crate) elasticity: [f64; 3],
-    /// How bodies that differ are solved, and the lower one's part of the displacement; like bodies have no such numbers, and their answers stay what they
-    /// are.
+    /// Revision of the method for bodies that differ, and the lower body's share of the displacement. Absent for equal bodies, whose digests do not depend
+    /// on that method.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) coupling: Option<(u32, f64)>,
     pub(crate) friction: FrictionForm<'a>,
