@@ -19,7 +19,7 @@ COPY src ./src
 RUN touch src/main.rs src/lib.rs src/contact/lib.rs \
     && cargo build --profile image --features cluster,otlp,gs,az --locked --bin railhead \
     && install -d /out/data \
-    && strip -o /out/railhead target/image/railhead
+    && install target/image/railhead /out
 
 FROM ${RUNTIME}
 LABEL org.opencontainers.image.title="railhead" \

@@ -181,7 +181,7 @@ fn batch(service: &Service, connection: &mut Connection) {
     });
     let solve = median(solves.collect());
     let before = service.usage().processor_s;
-    let batch = connection.post("/v1/batches", "", &json!({ "cases": cases }));
+    let batch = connection.post("/v1/batches", "", &json!(cases));
     let path = format!("/v1/batches/{}", batch["id"].as_str().expect("an id"));
     loop {
         std::thread::sleep(Duration::from_millis(50));
