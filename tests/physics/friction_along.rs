@@ -1,5 +1,7 @@
 //! Friction that lies on the track while a history rolls over it.
 
+use railhead::contact;
+use railhead::contact::case::limits::Limits;
 use railhead::contact::solution::words::answer::{PointSolution, Solution};
 use serde_json::{Value, json};
 
@@ -164,6 +166,19 @@ fn what_does_not_go_with_it_is_refused_with_the_member() {
         &with(&case, "/friction/along/x_mm", Some(json!([1.0, 0.0]))),
         "/friction/along/x_mm/1",
         &["0 given after 1"],
+    );
+    // Two equal places are a jump, three are a mistake.
+    let jump = json!({ "x_mm": [0.0, 1.0, 1.0], "coefficient": [0.3, 0.3, 0.2] });
+    let jump = with(&case, "/friction/along", Some(jump));
+    assert!(
+        contact::check(&jump, &Limits::default()).is_ok(),
+        "two equal places"
+    );
+    let thrice = json!({ "x_mm": [0.0, 1.0, 1.0, 1.0], "coefficient": [0.3, 0.3, 0.2, 0.1] });
+    assert_fault(
+        &with(&case, "/friction/along", Some(thrice)),
+        "/friction/along/x_mm/3",
+        &["1 given three times", "two equal places"],
     );
     assert_fault(
         &with(&case, "/friction/along/coefficient", Some(json!([0.3]))),

@@ -352,7 +352,12 @@ fn faults_of_friction_name_what_is_wrong() {
     assert_fault(
         &across(json!([1.0, 0.0]), json!([0.1, 0.2])),
         "/friction/across/y_mm/1",
-        &["in order"],
+        &["must increase"],
+    );
+    assert_fault(
+        &across(json!([1.0, 1.0, 1.0]), json!([0.1, 0.2, 0.3])),
+        "/friction/across/y_mm/2",
+        &["1 given three times"],
     );
     assert_fault(
         &across(json!([0.0, 1.0]), json!([0.1])),

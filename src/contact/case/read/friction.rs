@@ -171,13 +171,19 @@ fn places(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<(Vec<
     let coefficient = list(block, "coefficient", ACROSS);
     let (places, coefficient) = (places?, coefficient?);
     as_many(block, name, places.len(), coefficient.len())?;
-    if let Some(k) = places.windows(2).position(|pair| pair[1] < pair[0]) {
-        let pointer = join(&block.pointer_to(name), k + 1);
-        let detail = format!(
-            "{} given after {}; the places have to be in order, and two may be equal where the coefficient jumps",
-            places[k + 1],
-            places[k]
-        );
+    let falls = |k: usize| places[k] < places[k - 1];
+    let is_third = |k: usize| k > 1 && places[k] == places[k - 2];
+    if let Some(k) = (1..places.len()).find(|k| falls(*k) || is_third(*k)) {
+        let (given, before) = (places[k], places[k - 1]);
+        let detail = match falls(k) {
+            true => format!(
+                "{given} given after {before}; places must increase, or be equal twice where the coefficient jumps"
+            ),
+            false => format!(
+                "{given} given three times; two equal places are a jump of the coefficient, and no more may be equal"
+            ),
+        };
+        let pointer = join(&block.pointer_to(name), k);
         block.faults().add(pointer, detail);
         return None;
     }
