@@ -54,6 +54,21 @@ fn a_history_that_cannot_be_is_refused_by_name() {
         let path = |name: &str| format!("/motion/history/{name}");
         assert_fault(&with(&good(), &path(name), Some(value)), &path(at), &[word]);
     }
+    // The steps of a patch of a micrometre are not written as 0 mm.
+    let mut micro = good();
+    for (at, value) in [
+        ("/contact/a_mm", json!(1e-3)),
+        ("/contact/b_mm", json!(1e-3)),
+        ("/load/normal_force_n", json!(0.001)),
+        ("/motion/history/distance_mm", json!([0, 1, 100])),
+    ] {
+        micro = with(&micro, at, Some(value));
+    }
+    assert_fault(
+        &micro,
+        "/motion/history/distance_mm",
+        &["steps of 0.000188 mm"],
+    );
     let missing = with(&good(), "/motion/history/distance_mm", None);
     assert_fault(&missing, "/motion/history/distance_mm", &["missing"]);
 }

@@ -21,6 +21,7 @@ use crate::contact::evolution::task::{Evolution, PlannedEvent, Sections, SolveCo
 use crate::contact::evolution::traffic::condensed;
 use crate::contact::geometry::profile::Body;
 use crate::contact::monitor::{Monitor, MonitorPart};
+use crate::contact::remark::kind::short;
 use crate::contact::solution::words::evolution::{
     BodyState, EvolutionRecord, EvolutionState, StateContact, WornBody,
 };
@@ -143,9 +144,9 @@ impl Evolution {
         let (accuracy, begin) = (&self.plan.accuracy, state.share);
         if state.steps >= accuracy.steps_max {
             let reason = format!(
-                "after {} steps {:.1} % of the extent are done; raise accuracy.steps_max or accuracy.step_depth_mm, or shorten the extent",
+                "after {} steps {} % of the extent are done; raise accuracy.steps_max or accuracy.step_depth_mm, or shorten the extent",
                 state.steps,
-                100.0 * begin
+                short(100.0 * begin)
             );
             return Err(SolveError::NormalProblem { reason });
         }

@@ -70,7 +70,7 @@ impl AsFigure for &'static str {
 
 /// A number that is written with this many significant digits.
 #[derive(Debug, Clone, Copy)]
-pub struct Rounded(f64, i32);
+pub struct Rounded(pub f64, pub i32);
 
 /// A number with three significant digits.
 pub fn short(value: impl Borrow<f64>) -> Rounded {

@@ -42,7 +42,8 @@ macro_rules! case_remarks {
             severity: Warning,
             advice: "Expect errors of the order of K in tractions, or take `boundary_element`, which couples them.",
             detail: format!(
-                "the two bodies differ (K = {difference_parameter:.4}); the coupling of pressure and traction is neglected"
+                "the two bodies differ (K = {}); the coupling of pressure and traction is neglected",
+                short(difference_parameter)
             ),
 
             /// The two bodies differ. Tractions follow from the pressure, but the pressure is that without tractions.
@@ -56,8 +57,10 @@ macro_rules! case_remarks {
             severity: Warning,
             advice: "The error is part of the estimates. Steady motions also include the effect of tractions on pressure, but for those whose tractions part or join patches.",
             detail: format!(
-                "the two bodies differ (K = {difference_parameter:.4}); the effect of pressure on tractions is included, the effect of tractions on \
-                 pressure is not; this leaves an error of {error:.4} of the friction limit"
+                "the two bodies differ (K = {}); the effect of pressure on tractions is included, the effect of tractions on \
+                 pressure is not; this leaves an error of {} of the friction limit",
+                short(difference_parameter),
+                short(error)
             ),
         }
     };

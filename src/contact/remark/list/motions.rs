@@ -42,8 +42,9 @@ macro_rules! motion_remarks {
             severity: Warning,
             advice: "The answer is the state reached from small slip. Ask with less speed, pressure or fall to see where the two part.",
             detail: format!(
-                "friction falls so fast with slip that a second state exists, reached from sliding, whose force differs by {force_change:.3} of \
-                 the friction limit; the answer is the one reached from rest"
+                "friction falls so fast with slip that a second state exists, reached from sliding, whose force differs by {} of \
+                 the friction limit; the answer is the one reached from rest",
+                short(force_change)
             ),
 
             /// The contact passes so slowly that heat also flows along the surface.
@@ -57,7 +58,8 @@ macro_rules! motion_remarks {
             severity: Warning,
             advice: "Take the temperatures as an upper bound; check the speed, which is in mm/s.",
             detail: format!(
-                "the Péclet number is {peclet:.3}; temperatures are computed as if heat flowed only into the depth, which holds from about {least} on"
+                "the Péclet number is {}; temperatures are computed as if heat flowed only into the depth, which holds from about {least} on",
+                short(peclet)
             ),
 
             /// The error is not known to be below the target.
@@ -176,8 +178,9 @@ macro_rules! motion_remarks {
             severity: Warning,
             advice: "Raise `accuracy.states_max`.",
             detail: format!(
-                "twice the states would change the distribution of wear by {:.1} %; {:.1} % were asked for",
-                100.0 * traffic_error, 100.0 * tolerance_asked
+                "twice the states would change the distribution of wear by {} %; {} % were asked for",
+                short(100.0 * traffic_error),
+                short(100.0 * tolerance_asked)
             ),
 
             /// Some of the traffic has no answer and wears nothing.
@@ -189,8 +192,8 @@ macro_rules! motion_remarks {
             severity: Warning,
             advice: "`failure` in the states of the records says why.",
             detail: format!(
-                "up to {:.1} % of the traffic have no answer; they wear nothing",
-                100.0 * unsolved_share
+                "up to {} % of the traffic have no answer; they wear nothing",
+                short(100.0 * unsolved_share)
             ),
         }
     };

@@ -25,9 +25,9 @@ macro_rules! normal_remarks {
             severity: Warning,
             advice: "Take the width and the pressure of this patch as uncertain by some per cent; if it matters, solve it in a case of its own.",
             detail: format!(
-                "the patch carries {:.1} % of the load and has only {cells_across:.0} cells across: its width and its pressure are uncertain by \
+                "the patch carries {} % of the load and has only {cells_across:.0} cells across: its width and its pressure are uncertain by \
                  some per cent",
-                100.0 * load_share
+                short(100.0 * load_share)
             ),
 
             /// A given pressure does not fall to 0 at the edge of its grid.
@@ -65,7 +65,10 @@ macro_rules! normal_remarks {
             severity: Warning,
             advice: "Give finer samples, or smooth the pressure over two or three of them.",
             detail: format!(
-                "the pressure jumps by {share_of_largest:.2} of its largest value between samples at ({x_mm:.4}, {y_mm:.4}) mm, which strips and cells do not follow"
+                "the pressure jumps by {} of its largest value between samples at ({}, {}) mm, which strips and cells do not follow",
+                short(share_of_largest),
+                short(x_mm),
+                short(y_mm)
             ),
 
             /// The contact is long compared with the rolling radius: the bodies are nearly conformal.
@@ -79,8 +82,9 @@ macro_rules! normal_remarks {
             severity: Warning,
             advice: "Half-spaces do not describe such bodies: take the answer as approximate.",
             detail: format!(
-                "the contact is {length_mm:.3} mm long, compared with a rolling radius of {rolling_radius_mm} mm: the bodies are nearly \
-                 conformal, and half-spaces do not describe them"
+                "the contact is {} mm long, compared with a rolling radius of {rolling_radius_mm} mm: the bodies are nearly \
+                 conformal, and half-spaces do not describe them",
+                short(length_mm)
             ),
 
             /// The bodies overlap so deeply that strains are too large for linear elasticity.

@@ -137,7 +137,7 @@ macro_rules! profile_remarks {
             code: "profile-size-unusual",
             severity: Warning,
             advice: "State `unit` of the cross-section if its numbers are not in mm; models of a reduced scale need nothing.",
-            detail: format!("{profile}: the profile is {width_mm:.4} mm wide; if its numbers are in {unit}, state unit: \"{unit}\""),
+            detail: format!("{profile}: the profile is {width_mm} mm wide; if its numbers are in {unit}, state unit: \"{unit}\"", width_mm = short(width_mm)),
 
             /// Points of a profile that lie nearly at the same place were merged.
             ProfilePointsMerged {
@@ -177,7 +177,7 @@ macro_rules! profile_remarks {
             code: "profile-end-dropped",
             severity: Info,
             advice: "Nothing if the profile ends there; otherwise check the file.",
-            detail: format!("{profile}: {count} stray points at an end, {distance_mm:.1} mm from the next one, were dropped"),
+            detail: format!("{profile}: {count} stray points at an end, {distance_mm} mm from the next one, were dropped", distance_mm = short(distance_mm)),
 
             /// A profile has the shape of the other body.
             ProfileOfOtherBody {
@@ -202,7 +202,7 @@ macro_rules! profile_remarks {
             severity: Info,
             advice: "Nothing; give `smoothing_mm` as a number to use the same for other cases.",
             detail: if *smoothing_mm > 0.0 {
-                format!("{profile}: smoothed by {smoothing_mm:.2} mm, chosen from the noise of its points")
+                format!("{profile}: smoothed by {smoothing_mm} mm, chosen from the noise of its points", smoothing_mm = short(smoothing_mm))
             } else {
                 format!("{profile}: not smoothed, since its points are hardly noisy")
             },
@@ -218,7 +218,8 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "Send points that lie nearer to each other, 0.25 mm at gauge corner and flange, or give `smoothing_mm` as a number.",
             detail: format!(
-                "{profile}: with points {spacing_mm:.1} mm apart noise cannot be told from shape, so no smoothing was chosen and none is used"
+                "{profile}: with points {spacing_mm} mm apart noise cannot be told from shape, so no smoothing was chosen and none is used",
+                spacing_mm = short(spacing_mm)
             ),
 
             /// One point of a profile near the contact, or a few neighbours, are off the curve of the points on both sides.
@@ -243,13 +244,17 @@ macro_rules! profile_remarks {
             advice: "Remove or correct the points; smoothing only spreads their error.",
             detail: if *points == 1 {
                 format!(
-                    "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um:.1} µm off the curve of its neighbours, equivalent to \
-                     {waviness_mpa:.0} MPa of contact pressure: remove or correct it"
+                    "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um} µm off the curve of its neighbours, equivalent to \
+                     {waviness_mpa} MPa of contact pressure: remove or correct it",
+                distance_um = short(distance_um),
+                waviness_mpa = short(waviness_mpa)
                 )
             } else {
                 format!(
-                    "the {profile}'s points jump at y = {at_y_mm:.2} mm: {points} points from y {:.2} to {:.2} mm are up to {distance_um:.1} µm off the \
-                     curve of their neighbours, equivalent to {waviness_mpa:.0} MPa of contact pressure: remove or correct them", y_mm[0], y_mm[1]
+                    "the {profile}'s points jump at y = {at_y_mm:.2} mm: {points} points from y {:.2} to {:.2} mm are up to {distance_um} µm off the \
+                     curve of their neighbours, equivalent to {waviness_mpa} MPa of contact pressure: remove or correct them", y_mm[0], y_mm[1],
+                distance_um = short(distance_um),
+                waviness_mpa = short(waviness_mpa)
                 )
             },
 
@@ -270,8 +275,9 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "Measure this part again, or join the pieces better: smoothing does not remove a step, and forces are wrong as well.",
             detail: format!(
-                "the {profile}'s points jump by {:.1} µm at y = {at_y_mm:.2} mm, equivalent to {waviness_mpa:.0} MPa of contact pressure: smoothing does \
-                 not remove a step, measure this part again", height_um.abs()
+                "the {profile}'s points jump by {} µm at y = {at_y_mm:.2} mm, equivalent to {waviness_mpa} MPa of contact pressure: smoothing does \
+                 not remove a step, measure this part again", short(height_um.abs()),
+                waviness_mpa = short(waviness_mpa)
             ),
 
             /// The points of a profile lie on straight chords between fewer points, as linear resampling leaves them.
@@ -293,10 +299,12 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "Send the points as measured, without resampling, or give the `smoothing_mm` named here.",
             detail: format!(
-                "the {profile}'s points under the patch (y {:.1} to {:.1} mm) lie on straight chords of {chord_mm:.2} mm, as linear resampling leaves \
-                 them; the kinks are equivalent to {waviness_mpa:.0} MPa of contact pressure: send the points as measured{}",
+                "the {profile}'s points under the patch (y {:.1} to {:.1} mm) lie on straight chords of {chord_mm} mm, as linear resampling leaves \
+                 them; the kinks are equivalent to {waviness_mpa} MPa of contact pressure: send the points as measured{}",
                 y_mm[0], y_mm[1],
-                smoothing_mm.map_or_else(String::new, |length| format!(", or give smoothing_mm: {length}"))
+                smoothing_mm.map_or_else(String::new, |length| format!(", or give smoothing_mm: {length}")),
+                chord_mm = short(chord_mm),
+                waviness_mpa = short(waviness_mpa)
             ),
 
             /// Noise of the points of a profile, from the measurement or from rounding, changes the pressure considerably.
@@ -322,11 +330,14 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "Give the `smoothing_mm` named here, or `\"auto\"`; send points with more decimals where they were rounded.",
             detail: format!(
-                "noise of {noise_um:.2} µm{} at points {spacing_mm:.2} mm apart makes waves on the {profile} (y {:.1} to {:.1} mm) equivalent \
-                 to {waviness_mpa:.0} MPa of contact pressure{}",
+                "noise of {noise_um} µm{} at points {spacing_mm} mm apart makes waves on the {profile} (y {:.1} to {:.1} mm) equivalent \
+                 to {waviness_mpa} MPa of contact pressure{}",
                 rounding_mm.map_or_else(String::new, |step| format!(" (heights rounded to {step} mm)")),
                 y_mm[0], y_mm[1],
-                smoothing_mm.map_or_else(String::new, |length| format!(": give smoothing_mm: {length}"))
+                smoothing_mm.map_or_else(String::new, |length| format!(": give smoothing_mm: {length}")),
+                noise_um = short(noise_um),
+                spacing_mm = short(spacing_mm),
+                waviness_mpa = short(waviness_mpa)
             ),
 
             /// Waves of a profile that are neither noise nor a single fault change the pressure considerably.
@@ -346,8 +357,10 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "If they come from the measurement, remove them with a `smoothing_mm` of about their length; waves that are really there belong to the answer.",
             detail: format!(
-                "waves on the {profile} shorter than {shorter_than_mm:.1} mm (y {:.1} to {:.1} mm) are equivalent to {waviness_mpa:.0} MPa of \
-                 contact pressure: if they come from the measurement, remove them with smoothing_mm", y_mm[0], y_mm[1]
+                "waves on the {profile} shorter than {shorter_than_mm} mm (y {:.1} to {:.1} mm) are equivalent to {waviness_mpa} MPa of \
+                 contact pressure: if they come from the measurement, remove them with smoothing_mm", y_mm[0], y_mm[1],
+                shorter_than_mm = short(shorter_than_mm),
+                waviness_mpa = short(waviness_mpa)
             ),
 
             /// The points of a profile under the contact are so far apart that the curve between them is uncertain.
@@ -367,8 +380,11 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "Send points 0.5 mm apart on the tread, 0.25 mm at gauge corner and flange.",
             detail: format!(
-                "the {profile}'s points are {spacing_mm:.1} mm apart where it touches (y {:.1} to {:.1} mm), {spacing_over_width:.2} times the width of the \
-                 patch; the curve between them is uncertain by {ambiguity_mpa:.0} MPa of pressure: send more points there", y_mm[0], y_mm[1]
+                "the {profile}'s points are {spacing_mm} mm apart where it touches (y {:.1} to {:.1} mm), {spacing_over_width} times the width of the \
+                 patch; the curve between them is uncertain by {ambiguity_mpa} MPa of pressure: send more points there", y_mm[0], y_mm[1],
+                spacing_mm = short(spacing_mm),
+                spacing_over_width = short(spacing_over_width),
+                ambiguity_mpa = short(ambiguity_mpa)
             ),
 
             /// A profile has a stretch without points near the contact over which the bodies may touch as well.
@@ -384,8 +400,9 @@ macro_rules! profile_remarks {
             severity: Warning,
             advice: "Send the points there: the contact may be elsewhere than found.",
             detail: format!(
-                "the {profile} has no points from y {:.1} to {:.1} mm ({hole_mm:.1} mm), where the bodies may touch: the contact may be elsewhere than \
-                 found; send the points there", y_mm[0], y_mm[1]
+                "the {profile} has no points from y {:.1} to {:.1} mm ({hole_mm} mm), where the bodies may touch: the contact may be elsewhere than \
+                 found; send the points there", y_mm[0], y_mm[1],
+                hole_mm = short(hole_mm)
             ),
         }
     };

@@ -35,8 +35,8 @@ macro_rules! wheel_remarks {
             severity: Warning,
             advice: "Check lateral shift and gauge, or send at least 5 mm of profile beyond the contact.",
             detail: format!(
-                "the contact at y {:.1} to {:.1} mm of the {profile} is {left_mm:.1} mm from the end of its profile: check lateral shift and gauge, or send \
-                 a longer profile", y_mm[0], y_mm[1]
+                "the contact at y {:.1} to {:.1} mm of the {profile} is {} mm from the end of its profile: check lateral shift and gauge, or send \
+                 a longer profile", y_mm[0], y_mm[1], short(left_mm)
             ),
 
             /// The target is smaller than the uncertainty that the measurement of the profiles leaves: a finer solve adds nothing.
@@ -50,7 +50,8 @@ macro_rules! wheel_remarks {
             severity: Info,
             advice: "A better measurement reduces the uncertainty; a smaller target does not.",
             detail: format!(
-                "the profiles leave forces uncertain by {:.1} % of μN, more than the target of {:.1} %", 100.0 * uncertainty, 100.0 * target
+                "the profiles leave forces uncertain by {} % of μN, more than the target of {} %",
+                short(100.0 * uncertainty), short(100.0 * target)
             ),
 
             /// A patch reaches the line on the rail at which the contact was divided between two planes of contact. Its edge there comes from that division and
@@ -88,7 +89,8 @@ macro_rules! wheel_remarks {
             severity: Info,
             advice: "Take the forces as approximate: the influence between the ends of the contact is extrapolated, and the rail head is no half-space there.",
             detail: format!(
-                "the surface turns by {turn_rad:.2} rad over the contact; the influence between its ends is known up to {range_rad} rad"
+                "the surface turns by {} rad over the contact; the influence between its ends is known up to {range_rad} rad",
+                short(turn_rad)
             ),
 
             /// The force jumps at the height of the wheel that carries the load, where patches merge; forces were scaled to the load.

@@ -3,6 +3,7 @@
 use crate::contact::error::SolveError;
 use crate::contact::mesh::strips::MeshSize;
 use crate::contact::monitor::{Monitor, MonitorPart};
+use crate::contact::remark::kind::short;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan;
@@ -101,7 +102,8 @@ pub fn too_long(history: &HistoryTask, extents: &[[f64; 4]], steps_max: usize) -
     (steps > steps_max as f64).then(|| {
         let rolled = history.distances.last().copied().unwrap_or(0.0);
         format!(
-            "{rolled} mm are rolled over, which takes {steps:.0} steps of {longest:.3} mm; at most {steps_max} are allowed in one case"
+            "{rolled} mm are rolled over, which takes {steps:.0} steps of {} mm; at most {steps_max} are allowed in one case",
+            short(longest)
         )
     })
 }

@@ -7,6 +7,7 @@ use crate::contact::mesh::strips::MeshSize;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::patch::Patch;
+use crate::contact::remark::kind::short;
 use crate::contact::rolling::answer::{LevelAnswer, LevelExit, LevelFailure, Work};
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
 use crate::contact::rolling::methods::boundary_element::task::LevelTask;
@@ -216,8 +217,12 @@ fn slender(task: &RollingTask) -> Option<String> {
     let [x_min, x_max, y_min, y_max] = patch.extent;
     (ratio(patch) > SLENDER).then(|| {
         format!(
-            "patch {number} at x {x_min:.2} to {x_max:.2} mm, y {y_min:.3} to {y_max:.3} mm is {:.0} times as long along \
-             rolling as wide, which fastsim solves in any case",
+            "patch {number} at x = {} mm, y = {} mm, {} mm by {} mm, is {:.0} times as long along rolling as wide, \
+             which fastsim solves in any case",
+            short(0.5 * (x_min + x_max)),
+            short(0.5 * (y_min + y_max)),
+            short(x_max - x_min),
+            short(y_max - y_min),
             ratio(patch)
         )
     })

@@ -9,6 +9,7 @@ use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::hertz::Ellipse;
+use crate::contact::remark::kind::Rounded;
 use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::table::evaluate::Creep;
@@ -107,7 +108,8 @@ pub fn unlike(elasticity: &Elasticity) -> Option<String> {
 pub fn outside(ratio: f64) -> Option<String> {
     (!(RATIO_MIN..=RATIO_MAX).contains(&ratio)).then(|| {
         format!(
-            "an ellipse with a/b = {ratio:.4}; \"method\": \"table\" covers {RATIO_MIN} to {RATIO_MAX}, use boundary_element or fastsim"
+            "an ellipse with a/b = {}; \"method\": \"table\" covers {RATIO_MIN} to {RATIO_MAX}, use boundary_element or fastsim",
+            Rounded(ratio, 6)
         )
     })
 }
