@@ -3,7 +3,7 @@
 use railhead::contact::mesh::strips::Grading;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::liu_hsu::active_set::InitialGuess;
-use railhead::contact::rolling::methods::liu_hsu::active_set::{ZonesExit, ZonesRun};
+use railhead::contact::rolling::methods::liu_hsu::active_set::{ZonesRun, ZonesTermination};
 use railhead::contact::rolling::methods::liu_hsu::solve::{
     coarse_pole, solve_by_upwind, solve_with,
 };
@@ -133,12 +133,12 @@ pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f6
 impl Counts {
     fn note(&mut self, k: usize, attempt: &ZonesRun) {
         match attempt.exit {
-            ZonesExit::Converged => {
+            ZonesTermination::Converged => {
                 self.work[k][0] += attempt.outer_iterations;
                 self.work[k][1] += attempt.newton_iterations;
             }
-            ZonesExit::NewtonDiverged => self.failures[k][0] += 1,
-            ZonesExit::ZonesRepeat => self.failures[k][1] += 1,
+            ZonesTermination::NewtonDiverged => self.failures[k][0] += 1,
+            ZonesTermination::ZonesRepeat => self.failures[k][1] += 1,
             _ => self.failures[k][2] += 1,
         }
     }

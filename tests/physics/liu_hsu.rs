@@ -10,7 +10,7 @@ use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::Convergence;
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::methods::liu_hsu::active_set::InitialGuess;
-use railhead::contact::rolling::methods::liu_hsu::active_set::ZonesExit;
+use railhead::contact::rolling::methods::liu_hsu::active_set::ZonesTermination;
 use railhead::contact::rolling::methods::liu_hsu::solve::{
     ZonesOutcome, coarse_pole, solve, solve_by_upwind, solve_with,
 };
@@ -332,7 +332,7 @@ fn a_run_without_answer_names_its_end_and_its_residual() {
         let (t, outcome) = with_guess(&contact, Rule::Upwind, state, InitialGuess::RigidSlip);
         ends.push(outcome.last().exit);
         if !outcome.exit().converged() {
-            assert_ne!(outcome.last().exit, ZonesExit::Converged);
+            assert_ne!(outcome.last().exit, ZonesTermination::Converged);
             assert!(outcome.residual > 1e-8 && outcome.residual.is_finite());
             assert!(t.iter().all(|value| value.is_finite()));
             let advice = outcome.advice();
@@ -340,7 +340,7 @@ fn a_run_without_answer_names_its_end_and_its_residual() {
             assert!(advice.contains("boundary_element"), "{advice}");
         }
     }
-    assert!(ends.contains(&ZonesExit::ZonesRepeat), "{ends:?}");
+    assert!(ends.contains(&ZonesTermination::ZonesRepeat), "{ends:?}");
 }
 
 /// Stops at the given look.

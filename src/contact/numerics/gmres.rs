@@ -33,31 +33,31 @@ pub struct LinearReport {
     /// Norm of the residual divided by that of the right-hand side.
     pub residual: f64,
     /// How it ended.
-    pub exit: GmresExit,
+    pub exit: GmresTermination,
 }
 
 /// How a linear solve ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum GmresExit {
+pub enum GmresTermination {
     /// The residual fell by the tolerance.
     Converged,
     /// The restarts were used up before the residual fell by the tolerance.
     RestartsUsedUp,
 }
 
-impl GmresExit {
+impl GmresTermination {
     /// Whether the tolerance was met.
     #[must_use]
     pub fn converged(self) -> bool {
-        self == GmresExit::Converged
+        self == GmresTermination::Converged
     }
 
     /// The reason as a clause for messages.
     #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
-            GmresExit::Converged => "the residual fell by the tolerance",
-            GmresExit::RestartsUsedUp => "the restarts of the linear solver were used up",
+            GmresTermination::Converged => "the residual fell by the tolerance",
+            GmresTermination::RestartsUsedUp => "the restarts of the linear solver were used up",
         }
     }
 }
@@ -90,7 +90,7 @@ impl Gmres {
         let mut report = LinearReport {
             products: 0,
             residual: 0.0,
-            exit: GmresExit::Converged,
+            exit: GmresTermination::Converged,
         };
         if norm_b == 0.0 {
             return Ok(report);
@@ -123,7 +123,7 @@ impl Gmres {
         report.residual = beta / norm_b;
         // A residual that is not a number fails every comparison and must not pass for converged.
         if beta > tolerance * norm_b || beta.is_nan() {
-            report.exit = GmresExit::RestartsUsedUp;
+            report.exit = GmresTermination::RestartsUsedUp;
         }
         Ok(report)
     }
@@ -334,7 +334,7 @@ mod tests {
                     error <= 1.1e-10 * norm(&b) && report.residual <= 1e-10,
                     "{n} {error} {report:?}"
                 );
-                assert_eq!(report.exit, GmresExit::Converged);
+                assert_eq!(report.exit, GmresTermination::Converged);
             }
         }
     }
@@ -373,7 +373,7 @@ mod tests {
         b[0] = 1.0;
         let mut x = vec![0.0; 2000];
         let report = Gmres::default().solve(&mut Ring, &b, 1e-3, &mut x).unwrap();
-        assert_eq!(report.exit, GmresExit::RestartsUsedUp);
+        assert_eq!(report.exit, GmresTermination::RestartsUsedUp);
         assert!(
             !report.exit.converged() && report.residual > 0.9,
             "{report:?}"

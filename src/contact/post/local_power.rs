@@ -15,7 +15,7 @@ use crate::contact::method::Method;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd;
 use crate::contact::numerics::simd_ln::Float;
-use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
+use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
@@ -63,7 +63,10 @@ pub fn cell_power(task: &PowerTask, monitor: &dyn Monitor) -> Result<CellPower, 
     let (level, answer) = (task.level, task.answer);
     let unit = level.scale.slip();
     let mut slip = [0, 1].map(|k| answer.slip[k].iter().map(|s| s * unit).collect::<Vec<_>>());
-    if matches!(answer.exit, LevelExit::NoMotion | LevelExit::NoFriction) {
+    if matches!(
+        answer.exit,
+        LevelOutcome::NoMotion | LevelOutcome::NoFriction
+    ) {
         let power = vec![0.0; level.area.len()];
         return Ok(CellPower { power, slip });
     }
@@ -129,7 +132,7 @@ fn cell_mean_powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>,
             *power += areas[i] * (traction[0][i] * x[i] + traction[1][i] * y[i]);
         }
     }
-    if task.answer.exit != LevelExit::RigidSlip {
+    if task.answer.exit != LevelOutcome::RigidSlip {
         let differences = match level.precision() {
             Precision::Single => Differences::of::<f32>(mesh, nu, traction, monitor)?,
             Precision::Double => Differences::of::<f64>(mesh, nu, traction, monitor)?,

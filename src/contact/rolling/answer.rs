@@ -16,7 +16,7 @@ pub struct LevelAnswer {
     /// Does the cell slip?
     pub slips: Vec<bool>,
     /// How the tractions came about.
-    pub exit: LevelExit,
+    pub exit: LevelOutcome,
     /// Work done.
     pub work: Work,
     /// Work that was not needed.
@@ -27,7 +27,7 @@ pub struct LevelAnswer {
 
 /// How the tractions of a level came about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LevelExit {
+pub enum LevelOutcome {
     /// Nothing moves: they are 0.
     NoMotion,
     /// There is no friction: they are 0.

@@ -4,7 +4,7 @@ use crate::contact::error::SolveError;
 use crate::contact::mesh::strips::MeshSize;
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::remark::kind::short;
-use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
+use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome, Work};
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan;
 use crate::contact::rolling::history::record::PointRecord;
@@ -421,7 +421,7 @@ fn answers(
                         second: None,
                         slip: point.slip,
                         slips: point.slips,
-                        exit: LevelExit::Solved,
+                        exit: LevelOutcome::Solved,
                         work,
                         skips: Vec::new(),
                         remarks: Vec::new(),

@@ -17,7 +17,7 @@ use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::patch::Patch;
 use crate::contact::numerics::length::length;
-use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
+use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome, Work};
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::motion::Motion;
@@ -65,7 +65,7 @@ pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAns
         second: None,
         slip: [vec![0.0; cells], vec![0.0; cells]],
         slips: vec![false; cells],
-        exit: LevelExit::Solved,
+        exit: LevelOutcome::Solved,
         work: Work {
             iterations: 1,
             ..Work::default()

@@ -2,7 +2,7 @@
 
 use crate::contact::numerics::length::length;
 use crate::contact::rolling::answer::Skip;
-use crate::contact::rolling::answer::{LevelAnswer, LevelExit, Work};
+use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome, Work};
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::StripMesh;
 
@@ -55,9 +55,9 @@ pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
     let smallest = sizes.fold(f64::INFINITY, f64::min);
     let still = motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0;
     let (exit, skip) = if still {
-        (LevelExit::NoMotion, Skip::NoMotion)
+        (LevelOutcome::NoMotion, Skip::NoMotion)
     } else if smallest > ELASTIC_SLIP_MAX * NEGLIGIBLE && !pole_inside(level, motion) {
-        (LevelExit::RigidSlip, Skip::RigidSlip)
+        (LevelOutcome::RigidSlip, Skip::RigidSlip)
     } else {
         return None;
     };
@@ -96,7 +96,7 @@ pub fn frictionless_answer(level: &StripMesh, motion: &Motion) -> LevelAnswer {
                 .collect(),
         ],
         slips: vec![!still; cells],
-        exit: LevelExit::NoFriction,
+        exit: LevelOutcome::NoFriction,
         work: Work::default(),
         skips: vec![Skip::NoFriction],
         remarks: Vec::new(),

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use crate::contact::method::Method;
 use crate::contact::normal::patch::Patch;
-use crate::contact::rolling::answer::LevelExit;
+use crate::contact::rolling::answer::LevelOutcome;
 use crate::contact::rolling::methods::fastsim;
 use crate::contact::rolling::motion_answer::RelativeErrors;
 use crate::contact::rolling::refinement::on_mesh::DiscreteSolution;
@@ -82,7 +82,10 @@ impl Estimate {
             errors: vec![None; patches.len() + 1],
         };
         let tangential = &finest.tangential;
-        let still = matches!(tangential.exit, LevelExit::NoMotion | LevelExit::NoFriction);
+        let still = matches!(
+            tangential.exit,
+            LevelOutcome::NoMotion | LevelOutcome::NoFriction
+        );
         if still {
             found.errors.fill(Some(0.0));
             return Some(found);
@@ -127,7 +130,7 @@ impl Estimate {
         let size = finest.mesh.plan.size;
         let side = size.cells.min(size.strips);
         let least = match tangential.exit {
-            LevelExit::RigidSlip => RIGID,
+            LevelOutcome::RigidSlip => RIGID,
             _ if side < SIDE_FEW => f64::from(side).powi(-2),
             _ if cells < CELLS_FEW => ERROR_FEW / cells,
             _ => task.tolerance(index),

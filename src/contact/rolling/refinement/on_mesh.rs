@@ -8,7 +8,7 @@ use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::patch::Patch;
 use crate::contact::remark::kind::short;
-use crate::contact::rolling::answer::{LevelAnswer, LevelExit, LevelFailure, Work};
+use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, LevelOutcome, Work};
 use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
 use crate::contact::rolling::methods::boundary_element::task::LevelTask;
 use crate::contact::rolling::methods::liu_hsu::on_level;
@@ -133,7 +133,7 @@ fn boundary_elements(
     };
     let found = boundary_element::solve(of_mesh, start.as_ref(), &mut state.workspace, monitor)?;
     let is_predicting = task.motions.len() > 1 || task.forces[asked.index] != [None; 2];
-    if is_unique && is_predicting && found.exit == LevelExit::Solved {
+    if is_unique && is_predicting && found.exit == LevelOutcome::Solved {
         state.predictor.remember(number, motion, &found.traction);
     }
     Ok(found)
@@ -151,7 +151,7 @@ pub(crate) fn add_smooth_slips(
     answer: &mut LevelAnswer,
     monitor: &dyn Monitor,
 ) -> Result<Work, SolveError> {
-    let is_smooth = answer.second.is_some() || answer.exit != LevelExit::Solved;
+    let is_smooth = answer.second.is_some() || answer.exit != LevelOutcome::Solved;
     if task.method != Method::BoundaryElement || is_smooth {
         return Ok(Work::default());
     }

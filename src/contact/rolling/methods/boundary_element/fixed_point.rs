@@ -5,7 +5,7 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::length::length;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{
-    Convergence, NewtonExit, NewtonTask,
+    Convergence, NewtonTask, NewtonTermination,
 };
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 
@@ -51,7 +51,7 @@ pub fn fixed_point(
         report.residual = newton.evaluate(law, t, workspace, &mut report);
         report.iterations += 1;
         if report.residual <= law.tolerance {
-            report.exit = NewtonExit::Converged;
+            report.exit = NewtonTermination::Converged;
             let full_slip = (0..cells).all(|i| newton.slips(law.bound, t, workspace.slip(), i));
             return Ok(full_slip.then_some(report));
         }

@@ -17,7 +17,7 @@ use crate::contact::rolling::methods::boundary_element::linearisation::FallingRo
 use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
 use crate::contact::rolling::methods::boundary_element::preconditioner::StripFactors;
 use crate::contact::rolling::methods::boundary_element::task::{
-    Convergence, NewtonExit, NewtonTask, STEPS_MAX,
+    Convergence, NewtonTask, NewtonTermination, STEPS_MAX,
 };
 use crate::contact::rolling::methods::boundary_element::workspace::{
     NewtonWorkspace, StepVectors, zeroed,
@@ -175,7 +175,7 @@ impl<'a> Newton<'a> {
                 _ => law.tolerance,
             };
             if report.residual <= needed {
-                report.exit = NewtonExit::Converged;
+                report.exit = NewtonTermination::Converged;
                 break;
             }
             if report.iterations == law.steps_max {

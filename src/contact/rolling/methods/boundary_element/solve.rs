@@ -8,7 +8,7 @@ use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::Monitor;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::Skip;
-use crate::contact::rolling::answer::{LevelAnswer, LevelExit, LevelFailure, project_on_bound};
+use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, LevelOutcome, project_on_bound};
 use crate::contact::rolling::methods::boundary_element::rule_sequence::{Control, RuleSequence};
 use crate::contact::rolling::methods::boundary_element::task::{FEW_STEPS, LevelTask, STEPS_MAX};
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
@@ -74,7 +74,7 @@ pub fn solve(
         second,
         slip,
         slips,
-        exit: LevelExit::Solved,
+        exit: LevelOutcome::Solved,
         work: solve.work,
         skips,
         remarks,

@@ -2,8 +2,8 @@
 
 use crate::contact::friction::path_dependent::PathDependentFriction;
 use crate::contact::friction::velocity_weakening::Softening;
-use crate::contact::numerics::gmres::GmresExit;
-use crate::contact::rolling::answer::{LevelAnswer, LevelExit};
+use crate::contact::numerics::gmres::GmresTermination;
+use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome};
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -30,7 +30,7 @@ impl LevelTask<'_> {
             return None;
         }
         let answer = full_slip::rigid_answer(self.level, self.motion)?;
-        let still = answer.exit == LevelExit::NoMotion;
+        let still = answer.exit == LevelOutcome::NoMotion;
         let constant = self.fall.is_none() && self.passage.is_none();
         (still || constant).then_some(answer)
     }
@@ -67,18 +67,18 @@ pub const STEPS_MAX: u32 = 60;
 
 /// How an iteration for the tractions ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NewtonExit {
+pub enum NewtonTermination {
     /// The residual reached the tolerance.
     Converged,
     /// The steps were used up before.
     StepsUsedUp,
 }
 
-impl NewtonExit {
+impl NewtonTermination {
     /// Was the tolerance met?
     #[must_use]
     pub fn converged(self) -> bool {
-        self == NewtonExit::Converged
+        self == NewtonTermination::Converged
     }
 }
 
@@ -86,7 +86,7 @@ impl NewtonExit {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Convergence {
     /// How it ended.
-    pub exit: NewtonExit,
+    pub exit: NewtonTermination,
     /// Newton steps.
     pub iterations: u32,
     /// Products of the influence with a vector.
@@ -104,7 +104,7 @@ impl Convergence {
         let linear = match self.inexact_steps {
             0 => String::new(),
             steps => {
-                let reason = GmresExit::RestartsUsedUp.reason();
+                let reason = GmresTermination::RestartsUsedUp.reason();
                 format!("in {steps} steps {reason}; ")
             }
         };
@@ -116,7 +116,7 @@ impl Default for Convergence {
     /// Before the first step.
     fn default() -> Self {
         Convergence {
-            exit: NewtonExit::StepsUsedUp,
+            exit: NewtonTermination::StepsUsedUp,
             iterations: 0,
             products: 0,
             residual: f64::INFINITY,

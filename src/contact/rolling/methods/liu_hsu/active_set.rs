@@ -2,7 +2,9 @@
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::methods::liu_hsu::newton_raphson;
-use crate::contact::rolling::methods::liu_hsu::newton_raphson::{NewtonRaphsonExit, StepRule};
+use crate::contact::rolling::methods::liu_hsu::newton_raphson::{
+    NewtonRaphsonTermination, StepRule,
+};
 use crate::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
 };
@@ -18,7 +20,7 @@ const START_MARGIN: f64 = 1e-6;
 
 /// How the outer iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ZonesExit {
+pub enum ZonesTermination {
     /// The division into zones agrees with the tractions and slips that follow from it.
     Converged,
     /// Newton–Raphson found no tractions for a division.
@@ -31,22 +33,22 @@ pub enum ZonesExit {
     Inexact,
 }
 
-impl ZonesExit {
+impl ZonesTermination {
     /// Did the residual reach the tolerance?
     #[must_use]
     pub fn converged(self) -> bool {
-        self == ZonesExit::Converged
+        self == ZonesTermination::Converged
     }
 
     /// A clause for messages.
     #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
-            ZonesExit::Converged => "converged",
-            ZonesExit::NewtonDiverged => "Newton-Raphson diverged",
-            ZonesExit::ZonesRepeat => "the division into stick and slip repeats itself",
-            ZonesExit::IterationLimit => "too many divisions into stick and slip",
-            ZonesExit::Inexact => "the residual stays above the tolerance",
+            ZonesTermination::Converged => "converged",
+            ZonesTermination::NewtonDiverged => "Newton-Raphson diverged",
+            ZonesTermination::ZonesRepeat => "the division into stick and slip repeats itself",
+            ZonesTermination::IterationLimit => "too many divisions into stick and slip",
+            ZonesTermination::Inexact => "the residual stays above the tolerance",
         }
     }
 }
@@ -59,7 +61,7 @@ pub struct ZonesRun {
     /// The initial guess used.
     pub guess: InitialGuess,
     /// How it ended.
-    pub exit: ZonesExit,
+    pub exit: ZonesTermination,
     /// Divisions into stick and slip that were solved.
     pub outer_iterations: u32,
     /// Newton–Raphson steps over all divisions.
@@ -91,7 +93,7 @@ pub fn run(
     let mut attempt = ZonesRun {
         rule: task.rule,
         guess,
-        exit: ZonesExit::IterationLimit,
+        exit: ZonesTermination::IterationLimit,
         outer_iterations: 0,
         newton_iterations: 0,
     };
@@ -103,12 +105,12 @@ pub fn run(
         // Stick tractions are eliminated, and which these are depends on the division: each has a system of its own.
         let system = SlipSystem::new(task, &division.slips, monitor)?;
         if !solve_division(task, &system, &mut attempt, &mut division, monitor)? {
-            attempt.exit = ZonesExit::NewtonDiverged;
+            attempt.exit = ZonesTermination::NewtonDiverged;
             break;
         }
         let load_mismatch = load_mismatch(task, &system, &division.tractions);
         if load_mismatch.is_empty() {
-            attempt.exit = ZonesExit::Converged;
+            attempt.exit = ZonesTermination::Converged;
             break;
         }
         let mut next = division.slips.clone();
@@ -117,7 +119,7 @@ pub fn run(
         }
         // A division that comes back means that the iteration cycles.
         if seen.contains(&next) {
-            attempt.exit = ZonesExit::ZonesRepeat;
+            attempt.exit = ZonesTermination::ZonesRepeat;
             break;
         }
         division.slips = next;
@@ -189,7 +191,7 @@ impl RootChoice<'_> {
     fn find(&mut self, mut t: Vec<f64>, steps: StepRule) -> Result<Option<Vec<f64>>, Stop> {
         let end = newton_raphson::solve(self.system, &self.bound, steps, &mut t, self.monitor)?;
         self.iterations += end.iterations;
-        Ok((end.exit == NewtonRaphsonExit::Converged).then_some(t))
+        Ok((end.exit == NewtonRaphsonTermination::Converged).then_some(t))
     }
 
     /// A root with as few tractions as possible that oppose their slip. Eq. 9 has a root for every choice of such

@@ -26,7 +26,7 @@ pub enum StepRule {
 
 /// How an iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NewtonRaphsonExit {
+pub enum NewtonRaphsonTermination {
     /// The last step was small.
     Converged,
     /// A step was not finite.
@@ -39,7 +39,7 @@ pub enum NewtonRaphsonExit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NewtonEnd {
     /// How it ended.
-    pub exit: NewtonRaphsonExit,
+    pub exit: NewtonRaphsonTermination,
     /// Steps taken.
     pub iterations: u32,
 }
@@ -59,11 +59,11 @@ pub fn solve(
     monitor: &dyn Monitor,
 ) -> Result<NewtonEnd, Stop> {
     let mut end = NewtonEnd {
-        exit: NewtonRaphsonExit::StepsUsedUp,
+        exit: NewtonRaphsonTermination::StepsUsedUp,
         iterations: 0,
     };
     if bound.is_empty() {
-        end.exit = NewtonRaphsonExit::Converged;
+        end.exit = NewtonRaphsonTermination::Converged;
         return Ok(end);
     }
     while end.iterations < ITERATIONS_MAX {
@@ -79,7 +79,7 @@ pub fn solve(
                     |a: f64, b| if b.is_nan() { f64::NAN } else { a.max(b) },
                 );
         if !largest.is_finite() {
-            end.exit = NewtonRaphsonExit::Diverged;
+            end.exit = NewtonRaphsonTermination::Diverged;
             break;
         }
         match steps {
@@ -91,7 +91,7 @@ pub fn solve(
             StepRule::OnCircles => search_on_circles(system, bound, &step, t),
         }
         if largest <= STEP_SMALL {
-            end.exit = NewtonRaphsonExit::Converged;
+            end.exit = NewtonRaphsonTermination::Converged;
             break;
         }
     }

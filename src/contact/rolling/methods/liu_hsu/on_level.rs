@@ -2,7 +2,7 @@
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::answer::{
-    LevelAnswer, LevelExit, LevelFailure, Work, project_on_bound,
+    LevelAnswer, LevelFailure, LevelOutcome, Work, project_on_bound,
 };
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
@@ -71,7 +71,7 @@ pub fn solve(
         second: None,
         slip,
         slips: outcome.slips,
-        exit: LevelExit::Solved,
+        exit: LevelOutcome::Solved,
         work,
         skips: Vec::new(),
         remarks: Vec::new(),

@@ -7,7 +7,7 @@ use crate::contact::rolling::methods::boundary_element::task::Convergence;
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::methods::liu_hsu::active_set;
 use crate::contact::rolling::methods::liu_hsu::active_set::InitialGuess;
-use crate::contact::rolling::methods::liu_hsu::active_set::{ZonesExit, ZonesRun, Zoning};
+use crate::contact::rolling::methods::liu_hsu::active_set::{ZonesRun, ZonesTermination, Zoning};
 use crate::contact::rolling::methods::liu_hsu::stick_block::DenseProblem;
 use crate::contact::rolling::methods::liu_hsu::stick_block::DenseTask;
 use crate::contact::rolling::slip_rules::Rule;
@@ -34,7 +34,7 @@ impl ZonesOutcome {
 
     /// How the solve ended.
     #[must_use]
-    pub fn exit(&self) -> ZonesExit {
+    pub fn exit(&self) -> ZonesTermination {
         self.last().exit
     }
 
@@ -188,7 +188,7 @@ impl<'a> ZonesSearch<'a> {
         let residual = self.residual(&division.tractions);
         let exact = residual <= self.stage.law.tolerance;
         if attempt.exit.converged() && !exact {
-            attempt.exit = ZonesExit::Inexact;
+            attempt.exit = ZonesTermination::Inexact;
         }
         self.attempts.push(attempt);
         let converged = attempt.exit.converged();
