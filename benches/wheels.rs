@@ -1,4 +1,4 @@
-//! Wheels on rails by their profiles: what a solve, the rest of the wheel and the check of the case take, and what rows of one pair take.
+//! Wheels on rails by their profiles: what a solve and the check of the case take, and what rows of one pair take.
 //!
 //! `cargo bench --bench wheels` prints times in LU (the report's unit), best of several; `-- rows 1000` the means of so many rows that differ in
 //! shift, yaw and load, solved one after the other as a run solves them, at a target of 0.02 and without fields.
@@ -19,11 +19,7 @@ use std::sync::Arc;
 
 use railhead::contact::case::known_pair::KnownPair;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::half_space::grid_operator::GridWorkspace;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal::normal_task::NormalTask;
-use railhead::contact::normal::wheel_height::search::HeightStart;
-use railhead::contact::normal::wheel_height::task::{Accuracy, NormalPass};
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::{check, check_with, solve, solve_with};
 use serde_json::{Value, json};
@@ -78,7 +74,7 @@ fn checked(case: &Value) -> CheckedCase {
 fn cases() {
     let lu = lu_seconds();
     println!("1 LU = {:.3} ms", 1e3 * lu);
-    println!("| case | whole | rest | check | heights |\n|---|---|---|---|---|");
+    println!("| case | whole | check |\n|---|---|---|");
     let of_shift = |shift: f64| {
         let mut case = example("wheel-rail.case.json");
         case["contact"]["lateral_shift_mm"] = json!(shift);
@@ -93,31 +89,11 @@ fn cases() {
             times.fold(f64::INFINITY, f64::min) / lu
         };
         println!(
-            "| {name} | {:.2} | {:.2} | {:.2} | {} |",
+            "| {name} | {:.2} | {:.2} |",
             best(&|| drop(black_box(solve(&problem, &Unmonitored)))),
-            best(&|| {
-                black_box(rest(&problem));
-            }),
             best(&|| drop(black_box(checked(&case)))),
-            rest(&problem),
         );
     }
-}
-
-/// Brings the wheel of a problem to rest; returns the heights looked at.
-fn rest(problem: &CheckedCase) -> u32 {
-    let NormalTask::Wheel(contact) = &problem.problem.task else {
-        unreachable!("the examples give profiles")
-    };
-    let wanted = NormalPass {
-        friction_share: 0.0,
-        accuracy: Accuracy::For(problem.run.target()),
-    };
-    let mut search = contact.search().expect("a wheel over a rail");
-    let workspace = &mut GridWorkspace::default();
-    let start = HeightStart::default();
-    let found = contact.find_height(&mut search, wanted, start, workspace, &Unmonitored);
-    found.expect("a rest").heights
 }
 
 fn rows(count: usize) {

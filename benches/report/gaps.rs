@@ -4,11 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::hint::black_box;
 
-use railhead::contact::half_space::grid_operator::GridWorkspace;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal::normal_task::NormalTask;
-use railhead::contact::normal::wheel_height::search::HeightStart;
-use railhead::contact::normal::wheel_height::task::{Accuracy, NormalPass};
 use railhead::contact::normal_stage;
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::solution::words::answer::Solution;
@@ -197,9 +193,8 @@ const SHIFTS: [f64; 7] = [3.0, 1.0, 0.0, -1.0, -2.0, -4.0, -5.5];
 /// Wheel on rail by profiles. There are no converged results in the repository; the errors are the solver's estimates.
 fn wheels() -> String {
     let mut text = "### Wheel on rail by profiles\n\nS1002 on 60E1 as in `api/examples/wheel-rail.case.json`, by lateral shift of the wheelset, and the \
-                    flange contact of `wheel-rail-flange.case.json`; 75 kN vertical, target 0.005. *Rest*: the wheel brought to rest once under a given \
-                    normal share; the whole solve does this once roughly and once or twice exactly, because friction carries a part of the load.\n\n\
-                    | case | patches | LU | rest, LU | heights | tangential estimate |\n|---|---|---|---|---|---|\n"
+                    flange contact of `wheel-rail-flange.case.json`; 75 kN vertical, target 0.005.\n\n\
+                    | case | patches | LU | tangential estimate |\n|---|---|---|---|\n"
         .to_owned();
     let example = |name: &str| -> Value {
         let path = format!(
@@ -224,7 +219,6 @@ fn wheels() -> String {
         let checked = problem(&case);
         let (solution, seconds) = timed(&checked, REPEATS);
         let solution = solution.expect("an answer");
-        let (rest, heights) = at_rest(&checked);
         let estimate = solution.patches.iter().map(|patch| {
             let estimate = patch.points[0].error_estimate.unwrap_or_default();
             estimate.force_x_n.max(estimate.force_y_n)
@@ -232,39 +226,11 @@ fn wheels() -> String {
         });
         let _ = writeln!(
             text,
-            "| {name} | {} | {:.2} | {:.2} | {heights} | {:.4} |",
+            "| {name} | {} | {:.2} | {:.4} |",
             solution.patches.len(),
             seconds / lu,
-            rest / lu,
             estimate.fold(0.0, f64::max),
         );
     }
     text + "\n"
-}
-
-/// Seconds to bring the wheel of a problem to rest, and the heights looked at.
-fn at_rest(checked: &CheckedCase) -> (f64, u32) {
-    let NormalTask::Wheel(contact) = &checked.problem.task else {
-        unreachable!("the examples give profiles")
-    };
-    let wanted = NormalPass {
-        friction_share: 0.0,
-        accuracy: Accuracy::For(0.005),
-    };
-    let rest = || {
-        let mut search = contact.search().expect("a wheel over a rail");
-        contact
-            .find_height(
-                &mut search,
-                wanted,
-                HeightStart::default(),
-                &mut GridWorkspace::default(),
-                &Unmonitored,
-            )
-            .expect("a rest")
-            .heights
-    };
-    let heights = rest();
-    let seconds = (0..REPEATS).map(|_| seconds_of(rest).0).collect();
-    (median(seconds), heights)
 }

@@ -9,8 +9,7 @@
 //! | motions, from coarse to fine levels | footprint, [`friction`] | [`MotionAnswer`](rolling::motion_answer::MotionAnswer) | [`rolling_stage`], [`rolling`], [`mesh`], [`half_space`] |
 //! | answer | answers of motions | [`Solution`], [`Fields`] | [`post`], [`solution`] |
 //!
-//! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`] (in `unlike_motions`), [`wheel_on_rail`] (in [`profile_assessment`]), on the curve of the rail in
-//! `wheel_on_curve`, [`wheelset`].
+//! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`] (in `unlike_motions`), [`wheel_on_rail`] (in [`profile_assessment`]), [`wheelset`].
 //! Frame, signs, units and words: [`conventions`].
 //!
 //! # The way of a motion
@@ -20,7 +19,7 @@
 //!    From here on there is only the [`CheckedCase`].
 //! 3. **Cut**: [`slices()`] divides a long sweep; [`solve_slice`] starts the clock of the recipe for each slice.
 //! 4. **Find region and pressure**: [`normal_stage::solve`]. A gap is solved by [`normal::gap::solve`], a wheel is brought to rest on its
-//!    rail by [`normal::wheel_height::search`], and each of its patches becomes a problem of its own in [`wheel_on_rail`].
+//!    rail by [`normal::on_curve`].
 //! 5. **Take one motion after the other**: [`rolling_stage`]. [`rolling::force_control`] finds the creepages of a prescribed force; for
 //!    given creepages it passes the motion on. A history goes to [`rolling::history::solve`] instead.
 //! 6. **Refine**: [`rolling::refinement::adapt`] solves the motion on the meshes of its [family](rolling::refinement::mesh_family), coarse to
@@ -36,7 +35,6 @@ pub mod error;
 pub mod evaluate;
 pub mod evolution;
 pub mod facade;
-pub mod forecast;
 pub mod friction;
 pub mod geometry;
 pub mod half_space;
@@ -57,11 +55,11 @@ pub mod slices;
 pub mod solution;
 pub(crate) mod surface_fallback;
 pub mod time_limit;
+pub(crate) mod traction_estimate;
 pub mod unlike_bodies;
 pub(crate) mod unlike_motions;
 pub(crate) mod vertical_equilibrium;
 pub(crate) mod wheel_force_control;
-pub(crate) mod wheel_on_curve;
 pub mod wheel_on_rail;
 pub mod wheelset;
 

@@ -14,7 +14,7 @@ use crate::contact::error::SolveError;
 use crate::contact::geometry::wheel_rail::Placement;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::monitor::{Monitor, MonitorPart};
-use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::normal::wheel::task::WheelTask;
 use crate::contact::numerics::bracketed_root::{FRACTION_MAX, RootExit, find_root};
 use crate::contact::numerics::pair_root::{PairRoot, find_pair};
 use crate::contact::problem::checked_case::CheckedCase;

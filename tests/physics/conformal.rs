@@ -645,23 +645,20 @@ fn a_history_at_a_gauge_corner_has_the_steady_forces_of_the_curve() {
         from_steady["history"][name] = json!(0.0);
     }
     from_steady["start"] = json!("steady");
-    let with = |surface: &str, influence: Option<&str>, motion: &Value| {
-        let mut case = usual(surface, -6.2, 0.003);
+    let with = |influence: &str, motion: &Value| {
+        let mut case = usual("curve", -6.2, 0.003);
         case["load"] = json!({ "normal_force_n": 75e3 });
         case["motion"] = motion.clone();
-        if let Some(influence) = influence {
-            case["contact"]["influence"] = json!(influence);
-        }
+        case["contact"]["influence"] = json!(influence);
         solve(&case)
     };
-    let plane = forces_of(&with("plane", None, &steadily))[0];
-    for (influence, axis) in [("half_space", 1), ("angle_corrected", 0)] {
-        let known = with("curve", Some(influence), &steadily);
+    for influence in ["half_space", "angle_corrected"] {
+        let known = with(influence, &steadily);
         let steady = forces_of(&known)[0];
         let limit = limit(&known);
         let off = |from: &[f64; 3], k: usize| (from[k] - steady[k]).abs() / limit;
-        let ended = with("curve", Some(influence), &history([x, y, spin]));
-        let begun = with("curve", Some(influence), &from_steady);
+        let ended = with(influence, &history([x, y, spin]));
+        let begun = with(influence, &from_steady);
         for (solution, first) in [(ended, 5), (begun, 0)] {
             let forces = forces_of(&solution);
             for (forces, total) in forces.iter().zip(&solution.total).skip(first) {
@@ -675,11 +672,6 @@ fn a_history_at_a_gauge_corner_has_the_steady_forces_of_the_curve() {
                         "{influence} {k}: {forces:?} {steady:?}"
                     );
                 }
-                assert!(off(&plane, axis) > 0.03, "{plane:?} {steady:?}");
-                assert!(
-                    off(forces, axis) < 0.2 * off(&plane, axis),
-                    "{forces:?} {steady:?}"
-                );
             }
         }
     }

@@ -71,7 +71,6 @@ mod profile_faults;
 mod profile_forces;
 mod profile_formats;
 mod profile_geometry;
-mod profile_heights;
 mod profile_histories;
 mod profile_laws;
 mod profile_manchester;

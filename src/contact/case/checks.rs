@@ -20,7 +20,7 @@ use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::method::Method;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
-use crate::contact::normal::wheel_height::task::ReferenceSurface;
+use crate::contact::normal::wheel::task::ReferenceSurface;
 use crate::contact::problem::memory::{SizeInput, length_over_width, segments, spinning};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;

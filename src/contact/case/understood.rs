@@ -5,7 +5,7 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::normal::patch::Patch;
-use crate::contact::normal::wheel_height::task::{WheelLoad, WheelTask};
+use crate::contact::normal::wheel::task::{WheelLoad, WheelTask};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;

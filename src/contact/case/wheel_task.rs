@@ -18,10 +18,8 @@ use crate::contact::geometry::profile::{Body, Profile, Reading};
 use crate::contact::geometry::wheel_rail::{NotPlaced, Placement, RailPlace, WheelRail};
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel_height::task::{
-    ProfileTrust, ReferenceSurface, WheelLoad, WheelTask,
-};
-use crate::contact::normal::wheel_height::wheelset_task::WheelsetMove;
+use crate::contact::normal::wheel::task::{ProfileTrust, ReferenceSurface, WheelLoad, WheelTask};
+use crate::contact::normal::wheel::wheelset_task::WheelsetMove;
 use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;

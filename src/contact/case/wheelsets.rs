@@ -15,12 +15,8 @@ use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel_height::task::{
-    ProfileTrust, ReferenceSurface, WheelLoad, WheelTask,
-};
-use crate::contact::normal::wheel_height::wheelset_task::{
-    KinematicsTask, WheelsetMove, WheelsetTask,
-};
+use crate::contact::normal::wheel::task::{ProfileTrust, ReferenceSurface, WheelLoad, WheelTask};
+use crate::contact::normal::wheel::wheelset_task::{KinematicsTask, WheelsetMove, WheelsetTask};
 use crate::contact::problem::profile_points;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 

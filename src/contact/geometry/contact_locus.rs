@@ -1,44 +1,22 @@
-//! Finds where a wheel touches its rail, and the gap of every patch in the patch's own frame.
+//! Finds where a wheel touches its rail first, and about how far it is lowered under a load.
 //!
 //! The rail is straight along x, so that the wheel meets it where its normal has no part along x: the wheel is
-//! replaced by the curve of those points, and the search is one in the plane across. Patches are the intervals in which the
-//! undeformed bodies overlap (see `overlaps.rs`); the frame of a patch lies at the mean of its overlap, weighted with its square over the
-//! area (power 5/2 on a line), with the mean inclination of the rail. In that frame the gap is taken along the normal, exactly: the
-//! wheel as surface of revolution, the rail as cylinder.
+//! replaced by the curve of those points, and the search is one in the plane across.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use crate::contact::geometry::envelope::Envelope;
 use crate::contact::geometry::envelope::envelope;
-use crate::contact::geometry::frame::Frame;
-use crate::contact::geometry::grouping::{Grouping, Overlap, SHARED_GAP_DISTANCE};
-use crate::contact::geometry::local_gap::{GapSampling, LocalGap};
-use crate::contact::geometry::locus_lines::{Inclination, LocusLines, LocusPoint, RailEdge};
+use crate::contact::geometry::locus_lines::{LocusLines, LocusPoint};
 use crate::contact::geometry::wheel_rail::{WheelCircle, WheelRail};
-use crate::contact::lazy_field::LazyField;
 
-/// Spacing of the search across the track, in mm. It decides where frames and windows lie, not what the gap is in them: with 0.02 mm forces differ by
-/// 0.00003 of μN in the median and 0.0012 at most at a target of 0.002, on 200 of the rows of `cargo bench --bench wheels -- rows`, as with any other
-/// shift of the grids.
+/// Spacing of the search across the track, in mm. The height of first touch is as exact as the rail is straight over half of it.
 pub(crate) const STEP: f64 = 0.04;
 /// Spacing of the points along the curves, in mm.
 const CURVE_STEP: f64 = 0.08;
 /// Points of the wheel that are left out together where they lie beside the rail. It changes times, no answer.
 const LEFT_OUT: usize = 16;
-/// Lines from either end of an overlap that the window of its gap is found from: its margins are larger than what lies between two. All lines
-/// change forces of the same rows at a target of 0.02 by 0.000006 of μN in the median and 0.002 at most.
-const WINDOW_LINES: usize = 20;
-/// The window of a gap is larger than the overlap by this fraction on either side.
-const MARGIN: f64 = 0.15;
-/// Length in mm by which it is larger on either side as well.
-const MARGIN_MM: f64 = 0.1;
-/// A window that is too short along x is made longer by this factor.
-const WIDENING: f64 = 1.5;
-/// Number of times a window is made longer at most.
-const WIDENINGS_MAX: usize = 5;
-/// Slope with which surfaces are bent apart beyond a cut: steep enough that they do not touch there. Chosen by judgement; how
-/// much it matters was not measured.
-const SLOPE_BEYOND_CUT: f64 = 0.5;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
 /// Lowering in mm under a light load, where the estimate for others begins.
@@ -53,12 +31,7 @@ const ESTIMATED: f64 = 2e-3;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactLocus<'g> {
     pub(crate) geometry: &'g WheelRail,
-    pub(crate) rail: &'g RailEdge,
     pub(crate) lines: &'g [LocusPoint],
-    /// Which lines share a gap, if that is decided for all heights.
-    pub(crate) grouping: Option<Grouping>,
-    /// A force over the contact modulus in mm², and the lowering in mm that was estimated for it before.
-    pub(crate) estimated: Option<[f64; 2]>,
     /// Height of the wheel's centre in mm at which the bodies just touch.
     pub touch: f64,
 }
@@ -76,20 +49,16 @@ pub(crate) fn rail_points(
 }
 
 /// The rail's upper edge.
-fn edge_of(geometry: &WheelRail) -> &RailEdge {
+fn edge_of(geometry: &WheelRail) -> &Envelope {
     geometry.rail_edge.get_or_make(|| {
         let [rail, _] = geometry.parameters(CURVE_STEP);
-        let edge = envelope(&rail_points(geometry, rail), STEP);
-        RailEdge {
-            inclinations: vec![LazyField::default(); edge.points.len()],
-            edge,
-        }
+        envelope(&rail_points(geometry, rail), STEP)
     })
 }
 
 /// Places the wheel above the rail and finds the height of first touch.
 fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
-    let rail = &edge_of(geometry).edge;
+    let rail = edge_of(geometry);
     let circles = geometry.circles.get_or_make(|| {
         let [_, wheel] = geometry.parameters(CURVE_STEP);
         wheel.into_iter().map(|s| geometry.circle(s)).collect()
@@ -104,9 +73,8 @@ fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
     let last = (rail.first + rail.points.len() as i64).min(wheel.first + wheel.points.len() as i64);
     let mut lines = Vec::with_capacity(usize::try_from(last - first).unwrap_or(0));
     for k in first..last {
-        let of_rail = (k - rail.first) as usize;
         let (below, above) = (
-            rail.points[of_rail],
+            rail.points[(k - rail.first) as usize],
             wheel.points[(k - wheel.first) as usize],
         );
         if let (Some([z, rail]), Some([depth, wheel])) = (below, above) {
@@ -115,7 +83,6 @@ fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
                 clearance: -depth - z,
                 rail,
                 wheel,
-                of_rail,
             });
         }
     }
@@ -168,15 +135,6 @@ fn wheel_points(
     points
 }
 
-/// The inclination of the rail's surface at a parameter of its curve.
-fn inclination(geometry: &WheelRail, rail: f64) -> Inclination {
-    let [y, z] = geometry.rail_at(rail).slope;
-    Inclination {
-        angle: (z / y).atan(),
-        cos: y.abs() / (y * y + z * z).sqrt(),
-    }
-}
-
 impl<'g> ContactLocus<'g> {
     /// Places the wheel above the rail and finds the height of first touch; the second time for the same geometry they are known.
     ///
@@ -187,10 +145,7 @@ impl<'g> ContactLocus<'g> {
         let found = found.as_ref().as_ref().map_err(String::clone)?;
         Ok(ContactLocus {
             geometry,
-            rail: edge_of(geometry),
             lines: &found.lines,
-            grouping: None,
-            estimated: None,
             touch: found.touch,
         })
     }
@@ -203,28 +158,6 @@ impl<'g> ContactLocus<'g> {
         first.map_or([0.0; 2], |line| [line.rail, line.wheel])
     }
 
-    /// The frames of the patches when the wheel is lowered by `lowering` mm below first touch, from smaller to larger y.
-    ///
-    /// # Errors
-    /// A sentence, if an overlap reaches the end of a profile.
-    pub fn frames(&self, lowering: f64) -> Result<Vec<Frame>, String> {
-        self.overlaps(lowering)?
-            .into_iter()
-            .map(|overlap| Ok(self.frame_of(overlap, lowering)))
-            .collect()
-    }
-
-    /// The gaps of the patches at the same height, each in its own frame.
-    ///
-    /// # Errors
-    /// A sentence, if an overlap reaches the end of a profile.
-    pub fn gaps(&self, lowering: f64, detail: GapSampling) -> Result<Vec<LocalGap>, String> {
-        self.overlaps(lowering)?
-            .into_iter()
-            .map(|overlap| self.gap(overlap, lowering, detail))
-            .collect()
-    }
-
     /// About how far below first touch the wheel comes to rest under a vertical force, given in mm² as the force divided by
     /// the contact modulus.
     ///
@@ -232,9 +165,6 @@ impl<'g> ContactLocus<'g> {
     /// horizontal: `N = 4/3 E* √(A/π) δ`, exact for paraboloids. Near ones act on each other.
     #[must_use]
     pub fn estimated_lowering(&self, force: f64) -> f64 {
-        if let Some([_, known]) = self.estimated.filter(|[of, _]| *of == force) {
-            return known;
-        }
         let below = |lowering: f64| -> Vec<LocusPoint> {
             let inside = |line: &&LocusPoint| line.clearance < 0.5 * lowering;
             self.lines.iter().filter(inside).copied().collect()
@@ -283,114 +213,6 @@ impl<'g> ContactLocus<'g> {
     fn rolling_radius(&self) -> f64 {
         self.geometry.placement.rolling_radius
     }
-
-    pub(crate) fn frame(&self, lines: &[LocusPoint], lowering: f64) -> Frame {
-        let (mut weight, mut y, mut angle) = (0.0, 0.0, 0.0);
-        for line in lines {
-            let depth = (lowering - line.clearance).max(0.0);
-            let own = depth * depth * depth.sqrt();
-            weight += own;
-            y += own * line.y;
-            if own > 0.0 {
-                angle += own * self.inclination(line).angle;
-            }
-        }
-        let y = y / weight;
-        let k = lines
-            .partition_point(|line| line.y < y)
-            .clamp(1, lines.len() - 1);
-        let t = ((y - lines[k - 1].y) / (lines[k].y - lines[k - 1].y)).clamp(0.0, 1.0);
-        let between =
-            |of: fn(&LocusPoint) -> f64| of(&lines[k - 1]) * (1.0 - t) + of(&lines[k]) * t;
-        let (rail, wheel) = (between(|line| line.rail), between(|line| line.wheel));
-        let [y, z] = self.geometry.rail_at(rail).at;
-        let x = self.geometry.lowest(wheel).map_or(0.0, |point| point[0]);
-        Frame {
-            origin: [x, y, z],
-            angle: angle / weight,
-            rail,
-            wheel,
-        }
-    }
-
-    /// The inclination of the rail's surface on a line.
-    pub(crate) fn inclination(&self, line: &LocusPoint) -> Inclination {
-        *self.rail.inclinations[line.of_rail].get_or_make(|| inclination(self.geometry, line.rail))
-    }
-
-    fn gap(
-        &self,
-        overlap: Overlap,
-        lowering: f64,
-        detail: GapSampling,
-    ) -> Result<LocalGap, String> {
-        let lines = self.around(overlap.ends);
-        let frame = self.frame_of(overlap, lowering);
-        let plane = frame.plane();
-        let v_of = |line: &LocusPoint| plane.across(self.geometry.rail_at(line.rail).at)[0];
-        let mut across = [f64::INFINITY, f64::NEG_INFINITY];
-        let mut along = [0.0_f64; 2];
-        // From both ends, so that a mirror image has the mirrored window.
-        let every = lines.len().div_ceil(WINDOW_LINES);
-        let from_ends = lines.iter().step_by(every);
-        for line in from_ends.chain(lines.iter().rev().step_by(every)) {
-            let v = v_of(line);
-            across = [across[0].min(v), across[1].max(v)];
-            let overlap = (lowering - line.clearance).max(0.0);
-            let half = (2.0 * self.geometry.meridian(line.wheel).radius * overlap).sqrt();
-            let middle = self
-                .geometry
-                .lowest(line.wheel)
-                .map_or(0.0, |point| point[0] - frame.origin[0]);
-            along = [along[0].min(middle - half), along[1].max(middle + half)];
-        }
-        let limits = self
-            .limits(overlap, lowering)
-            .map(|line| line.map(|line| v_of(&line)));
-        let widen = |[low, high]: [f64; 2]| {
-            let margin = MARGIN * (high - low) + MARGIN_MM;
-            [low - margin, high + margin]
-        };
-        let sampled = |along: [f64; 2], across: [f64; 2]| {
-            let window = [widen(along), widen(across)];
-            let centre = self.touch - lowering;
-            let gap = LocalGap::new(self.geometry, frame, centre, window, detail)?;
-            Ok::<_, String>(apart(gap, limits))
-        };
-        let mut gap = sampled(along, across)?;
-        // With yaw a hollow flange root follows the rail farther than a circle would, and seen along the normal an overlap may
-        // be wider than along the vertical.
-        for _ in 0..WIDENINGS_MAX {
-            let overlaps = gap.overlaps_at_ends();
-            if overlaps == [false; 2] {
-                break;
-            }
-            if overlaps[0] {
-                along = along.map(|end| WIDENING * end);
-            }
-            if overlaps[1] {
-                let grown = 0.5 * (WIDENING - 1.0) * (across[1] - across[0]);
-                across = [across[0] - grown, across[1] + grown];
-            }
-            gap = sampled(along, across)?;
-        }
-        Ok(gap)
-    }
-}
-
-/// The gap with its surfaces bent apart beyond the limits toward other gaps, `[lower, upper]` across in mm: what touches there
-/// belongs to those, in frames of their own.
-fn apart(mut gap: LocalGap, limits: [Option<f64>; 2]) -> LocalGap {
-    let [lower, upper] = limits;
-    gap.limits = limits;
-    for (v, row) in gap.y.iter().zip(&mut gap.gap) {
-        let below = lower.map_or(0.0, |end| end - v);
-        let above = upper.map_or(0.0, |end| v - end);
-        let beyond = below.max(above).max(0.0);
-        row.iter_mut()
-            .for_each(|height| *height += SLOPE_BEYOND_CUT * beyond);
-    }
-    gap
 }
 
 /// Force over the contact modulus, in mm², that lines `step` mm apart, in the order of y, carry at a lowering of a wheel of this radius, both in
@@ -407,7 +229,7 @@ pub(crate) fn estimated_force(lines: &[LocusPoint], step: f64, radius: f64, lowe
         let area: f64 = run.iter().map(|line| length(line) * step).sum();
         let clearances = run.iter().map(|line| line.clearance);
         EstimatedPatch {
-            ends: [run[0].y, run[run.len() - 1].y],
+            middle: 0.5 * (run[0].y + run[run.len() - 1].y),
             depth: lowering - clearances.fold(f64::INFINITY, f64::min),
             force: 4.0 / 3.0 * (area / PI).sqrt() * lowering,
         }
@@ -421,30 +243,15 @@ pub(crate) fn estimated_force(lines: &[LocusPoint], step: f64, radius: f64, lowe
 
 /// A patch as [`estimated_force`] finds it.
 struct EstimatedPatch {
-    /// Its ends across, in mm.
-    ends: [f64; 2],
+    /// Its middle across, in mm.
+    middle: f64,
     /// Deepest overlap in mm.
     depth: f64,
     /// What it would carry alone, over the contact modulus, in mm².
     force: f64,
 }
 
-impl EstimatedPatch {
-    /// The distance of the middles in mm of two patches so near to each other that they share a gap.
-    fn near(&self, other: &EstimatedPatch) -> Option<f64> {
-        /// At twice the depth a paraboloid's overlap is wider by this part of its width on either side: `(√2 − 1)/2`.
-        const NARROWER: f64 = 0.207;
-        let [own, others] = [self, other].map(|patch| {
-            let [low, high] = patch.ends;
-            [0.5 * (low + high), 0.5 * (high - low)]
-        });
-        let apart = (own[0] - others[0]).abs();
-        let beside = apart - (1.0 + 2.0 * NARROWER) * (own[1] + others[1]);
-        (apart > 0.0 && beside < SHARED_GAP_DISTANCE).then_some(apart)
-    }
-}
-
-/// Force over the contact modulus of all patches. Patches that share a gap press each other out of contact: one that carries the force F lets the
+/// Force over the contact modulus of all patches. Patches press each other out of contact: one that carries the force F lets the
 /// surface at the distance r sink by `F / (π E* r)` (Boussinesq 1885), and forces grow as the power 3/2 of the depth.
 fn coupled_force(patches: &[EstimatedPatch]) -> f64 {
     /// Rounds in which forces and what they let sink are found from each other; two leave less than 2 % (see the test). They decide
@@ -455,8 +262,8 @@ fn coupled_force(patches: &[EstimatedPatch]) -> f64 {
     for _ in 0..rounds {
         for (k, patch) in patches.iter().enumerate() {
             let sunk = |(other, force): (&EstimatedPatch, &f64)| {
-                let apart = patch.near(other)?;
-                Some(force / (PI * apart))
+                let apart = (patch.middle - other.middle).abs();
+                (apart > 0.0).then(|| force / (PI * apart))
             };
             let sunk: f64 = patches.iter().zip(&forces).filter_map(sunk).sum();
             let left = (1.0 - sunk / patch.depth).max(0.0);
@@ -481,7 +288,6 @@ mod tests {
                 clearance: heights.fold(f64::INFINITY, f64::min),
                 rail: y,
                 wheel: y,
-                of_rail: 0,
             }
         };
         let lines: Vec<LocusPoint> = (-4000..=4000).map(line).collect();
@@ -495,17 +301,15 @@ mod tests {
     }
 
     #[test]
-    fn patches_that_share_a_gap_carry_less_than_each_alone_and_others_as_much() {
+    fn two_patches_carry_less_than_each_alone_the_nearer_they_are() {
         let alone = carried(&[0.0]);
-        assert!((carried(&[-20.0, 20.0]) / alone - 2.0).abs() < 1e-9);
-        let near = carried(&[-6.0, 6.0]);
-        // Each sinks by what the other one carries: w = N / (π r), N = N₀ (1 − w/δ)^(3/2).
-        let half = 0.5 * near;
-        let left = 1.0 - half / (PI * 12.0 * 0.05);
-        assert!(
-            (half / (alone * left.powf(1.5)) - 1.0).abs() < 0.02,
-            "{near} {alone}"
-        );
-        assert!(near < 1.9 * alone);
+        for apart in [12.0, 40.0] {
+            let both = carried(&[-0.5 * apart, 0.5 * apart]);
+            // Each sinks by what the other one carries: w = N / (π r), N = N₀ (1 − w/δ)^(3/2).
+            let half = 0.5 * both;
+            let left = 1.0 - half / (PI * apart * 0.05);
+            let expected = alone * left.powf(1.5);
+            assert!((half / expected - 1.0).abs() < 0.02, "{both} {alone}");
+        }
     }
 }

@@ -3,11 +3,16 @@
 //! In track axes the curve has the place `(y, z)`, the tangent `(cos α, sin α)` and the normal out of the rail `(−sin α, cos α)` at the arc length
 //! s, which grows to the left. The gap is measured from the rail along that normal to the wheel, a surface of revolution about its axle; both are
 //! undeformed. Contact solved on this curve needs no plane of contact: x and s are the coordinates of the surface, unfolded.
+//!
+//! Planes of contact are a special case. Each replaces a part of the curve: there s is the distance along the plane from its origin, the angle is that of
+//! the plane, and the gap is measured along its normal.
 
+use std::borrow::Cow;
 use std::cell::Cell;
 use std::ops::Range;
 
 pub use crate::contact::geometry::curve_place::CurvePlace;
+use crate::contact::geometry::plane_curve::CurvePoint;
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::numerics::quadrature::{GaussPoints, integral};
@@ -41,13 +46,41 @@ const NEIGHBOURS: usize = 8;
 const STEPS_MAX: usize = 25;
 const STEP_LAST: f64 = 1e-10;
 const STEP_LONGEST: f64 = 1.0;
+/// A plane of contact ends where the tangent of the rail has a smaller part along it than this.
+const ALONG_PLANE: f64 = 0.1;
+
+/// A plane of contact across the track.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactPlane {
+    /// Its origin on the rail.
+    pub origin: CurvePlace,
+    /// Its angle in rad.
+    pub angle: f64,
+    /// Arc lengths in mm between which it replaces the curve.
+    pub range: [f64; 2],
+}
+
+impl ContactPlane {
+    /// The coordinate s in mm of a point `[y, z]`.
+    fn along(&self, at: [f64; 2]) -> f64 {
+        let (sin, cos) = self.angle.sin_cos();
+        self.origin.s + (at[0] - self.origin.at[0]) * cos + (at[1] - self.origin.at[1]) * sin
+    }
+
+    /// The part of a tangent at an angle in rad that lies along the plane.
+    fn follows(&self, angle: f64) -> f64 {
+        (angle - self.angle).cos()
+    }
+}
 
 /// The rail's cross-section by its arc length, and the wheel's circles.
 #[derive(Debug, Clone)]
 pub struct ReferenceCurve<'g> {
     geometry: &'g WheelRail,
     /// The rail's curve, from its first point to its last.
-    rail: &'g [CurvePlace],
+    rail: Cow<'g, [CurvePlace]>,
+    /// Planes of contact in place of the curve, with increasing arc length; none on the curve itself.
+    planes: Vec<ContactPlane>,
     /// Lowest points of the wheel's circles.
     circles: Vec<LowestPoint>,
     /// Circles around [`BLOCK`] intervals between neighbouring lowest points each.
@@ -150,10 +183,64 @@ impl<'g> ReferenceCurve<'g> {
             blocks: blocks.collect(),
             last: Cell::new(rail[0]),
             after: Cell::new(1),
-            rail,
+            rail: Cow::Borrowed(rail),
+            planes: Vec::new(),
             geometry,
             circles,
         }
+    }
+
+    /// The same wheel over planes of contact, which are given with increasing arc length.
+    #[must_use]
+    pub fn on_planes(&self, planes: Vec<ContactPlane>) -> ReferenceCurve<'g> {
+        let mut rail = Vec::new();
+        for plane in &planes {
+            let facing = |place: &CurvePlace| plane.follows(place.angle) > ALONG_PLANE;
+            let inside = |place: &CurvePlace| {
+                (plane.range[0]..plane.range[1]).contains(&place.s) && facing(place)
+            };
+            let sign = self.sign();
+            let before = |place: &CurvePlace| sign * place.s < sign * plane.origin.s;
+            let middle = self.rail.partition_point(before);
+            let before = self.rail[..middle]
+                .iter()
+                .rev()
+                .take_while(|place| inside(place));
+            let first = middle - before.count();
+            let after = self.rail[middle..].iter().take_while(|place| inside(place));
+            let last = middle + after.count();
+            let places = self.rail[first..last].iter().map(|place| CurvePlace {
+                s: plane.along(place.at),
+                angle: plane.angle,
+                ..*place
+            });
+            rail.extend(places);
+        }
+        // The planes are in order of the arc length, the places in order of the rail's points.
+        if self.sign() < 0.0 {
+            rail.sort_by(|a: &CurvePlace, b| b.s.total_cmp(&a.s));
+        }
+        ReferenceCurve {
+            last: Cell::new(rail[0]),
+            rail: Cow::Owned(rail),
+            planes,
+            ..self.clone()
+        }
+    }
+
+    /// The number of the plane at a coordinate s in mm; 0 on the curve.
+    #[must_use]
+    pub fn plane(&self, s: f64) -> usize {
+        let last = self.planes.len().saturating_sub(1);
+        self.planes
+            .partition_point(|plane| plane.range[1] <= s)
+            .min(last)
+    }
+
+    /// Whether planes replace the curve.
+    #[must_use]
+    pub fn is_flat(&self) -> bool {
+        !self.planes.is_empty()
     }
 
     /// Least and largest arc length in mm. On a right rail, whose points run to the right, arc lengths are negative.
@@ -181,10 +268,24 @@ impl<'g> ReferenceCurve<'g> {
         let [from, to] = [self.rail[next - 1], self.rail[next]];
         let mut rail = from.rail + (to.rail - from.rail) * (s - from.s) / (to.s - from.s);
         // The table is so fine that a step squares an error of some thousandths of its spacing.
-        let [y, z] = self.geometry.rail_at(rail).slope;
-        let missed = length(self.geometry, from.rail, rail) - sign * (s - from.s);
-        rail -= missed / y.hypot(z);
-        let found = place(self.geometry, rail, s);
+        let CurvePoint {
+            at, slope: [y, z], ..
+        } = self.geometry.rail_at(rail);
+        let found = match self.planes.get(self.plane(s)) {
+            None => {
+                let missed = length(self.geometry, from.rail, rail) - sign * (s - from.s);
+                rail -= missed / y.hypot(z);
+                place(self.geometry, rail, s)
+            }
+            Some(plane) => {
+                let (sin, cos) = plane.angle.sin_cos();
+                rail -= (plane.along(at) - s) / (y * cos + z * sin);
+                CurvePlace {
+                    angle: plane.angle,
+                    ..place(self.geometry, rail, s)
+                }
+            }
+        };
         self.last.set(found);
         found
     }

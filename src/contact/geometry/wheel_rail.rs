@@ -10,7 +10,8 @@ use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::contact::geometry::curve_place::CurvePlace;
-use crate::contact::geometry::locus_lines::{LocusLines, RailEdge};
+use crate::contact::geometry::envelope::Envelope;
+use crate::contact::geometry::locus_lines::LocusLines;
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile::Profile;
 use crate::contact::lazy_field::LazyField;
@@ -135,7 +136,7 @@ pub struct WheelRail {
     wheel: Arc<Profile>,
     axes: AxleAxes,
     /// The rail's upper edge.
-    pub(crate) rail_edge: Arc<LazyField<RailEdge>>,
+    pub(crate) rail_edge: Arc<LazyField<Envelope>>,
     /// Places along the rail's curve, the same for every place of the wheelset.
     pub(crate) rail_places: Arc<LazyField<Vec<CurvePlace>>>,
     /// Circles of the wheel, which are the same for every place of the wheelset.
@@ -436,16 +437,6 @@ impl WheelRail {
     pub fn on_wheel(&self, s: f64) -> [f64; 2] {
         let [y, z] = self.wheel.at(s).at;
         [y, -z]
-    }
-
-    /// Why there is no answer where a contact reaches the end of a profile, at these parameters of rail and wheel.
-    pub(crate) fn cut_off(&self, [rail, wheel]: [f64; 2]) -> String {
-        format!(
-            "the contact reaches the end of a profile, at y = {:.2} mm on the rail and {:.2} mm on the wheel; the true contact is \
-             cut off, longer profiles are needed",
-            self.on_rail(rail)[0],
-            self.on_wheel(wheel)[0]
-        )
     }
 
     /// Remarks on the two profiles.

@@ -110,18 +110,18 @@ impl Footprint {
         }
     }
 
-    /// Returns this footprint on a curved surface: with a rigid slip of its own in every cell, added to that of the motion; with the part of it that
+    /// Returns this footprint on the surface of a rail: on a curve with a rigid slip of its own in every cell, added to that of the motion; with the part of it that
     /// follows from a motion, for a unit of creepage across and of spin in 1/mm, where motions share the footprint; and for every patch the origin
     /// `[x, y]` in mm of the coordinates that its places are given in.
     #[must_use]
     pub(crate) fn on_surface(
         self,
-        slip: SurfaceSlip,
+        slip: Option<SurfaceSlip>,
         by_motion: Option<[SurfaceSlip; 2]>,
         origins: impl Iterator<Item = [f64; 2]>,
     ) -> Footprint {
         Footprint {
-            slip: Some(Arc::new(slip)),
+            slip: slip.map(Arc::new),
             slip_by_motion: by_motion.map(Arc::new),
             origins: origins.collect(),
             ..self

@@ -10,4 +10,4 @@ pub(crate) mod on_curve;
 pub mod patch;
 pub mod pressure_field;
 pub mod surface_slip;
-pub mod wheel_height;
+pub mod wheel;

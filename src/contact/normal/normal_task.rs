@@ -7,8 +7,8 @@ use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::normal::wheel_height::task::WheelTask;
-use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
+use crate::contact::normal::wheel::task::WheelTask;
+use crate::contact::normal::wheel::wheelset_task::WheelsetTask;
 
 /// What is known of a contact before it is solved. Solved, it is a [`Footprint`].
 #[derive(Debug, Clone, PartialEq)]

@@ -5,7 +5,7 @@
 //! between the patches.
 
 use crate::contact::geometry::reference_curve::{
-    CurvePlace, Nearest, ReferenceCurve, SPACING, WheelOver,
+    ContactPlane, CurvePlace, Nearest, ReferenceCurve, SPACING, WheelOver,
 };
 use crate::contact::half_space::bent_surface::{
     BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
@@ -21,10 +21,9 @@ use crate::contact::normal::gap::conjugate_gradients::{
 use crate::contact::normal::gap::edges::squares;
 use crate::contact::normal::gap::grid::GridFineness;
 use crate::contact::normal::hertz::NormalLoad;
-use crate::contact::normal::pressure_field::computed::Edges;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal::wheel_height::task::WheelLoad;
+use crate::contact::normal::wheel::task::WheelLoad;
 use crate::contact::numerics::flood_fill::groups;
 
 /// Cells across the overlaps on the grid that finds the contact.
@@ -60,6 +59,31 @@ const LINEAR: f64 = 0.05;
 const COSINE_LEAST: f64 = 0.1;
 /// Runs of contact on a half-space that lie nearer than this, in mm, act on each other.
 const APART_ON_HALF_SPACE: f64 = 4.0;
+/// Patches nearer to each other than this, in mm, and inclined to each other by less than this, in rad, share a plane of contact. CONTACT separates patches that
+/// are 8 mm or 30° apart.
+const SHARED_PLANE_DISTANCE: f64 = 12.0;
+const SHARED_PLANE_ANGLE: f64 = 0.5;
+
+/// The place of a run of strips.
+#[derive(Debug, Clone, Copy)]
+struct StripRun {
+    /// Arc lengths of its ends in mm.
+    ends: [f64; 2],
+    /// Mean angle in rad, weighted with the pressures.
+    angle: f64,
+}
+
+impl StripRun {
+    /// How far it lies from another one in mm.
+    fn apart(&self, other: &StripRun) -> f64 {
+        (self.ends[0] - other.ends[1]).max(other.ends[0] - self.ends[1])
+    }
+
+    fn inclined(&self, other: &StripRun) -> f64 {
+        (self.angle - other.angle).abs()
+    }
+}
+
 /// What presses a wheel on a rail.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CurveTask<'a> {
@@ -83,6 +107,8 @@ pub(crate) struct CurveGrid {
     pub(crate) places: Vec<CurvePlace>,
     /// The places of the strips in widths of a strip from that of the first one.
     pub(crate) numbers: Vec<usize>,
+    /// The plane of contact of each strip; none on the curve.
+    planes: Option<Vec<usize>>,
     /// Size of a cell along x and s in mm.
     pub(crate) step: [f64; 2],
 }
@@ -194,14 +220,15 @@ impl CurveGrid {
             .collect();
         numbers.sort_unstable();
         numbers.dedup();
+        let places = || numbers.iter().map(|cell| centre(*cell, step[1]));
         CurveGrid {
             x: cells(x, step[0])
                 .map(|cell| centre(cell, step[0]))
                 .collect(),
-            places: numbers
-                .iter()
-                .map(|cell| curve.at(centre(*cell, step[1])))
-                .collect(),
+            places: places().map(|s| curve.at(s)).collect(),
+            planes: curve
+                .is_flat()
+                .then(|| places().map(|s| curve.plane(s)).collect()),
             numbers: numbers
                 .iter()
                 .map(|cell| (cell - numbers[0]) as usize)
@@ -335,8 +362,11 @@ impl CurveGrid {
         joined
     }
 
-    /// The number of the run that each strip belongs to; those between two belong to the nearer one.
+    /// The number of the run, or of the plane of contact, that each strip belongs to; those between two runs belong to the nearer one.
     fn run_of_strips(&self, runs: &[[usize; 2]]) -> Vec<usize> {
+        if let Some(planes) = &self.planes {
+            return planes.clone();
+        }
         let number = |j: usize| self.numbers[j];
         let far = |j: usize, [first, last]: [usize; 2]| {
             let [first, last] = [first, last].map(number);
@@ -443,6 +473,9 @@ fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
 impl CurveTask<'_> {
     /// The mean of two angles of rail and wheel, with the parts that they have of the displacements.
     fn of_both(&self, rail: f64, wheel: f64) -> f64 {
+        if self.curve.is_flat() {
+            return rail;
+        }
         let share = self.elasticity.lower_share;
         share * rail + (1.0 - share) * wheel
     }
@@ -515,10 +548,17 @@ impl CurveTask<'_> {
         let margin = coarse.grid.step[0] + (FREE as f64 + 0.5) * step[0];
         let beside = 0.5 * coarse.grid.step[1] + (FREE as f64 + 0.5) * step[1];
         let near = coarse.grid.places.iter().zip(&coarse.near);
-        let windows: Vec<[f64; 2]> = near
+        let mut windows: Vec<[f64; 2]> = near
             .filter(|(_, near)| **near)
             .map(|(place, _)| [place.s - beside, place.s + beside])
             .collect();
+        // Overlaps narrower than a cell of the coarse grid.
+        for overlap in self.curve.overlaps(coarse.centre) {
+            let [low, high] = [0, overlap.len() - 1].map(|k| overlap[k].place.s);
+            if windows.iter().all(|[from, to]| *to < low || *from > high) {
+                windows.push([low - beside, high + beside]);
+            }
+        }
         let grid = CurveGrid::new(self.curve, [first - margin, last + margin], &windows, step);
         let friction = Friction {
             opened: friction
@@ -577,15 +617,9 @@ impl CurveTask<'_> {
         let [first, last] = self.curve.range();
         for overlap in &overlaps {
             let window = [
-                overlap[0].place.s - SPACING,
-                overlap[overlap.len() - 1].place.s + SPACING,
+                (overlap[0].place.s - SPACING).max(first),
+                (overlap[overlap.len() - 1].place.s + SPACING).min(last),
             ];
-            if window[0] < first || window[1] > last {
-                return Err(NormalError::NoAnswer(
-                    "the contact reaches the end of the rail's points; send the points beyond"
-                        .to_owned(),
-                ));
-            }
             widest = widest.max(window[1] - window[0] - SPACING);
             windows.push(window);
             for Nearest { x, wheel, .. } in overlap {
@@ -976,7 +1010,6 @@ impl CurveContact {
                 &squares(columns.len(), &pressure),
                 &pressure,
                 depth,
-                Edges::Found,
             );
             // A patch of a cell or two has no edges.
             Some((strip, found.ok()?))
@@ -986,24 +1019,123 @@ impl CurveContact {
         patches.filter_map(field).collect()
     }
 
-    /// The strips of the parts of the contact that are solved together.
+    /// The strips of the parts of the contact that are solved together: all on the curve, those of a plane, and with the influence of a half-space the
+    /// runs that act on each other.
     pub(crate) fn parts(&self, influence: Influence) -> Vec<[usize; 2]> {
-        let last = self.grid.places.len() - 1;
-        let runs = self.grid.runs(&self.pressure);
-        match influence {
-            Influence::AngleCorrected => vec![[0, last]],
-            Influence::HalfSpace => {
-                let of_strips = self.grid.run_of_strips(&self.runs);
-                let mut parts: Vec<[usize; 2]> = Vec::new();
-                for run in runs {
-                    match parts.last_mut() {
-                        Some(part) if of_strips[part[1]] == of_strips[run[0]] => part[1] = run[1],
-                        _ => parts.push(run),
-                    }
-                }
-                parts
+        let of_strips = match influence {
+            Influence::AngleCorrected => vec![0; self.grid.places.len()],
+            Influence::HalfSpace => self.grid.run_of_strips(&self.runs),
+        };
+        let mut parts: Vec<[usize; 2]> = Vec::new();
+        for run in self.grid.runs(&self.pressure) {
+            match parts.last_mut() {
+                Some(part) if of_strips[part[1]] == of_strips[run[0]] => part[1] = run[1],
+                _ => parts.push(run),
             }
         }
+        parts
+    }
+
+    /// Planes of contact for its patches and for overlaps without pressure: neighbours that are near and hardly inclined to each other share one. Each passes
+    /// through the mean of the overlap, weighted with its square over the area as seen from above, at the mean angle there.
+    pub(crate) fn planes(&self, curve: &ReferenceCurve) -> Vec<ContactPlane> {
+        let overlaps = curve.overlaps(self.centre);
+        let pressed = self.grid.runs(&self.pressure).into_iter();
+        let pressed: Vec<StripRun> = pressed.map(|run| self.strip_run(run)).collect();
+        let free = overlaps.iter().filter_map(|overlap| {
+            let ends = [overlap[0].place.s, overlap[overlap.len() - 1].place.s];
+            let apart = |run: &StripRun| run.ends[1] < ends[0] || run.ends[0] > ends[1];
+            let gap = |near: &&Nearest| near.wheel.gap;
+            let deepest = overlap.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)))?;
+            pressed.iter().all(apart).then_some(StripRun {
+                ends,
+                angle: deepest.place.angle,
+            })
+        });
+        let mut groups: Vec<Vec<StripRun>> = Vec::new();
+        for run in pressed.iter().copied().chain(free) {
+            // Of the groups that may have it, the one whose inclination is nearest.
+            let fits = |group: &&mut Vec<StripRun>| {
+                let near = |other: &StripRun| other.apart(&run) <= SHARED_PLANE_DISTANCE;
+                let inclined = group.iter().map(|other| other.inclined(&run));
+                group.iter().any(near) && inclined.fold(0.0, f64::max) <= SHARED_PLANE_ANGLE
+            };
+            let nearest = groups
+                .iter_mut()
+                .filter(fits)
+                .min_by(|a, b| a[0].inclined(&run).total_cmp(&b[0].inclined(&run)));
+            match nearest {
+                Some(group) => group.push(run),
+                None => groups.push(vec![run]),
+            }
+        }
+        groups.iter_mut().for_each(|group| {
+            group.sort_by(|a, b| a.ends[0].total_cmp(&b.ends[0]));
+        });
+        groups.sort_by(|a, b| a[0].ends[0].total_cmp(&b[0].ends[0]));
+        let ends = |group: &[StripRun]| [group[0].ends[0], group[group.len() - 1].ends[1]];
+        let ends: Vec<[f64; 2]> = groups.iter().map(|group| ends(group)).collect();
+        let between = |k: usize| 0.5 * (ends[k][1] + ends[k + 1][0]);
+        let plane = |k: usize| {
+            let low = match k {
+                0 => f64::NEG_INFINITY,
+                _ => between(k - 1),
+            };
+            let high = match k + 1 == ends.len() {
+                true => f64::INFINITY,
+                false => between(k),
+            };
+            let (mut weight, mut s, mut angle) = (0.0, 0.0, 0.0);
+            for Nearest { place, wheel, .. } in overlaps.iter().flatten() {
+                if (low..high).contains(&place.s) {
+                    // The length of the overlap along x grows as its square root.
+                    let own = wheel.gap.abs().powf(2.5) * place.angle.cos().max(COSINE_LEAST);
+                    weight += own;
+                    s += own * place.s;
+                    angle += own * place.angle;
+                }
+            }
+            let origin = match weight > 0.0 {
+                true => curve.at(s / weight),
+                false => curve.at(0.5 * (ends[k][0] + ends[k][1])),
+            };
+            ContactPlane {
+                origin,
+                angle: if weight > 0.0 {
+                    angle / weight
+                } else {
+                    origin.angle
+                },
+                range: [low, high],
+            }
+        };
+        (0..groups.len()).map(plane).collect()
+    }
+
+    /// The place of a run of strips.
+    fn strip_run(&self, [first, last]: [usize; 2]) -> StripRun {
+        let nx = self.grid.x.len();
+        let half = 0.5 * self.grid.step[1];
+        let [low, high] = [first, last].map(|j| self.grid.places[j].s);
+        let (mut load, mut angle) = (0.0, 0.0);
+        for j in first..=last {
+            let own: f64 = self.pressure[j * nx..(j + 1) * nx].iter().sum();
+            load += own;
+            angle += own * self.grid.places[j].angle;
+        }
+        StripRun {
+            ends: [low - half, high + half],
+            angle: angle / load,
+        }
+    }
+
+    /// The largest pressure in MPa of the patch with the largest load.
+    pub(crate) fn main_pressure(&self) -> f64 {
+        let patches = groups(self.grid.cells(), |k| self.pressure[k] > 0.0);
+        let load = |patch: &Vec<usize>| patch.iter().map(|k| self.pressure[*k]).sum::<f64>();
+        let main = patches.iter().max_by(|a, b| load(a).total_cmp(&load(b)));
+        let pressures = main.into_iter().flatten().map(|k| self.pressure[*k]);
+        pressures.fold(0.0, f64::max)
     }
 
     /// Sum of the pressures in N.

@@ -19,15 +19,10 @@
 //!
 //! Some iterations of the physics resemble one of these, and stay where they are because what they do beside the iteration differs:
 //!
-//! - [`RailInFrame`](crate::contact::geometry::rail_in_frame) follows a curve with Newton's method. No bounds of the root are known, and
-//!   the end of the curve, or a curve that turns away, is an answer too.
-//! - [`WheelInFrame`](crate::contact::geometry::wheel_in_frame) has two unknowns, height and place on the profile.
 //! - [`rigid_touch`](crate::contact::geometry::rigid_touch) starts within 0.02 mm of the root and takes four steps untested; where the rail
 //!   is upright, it keeps the start instead of failing.
 //! - [`coordinates`](crate::contact::rolling::methods::table::coordinates) of the creep table always takes six steps, without a test in
 //!   between, because it is evaluated for millions of rows.
-//! - The [bracket](crate::contact::normal::wheel_height::bracket) of a wheel's height has ends at which there is no value, because the gap
-//!   could not be solved. Each value costs the solve of a gap, which gives a slope too, and values of different grids differ.
 //! - The [search](crate::contact::rolling::history::search) of a history looks for two creepages at once as [`pair_root`] does, and keeps its
 //!   compliance from step to step.
 

@@ -2,7 +2,7 @@
 
 use crate::contact::method::Method;
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel_height::task::{ReferenceSurface, WheelTask};
+use crate::contact::normal::wheel::task::{ReferenceSurface, WheelTask};
 use crate::contact::problem::physics::Problem;
 use crate::contact::problem::run::Run;
 use crate::contact::remark::list::Remark;

@@ -10,7 +10,7 @@ use crate::contact::geometry::wheelset::WheelsetMotion;
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::normal::wheel::task::WheelTask;
 use crate::contact::rolling::history::task::HistoryTask;
 use crate::contact::rolling::methods::table::solve::{outside, unlike};
 use crate::contact::rolling::motion::{Motion, PrescribedForces};

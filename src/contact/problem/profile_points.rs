@@ -6,7 +6,7 @@ use crate::contact::geometry::profile_quality::points::{
     Grain, advised_smoothing, noise_of, polygon_of,
 };
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::normal::wheel::task::WheelTask;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::profile_quality::{PairQuality, SectionQuality};

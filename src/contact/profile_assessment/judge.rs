@@ -1,6 +1,5 @@
 //! Examines the points of both profiles under the patches found, and reports their defects.
 
-use crate::contact::geometry::frame::SurfaceMissed;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::noise::Oddity;
 use crate::contact::geometry::profile_quality::points::{
@@ -8,7 +7,7 @@ use crate::contact::geometry::profile_quality::points::{
 };
 use crate::contact::geometry::profile_quality::readings::noise_pressure;
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::wheel_height::wheel_contact::GapContact;
+use crate::contact::normal::wheel::wheel_contact::WheelPatch;
 use crate::contact::profile_assessment::finding::{AMBIGUOUS, Cause, Finding, LIGHT};
 use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileQuality};
 
@@ -38,12 +37,8 @@ const BEYOND: f64 = 5.0;
 /// What the assessment needs to know of a patch.
 #[derive(Debug, Clone, Copy)]
 pub struct FoundPatch<'a> {
-    /// The gap it belongs to.
-    pub gap: &'a GapContact,
-    /// Height of the wheel's centre in mm.
-    pub centre: f64,
-    /// Extent across in mm, in the coordinates of the gap.
-    pub across: [f64; 2],
+    /// The patch.
+    pub patch: &'a WheelPatch,
     /// Largest pressure in MPa.
     pub pressure: f64,
     /// Its share of the sum of the normal forces of all patches.
@@ -142,21 +137,14 @@ fn sorted([a, b]: [f64; 2]) -> [f64; 2] {
 
 /// The quality of both profiles under a patch, and the findings. Roughness is always among them, however small. `auto` says whose smoothing
 /// is chosen automatically.
-///
-/// # Errors
-/// The wheel's surface was not found over an end of the patch.
+#[must_use]
 pub fn judge(
     geometry: &WheelRail,
     patch: FoundPatch,
     modulus: f64,
     auto: [bool; 2],
-) -> Result<(PatchQuality, Vec<Finding>), SurfaceMissed> {
-    let over = |y: f64| geometry.moved(&patch.gap.frame, [0.0, y], patch.centre);
-    let ends = [over(patch.across[0])?, over(patch.across[1])?];
-    let contacts = [
-        sorted(ends.map(|end| end.rail)),
-        sorted(ends.map(|end| end.wheel)),
-    ];
+) -> (PatchQuality, Vec<Finding>) {
+    let contacts = [0, 1].map(|body| sorted(patch.patch.ends.map(|end| end[body])));
     let [rail, wheel] = geometry.profiles();
     let both = [
         Under::new(Body::Rail, rail, contacts[0], modulus),
@@ -189,7 +177,7 @@ pub fn judge(
         rail: quality(&both[0], advised[0]),
         wheel: quality(&both[1], advised[1]),
     };
-    Ok((quality, findings))
+    (quality, findings)
 }
 
 /// The roughness of a profile with its cause.

@@ -7,11 +7,9 @@ use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::holes::{Hole, holes};
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::points::{Grain, advised_smoothing, under_contact};
-use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel_height::search::HeightStart;
-use crate::contact::normal::wheel_height::task::{Accuracy, NormalPass, WheelTask};
-use crate::contact::normal::wheel_height::wheel_contact::{GapContact, WheelContact};
+use crate::contact::normal::wheel::task::{ReferenceSurface, WheelTask};
+use crate::contact::normal::wheel::wheel_contact::{WheelContact, WheelPatch};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::profile_points;
 use crate::contact::problem::profile_points::PRESSURE_USUAL;
@@ -24,9 +22,8 @@ use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::solution::words::fields::Fields;
 use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileQuality};
-use crate::contact::time_limit::TimeLimit;
 use crate::contact::wheel_on_rail;
-use crate::contact::wheel_on_rail::{Judge, SolvedWheel};
+use crate::contact::wheel_on_rail::SolvedWheel;
 
 /// Solves a wheel on a rail and assesses its profiles.
 ///
@@ -42,7 +39,7 @@ pub(crate) fn solve(
     let settled = settled(case, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
     let mut judgement = Judgement::new(contact);
-    let found = wheel_on_rail::solve(operators, case, contact, None, &mut judgement, monitor)?;
+    let found = judgement.solve(operators, case, monitor)?;
     let found = assessed(operators, case, &judgement, found, monitor)?;
     Ok((found.solution, found.fields))
 }
@@ -57,17 +54,10 @@ pub(crate) fn judged(
     contact: &WheelTask,
     monitor: &dyn Monitor,
 ) -> Result<SolvedWheel, SolveError> {
-    wheel_on_rail::solve(
-        operators,
-        case,
-        contact,
-        None,
-        &mut Judgement::new(contact),
-        monitor,
-    )
+    Judgement::new(contact).solve(operators, case, monitor)
 }
 
-/// Whether a wheel comes to rest on the curve of its rail without tractions, on profiles that allow an answer.
+/// Whether a wheel comes to rest on the curve of its rail without tractions, on profiles that allow an answer. There is no such question on planes.
 ///
 /// # Errors
 /// Why it does not.
@@ -76,10 +66,15 @@ pub(crate) fn comes_to_rest(
     contact: &WheelTask,
     monitor: &dyn Monitor,
 ) -> Result<(), SolveError> {
+    if contact.surface == ReferenceSurface::Planes {
+        return Ok(());
+    }
     let settled = settled(case, contact, monitor)?;
     let contact = settled.as_ref().unwrap_or(contact);
     let mut judgement = Judgement::new(contact);
-    wheel_on_rail::comes_to_rest(case, contact, &mut judgement, monitor)
+    let before = &mut |wheel: &WheelContact| judgement.before(wheel);
+    wheel_on_rail::patches_at_rest(case, contact, before, monitor)?;
+    Ok(())
 }
 
 /// Assesses the profiles under the patches of a wheel that was solved.
@@ -104,10 +99,8 @@ fn assessed(
     monitor: &dyn Monitor,
 ) -> Result<SolvedWheel, SolveError> {
     let contact = judgement.contact;
-    let (qualities, findings) = judgement.of(&found.wheel)?;
-    let SolvedWheel {
-        wheel, solution, ..
-    } = &mut found;
+    let (qualities, findings) = judgement.of(&found.wheel);
+    let solution = &mut found.solution;
     for (patch, quality) in solution.patches.iter_mut().zip(qualities) {
         patch.quality = Some(quality);
     }
@@ -115,9 +108,7 @@ fn assessed(
         finding.of_roughness() && finding.has_evidence() && finding.share > uncertainty::HARMLESS
     });
     let suspicious = rough || undecided(contact);
-    let changes = uncertainty::add(
-        operators, case, contact, wheel, suspicious, solution, monitor,
-    )?;
+    let changes = uncertainty::add(operators, case, contact, suspicious, solution, monitor)?;
     let reported = findings
         .into_iter()
         .filter(|finding| finding.is_reported(changes[finding.patch]));
@@ -156,52 +147,12 @@ struct Judgement<'a> {
 /// The quality of the profiles under every patch, and the findings.
 type Assessed = (Vec<PatchQuality>, Vec<Finding>);
 
-/// What tells one wheel at rest of a contact from another: its lowering, and the normal forces of its gaps.
+/// What tells one wheel at rest of a contact from another: its lowering, and the normal forces of its patches.
 type WheelAtRest = (f64, Vec<f64>);
 
 fn at_rest(wheel: &WheelContact) -> WheelAtRest {
-    let forces = wheel.patches.iter().map(GapContact::normal_force);
+    let forces = wheel.patches.iter().map(WheelPatch::normal_force);
     (wheel.lowering, forces.collect())
-}
-
-impl Judge for Judgement<'_> {
-    /// Fails before the tangential problem is solved if the answer would mislead: on the ridge under an outlier, for example, that
-    /// solve would fail with an error that does not mention the outlier.
-    fn before(&mut self, wheel: &WheelContact) -> Result<(), SolveError> {
-        if self.contact.trust.accept_rough {
-            return Ok(());
-        }
-        let assessed = self.of(wheel)?;
-        let (_, (_, findings)) = self.last.insert((at_rest(wheel), assessed));
-        let refused = findings.iter().find(|finding| finding.refused);
-        refused.map_or(Ok(()), |finding| Err(rough(finding, ACCEPT)))
-    }
-
-    fn explain(&self, wheel: &WheelContact, error: SolveError) -> SolveError {
-        if !matches!(
-            error,
-            SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }
-        ) {
-            return error;
-        }
-        let Ok((_, findings)) = self.of(wheel) else {
-            return error;
-        };
-        let worst = findings
-            .iter()
-            .filter(|finding| finding.refused || finding.is_reported(false))
-            .reduce(|worst, other| {
-                if other.worse_than(worst) {
-                    other
-                } else {
-                    worst
-                }
-            });
-        match worst {
-            Some(finding) => rough(finding, &format!("; {error}")),
-            None => error,
-        }
-    }
 }
 
 /// Advice that ends the error about a refused profile.
@@ -223,40 +174,83 @@ impl<'a> Judgement<'a> {
         }
     }
 
+    fn solve(
+        &mut self,
+        operators: &Arc<OperatorStore>,
+        case: &CheckedCase,
+        monitor: &dyn Monitor,
+    ) -> Result<SolvedWheel, SolveError> {
+        let contact = self.contact;
+        let before = &mut |wheel: &WheelContact| self.before(wheel);
+        let found = wheel_on_rail::solve(operators, case, contact, before, monitor);
+        found.map_err(|error| self.explained(error))
+    }
+
+    /// Fails before the tangential problem is solved if the answer would mislead: on the ridge under an outlier, for example, that
+    /// solve would fail with an error that does not mention the outlier.
+    fn before(&mut self, wheel: &WheelContact) -> Result<(), SolveError> {
+        let assessed = self.assess(wheel);
+        let (_, (_, findings)) = self.last.insert((at_rest(wheel), assessed));
+        if self.contact.trust.accept_rough {
+            return Ok(());
+        }
+        let refused = findings.iter().find(|finding| finding.refused);
+        refused.map_or(Ok(()), |finding| Err(rough(finding, ACCEPT)))
+    }
+
+    /// The error of a motion that was not solved, with what the wheel at rest says of its cause.
+    fn explained(&self, error: SolveError) -> SolveError {
+        let of_mesh = matches!(
+            error,
+            SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }
+        );
+        let Some((_, (_, findings))) = self.last.as_ref().filter(|_| of_mesh) else {
+            return error;
+        };
+        let worst = findings
+            .iter()
+            .filter(|finding| finding.refused || finding.is_reported(false))
+            .reduce(|worst, other| match other.worse_than(worst) {
+                true => other,
+                false => worst,
+            });
+        match worst {
+            Some(finding) => rough(finding, &format!("; {error}")),
+            None => error,
+        }
+    }
+
     /// The quality of the profiles under every patch, and the findings; not assessed again if this wheel was the last one.
-    fn of(&self, wheel: &WheelContact) -> Result<Assessed, SolveError> {
+    fn of(&self, wheel: &WheelContact) -> Assessed {
         match &self.last {
-            Some((known, assessed)) if *known == at_rest(wheel) => Ok(assessed.clone()),
+            Some((known, assessed)) if *known == at_rest(wheel) => assessed.clone(),
             _ => self.assess(wheel),
         }
     }
 
-    fn assess(&self, wheel: &WheelContact) -> Result<Assessed, SolveError> {
+    fn assess(&self, wheel: &WheelContact) -> Assessed {
         let contact = self.contact;
         let (mut qualities, mut findings) = (Vec::new(), Vec::new());
         let mut width: f64 = 0.0;
-        let load: f64 = wheel.patches.iter().map(GapContact::normal_force).sum();
-        for gap in &wheel.patches {
-            for patch in gap.field.patches() {
-                let [.., from, to] = patch.extent;
-                let place = FoundPatch {
-                    gap,
-                    centre: wheel.centre,
-                    across: [from, to],
-                    pressure: patch.pressure_max,
-                    load_share: patch.normal_force / load,
-                    number: qualities.len(),
-                };
-                let (modulus, auto) = (contact.contact_modulus, contact.trust.auto);
-                let (quality, own) = judge(&contact.geometry, place, modulus, auto)?;
-                width = width.max(to - from);
-                qualities.push(quality);
-                findings.extend(own);
-            }
+        let load = wheel.normal_force();
+        for found in &wheel.patches {
+            let patch = found.patch();
+            let [.., from, to] = patch.extent;
+            let place = FoundPatch {
+                patch: found,
+                pressure: patch.pressure_max,
+                load_share: patch.normal_force / load,
+                number: qualities.len(),
+            };
+            let (modulus, auto) = (contact.contact_modulus, contact.trust.auto);
+            let (quality, own) = judge(&contact.geometry, place, modulus, auto);
+            width = width.max(to - from);
+            qualities.push(quality);
+            findings.extend(own);
         }
         let hidden = self.hidden(wheel, width, &mut qualities);
         findings.extend(hidden);
-        Ok((qualities, findings))
+        (qualities, findings)
     }
 
     /// Stretches without points where the bodies may touch in addition to the patches found; `width` in mm is that of the widest
@@ -330,8 +324,6 @@ impl<'a> Judgement<'a> {
     }
 }
 
-/// Relative error allowed in the force of the solve that finds the pressure; the smoothing varies only as its power −2/9.
-const TOLERANCE: f64 = 0.1;
 /// Half of the length in mm about the first touch that counts as contact, about half the width of a usual patch.
 const NEAR: f64 = 5.0;
 
@@ -382,7 +374,7 @@ pub(crate) fn undecided(contact: &WheelTask) -> bool {
 }
 
 /// The contact with every automatic smoothing replaced by a length: first the one for a pressure of 1200 MPa, then the one for the largest
-/// pressure that a solve on coarse gaps finds with the first. Where the noise of a whole profile asks for none, that of its points near the
+/// pressure that a solve on a coarse grid finds with the first. Where the noise of a whole profile asks for none, that of its points near the
 /// first touch decides.
 ///
 /// # Errors
@@ -418,25 +410,6 @@ pub(crate) fn settled(
     if first == [0.0; 2] {
         return Ok(Some(with(first)));
     }
-    let trial = with(first);
-    let mut search = trial
-        .search()
-        .map_err(|reason| SolveError::NormalProblem { reason })?;
-    let wanted = NormalPass {
-        friction_share: 0.0,
-        accuracy: Accuracy::About(TOLERANCE),
-    };
-    let watch = TimeLimit::new(monitor, case.run.time_limit, 1);
-    let wheel = trial.find_height(
-        &mut search,
-        wanted,
-        HeightStart::default(),
-        &mut GridWorkspace::default(),
-        &watch,
-    )?;
-    let pressures = wheel.patches.iter().flat_map(|gap| gap.field.patches());
-    let main = pressures
-        .max_by(|a, b| a.normal_force.total_cmp(&b.normal_force))
-        .map_or(PRESSURE_USUAL, |patch| patch.pressure_max);
+    let main = wheel_on_rail::largest_pressure(case, &with(first), monitor)?;
     Ok(Some(with(chosen(main))))
 }

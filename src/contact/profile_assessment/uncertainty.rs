@@ -13,8 +13,7 @@ use crate::contact::geometry::profile::Profile;
 use crate::contact::geometry::profile_quality::points::SMOOTHING_ADVISED;
 use crate::contact::geometry::profile_quality::readings::noise_pressure;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::wheel_height::task::WheelTask;
-use crate::contact::normal::wheel_height::wheel_contact::WheelContact;
+use crate::contact::normal::wheel::task::WheelTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -23,7 +22,6 @@ use crate::contact::rolling::resolution::Resolution;
 use crate::contact::solution::words::answer::{PatchSolution, Solution};
 use crate::contact::solution::words::profile_quality::{ProfileQuality, ProfileUncertainty};
 use crate::contact::wheel_on_rail;
-use crate::contact::wheel_on_rail::Judge;
 
 /// The companion solves use the smoothing multiplied by these factors.
 const COMPANIONS: [f64; 2] = [0.4, 2.0];
@@ -62,19 +60,6 @@ impl Monitor for Afterwards<'_> {
     }
 }
 
-/// Companions are solved without an assessment of their profiles.
-struct NoJudge;
-
-impl Judge for NoJudge {
-    fn before(&mut self, _wheel: &WheelContact) -> Result<(), SolveError> {
-        Ok(())
-    }
-
-    fn explain(&self, _wheel: &WheelContact, error: SolveError) -> SolveError {
-        error
-    }
-}
-
 /// Writes the uncertainty into every point and total, and returns which patches another reading changes so much that a remark is due.
 ///
 /// # Errors
@@ -83,7 +68,6 @@ pub(crate) fn add(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     contact: &WheelTask,
-    wheel: &WheelContact,
     suspicious: bool,
     solution: &mut Solution,
     monitor: &dyn Monitor,
@@ -106,8 +90,8 @@ pub(crate) fn add(
                 operators,
                 &companion(case, &chosen),
                 &other,
-                Some(wheel),
-                &mut NoJudge,
+                // Companions are solved without an assessment of their profiles.
+                &mut |_| Ok(()),
                 &Afterwards(monitor),
             ) {
                 Ok(found) => companions.push(found.solution),

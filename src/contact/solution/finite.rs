@@ -318,7 +318,10 @@ mod tests {
         let inner = |pair, maybe| Inner {
             pair,
             maybe,
-            remark: Remark::ForceJumps { factor: 2.0 }.at_patch(1),
+            remark: Remark::OnPlanes {
+                reason: String::new(),
+            }
+            .at_patch(1),
         };
         let list = vec![inner([0.0; 2], None), inner(pair, maybe)];
         Outer { word: "NaN", list }

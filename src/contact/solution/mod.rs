@@ -6,5 +6,4 @@ pub mod finish;
 pub mod finite;
 pub mod maintain;
 pub(crate) mod moved;
-pub mod track_axes;
 pub mod words;

@@ -1,9 +1,8 @@
 //! Gathers the answers for both wheels in all positions into one, with the sums in track axes.
 
-use crate::contact::normal::wheel_height::wheelset_task::WheelsetTask;
+use crate::contact::normal::wheel::wheelset_task::WheelsetTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::solution::track_axes::both;
 use crate::contact::solution::words::answer::{
     ErrorEstimate, Origin, PatchSolution, Solution, Total,
 };
@@ -104,7 +103,7 @@ impl<'a> WheelsetGathering<'a> {
         match &mut self.whole {
             None => self.whole = Some((solution, fields)),
             Some((all, all_fields)) => {
-                all.normal = both(all.normal, solution.normal);
+                all.normal = all.normal.zip(solution.normal).map(|(a, b)| a.with(b));
                 all.patches.extend(solution.patches);
                 all_fields.patches.extend(fields.patches);
             }

@@ -13,8 +13,8 @@ use crate::contact::geometry::profile_quality::points::{SMOOTHING_ADVISED, advis
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset_pose::{PairOfRails, RigidPose};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel_height::task::WheelTask;
-use crate::contact::normal::wheel_height::wheelset_task::KinematicsTask;
+use crate::contact::normal::wheel::task::WheelTask;
+use crate::contact::normal::wheel::wheelset_task::KinematicsTask;
 use crate::contact::problem::profile_points;
 use crate::contact::problem::profile_points::PRESSURE_USUAL;
 use crate::contact::solution::words::wheelset::{EquivalentConicity, Kinematics, TouchLine};

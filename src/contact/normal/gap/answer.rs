@@ -3,7 +3,6 @@
 use crate::contact::monitor::Stop;
 use crate::contact::normal::gap::conjugate_gradients;
 use crate::contact::normal::gap::grid::GridSide;
-use crate::contact::normal::gap::start::GapStart;
 use crate::contact::normal::gap::surface::Window;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::remark::entry::RemarkEntry;
@@ -17,8 +16,6 @@ pub struct NormalAnswer {
     pub report: NormalWork,
     /// Remarks for the answer.
     pub remarks: Vec<RemarkEntry>,
-    /// What nearly the same gap may be solved from; nothing where patches have grids of their own.
-    pub(crate) start: Option<GapStart>,
 }
 
 /// How a normal problem was solved.

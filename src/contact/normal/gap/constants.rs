@@ -16,31 +16,6 @@ pub(crate) const RESOLUTION: GridFineness = GridFineness {
     tolerance: 2e-4,
 };
 
-/// The same for the search of a height, where forces within some tenths of a per cent are enough.
-pub(crate) const RESOLUTION_COARSE: GridFineness = GridFineness {
-    first: 32,
-    contact: 22.0,
-    patch: 12.0,
-    share_min: 0.05,
-    settles: false,
-    tolerance: 2e-4,
-};
-
-/// From this target on heights are searched with [`RESOLUTION_COARSE_LOOSE`]. Below, normal forces would differ by 0.3 %
-/// between a wheelset and its mirror image, because the grid of the answer begins at what this one shows of the contact.
-pub(crate) const COARSE_LOOSE_FROM: f64 = 0.01;
-
-/// [`RESOLUTION_COARSE`] for loose targets, at which forces of rows differ by 0.0002 of μN in the median and 0.005 at most from those with the
-/// finer one (`cargo bench --bench wheels -- rows`; with 12 cells across a patch). 12 in place of 8 cells across a patch take 12 % more
-/// instructions where there are two.
-pub(crate) const RESOLUTION_COARSE_LOOSE: GridFineness = GridFineness {
-    first: 24,
-    contact: 16.0,
-    patch: 8.0,
-    tolerance: 1e-3,
-    ..RESOLUTION_COARSE
-};
-
 /// Below this target of the resultants' error (relative to μN) grids are finer: the error of a normal problem falls with the
 /// power 3/2 of its cells' size.
 pub(crate) const TARGET_USUAL: f64 = 0.002;
@@ -52,7 +27,7 @@ pub(crate) const TARGET_POWER: f64 = -2.0 / 3.0;
 pub(crate) const TARGETS_LOOSE: [f64; 2] = [0.005, 0.02];
 
 /// Power of the target by which they fall: 25 cells at 0.02. At that target gaps take two thirds of the time that they
-/// take with all cells, patches of wheels three quarters, two of them half; .97 and .95 of them are covered, .985 and .99 with all cells
+/// take with all cells; .97 and .95 of them are covered, .985 and .99 with all cells
 /// (`cargo bench --bench calibrate gap profiles`).
 pub(crate) const LOOSE_POWER: f64 = -0.4;
 
@@ -82,8 +57,3 @@ pub(crate) const LEVEL_BEYOND: f64 = 0.2;
 
 /// Cells outside the contact that nearly touch, relative to the deepest overlap, belong to the next grid.
 pub(crate) const NEAR: f64 = 0.03;
-
-/// Violation of the contact conditions over that of an answer where another reading of the profiles is solved, whose difference from the first
-/// one tells their uncertainty. With 1 two patches take 7 % more
-/// instructions; what else it changes was not measured apart.
-pub(crate) const OTHER_READING: f64 = 3.0;

@@ -91,21 +91,6 @@ impl PressureGrid {
         }
     }
 
-    /// The grid over the same box with fewer cells along either axis, by about a factor.
-    pub(crate) fn coarser(&self, factor: f64) -> PressureGrid {
-        let cells = self.cells.map(|n| (n as f64 / factor) as usize);
-        PressureGrid::new([self.range(0), self.range(1)], cells, self.mirrored)
-    }
-
-    /// The grid of as many cells with lengths from the origin times a factor, the origin being moved to a place in mm.
-    pub(crate) fn placed(&self, size: f64, origin: [f64; 2]) -> PressureGrid {
-        PressureGrid {
-            middle: [0, 1].map(|k| origin[k] + size * self.middle[k]),
-            step: self.step.map(|step| size * step),
-            ..*self
-        }
-    }
-
     /// Coordinates of the centres along an axis.
     pub(crate) fn centres(&self, axis: usize) -> Vec<f64> {
         let n = self.cells[axis] as f64;

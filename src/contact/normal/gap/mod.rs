@@ -16,7 +16,5 @@ pub mod patch_grids;
 pub mod preview;
 pub mod search_box;
 pub mod solve;
-pub mod solve_from;
-pub mod start;
 pub mod surface;
 pub mod task;

@@ -3,9 +3,7 @@
 use crate::contact::normal::gap::answer::{NormalAnswer, NormalError, NormalWork};
 use crate::contact::normal::gap::edges::squares;
 use crate::contact::normal::gap::patch_grid::{GapOutcome, PatchGrid};
-use crate::contact::normal::gap::start::GapStart;
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::pressure_field::computed::Edges;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::remark::entry::RemarkEntry;
@@ -32,11 +30,7 @@ struct Coarse {
 
 impl GapTask {
     /// Field, report and remarks.
-    pub(crate) fn found(
-        &self,
-        outcome: GapOutcome,
-        edges: Edges,
-    ) -> Result<NormalAnswer, NormalError> {
+    pub(crate) fn found(&self, outcome: GapOutcome) -> Result<NormalAnswer, NormalError> {
         let loads = outcome.patch_grids.iter().map(PatchGrid::load);
         let heaviest = loads
             .zip(&outcome.patch_grids)
@@ -52,7 +46,7 @@ impl GapTask {
             residual: pressed.residual,
             pressure_change: outcome.pressure_change,
         };
-        let field = field(&outcome.patch_grids, edges).map_err(NormalError::NoAnswer)?;
+        let field = field(&outcome.patch_grids).map_err(NormalError::NoAnswer)?;
         let coarse = coarse(&outcome.patch_grids);
         let mut remarks = Vec::new();
         for Coarse {
@@ -74,14 +68,10 @@ impl GapTask {
             remarks.push(Remark::GapRough {}.into());
         }
         remarks.extend(self.remarks(&field, pressed.approach - outcome.least));
-        let depth = pressed.approach - outcome.least;
-        let centre = field.load_centre(None);
-        let start = Some(GapStart::new(outcome.patch_grids, depth, centre));
         Ok(NormalAnswer {
             field,
             report,
             remarks,
-            start,
         })
     }
 
@@ -144,7 +134,7 @@ fn coarse(patch_grids: &[PatchGrid]) -> Vec<Coarse> {
 }
 
 /// The pressures of the grids as a field with edges between their cells.
-fn field(patch_grids: &[PatchGrid], edges: Edges) -> Result<PressureField, String> {
+fn field(patch_grids: &[PatchGrid]) -> Result<PressureField, String> {
     let loaded = patch_grids
         .iter()
         .filter(|patch_grid| patch_grid.largest() > 0.0);
@@ -155,7 +145,6 @@ fn field(patch_grids: &[PatchGrid], edges: Edges) -> Result<PressureField, Strin
             &squares(grid.cells[0], &pressed.pressure),
             &pressed.pressure,
             pressed.approach,
-            edges,
         )
     });
     PressureField::of_grids(grids.collect::<Result<_, _>>()?)

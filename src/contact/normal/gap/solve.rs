@@ -11,16 +11,14 @@ use crate::contact::normal::gap::conjugate_gradients::{
     PressureAnswer, PressureTask, solve_pressure,
 };
 use crate::contact::normal::gap::constants::{
-    APPROACH_CHANGE, COARSE_LOOSE_FROM, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, LOOSE_POWER, NEAR,
-    OTHER_READING, PRESSURE_CHANGE, REFINEMENT, RESOLUTION, RESOLUTION_COARSE,
-    RESOLUTION_COARSE_LOOSE, TARGET_POWER, TARGET_USUAL, TARGETS_LOOSE, TOLERANCE_FIRST,
+    APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, LOOSE_POWER, NEAR, PRESSURE_CHANGE,
+    REFINEMENT, RESOLUTION, TARGET_POWER, TARGET_USUAL, TARGETS_LOOSE, TOLERANCE_FIRST,
 };
 use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
 use crate::contact::normal::gap::patch_grid::{GapOutcome, GridsExit, PatchGrid};
 use crate::contact::normal::gap::search_box::{SearchBox, reach_of_level};
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::NormalLoad;
-use crate::contact::normal::pressure_field::computed::Edges;
 
 impl GapTask {
     /// What is wrong with the gap, as far as its samples tell without solving.
@@ -75,30 +73,8 @@ impl GapTask {
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
-        let found = self.solve_near(Vec::new(), resolution, workspace, monitor)?;
-        self.found(found, Edges::Found)
-    }
-
-    /// The solution from a start of any number of grids, if it has one there.
-    pub(crate) fn solve_near(
-        &self,
-        mut start: Vec<PatchGrid>,
-        resolution: GridFineness,
-        workspace: &mut GridWorkspace<f32>,
-        monitor: &dyn Monitor,
-    ) -> Result<GapOutcome, NormalError> {
-        let found = match (start.len(), start.pop()) {
-            (1, Some(one)) => self.solve_from(one, resolution, workspace, monitor)?,
-            (_, Some(last)) => {
-                start.push(last);
-                self.solve_from_tiles(start, resolution, workspace, monitor)?
-            }
-            (_, None) => None,
-        };
-        if let Some(found) = found {
-            return Ok(found);
-        }
-        self.solve_on(resolution, workspace, monitor)
+        let found = self.solve_on(resolution, workspace, monitor)?;
+        self.found(found)
     }
 
     fn solve_on(
@@ -272,21 +248,6 @@ pub(crate) struct GridStart<'a> {
     pub(crate) tolerance: f64,
 }
 
-impl<'a> GridStart<'a> {
-    /// From an earlier grid.
-    pub(crate) fn new(
-        before: &'a (PressureGrid, PressureAnswer),
-        reach: &'a SearchBox,
-        tolerance: f64,
-    ) -> GridStart<'a> {
-        GridStart {
-            before: Some(before),
-            reach,
-            tolerance,
-        }
-    }
-}
-
 /// What follows a grid.
 pub(crate) enum NextStep {
     PressureGrid(PressureGrid),
@@ -294,37 +255,12 @@ pub(crate) enum NextStep {
     End(GridsExit, bool),
 }
 
-impl NextStep {
-    /// Is the grid before the last one, fine enough and settled?
-    pub(crate) fn is_settled(&self) -> bool {
-        matches!(self, NextStep::End(GridsExit::Settled, false))
-    }
-}
-
 impl GridFineness {
-    /// The resolution for the search of a height, at a third of the cost: forces within some tenths of a per cent, edges within one cell, a
-    /// twentieth of the contact. Roughness is not resolved. At loose targets it is coarser still.
-    pub(crate) fn coarse(target: f64) -> GridFineness {
-        if target < COARSE_LOOSE_FROM {
-            RESOLUTION_COARSE
-        } else {
-            RESOLUTION_COARSE_LOOSE
-        }
-    }
-
     /// The same without a comparison with another grid.
     pub(crate) fn alone(self) -> GridFineness {
         GridFineness {
             settles: false,
             ..self
-        }
-    }
-
-    /// The same where only the difference between two readings of the profiles counts.
-    pub(crate) fn of_other_reading(self) -> GridFineness {
-        GridFineness {
-            tolerance: OTHER_READING * self.tolerance,
-            ..self.alone()
         }
     }
 

@@ -104,14 +104,6 @@ impl GapSurface {
         }
     }
 
-    /// Coordinates along x and y of a gap given on a grid, and its samples, sample (i, j) at `j * x.len() + i`.
-    pub(crate) fn grid_samples(&self) -> Option<[&[f64]; 3]> {
-        match self {
-            GapSurface::Grid(SampledSurface { x, y, values, .. }) => Some([x, y, values]),
-            GapSurface::Profile { .. } | GapSurface::Changed { .. } => None,
-        }
-    }
-
     /// Values at all `(x[i], y[j])`, stored at `j * x.len() + i`. All points lie in the window.
     #[must_use]
     pub fn on(&self, x: &[f64], y: &[f64]) -> Vec<f64> {

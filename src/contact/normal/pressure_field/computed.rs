@@ -4,15 +4,6 @@ use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::sample_grid::{PADDING, SampleGrid, padded};
 
-/// Whether edges are placed between the cells of a computed pressure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Edges {
-    /// They are.
-    Found,
-    /// Not: of every patch there are the force, the load centre and spread, and about its area and extent. It has no chords.
-    Left,
-}
-
 impl GridPressure {
     /// The field of a pressure computed on equal cells with the centres `(x[i], y[j])` in mm, stored at
     /// `j * x.len() + i`.
@@ -28,7 +19,6 @@ impl GridPressure {
         squares: &[f64],
         pressure: &[f64],
         approach: f64,
-        edges: Edges,
     ) -> Result<GridPressure, String> {
         let grid = SampleGrid {
             x: padded(x),
@@ -62,17 +52,7 @@ impl GridPressure {
             shape.patch.pressure_max = peak;
             shape.patch.approach = Some(approach);
         }
-        match edges {
-            Edges::Found => field.find_edges(),
-            Edges::Left => {
-                for label in 0..field.shapes.len() {
-                    let (extent, area) = field.measure_samples(&samples, label);
-                    let patch = &mut field.shapes[label].patch;
-                    (patch.extent, patch.area) = (extent, area);
-                }
-                field.smooth = vec![false; field.q.len()];
-            }
-        }
+        field.find_edges();
         Ok(field)
     }
 

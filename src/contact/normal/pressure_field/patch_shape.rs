@@ -6,7 +6,7 @@ use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::components::NOWHERE;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::pressure_field::patch_cells::{PatchShape, SampledLoad};
-use crate::contact::normal::pressure_field::sample_grid::{PADDING, SampleGrid};
+use crate::contact::normal::pressure_field::sample_grid::PADDING;
 use crate::contact::numerics::bracketed_root::maximum;
 use crate::contact::numerics::vanishing;
 use crate::contact::remark::entry::RemarkEntry;
@@ -124,26 +124,6 @@ impl GridPressure {
             let x = &self.grid.x;
             x[first - 2] < reach.left.0 || x[last + 2] > reach.right.0
         })
-    }
-
-    /// Region of a patch from its samples alone: the box around them, and the area that they stand for.
-    pub(crate) fn measure_samples(&self, samples: &[u8], label: usize) -> ([f64; 4], f64) {
-        let shape = &self.shapes[label];
-        let share = |axis: &[f64], k: usize| 0.5 * (axis[k + 1] - axis[k - 1]);
-        let ends = |axis: &[f64], first: usize, last: usize| {
-            [
-                axis[first] - 0.5 * share(axis, first),
-                axis[last] + 0.5 * share(axis, last),
-            ]
-        };
-        let SampleGrid { x, y } = &self.grid;
-        let (columns, rows) = (&shape.columns, &shape.rows);
-        let [x_min, x_max] = ends(x, columns.start() + 2, columns.end() - 1);
-        let [y_min, y_max] = ends(y, rows.start() + 2, rows.end() - 1);
-        let own = samples.iter().enumerate();
-        let own = own.filter(|(_, patch)| usize::from(**patch) == label);
-        let area = own.map(|(k, _)| share(x, k % x.len()) * share(y, k / x.len()));
-        ([x_min, x_max, y_min, y_max], area.sum())
     }
 
     /// Left and right end of a patch on the line at y, and the length of its segments there; infinite ends and 0 if it has none.

@@ -54,20 +54,6 @@ macro_rules! wheel_remarks {
                 short(100.0 * uncertainty), short(100.0 * target)
             ),
 
-            /// A patch reaches the line on the rail at which the contact was divided between two planes of contact. Its edge there comes from that division and
-            /// is not the edge of a contact: if the largest pressure lies on that line, it grows as the grid is refined.
-            PatchCut {
-                /// y of the line on the cross-section of the rail.
-                rail_y_mm: f64 = -18.4,
-            }
-            code: "patch-cut",
-            severity: Warning,
-            advice: "Do not use pressures near that line, nor the largest pressure if the answer has `gap-rough` as well. At this load two patches have merged into one curved patch; at a smaller load they are separate.",
-            detail: format!(
-                "the patch reaches the line y = {rail_y_mm:.2} mm on the rail, where the contact is divided between two planes: its edge and its \
-                 pressure there come from that division"
-            ),
-
             /// The case does not ask for a reference surface, and the curve of the rail does not solve it: it is solved on planes of contact.
             OnPlanes {
                 /// Why.
@@ -91,18 +77,6 @@ macro_rules! wheel_remarks {
             detail: format!(
                 "the surface turns by {} rad over the contact; the influence between its ends is known up to {range_rad} rad",
                 short(turn_rad)
-            ),
-
-            /// The force jumps at the height of the wheel that carries the load, where patches merge; forces were scaled to the load.
-            ForceJumps {
-                /// Load over force found.
-                factor: f64 = 1.004,
-            }
-            code: "force-jumps",
-            severity: Warning,
-            advice: "Vary the lateral place of the wheel a little to see how far the answer depends on it.",
-            detail: format!(
-                "the force jumps at this height of the wheel, where patches merge; forces were scaled by {factor:.4}"
             ),
 
             /// Several motions, or the points of a history, share their patches, so that the vertical load is balanced by normal forces alone.

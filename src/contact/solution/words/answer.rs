@@ -94,6 +94,32 @@ pub struct NormalReport {
     pub seconds: f64,
 }
 
+impl NormalReport {
+    /// One report for two parts of a contact: the finer grid, all the work, the worse residual.
+    #[must_use]
+    pub fn with(self, other: NormalReport) -> NormalReport {
+        let finer = if self.cells >= other.cells {
+            self
+        } else {
+            other
+        };
+        let changed = self.pressure_change.abs() >= other.pressure_change.abs();
+        NormalReport {
+            cells: finer.cells,
+            grids: self.grids + other.grids,
+            iterations: self.iterations + other.iterations,
+            residual: self.residual.max(other.residual),
+            pressure_change: if changed {
+                self.pressure_change
+            } else {
+                other.pressure_change
+            },
+            force_residual: self.force_residual.max(other.force_residual),
+            seconds: self.seconds + other.seconds,
+        }
+    }
+}
+
 /// Origin of moments and rigid slip.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Origin {

@@ -1,7 +1,7 @@
 //! A wheelset over both rails, with what presses it down and what is asked of it.
 
 use crate::contact::geometry::wheelset::WheelsetMotion;
-use crate::contact::normal::wheel_height::task::WheelTask;
+use crate::contact::normal::wheel::task::WheelTask;
 
 /// A wheelset over both rails, in all positions that are asked for.
 #[derive(Debug, Clone, PartialEq)]
