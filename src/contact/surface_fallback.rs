@@ -9,7 +9,6 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_assessment::trust;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
-use crate::contact::solution::words::answer::Solution;
 
 /// Solves a wheel on its reference surface, or on planes where the curve has no answer and the case does not ask for it.
 ///
@@ -63,11 +62,4 @@ pub(crate) fn fallback(contact: &WheelTask, error: SolveError) -> Result<RemarkE
     }
     let reason = format!("on the curve of the rail, {error}");
     Ok(Remark::OnPlanes { reason }.into())
-}
-
-/// Whether a solution is one on planes in place of the curve.
-pub(crate) fn is_on_planes(solution: &Solution) -> bool {
-    let reason = String::new();
-    let code = Remark::OnPlanes { reason }.code();
-    solution.remarks.iter().any(|remark| remark.code == code)
 }

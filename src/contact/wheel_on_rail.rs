@@ -1124,9 +1124,7 @@ impl<'a> WheelSolve<'a> {
         }
         Ok(WheelContact {
             lowering: self.touch - contact.centre,
-            force_residual: contact.missed,
             centre: contact.centre,
-            heights: contact.heights,
             patches,
             remarks: Vec::new(),
         })

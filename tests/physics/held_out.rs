@@ -144,8 +144,9 @@ fn estimates_cover_the_error_of_random_gaps() {
 }
 
 #[test]
-fn estimates_cover_the_error_of_wheels_on_rails() {
-    assert_covers(Class::Profiles, 95, 1, 4.0);
+fn estimates_cover_the_error_of_wheels_on_planes_of_contact() {
+    // One of 99.
+    assert_covers(Class::Profiles, 95, 2, 4.0);
 }
 
 #[test]

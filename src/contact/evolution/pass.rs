@@ -9,11 +9,9 @@ use crate::contact::evolution::section::{add, along, lengths, smoothed};
 use crate::contact::evolution::task::{Evolution, Sections, SolveContext};
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel::task::ReferenceSurface;
 use crate::contact::post::heat::NANOMETRES;
 use crate::contact::solution::words::answer::PatchSolution;
 use crate::contact::solution::words::evolution::{StateContact, StatePatch};
-use crate::contact::surface_fallback::is_on_planes;
 
 /// Wear of one body: of the rail in one pass, of the wheel over 1 mm rolled.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -93,7 +91,6 @@ pub(crate) fn pass(
     let NormalTask::Wheel(wheel) = &checked.problem.task else {
         return Ok(unsolved("not a wheel on a rail".to_owned()));
     };
-    let on_curve = wheel.surface != ReferenceSurface::Planes && !is_on_planes(&solution);
     // The coordinate across a patch runs to the left, the points of the sections to the field side.
     let to_left = wheel.geometry.placement.side.sign();
     let mut wear = BodyWear::none(on);
@@ -109,15 +106,11 @@ pub(crate) fn pass(
             pressure_max_mpa: patch.pressure_max_mpa,
             t_gamma_n: patch.points[0].friction_power_n,
         });
-        // The coordinate of the load centre: on a curve it is counted from there.
-        let (sin, cos) = position.contact_angle_rad.sin_cos();
-        let [y, z] = [1, 2].map(|k| position.track_mm[k] - position.origin_track_mm[k]);
-        let centre = if on_curve { 0.0 } else { y * cos + z * sin };
         // A line of the wheel is passed once in a turn.
         let turn = 2.0 * PI * position.rolling_radius_mm;
         let places = [(position.rail_mm, 1.0), (position.wheel_mm, 1.0 / turn)];
         for (k, (at, share)) in places.into_iter().enumerate() {
-            let arc = PatchArc::new(on.points[k], at, [to_left, centre]);
+            let arc = PatchArc::new(on.points[k], at, to_left);
             add_patch(task.plan.wear_model, patch, &arc, share, &mut wear[k]);
         }
     }
@@ -180,8 +173,8 @@ struct PatchArc {
 }
 
 impl PatchArc {
-    /// Of a patch whose load centre lies at a place and has a coordinate.
-    fn new(points: &[[f64; 2]], at: [f64; 2], [to_left, centre]: [f64; 2]) -> PatchArc {
+    /// Of a patch whose load centre lies at a place.
+    fn new(points: &[[f64; 2]], at: [f64; 2], to_left: f64) -> PatchArc {
         let from_point = |k: usize| [0, 1].map(|i| at[i] - points[k][i]);
         let off = |k: &usize| from_point(*k).iter().map(|d| d * d).sum::<f64>();
         let nearest = (0..points.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
@@ -194,7 +187,7 @@ impl PatchArc {
         let of_centre = along[nearest] + (y * chord[0] + z * chord[1]) / chord[0].hypot(chord[1]);
         let middles = along.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
         PatchArc {
-            zero: of_centre - to_left * centre,
+            zero: of_centre,
             to_left,
             lengths: lengths(points),
             ends: middles.chain([f64::INFINITY]).collect(),

@@ -140,8 +140,6 @@ pub(crate) struct CurveContact {
     /// The runs of contact that act on each other, by strips: first and last.
     pub(crate) runs: Vec<[usize; 2]>,
     pub(crate) work: NormalWork,
-    /// Heights that were solved.
-    pub(crate) heights: u32,
     /// Was the height found before the heights were used up?
     settled: bool,
     /// By which part the force is missed.
@@ -513,7 +511,6 @@ impl CurveTask<'_> {
                 over: None,
                 grid,
                 centre,
-                heights: 0,
                 iterations: 0,
             };
             let none = Friction::default();
@@ -574,7 +571,6 @@ impl CurveTask<'_> {
             over: None,
             grid,
             centre: coarse.centre,
-            heights: coarse.heights,
             iterations: coarse.work.iterations,
         };
         let tolerance = self.fineness.tolerance;
@@ -599,7 +595,6 @@ impl CurveTask<'_> {
             centre: before.centre,
             operator: Some(before.operator),
             over: Some(before.over),
-            heights: before.heights,
             iterations: before.work.iterations,
         };
         let tolerance = self.fineness.tolerance;
@@ -704,7 +699,6 @@ impl CurveTask<'_> {
                 over: None,
                 grid,
                 centre: found.centre,
-                heights: found.heights,
                 iterations: found.work.iterations,
             };
         }
@@ -765,7 +759,6 @@ impl CurveTask<'_> {
             mut centre,
             operator,
             over,
-            mut heights,
             mut iterations,
         } = start;
         let nx = grid.x.len();
@@ -787,7 +780,6 @@ impl CurveTask<'_> {
             _ => wanted,
         });
         for height in 0..HEIGHTS_MAX {
-            heights += 1;
             let gap = over.at(centre);
             let mut weighted: Vec<f64> = match &friction.opened {
                 Some(opened) => gap.iter().zip(opened).map(|(a, b)| a + b).collect(),
@@ -844,7 +836,6 @@ impl CurveTask<'_> {
                     centre,
                     pressure,
                     runs,
-                    heights,
                     settled,
                     missed: missed.abs(),
                     over,
@@ -917,7 +908,6 @@ struct Start {
     /// Solution found earlier on the same grid.
     operator: Option<BentOperator>,
     over: Option<WheelOverGrid>,
-    heights: u32,
     iterations: u32,
 }
 

@@ -279,7 +279,7 @@ fn torque_of_rails(found: &[SolvedWheel; 2], pose: [f64; 3], height: f64) -> f64
     found.iter().map(patches).sum()
 }
 
-/// That of one patch: friction acts about the origin of its frame, the rest of the force, which is that of the pressures, at its load centre.
+/// That of one patch, whose force acts at its load centre.
 fn torque(patch: &PatchSolution, centre: [f64; 3], axle: [f64; 3]) -> f64 {
     let (Some(position), Some(point)) = (&patch.position, patch.points.first()) else {
         return 0.0;
@@ -288,22 +288,13 @@ fn torque(patch: &PatchSolution, centre: [f64; 3], axle: [f64; 3]) -> f64 {
         return 0.0;
     };
     let (sin, cos) = position.contact_angle_rad.sin_cos();
-    let about = |at: [f64; 3], force: [f64; 3]| {
-        let arm = [0, 1, 2].map(|k| at[k] - centre[k]);
-        let cross = [
-            arm[1] * force[2] - arm[2] * force[1],
-            arm[2] * force[0] - arm[0] * force[2],
-            arm[0] * force[1] - arm[1] * force[0],
-        ];
-        (0..3).map(|k| axle[k] * cross[k]).sum::<f64>()
-    };
+    let arm = [0, 1, 2].map(|k| position.track_mm[k] - centre[k]);
     // Of the wheel on the rail; the wheelset feels the opposite.
-    let tangential = [
-        point.force_x_n,
-        point.force_y_n * cos,
-        point.force_y_n * sin,
+    let moment = [
+        arm[1] * force[2] - arm[2] * force[1],
+        arm[2] * force[0] - arm[0] * force[2],
+        arm[0] * force[1] - arm[1] * force[0],
     ];
-    let normal = [0, 1, 2].map(|k| force[k] - tangential[k]);
     let spin = point.moment_z_n_mm * (axle[2] * cos - axle[1] * sin);
-    -(about(position.origin_track_mm, tangential) + about(position.track_mm, normal) + spin)
+    -((0..3).map(|k| axle[k] * moment[k]).sum::<f64>() + spin)
 }

@@ -10,12 +10,8 @@ use crate::contact::remark::entry::RemarkEntry;
 pub struct WheelContact {
     /// How far the wheel is below first touch, in mm.
     pub lowering: f64,
-    /// By which part the prescribed force is missed.
-    pub force_residual: f64,
     /// Height of the wheel's centre over the top of the rail, in mm.
     pub centre: f64,
-    /// Heights that were solved.
-    pub heights: u32,
     /// The patches, from smaller to larger y of the track; never empty.
     pub patches: Vec<WheelPatch>,
     /// Remarks for the answer.
