@@ -34,6 +34,7 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::coupled::negligible;
 use crate::contact::problem::run::Run;
 use crate::contact::remark::entry::{RemarkEntry, merged};
+use crate::contact::remark::kind::short;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::OperatorStore;
@@ -1115,10 +1116,10 @@ impl<'a> WheelSolve<'a> {
             let [rear, front, low, high] = extent;
             return Err(SolveError::NormalProblem {
                 reason: format!(
-                    "a patch on the curve of the rail is {:.1} mm long and {:.2} mm wide, more than {SLENDER_MAX} times as long as wide, as on a ridge; \
+                    "a patch on the curve of the rail is {} mm long and {} mm wide, more than {SLENDER_MAX} times as long as wide, as on a ridge; \
                      smooth the profiles, or give reference_surface \"plane\"",
-                    front - rear,
-                    high - low
+                    short(front - rear),
+                    short(high - low)
                 ),
             });
         }

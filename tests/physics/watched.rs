@@ -151,7 +151,7 @@ fn a_contact_that_outgrows_its_grids_is_given_up_on_the_first_of_them() {
     let monitor = Counting::new(None);
     let answer = solve(&checked, &monitor);
     assert!(
-        matches!(&answer, Err(SolveError::NormalProblem { reason }) if reason.contains("the end of a profile")),
+        matches!(&answer, Err(SolveError::NormalProblem { reason }) if reason.contains("nearly vertical")),
         "{answer:?}"
     );
     assert!(monitor.ticks.get() < 1000, "{}", monitor.ticks.get());

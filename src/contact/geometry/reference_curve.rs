@@ -190,7 +190,7 @@ impl<'g> ReferenceCurve<'g> {
         }
     }
 
-    /// The same wheel over planes of contact, which are given with increasing arc length.
+    /// The same wheel over planes of contact, which are given with increasing arc length. It stays the curve where the rail has no stretch along any of them.
     #[must_use]
     pub fn on_planes(&self, planes: Vec<ContactPlane>) -> ReferenceCurve<'g> {
         let mut rail = Vec::new();
@@ -220,11 +220,14 @@ impl<'g> ReferenceCurve<'g> {
         if self.sign() < 0.0 {
             rail.sort_by(|a: &CurvePlace, b| b.s.total_cmp(&a.s));
         }
-        ReferenceCurve {
-            last: Cell::new(rail[0]),
-            rail: Cow::Owned(rail),
-            planes,
-            ..self.clone()
+        match rail[..] {
+            [first, _, ..] => ReferenceCurve {
+                last: Cell::new(first),
+                rail: Cow::Owned(rail),
+                planes,
+                ..self.clone()
+            },
+            _ => self.clone(),
         }
     }
 
