@@ -25,9 +25,6 @@ const SIDE_MIN: f64 = 4.0;
 const SIDE_MIN_EXPLICIT: f64 = 2.0;
 /// Dimensionless spin `φ c G/(μ p_max)` from which meshes gather about the pole of the rigid slip. 1 to 4 change the work by 20 %.
 const SPIN_GRADED: f64 = 2.0;
-/// Length over width of a patch beyond which spin takes more cells along strips. Cells many times as long as their strips are wide make the
-/// trapezoid rule alternate, so that Newton's method hardly converges and the estimate misses its target.
-const LONG: f64 = 4.0;
 /// Distance from the middle of the patch, in half axes, beyond which a pole counts as outside.
 const POLE_INSIDE: f64 = 0.9;
 /// Poles are rounded to multiples of this, in half axes, so that near motions share meshes. 0.02 and 0.1 change the work by 1 to 6 %.
@@ -61,7 +58,7 @@ impl MeshFamily {
         let shape = if pole.is_some() {
             0.85 * a_over_b.powf(0.4)
         } else if motion.spin_per_mm != 0.0 && a_over_b > 1.0 {
-            1.3 * (a_over_b / LONG).max(1.0).powf(0.75)
+            1.3
         } else {
             1.3 * a_over_b.powf(0.3)
         };
