@@ -13,6 +13,7 @@ use crate::contact::case::words::solver::Output;
 use crate::contact::error::SolveError;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::friction::on_rail::on_rail;
+use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::reference_curve::{
     CurvePlace, ReferenceCurve, RigidMotion, WheelOver,
 };
@@ -154,8 +155,11 @@ fn surface<'a>(
     if let ReferenceSurface::Curve { influence, .. } = contact.surface {
         return Ok((curve, influence));
     }
+    let locus = ContactLocus::new(&contact.geometry)
+        .map_err(|reason| SolveError::NormalProblem { reason })?;
     let influence = Influence::HalfSpace;
-    let mut planes = coarse(case, contact, &curve, contact.loading, monitor)?.planes(&curve);
+    let mut planes =
+        coarse(case, contact, &curve, contact.loading, monitor)?.planes(&curve, &locus);
     let alone = case.problem.part.all == 1 && case.problem.history.is_none();
     let flat = curve.on_planes(planes.clone());
     let (operators, watch) = (
@@ -167,7 +171,7 @@ fn surface<'a>(
         // Friction changes the height.
         let (_, found) = solve.coarse(true, &mut Workspace::default())?;
         let lowering = WheelLoad::Lowering(solve.touch - found.centre);
-        planes = coarse(case, contact, &curve, lowering, monitor)?.planes(&curve);
+        planes = coarse(case, contact, &curve, lowering, monitor)?.planes(&curve, &locus);
     }
     Ok((curve.on_planes(planes), influence))
 }

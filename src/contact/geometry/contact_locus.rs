@@ -210,6 +210,25 @@ impl<'g> ContactLocus<'g> {
         lowering
     }
 
+    /// The mean of the overlap of a wheel lowered by so many mm, weighted with its square over the area, among the lines over a range of the rail's
+    /// parameters: the parameter there, and the mean inclination of the rail in rad. None where nothing overlaps.
+    pub(crate) fn mean_overlap(&self, lowering: f64, [from, to]: [f64; 2]) -> Option<[f64; 2]> {
+        let inside =
+            |line: &&LocusPoint| line.clearance < lowering && (from..to).contains(&line.rail);
+        let (mut weight, mut y, mut angle) = (0.0, 0.0, 0.0);
+        for line in self.lines.iter().filter(inside) {
+            // The length of the overlap along x grows as its square root.
+            let own = (lowering - line.clearance).powf(2.5);
+            let [across, up] = self.geometry.rail_at(line.rail).slope;
+            weight += own;
+            y += own * line.y;
+            angle += own * (up / across).atan();
+        }
+        let far = |line: &&LocusPoint| (line.y - y / weight).abs();
+        let nearest = self.lines.iter().min_by(|a, b| far(a).total_cmp(&far(b)))?;
+        (weight > 0.0).then_some([nearest.rail, angle / weight])
+    }
+
     fn rolling_radius(&self) -> f64 {
         self.geometry.placement.rolling_radius
     }

@@ -293,6 +293,15 @@ impl<'g> ReferenceCurve<'g> {
         found
     }
 
+    /// The place at a parameter of the rail's curve; not on planes.
+    #[must_use]
+    pub(crate) fn at_rail(&self, rail: f64) -> CurvePlace {
+        let next = self.rail.partition_point(|known| known.rail <= rail);
+        let from = self.rail[next.clamp(1, self.rail.len()) - 1];
+        let along = length(self.geometry, from.rail, rail);
+        place(self.geometry, rail, from.s + self.sign() * along)
+    }
+
     /// Where the wheel is nearest to the rail on the line along x through a place, with the wheel's centre at a height in mm: x, and the wheel there as
     /// a start for [`over`](Self::over). None where the wheel does not face the rail within 8 mm.
     #[must_use]

@@ -4,6 +4,7 @@
 //! has the answer. Its strips lie at multiples of their width from the origin of the arc length, whatever the height is, and leave out what lies
 //! between the patches.
 
+use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::reference_curve::{
     ContactPlane, CurvePlace, Nearest, ReferenceCurve, SPACING, WheelOver,
 };
@@ -1027,8 +1028,9 @@ impl CurveContact {
     }
 
     /// Planes of contact for its patches and for overlaps without pressure: neighbours that are near and hardly inclined to each other share one. Each passes
-    /// through the mean of the overlap, weighted with its square over the area as seen from above, at the mean angle there.
-    pub(crate) fn planes(&self, curve: &ReferenceCurve) -> Vec<ContactPlane> {
+    /// through the mean of the overlap, weighted with its square over the area, at the mean angle there.
+    pub(crate) fn planes(&self, curve: &ReferenceCurve, locus: &ContactLocus) -> Vec<ContactPlane> {
+        let [first, last] = curve.range();
         let overlaps = curve.overlaps(self.centre);
         let pressed = self.grid.runs(&self.pressure).into_iter();
         let pressed: Vec<StripRun> = pressed.map(|run| self.strip_run(run)).collect();
@@ -1075,27 +1077,14 @@ impl CurveContact {
                 true => f64::INFINITY,
                 false => between(k),
             };
-            let (mut weight, mut s, mut angle) = (0.0, 0.0, 0.0);
-            for Nearest { place, wheel, .. } in overlaps.iter().flatten() {
-                if (low..high).contains(&place.s) {
-                    // The length of the overlap along x grows as its square root.
-                    let own = wheel.gap.abs().powf(2.5) * place.angle.cos().max(COSINE_LEAST);
-                    weight += own;
-                    s += own * place.s;
-                    angle += own * place.angle;
-                }
-            }
-            let origin = match weight > 0.0 {
-                true => curve.at(s / weight),
-                false => curve.at(0.5 * (ends[k][0] + ends[k][1])),
-            };
+            let mut rails = [low, high].map(|s| curve.at(s.clamp(first, last)).rail);
+            rails.sort_by(f64::total_cmp);
+            let middle = curve.at(0.5 * (ends[k][0] + ends[k][1]));
+            let mean = locus.mean_overlap(locus.touch - self.centre, rails);
+            let [rail, angle] = mean.unwrap_or([middle.rail, middle.angle]);
             ContactPlane {
-                origin,
-                angle: if weight > 0.0 {
-                    angle / weight
-                } else {
-                    origin.angle
-                },
+                origin: curve.at_rail(rail),
+                angle,
                 range: [low, high],
             }
         };
