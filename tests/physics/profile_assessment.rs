@@ -268,7 +268,7 @@ fn a_ridge_under_an_outlier_is_refused_or_remarked_on_with_its_place() {
                 }
                 Err(other) => panic!("{other}"),
             };
-            assert!(told.contains("300.0 µm off"), "{told}");
+            assert!(told.contains("300 µm off"), "{told}");
         }
     }
 }
