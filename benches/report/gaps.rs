@@ -6,7 +6,6 @@ use std::hint::black_box;
 
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal_stage;
-use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
