@@ -210,8 +210,9 @@ impl<'g> ContactLocus<'g> {
         lowering
     }
 
-    /// The mean of the overlap of a wheel lowered by so many mm, weighted with its square over the area, among the lines over a range of the rail's
-    /// parameters: the parameter there, and the mean inclination of the rail in rad. None where nothing overlaps.
+    /// Weighted mean of the overlap between wheel and rail: the parameter of the rail's curve at the mean position, and the mean inclination of the rail in
+    /// rad. The wheel is `lowering` mm below first touch. Only lines whose rail parameter lies between `from` and `to` count; the weight is the square of the
+    /// overlap, integrated over the area. `None` if the bodies do not overlap there.
     pub(crate) fn mean_overlap(&self, lowering: f64, [from, to]: [f64; 2]) -> Option<[f64; 2]> {
         let inside =
             |line: &&LocusPoint| line.clearance < lowering && (from..to).contains(&line.rail);

@@ -190,7 +190,8 @@ impl<'g> ReferenceCurve<'g> {
         }
     }
 
-    /// The same wheel over planes of contact, which are given with increasing arc length. It stays the curve where the rail has no stretch along any of them.
+    /// Returns this curve with its stretches replaced by planes of contact, which are given by increasing arc length. Returns the curve itself if fewer than two
+    /// of its points face a plane.
     #[must_use]
     pub fn on_planes(&self, planes: Vec<ContactPlane>) -> ReferenceCurve<'g> {
         let mut rail = Vec::new();

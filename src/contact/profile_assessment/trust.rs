@@ -147,7 +147,7 @@ struct Judgement<'a> {
 /// The quality of the profiles under every patch, and the findings.
 type Assessed = (Vec<PatchQuality>, Vec<Finding>);
 
-/// What tells one wheel at rest of a contact from another: its lowering, and the normal forces of its patches.
+/// Identifies a wheel at rest: its lowering in mm and the normal forces of its patches in N.
 type WheelAtRest = (f64, Vec<f64>);
 
 fn at_rest(wheel: &WheelContact) -> WheelAtRest {

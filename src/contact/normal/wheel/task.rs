@@ -46,7 +46,7 @@ pub enum ReferenceSurface {
 }
 
 impl WheelTask {
-    /// The same with other smoothings of rail and wheel, in mm.
+    /// Returns this task with other smoothing lengths of rail and wheel, in mm.
     #[must_use]
     pub fn smoothed(&self, smoothing: [f64; 2]) -> WheelTask {
         WheelTask {
