@@ -1,4 +1,4 @@
-//! Frame, signs, units, order of values and the words of this room. Other pages refer to this one.
+//! Frame, signs, units, order of values and the words of this crate. Other modules refer to this page.
 //!
 //! # Units
 //!
@@ -11,8 +11,8 @@
 //! *x* points along rolling, so that the leading edge is at larger x; *y* to the left; *z* up, out of the lower body (body 2, the
 //! rail). Forces, moments and tractions are those on the lower body; slip is that of the upper body relative to the lower one, so
 //! that traction and slip of a slipping cell point the same way. Kalker's CONTACT reports forces on body 1, whose signs are the
-//! reverse. Of a wheel on a rail every patch has a frame of its own ([`Frame`](crate::contact::geometry::frame::Frame)), turned by
-//! its contact angle; track axes are those of the rail's foot.
+//! reverse. The forces on each patch of a wheel on a rail are also given in axes of the patch, turned about *x* by its mean contact
+//! angle; track axes are those of the rail's foot.
 //!
 //! # Order of values
 //!
