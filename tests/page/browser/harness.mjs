@@ -54,8 +54,10 @@ export class Service {
 
   /** Ends the process at once, as a crash would. */
   async kill() {
-    const ended = new Promise((resolve) => this.process?.once('exit', resolve));
-    this.process?.kill('SIGKILL');
+    const child = this.process;
+    if (!child || child.exitCode !== null || child.signalCode !== null) return;
+    const ended = new Promise((resolve) => child.once('exit', resolve));
+    child.kill('SIGKILL');
     await ended;
   }
 
@@ -123,7 +125,7 @@ export function setUp(more = []) {
       const { protocol, origin } = new URL(request.url());
       if (protocol.startsWith('http') && origin !== service.base) complaints.push(`asked ${request.url()}`);
     });
-    page.setDefaultTimeout(15_000);
+    page.setDefaultTimeout(60_000);
     try {
       await page.goto(`${service.base}/${hash}`);
       await test(page);
