@@ -598,14 +598,17 @@ fn a_history_on_a_flat_rail_has_the_forces_of_a_plane() {
     for body in [None, Some(SOFT[1])] {
         let plane = on("plane", None, body);
         let limit = limit(&plane);
+        // On planes tractions of bodies that differ do not change the pressures.
+        let allowed = if body.is_some() { 0.01 } else { 0.005 };
         for influence in ["half_space", "angle_corrected"] {
             let curve = on("curve", Some(influence), body);
             let told = |code: &str| curve.remarks.iter().any(|remark| remark.code == code);
-            assert_eq!(told("coupling-first-order"), body.is_some());
+            // Its pressures belong to the tractions of its last point.
+            assert!(!told("coupling-first-order"));
             for (found, known) in forces_of(&curve).iter().zip(&forces_of(&plane)) {
                 for k in 0..3 {
                     let off = (found[k] - known[k]).abs() / limit;
-                    assert!(off < 0.005, "{influence} {k}: {found:?} {known:?} {off}");
+                    assert!(off < allowed, "{influence} {k}: {found:?} {known:?} {off}");
                 }
             }
         }

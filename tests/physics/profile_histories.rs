@@ -2,7 +2,7 @@
 
 use railhead::contact;
 use railhead::contact::case::limits::Limits;
-use railhead::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
+use railhead::contact::solution::words::answer::{PatchSolution, PointSolution, Solution, Total};
 use serde_json::{Value, json};
 
 use crate::cases::assert_fault;
@@ -115,19 +115,35 @@ fn totals_are_sums_in_track_axes_at_every_distance() {
     }
 }
 
-/// A vertical force is balanced by normal forces alone, since those do not change as the friction does.
+/// The pressures of a history belong to its last point: there the forces are those of steady rolling, and before it friction carries less.
 #[test]
-fn a_vertical_force_is_balanced_by_normal_forces_and_a_remark_says_so() {
+fn a_vertical_force_is_met_at_the_last_point_and_a_remark_tells_of_the_others() {
     let mut case = two_patches();
     case["load"] = json!({ "vertical_force_n": 75_000 });
     for case in [on_planes(&case), case] {
+        let [x, y, spin] = CREEPAGES;
+        let motion = json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": spin });
+        let steady = moving(&case, motion).total[0];
         // Nothing is displaced at 0.
-        let solution = moving(&case, rolled(&[0.0, 6.0], CREEPAGES));
-        let code = "normal-forces-alone-balance";
+        let solution = moving(&case, rolled(&[0.0, 60.0], CREEPAGES));
+        let code = "pressures-of-last-point";
         assert!(solution.remarks.iter().any(|remark| remark.code == code));
-        let [still, rolling] = [0, 1].map(|k| solution.total[k].force_z_n.expect("of profiles"));
-        assert!((still / -75e3 - 1.0).abs() < 1e-3, "{still}");
-        assert!((rolling / still - 1.0).abs() > 0.01, "{rolling}");
+        let vertical = |total: &Total| total.force_z_n.expect("of profiles");
+        let [still, rolling] = [&solution.total[0], &solution.total[1]];
+        assert!(
+            (vertical(rolling) / -75e3 - 1.0).abs() < 1e-3,
+            "{rolling:?}"
+        );
+        assert!((vertical(still) / -75e3 - 1.0).abs() > 0.01, "{still:?}");
+        for (own, known) in [
+            (rolling.force_x_n, steady.force_x_n),
+            (rolling.force_y_n, steady.force_y_n),
+        ] {
+            assert!(
+                (own - known).abs() < 0.01 * MU * 75e3,
+                "{rolling:?} {steady:?}"
+            );
+        }
     }
 }
 

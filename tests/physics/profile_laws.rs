@@ -216,29 +216,21 @@ fn a_free_wheel_rolls_without_longitudinal_creepage_at_its_own_radius_only() {
 }
 
 #[test]
-fn several_motions_share_their_patches_and_a_remark_says_what_balances() {
+fn motions_of_a_list_on_planes_balance_the_vertical_force_as_if_they_were_alone() {
     let mut case = on_planes(&place(&generated(), -8.0, 0.0, 0.0));
-    let motion = |y: f64| json!({ "creepage_y": y });
-    case["motion"] = json!([motion(0.0), motion(0.02)]);
-    let (solution, _) = solve(&case);
-    assert_eq!(solution.total.len(), 2);
-    assert!(
-        solution
-            .remarks
-            .iter()
-            .any(|remark| remark.code == "normal-forces-alone-balance"),
-        "{:?}",
-        solution.remarks
-    );
-    let vertical = |k: usize| -solution.total[k].force_z_n.expect("a force");
-    assert!((vertical(0) / 75e3 - 1.0).abs() < 1e-3 && vertical(1) > 1.05 * 75e3);
-    // Each as if it were asked for alone with the forces that came out.
-    let normal: f64 = solution
-        .patches
-        .iter()
-        .map(|patch| patch.normal_force_n)
-        .sum();
-    case["motion"] = motion(0.02);
-    let (alone, _) = solve(&load(&case, "normal_force_n", normal));
-    assert!((alone.total[0].force_y_n / solution.total[1].force_y_n - 1.0).abs() < 1e-3);
+    let motions = [0.0, 0.02].map(|y| json!({ "creepage_y": y }));
+    case["motion"] = json!(motions);
+    let (together, _) = solve(&case);
+    for (k, motion) in motions.into_iter().enumerate() {
+        case["motion"] = motion;
+        let (alone, _) = solve(&case);
+        let (found, own) = (&together.total[k], &alone.total[0]);
+        assert_eq!(
+            [found.force_x_n, found.force_y_n],
+            [own.force_x_n, own.force_y_n],
+            "{k}"
+        );
+        let vertical = -found.force_z_n.expect("a force");
+        assert!((vertical / 75e3 - 1.0).abs() < 1e-3, "{k}: {vertical}");
+    }
 }

@@ -1,6 +1,8 @@
 //! The normal problem: which patches touch, and with what pressure.
 
 pub(crate) mod axis_ratio;
+pub(crate) mod contact_planes;
+pub(crate) mod curve_grid;
 pub mod footprint;
 pub mod gap;
 pub mod hertz;

@@ -4,16 +4,14 @@
 //! has the answer. Its strips lie at multiples of their width from the origin of the arc length, whatever the height is, and leave out what lies
 //! between the patches.
 
-use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::reference_curve::{
-    ContactPlane, CurvePlace, Nearest, ReferenceCurve, SPACING, WheelOver,
-};
+use crate::contact::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCurve, SPACING};
 use crate::contact::half_space::bent_surface::{
     BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
 };
 use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::lazy_field::LazyField;
 use crate::contact::monitor::Monitor;
+use crate::contact::normal::curve_grid::{CurveGrid, FREE, WheelOverGrid, extent_of};
 use crate::contact::normal::gap::answer::{NormalError, NormalWork, no_touch};
 use crate::contact::normal::gap::cell_sums::{CellWeights, LANES};
 use crate::contact::normal::gap::conjugate_gradients::{
@@ -27,20 +25,14 @@ use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::normal::wheel::task::WheelLoad;
 use crate::contact::numerics::flood_fill::groups;
 
-/// Cells across the overlaps on the grid that finds the contact.
+/// Cells across the largest overlap on the grid that finds the contact.
 const FIRST: f64 = 24.0;
 /// Largest number of cells along x and s.
 const CELLS_MAX: usize = 600;
 /// A finer grid is not needed where the present one has this part of the wanted cells.
 const FINE_ENOUGH: f64 = 0.9;
-/// A strip whose least gap is larger than this, in mm, is no part of the contact.
-const APART: f64 = 0.3;
-/// The gap of a cell that is no part of the contact, in mm.
-const NO_CONTACT: f64 = 1e3;
 /// Strips whose deformed surfaces come nearer than this part of the deepest overlap are part of the next grid.
 const NEAR: f64 = 0.03;
-/// Cells around the contact that stay free.
-const FREE: usize = 2;
 /// Normal problems that are solved on one grid at most, and grids.
 const HEIGHTS_MAX: usize = 40;
 const GRIDS_MAX: usize = 12;
@@ -58,32 +50,6 @@ const LOWERING_LEAST: f64 = 1e-4;
 const LINEAR: f64 = 0.05;
 /// Steeper strips count in the search for the height as if their angle had this cosine.
 const COSINE_LEAST: f64 = 0.1;
-/// Runs of contact on a half-space that lie nearer than this, in mm, act on each other.
-const APART_ON_HALF_SPACE: f64 = 4.0;
-/// Patches nearer to each other than this, in mm, and inclined to each other by less than this, in rad, share a plane of contact. CONTACT separates patches that
-/// are 8 mm or 30° apart.
-const SHARED_PLANE_DISTANCE: f64 = 12.0;
-const SHARED_PLANE_ANGLE: f64 = 0.5;
-
-/// The place of a run of strips.
-#[derive(Debug, Clone, Copy)]
-struct StripRun {
-    /// Arc lengths of its ends in mm.
-    ends: [f64; 2],
-    /// Mean angle in rad, weighted with the pressures.
-    angle: f64,
-}
-
-impl StripRun {
-    /// How far it lies from another one in mm.
-    fn apart(&self, other: &StripRun) -> f64 {
-        (self.ends[0] - other.ends[1]).max(other.ends[0] - self.ends[1])
-    }
-
-    fn inclined(&self, other: &StripRun) -> f64 {
-        (self.angle - other.angle).abs()
-    }
-}
 
 /// What presses a wheel on a rail.
 #[derive(Debug, Clone, Copy)]
@@ -97,34 +63,6 @@ pub(crate) struct CurveTask<'a> {
     /// Lowering in mm to begin with.
     pub(crate) expected: f64,
     pub(crate) fineness: GridFineness,
-}
-
-/// Equal cells over parts of the unfolded surface; cell (i, j) is stored at `j * x.len() + i`.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct CurveGrid {
-    /// Centres of the cells along x in mm.
-    pub(crate) x: Vec<f64>,
-    /// The strips, by increasing arc length; without those between parts of the contact.
-    pub(crate) places: Vec<CurvePlace>,
-    /// The places of the strips in widths of a strip from that of the first one.
-    pub(crate) numbers: Vec<usize>,
-    /// The plane of contact of each strip; none on the curve.
-    planes: Option<Vec<usize>>,
-    /// Size of a cell along x and s in mm.
-    pub(crate) step: [f64; 2],
-}
-
-/// The undeformed wheel over the cells of a grid.
-#[derive(Debug, Clone)]
-struct WheelOverGrid {
-    /// Height of the wheel's centre in mm.
-    centre: f64,
-    /// Distance from the rail along its normal in mm.
-    gap: Vec<f64>,
-    /// Its change with the height of the wheel's centre.
-    lift: Vec<f64>,
-    /// Mean angles of rail and wheel of each strip where the wheel is nearest, weighted with the shares of the displacement of both bodies.
-    angle: Vec<f64>,
 }
 
 /// A wheel at rest on the curve.
@@ -204,271 +142,6 @@ impl PressureInfluence for WeightedStrips<'_> {
     }
 }
 
-impl CurveGrid {
-    /// The cells over a window along x and windows along s in mm, with centres at `(k + ½)` times their size.
-    fn new(curve: &ReferenceCurve, x: [f64; 2], s: &[[f64; 2]], step: [f64; 2]) -> CurveGrid {
-        let cells = |window: [f64; 2], step: f64| {
-            let [low, high] = window.map(|end| end / step);
-            let (first, last) = (low.floor() as i64, high.ceil() as i64);
-            first..last.max(first + 1)
-        };
-        let centre = |cell: i64, step: f64| (cell as f64 + 0.5) * step;
-        let mut numbers: Vec<i64> = s
-            .iter()
-            .flat_map(|window| cells(*window, step[1]))
-            .collect();
-        numbers.sort_unstable();
-        numbers.dedup();
-        let places = || numbers.iter().map(|cell| centre(*cell, step[1]));
-        CurveGrid {
-            x: cells(x, step[0])
-                .map(|cell| centre(cell, step[0]))
-                .collect(),
-            places: places().map(|s| curve.at(s)).collect(),
-            planes: curve
-                .is_flat()
-                .then(|| places().map(|s| curve.plane(s)).collect()),
-            numbers: numbers
-                .iter()
-                .map(|cell| (cell - numbers[0]) as usize)
-                .collect(),
-            step,
-        }
-    }
-
-    pub(crate) fn cells(&self) -> [usize; 2] {
-        [self.x.len(), self.places.len()]
-    }
-
-    pub(crate) fn area(&self) -> f64 {
-        self.step[0] * self.step[1]
-    }
-
-    /// The wheel over the cells at a height of its centre. Along x the gap is that of a polynomial through some points.
-    fn over(&self, task: &CurveTask, centre: f64) -> WheelOverGrid {
-        let curve = task.curve;
-        let of_both = |rail: f64, wheel: f64| task.of_both(rail, wheel);
-        let [nx, ny] = self.cells();
-        let [first, last] = [self.x[0], self.x[nx - 1]];
-        let nodes = curve.nodes([first, last]);
-        let weights: Vec<Vec<f64>> = self.x.iter().map(|x| lagrange(&nodes, *x)).collect();
-        let mut over = WheelOverGrid {
-            centre,
-            gap: Vec::with_capacity(nx * ny),
-            lift: Vec::with_capacity(nx * ny),
-            angle: Vec::with_capacity(ny),
-        };
-        let mut before: Option<Vec<WheelOver>> = None;
-        for (j, place) in self.places.iter().enumerate() {
-            let adjoins = j > 0 && self.numbers[j] == self.numbers[j - 1] + 1;
-            let start = before.take().filter(|_| adjoins);
-            before = curve.over_line(place, &nodes, centre, start.as_deref());
-            let Some(line) = &before else {
-                self.one_by_one(task, place, &mut over);
-                continue;
-            };
-            let values = |of: fn(&WheelOver) -> f64| {
-                let known: Vec<f64> = line.iter().map(of).collect();
-                let at = move |weights: &Vec<f64>| -> f64 {
-                    weights.iter().zip(&known).map(|(w, v)| w * v).sum()
-                };
-                weights.iter().map(at)
-            };
-            let row = over.gap.len();
-            over.gap.extend(values(|wheel| wheel.gap));
-            over.lift.extend(values(|wheel| wheel.lift));
-            let gaps = &over.gap[row..];
-            let nearest = (0..nx).min_by(|a, b| gaps[*a].total_cmp(&gaps[*b]));
-            let nearest = nearest.unwrap_or(0);
-            let of_wheel = values(|wheel| wheel.angle).nth(nearest);
-            if gaps[nearest] < APART {
-                over.angle
-                    .push(of_both(place.angle, of_wheel.unwrap_or(place.angle)));
-            } else {
-                over.angle.push(place.angle);
-                over.gap[row..].fill(NO_CONTACT);
-            }
-        }
-        over
-    }
-
-    /// The wheel over a strip above whose ends along x it may end.
-    fn one_by_one(&self, task: &CurveTask, place: &CurvePlace, over: &mut WheelOverGrid) {
-        let (curve, centre) = (task.curve, over.centre);
-        let row = over.gap.len();
-        over.gap.resize(row + self.x.len(), NO_CONTACT);
-        over.lift.resize(row + self.x.len(), place.angle.cos());
-        let nearest = curve.nearest(place, centre);
-        let Some((x, nearest)) = nearest.filter(|(_, wheel)| wheel.gap < APART) else {
-            over.angle.push(place.angle);
-            return;
-        };
-        over.angle.push(task.of_both(place.angle, nearest.angle));
-        let from = self.x.partition_point(|centre| *centre < x);
-        let mut go = |cells: &mut dyn Iterator<Item = usize>| {
-            let mut start = Some(nearest);
-            for i in cells {
-                start = start.and_then(|start| curve.over(place, self.x[i], centre, &start));
-                if let Some(wheel) = start {
-                    (over.gap[row + i], over.lift[row + i]) = (wheel.gap, wheel.lift);
-                }
-            }
-        };
-        go(&mut (0..from).rev());
-        go(&mut (from..self.x.len()));
-    }
-
-    /// Ends of the parts of the grid whose strips adjoin each other, by strips: first and last.
-    fn parts(&self) -> Vec<[usize; 2]> {
-        let mut parts: Vec<[usize; 2]> = Vec::new();
-        for (j, number) in self.numbers.iter().enumerate() {
-            match parts.last_mut() {
-                Some([_, last]) if self.numbers[*last] + 1 == *number => *last = j,
-                _ => parts.push([j, j]),
-            }
-        }
-        parts
-    }
-
-    /// First and last strip of each run of strips in contact.
-    pub(crate) fn runs(&self, pressure: &[f64]) -> Vec<[usize; 2]> {
-        let mut runs: Vec<[usize; 2]> = Vec::new();
-        for (j, row) in pressure.chunks_exact(self.x.len()).enumerate() {
-            if row.iter().all(|p| *p == 0.0) {
-                continue;
-            }
-            match runs.last_mut() {
-                Some([_, last]) if *last + 1 == j => *last = j,
-                _ => runs.push([j, j]),
-            }
-        }
-        runs
-    }
-
-    /// Runs of contact on a half-space, without those that act on each other as one.
-    fn joined(&self, runs: Vec<[usize; 2]>) -> Vec<[usize; 2]> {
-        let mut joined: Vec<[usize; 2]> = Vec::new();
-        for run in runs {
-            match joined.last_mut() {
-                Some([_, last])
-                    if self.places[run[0]].s - self.places[*last].s < APART_ON_HALF_SPACE =>
-                {
-                    *last = run[1];
-                }
-                _ => joined.push(run),
-            }
-        }
-        joined
-    }
-
-    /// The number of the run, or of the plane of contact, that each strip belongs to; those between two runs belong to the nearer one.
-    fn run_of_strips(&self, runs: &[[usize; 2]]) -> Vec<usize> {
-        if let Some(planes) = &self.planes {
-            return planes.clone();
-        }
-        let number = |j: usize| self.numbers[j];
-        let far = |j: usize, [first, last]: [usize; 2]| {
-            let [first, last] = [first, last].map(number);
-            first.saturating_sub(number(j)) + number(j).saturating_sub(last)
-        };
-        let nearest = |j: usize| (0..runs.len()).min_by_key(|k| far(j, runs[*k]));
-        (0..self.places.len())
-            .map(|j| nearest(j).unwrap_or(0))
-            .collect()
-    }
-
-    /// A larger grid where the contact reaches the border of this one or of a part of it.
-    fn enlarged(&self, curve: &ReferenceCurve, pressure: &[f64]) -> Option<CurveGrid> {
-        let nx = self.x.len();
-        let is_loaded = |j: usize| pressure[j * nx..(j + 1) * nx].iter().any(|p| *p > 0.0);
-        let half = 0.25 * self.step[1];
-        let mut any = false;
-        let mut window = |[low, high]: [f64; 2], reached: [bool; 2], step: f64| {
-            any |= reached[0] || reached[1];
-            let growth = 0.15 * (high - low) + 2.0 * step;
-            // Cells are whole, so that half of one is no new one.
-            let [below, above] = reached.map(|reached| if reached { growth } else { 0.0 });
-            [low - below - half, high + above + half]
-        };
-        let windows: Vec<[f64; 2]> = self
-            .parts()
-            .into_iter()
-            .map(|[first, last]| {
-                let end = (first + FREE).min(last + 1);
-                let low = (first..end).any(is_loaded);
-                let high = ((last + 1).saturating_sub(FREE).max(first)..=last).any(is_loaded);
-                let ends = [first, last].map(|j| self.places[j].s);
-                window(ends, [low, high], self.step[1])
-            })
-            .collect();
-        let in_columns = |columns: std::ops::Range<usize>| {
-            let mut rows = pressure.chunks_exact(nx);
-            rows.any(|row| row[columns.clone()].iter().any(|p| *p > 0.0))
-        };
-        let reached = [
-            in_columns(0..FREE.min(nx)),
-            in_columns(nx.saturating_sub(FREE)..nx),
-        ];
-        let along = window([self.x[0], self.x[nx - 1]], reached, self.step[0]);
-        any.then(|| CurveGrid::new(curve, along, &windows, self.step))
-    }
-
-    /// Pressures of another grid at the cells, bilinearly.
-    fn interpolated(&self, other: &CurveGrid, pressure: &[f64]) -> Vec<f64> {
-        let width = other.x.len();
-        let value = |i: i64, j: Option<usize>| match j {
-            Some(j) if (0..width as i64).contains(&i) => pressure[j * width + i as usize],
-            _ => 0.0,
-        };
-        let place = |at: f64, first: f64, step: f64| {
-            let at = (at - first) / step;
-            (at.floor() as i64, at - at.floor())
-        };
-        let columns: Vec<(i64, f64)> = self
-            .x
-            .iter()
-            .map(|x| place(*x, other.x[0], other.step[0]))
-            .collect();
-        let mut out = Vec::with_capacity(self.x.len() * self.places.len());
-        for strip in &self.places {
-            let (j, v) = place(strip.s, other.places[0].s, other.step[1]);
-            let [low, high] = [j, j + 1].map(|j| other.strip(j));
-            for &(i, u) in &columns {
-                let row = |j| (1.0 - u) * value(i, j) + u * value(i + 1, j);
-                out.push((1.0 - v) * row(low) + v * row(high));
-            }
-        }
-        out
-    }
-
-    /// The strip at a place in widths of a strip from that of the first one.
-    pub(crate) fn strip(&self, number: i64) -> Option<usize> {
-        let number = usize::try_from(number).ok()?;
-        self.numbers.binary_search(&number).ok()
-    }
-
-    /// The strips with the same arc lengths as the first and the last ones of runs on another grid.
-    fn runs_of(&self, other: &CurveGrid, runs: &[[usize; 2]]) -> Vec<[usize; 2]> {
-        let last = self.places.len() - 1;
-        let same = |j: usize| {
-            let s = other.places[j].s;
-            self.places.partition_point(|place| place.s < s).min(last)
-        };
-        runs.iter().map(|run| run.map(same)).collect()
-    }
-}
-
-/// Weights of values at some nodes for that of a polynomial through them.
-fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
-    let weight = |k: usize| {
-        let others = (0..nodes.len()).filter(|m| *m != k);
-        others
-            .map(|m| (at - nodes[m]) / (nodes[k] - nodes[m]))
-            .product()
-    };
-    (0..nodes.len()).map(weight).collect()
-}
-
 impl CurveTask<'_> {
     /// The mean of two angles of rail and wheel, with the parts that they have of the displacements.
     fn of_both(&self, rail: f64, wheel: f64) -> f64 {
@@ -496,7 +169,7 @@ impl CurveTask<'_> {
         for _ in 0..GRIDS_MAX {
             let grid = self.over_overlaps(lowering)?;
             let centre = self.touch - lowering;
-            let over = grid.over(self, centre);
+            let over = grid.over(self.curve, centre);
             let runs = match self.influence {
                 Influence::AngleCorrected => vec![[0, grid.places.len() - 1]],
                 // Overlaps are wider than contacts, so that runs of strips that touch may only be found with what acts alone.
@@ -562,11 +235,11 @@ impl CurveTask<'_> {
             opened: friction
                 .opened
                 .as_ref()
-                .map(|opened| grid.interpolated(&coarse.grid, opened)),
+                .map(|opened| grid.gaps(&coarse.grid, opened)),
             ..*friction
         };
         let start = Start {
-            pressure: grid.interpolated(&coarse.grid, &coarse.pressure),
+            pressure: grid.pressures(&coarse.grid, &coarse.pressure),
             runs: grid.runs_of(&coarse.grid, &coarse.runs),
             operator: None,
             over: None,
@@ -692,10 +365,10 @@ impl CurveTask<'_> {
                         .to_owned(),
                 ));
             }
-            friction.opened = opened.map(|opened| grid.interpolated(&found.grid, &opened));
+            friction.opened = opened.map(|opened| grid.gaps(&found.grid, &opened));
             start = Start {
                 runs: grid.runs_of(&found.grid, &found.runs),
-                pressure: grid.interpolated(&found.grid, &found.pressure),
+                pressure: grid.pressures(&found.grid, &found.pressure),
                 operator: None,
                 over: None,
                 grid,
@@ -731,9 +404,12 @@ impl CurveTask<'_> {
         runs: &[[usize; 2]],
         workspace: &mut Workspace,
     ) -> BentOperator {
+        let angles = grid.places.iter().zip(&over.angle);
         let strips = BentStrips {
             number: grid.numbers.clone(),
-            angle: over.angle.clone(),
+            angle: angles
+                .map(|(place, wheel)| self.of_both(place.angle, *wheel))
+                .collect(),
             run: grid.run_of_strips(runs),
             corrected: self.influence == Influence::AngleCorrected,
         };
@@ -763,7 +439,7 @@ impl CurveTask<'_> {
             mut iterations,
         } = start;
         let nx = grid.x.len();
-        let mut over = over.unwrap_or_else(|| grid.over(self, centre));
+        let mut over = over.unwrap_or_else(|| grid.over(self.curve, centre));
         let operator = operator.unwrap_or_else(|| self.operator(&grid, &over, &runs, workspace));
         let wanted = self.wanted_force(friction)?;
         let weight = |place: &CurvePlace| match wanted {
@@ -844,7 +520,7 @@ impl CurveTask<'_> {
             }
             sum = sum.map(|sum| sum / (1.0 + missed));
             if !is_linear {
-                over = grid.over(self, centre);
+                over = grid.over(self.curve, centre);
             }
         }
         unreachable!("the last height ends the search")
@@ -865,26 +541,6 @@ fn each_row(values: &mut [f64], weights: &[f64], of: fn(f64, f64) -> f64) {
     for (row, weight) in values.chunks_exact_mut(nx).zip(weights) {
         row.iter_mut()
             .for_each(|value| *value = of(*value, *weight));
-    }
-}
-
-impl WheelOverGrid {
-    /// The largest difference of the change of the gap with the height over the weight of the strip from 1, among cells in contact.
-    fn lift_off(&self, pressure: &[f64], weights: &[f64]) -> f64 {
-        let nx = pressure.len() / weights.len();
-        let rows = pressure.chunks_exact(nx).zip(self.lift.chunks_exact(nx));
-        let off = rows.zip(weights).flat_map(|((pressure, lift), weight)| {
-            let in_contact = pressure.iter().zip(lift).filter(|(p, _)| **p > 0.0);
-            in_contact.map(move |(_, lift)| (lift / weight - 1.0).abs())
-        });
-        off.fold(0.0, f64::max)
-    }
-
-    /// The gap of the cells at another height of the wheel's centre.
-    fn at(&self, centre: f64) -> Vec<f64> {
-        let raised = centre - self.centre;
-        let cells = self.gap.iter().zip(&self.lift);
-        cells.map(|(gap, lift)| gap + raised * lift).collect()
     }
 }
 
@@ -940,19 +596,6 @@ fn extent(contact: &CurveContact, axis: usize) -> [f64; 2] {
     let pressure = &contact.pressure;
     let cells: Vec<usize> = (0..pressure.len()).filter(|k| pressure[*k] > 0.0).collect();
     extent_of(&contact.grid, &cells, axis)
-}
-
-/// The ends of some cells along x or s in mm.
-fn extent_of(grid: &CurveGrid, cells: &[usize], axis: usize) -> [f64; 2] {
-    let nx = grid.x.len();
-    let places = cells.iter().map(|k| match axis {
-        0 => grid.x[k % nx],
-        _ => grid.places[k / nx].s,
-    });
-    let nothing = [f64::INFINITY, f64::NEG_INFINITY];
-    let [low, high] = places.fold(nothing, |[low, high], at| [low.min(at), high.max(at)]);
-    let half = 0.5 * grid.step[axis];
-    [low - half, high + half]
 }
 
 impl CurveContact {
@@ -1025,87 +668,6 @@ impl CurveContact {
             }
         }
         parts
-    }
-
-    /// Planes of contact for its patches and for overlaps without pressure: neighbours that are near and hardly inclined to each other share one. Each passes
-    /// through the mean of the overlap, weighted with its square over the area, at the mean angle there.
-    pub(crate) fn planes(&self, curve: &ReferenceCurve, locus: &ContactLocus) -> Vec<ContactPlane> {
-        let [first, last] = curve.range();
-        let overlaps = curve.overlaps(self.centre);
-        let pressed = self.grid.runs(&self.pressure).into_iter();
-        let pressed: Vec<StripRun> = pressed.map(|run| self.strip_run(run)).collect();
-        let free = overlaps.iter().filter_map(|overlap| {
-            let ends = [overlap[0].place.s, overlap[overlap.len() - 1].place.s];
-            let apart = |run: &StripRun| run.ends[1] < ends[0] || run.ends[0] > ends[1];
-            let gap = |near: &&Nearest| near.wheel.gap;
-            let deepest = overlap.iter().min_by(|a, b| gap(a).total_cmp(&gap(b)))?;
-            pressed.iter().all(apart).then_some(StripRun {
-                ends,
-                angle: deepest.place.angle,
-            })
-        });
-        let mut groups: Vec<Vec<StripRun>> = Vec::new();
-        for run in pressed.iter().copied().chain(free) {
-            // Of the groups that may have it, the one whose inclination is nearest.
-            let fits = |group: &&mut Vec<StripRun>| {
-                let near = |other: &StripRun| other.apart(&run) <= SHARED_PLANE_DISTANCE;
-                let inclined = group.iter().map(|other| other.inclined(&run));
-                group.iter().any(near) && inclined.fold(0.0, f64::max) <= SHARED_PLANE_ANGLE
-            };
-            let nearest = groups
-                .iter_mut()
-                .filter(fits)
-                .min_by(|a, b| a[0].inclined(&run).total_cmp(&b[0].inclined(&run)));
-            match nearest {
-                Some(group) => group.push(run),
-                None => groups.push(vec![run]),
-            }
-        }
-        groups.iter_mut().for_each(|group| {
-            group.sort_by(|a, b| a.ends[0].total_cmp(&b.ends[0]));
-        });
-        groups.sort_by(|a, b| a[0].ends[0].total_cmp(&b[0].ends[0]));
-        let ends = |group: &[StripRun]| [group[0].ends[0], group[group.len() - 1].ends[1]];
-        let ends: Vec<[f64; 2]> = groups.iter().map(|group| ends(group)).collect();
-        let between = |k: usize| 0.5 * (ends[k][1] + ends[k + 1][0]);
-        let plane = |k: usize| {
-            let low = match k {
-                0 => f64::NEG_INFINITY,
-                _ => between(k - 1),
-            };
-            let high = match k + 1 == ends.len() {
-                true => f64::INFINITY,
-                false => between(k),
-            };
-            let mut rails = [low, high].map(|s| curve.at(s.clamp(first, last)).rail);
-            rails.sort_by(f64::total_cmp);
-            let middle = curve.at(0.5 * (ends[k][0] + ends[k][1]));
-            let mean = locus.mean_overlap(locus.touch - self.centre, rails);
-            let [rail, angle] = mean.unwrap_or([middle.rail, middle.angle]);
-            ContactPlane {
-                origin: curve.at_rail(rail),
-                angle,
-                range: [low, high],
-            }
-        };
-        (0..groups.len()).map(plane).collect()
-    }
-
-    /// The place of a run of strips.
-    fn strip_run(&self, [first, last]: [usize; 2]) -> StripRun {
-        let nx = self.grid.x.len();
-        let half = 0.5 * self.grid.step[1];
-        let [low, high] = [first, last].map(|j| self.grid.places[j].s);
-        let (mut load, mut angle) = (0.0, 0.0);
-        for j in first..=last {
-            let own: f64 = self.pressure[j * nx..(j + 1) * nx].iter().sum();
-            load += own;
-            angle += own * self.grid.places[j].angle;
-        }
-        StripRun {
-            ends: [low - half, high + half],
-            angle: angle / load,
-        }
     }
 
     /// The largest pressure in MPa of the patch with the largest load.

@@ -29,9 +29,8 @@ impl Problem {
         FIRST_ORDER * difference * self.friction.largest()
     }
 
-    /// Is the pressure found together with the tractions? It is on the curve of a rail. Where bodies differ it is of motions and of one pressing alone,
-    /// where the gap is known. Points of a history that goes on share their patches. On planes tractions do not change how a
-    /// wheel rests.
+    /// Returns whether the pressures belong to the tractions of bodies that differ. On the curve of a rail they do, in a history to those of its last point.
+    /// Elsewhere they do in motions and in one pressing alone, where the gap is known. Points of a history that goes on share their patches.
     #[must_use]
     pub fn is_coupled(&self, run: &Run) -> bool {
         let on_curve = |wheel: &WheelTask| matches!(wheel.surface, ReferenceSurface::Curve { .. });
@@ -52,10 +51,7 @@ impl Problem {
 
     /// The remark if the pressure should feel the tractions and does not.
     pub(crate) fn first_order(&self, run: &Run) -> Option<Remark> {
-        // The points of a history of a wheel share the pressures without tractions.
-        let is_wheel = matches!(self.task, NormalTask::Wheel(_) | NormalTask::Wheelset(_));
-        let coupled = self.is_coupled(run) && !(is_wheel && self.history.is_some());
-        let needed = self.first_order_error(run.method) > negligible(run) && !coupled;
+        let needed = self.first_order_error(run.method) > negligible(run) && !self.is_coupled(run);
         needed.then(|| self.first_order_remark(run.method))
     }
 

@@ -73,7 +73,7 @@ pub(crate) fn comes_to_rest(
     let contact = settled.as_ref().unwrap_or(contact);
     let mut judgement = Judgement::new(contact);
     let before = &mut |wheel: &WheelContact| judgement.before(wheel);
-    wheel_on_rail::patches_at_rest(case, contact, before, monitor)?;
+    wheel_on_rail::at_rest(case, contact, before, monitor)?;
     Ok(())
 }
 

@@ -79,13 +79,25 @@ macro_rules! wheel_remarks {
                 short(turn_rad)
             ),
 
-            /// Several motions, or the points of a history, share their patches, so that the vertical load is balanced by normal forces alone.
+            /// The tractions of a motion in a list change the number of patches, or leave no answer; its pressures are those without tractions.
             NormalForcesAloneBalance {}
             code: "normal-forces-alone-balance",
             severity: Warning,
-            advice: "Ask for the motions in cases of their own if friction forces should be included in the vertical balance.",
-            detail: "normal forces alone balance the vertical force, because several motions, or the points of a history, share their patches; the totals of a motion \
-                     include its friction, so that they differ from the load".to_owned(),
+            advice: "Ask for the motion in a case of its own if its tractions should change the pressures, and its friction forces be included in the vertical balance.",
+            detail: "the tractions of this motion change the number of patches, of which an answer to several motions has one list, or leave no answer: its pressures are                      those without tractions, and normal forces alone balance the load".to_owned(),
+
+            /// A history under a vertical force has the pressures that belong to its last point.
+            PressuresOfLastPoint {
+                /// The largest difference of the vertical force of a point to that of the last one, relative to it.
+                part: f64 = 0.12,
+            }
+            code: "pressures-of-last-point",
+            severity: Info,
+            advice: "Compare `total.force_z_n` of the points with the load; end the history where the forces are needed, or give `normal_force_n`.",
+            detail: format!(
+                "all points of a history have the pressures that belong to its last one, at which the vertical force is met; at others friction changes it by up to {} %,                  which the error estimates of their forces contain",
+                short(100.0 * part)
+            ),
         }
     };
 }

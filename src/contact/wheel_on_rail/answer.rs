@@ -1,0 +1,296 @@
+//! The answer to a wheel on a rail from its pressures and tractions.
+
+use crate::contact::case::words::solver::Output;
+use crate::contact::error::SolveError;
+use crate::contact::geometry::reference_curve::{ReferenceCurve, RigidMotion};
+use crate::contact::normal::on_curve::CurveContact;
+use crate::contact::normal::wheel::wheel_contact::WheelContact;
+use crate::contact::post::damage::evaluate::{DamagedPatch, damage};
+use crate::contact::problem::run::Run;
+use crate::contact::remark::entry::{RemarkEntry, merged};
+use crate::contact::solution::assemble::normalised;
+use crate::contact::solution::moved::move_origin;
+use crate::contact::solution::words::answer::{ErrorEstimate, Origin, Position, Solution, Total};
+use crate::contact::solution::words::damage::Damage;
+use crate::contact::solution::words::fields::{Fields, PatchFields};
+use crate::contact::wheel_on_rail::rounds::Found;
+use crate::contact::wheel_on_rail::tractions::{Part, PatchForces, creepages, each_cell};
+use crate::contact::wheel_on_rail::{WheelSolve, minus};
+
+/// Errors of the factors for the turn relative to μN: this times the standard deviation of the angle over the load, in rad, and at most that. Against
+/// boundary elements of seven wheels on rails with μ of 0.3 they are 0.2 to 1.5 % where the angle deviates by 0.07 to 0.5 rad; half of these the factors were
+/// fitted to.
+const OPEN_BY_TURN: f64 = 0.2;
+const OPEN_MAX: f64 = 0.035;
+/// The errors by the turn grow with the difference of the two bodies' shares of the displacement, times this. On a bent surface the stiffness of a convex and
+/// of a concave body changes in opposite directions, by boundary elements of each body alone; the factors hold for their mean. The value was derived from these
+/// single-body results (about 2 in lateral forces); it was not compared with boundary elements of unequal pairs.
+const OPEN_BY_UNEQUAL: f64 = 2.5;
+/// Lateral forces of pressures count as under this coefficient of friction at least.
+const FRICTION_OPEN: f64 = 0.3;
+/// Axes, origins and signs in words.
+const FRAME: &str = "every patch on the surface of the rail: x along rolling (leading edge at larger x), y to the left along the cross-section, \
+                     z out of the rail, origin at its load centre; forces of a patch at its mean contact angle; total in track axes: x along \
+                     rolling, y to the left, z up; forces, moments and tractions act on the lower body, slip is that of the upper body relative \
+                     to the lower one";
+
+impl Part {
+    /// Adds to the estimates of all forces of a motion what is left open of them, relative to the friction limit.
+    fn leave_open(&mut self, index: usize, share: f64) {
+        let mut all = ErrorEstimate::default();
+        for patch in &mut self.solution.patches {
+            let limit = patch.friction_limit_n.unwrap_or(0.0);
+            let open = ErrorEstimate {
+                force_x_n: share * limit,
+                force_y_n: share * limit,
+                moment_z_n_mm: 0.0,
+            };
+            let point = &mut patch.points[index];
+            point.error_estimate = point.error_estimate.map(|error| error.plus(open));
+            let of_pressure = share * FRICTION_OPEN * patch.normal_force_n;
+            all = all.plus(ErrorEstimate {
+                force_y_n: open.force_y_n.max(of_pressure),
+                ..open
+            });
+        }
+        let total = &mut self.solution.total[index];
+        total.error_estimate = total.error_estimate.map(|error| error.plus(all));
+    }
+}
+
+impl WheelSolve<'_> {
+    /// What the factors for the turn leave open of a force, relative to the friction limit.
+    pub(super) fn left_open(&self, contact: &CurveContact) -> f64 {
+        if !self.is_corrected() {
+            return 0.0;
+        }
+        let [_, deviation] = contact.angles();
+        let unequal = (2.0 * self.case.problem.elasticity.lower_share - 1.0).abs();
+        (1.0 + OPEN_BY_UNEQUAL * unequal) * (OPEN_BY_TURN * deviation).min(OPEN_MAX)
+    }
+
+    /// The answer of all parts.
+    pub(super) fn answer(
+        &self,
+        found: Found,
+        wheel: &WheelContact,
+        seconds: f64,
+    ) -> Result<(Solution, Fields), SolveError> {
+        let Found {
+            contact,
+            parts,
+            changes,
+        } = found;
+        let left_open = self.left_open(&contact);
+        let of_motions: Vec<_> = (0..changes.len())
+            .map(|index| self.forces(&contact, &parts, index))
+            .collect();
+        let mut remarks = self.case.remarks.clone();
+        remarks.extend(wheel.remarks.iter().cloned());
+        let centre = load_centre_of_all(self.curve, &parts);
+        let nothing = Total {
+            force_x_n: 0.0,
+            force_y_n: 0.0,
+            force_z_n: Some(0.0),
+            moment_z_n_mm: 0.0,
+            error_estimate: Some(ErrorEstimate::default()),
+            profile_uncertainty: None,
+        };
+        let mut totals = vec![nothing; changes.len()];
+        let mut whole: Option<(Solution, Fields)> = None;
+        for (number, mut part) in parts.into_iter().enumerate() {
+            let first = whole.as_ref().map_or(0, |(whole, _)| whole.patches.len());
+            remarks.extend(part.solution.remarks.iter().map(|remark| RemarkEntry {
+                patch: remark.patch.map(|patch| patch + first),
+                ..remark.clone()
+            }));
+            for (index, total) in totals.iter_mut().enumerate() {
+                part.leave_open(index, left_open + changes[index]);
+                let error = self.error_of(&part, index, centre);
+                total.error_estimate = total.error_estimate.zip(error).map(|(a, b)| a.plus(b));
+            }
+            for k in 0..part.loads.len() {
+                let forces: Vec<PatchForces> =
+                    of_motions.iter().map(|forces| forces[number][k]).collect();
+                for (index, total) in totals.iter_mut().enumerate() {
+                    let [x, y, z] = forces[index].in_track();
+                    total.force_x_n += x;
+                    total.force_y_n += y;
+                    total.force_z_n = total.force_z_n.map(|sum| sum + z);
+                    total.moment_z_n_mm += self.moment(&part, k, index, centre);
+                }
+                self.add_patch(&contact, &mut part, k, &forces)?;
+            }
+            match &mut whole {
+                None => whole = Some((part.solution, part.fields)),
+                Some((all, fields)) => {
+                    all.normal = all.normal.zip(part.solution.normal).map(|(a, b)| a.with(b));
+                    all.patches.extend(part.solution.patches);
+                    fields.patches.extend(part.fields.patches);
+                }
+            }
+        }
+        let Some((mut solution, mut fields)) = whole else {
+            unreachable!("a wheel at rest touches its rail")
+        };
+        drop_unasked(&self.case.run, &mut fields);
+        if let Some(normal) = &mut solution.normal {
+            normal.seconds = seconds;
+        }
+        let solution = Solution {
+            total: totals,
+            remarks: merged(remarks),
+            wheel_lowering_mm: Some(wheel.lowering),
+            origin: Origin {
+                x_mm: centre[0],
+                y_mm: centre[1],
+                meaning: "load centre of all patches in track axes, for the total; the origin of a patch is in its position"
+                    .to_owned(),
+            },
+            frame: FRAME.to_owned(),
+            ..solution
+        };
+        Ok((solution, fields))
+    }
+
+    /// The moment of a patch in a motion about the vertical line through a point `[x, y]` of the track.
+    pub(super) fn moment(&self, part: &Part, k: usize, index: usize, about: [f64; 2]) -> f64 {
+        let mut moment = 0.0;
+        each_cell(part, k, index, |cell, _, area, [q_x, q_s, p]| {
+            let place = self.curve.at(cell[1]);
+            let (sin, cos) = place.angle.sin_cos();
+            let across = q_s * cos + p * sin;
+            moment += area * ((cell[0] - about[0]) * across - (place.at[0] - about[1]) * q_x);
+        });
+        moment
+    }
+
+    /// Completes a patch with its position, and in every motion with its force at its mean angle and the motion at its load centre.
+    pub(super) fn add_patch(
+        &self,
+        contact: &CurveContact,
+        part: &mut Part,
+        k: usize,
+        forces: &[PatchForces],
+    ) -> Result<(), SolveError> {
+        let geometry = &self.contact.geometry;
+        let centre = part.centres[k];
+        let (place, over) = self.load_centre(contact, centre)?;
+        let [_, y, z] = place.point(centre[0], 0.0);
+        let by = minus(part.centres[k], part.origin);
+        move_origin(
+            &mut part.solution.patches[k],
+            part.fields.patches.get_mut(k),
+            by,
+        );
+        let load = part.loads[k];
+        let patch = &mut part.solution.patches[k];
+        let limit = patch.friction_limit_n.unwrap_or(0.0);
+        // Pressures are those of all motions.
+        let angle = forces[0].angle();
+        patch.position = Some(Position {
+            track_mm: [centre[0], y, z],
+            rail_mm: geometry.on_rail(place.rail),
+            wheel_mm: geometry.on_wheel(over.wheel),
+            contact_angle_rad: angle,
+            rolling_radius_mm: geometry.meridian(over.wheel).radius,
+            origin_track_mm: [centre[0], y, z],
+        });
+        patch.approach_mm = load.approach;
+        let problem = &self.case.problem;
+        let (sin, cos) = angle.sin_cos();
+        let points = patch.points.iter_mut().zip(forces);
+        for ((point, forces), speed) in points.zip(&problem.speeds) {
+            if let Some(wheelset) = &problem.wheelset {
+                let rigid = RigidMotion::of_wheelset(geometry, contact.centre, wheelset);
+                let motion = creepages(&rigid, centre[0], &place, &over);
+                point.motion = motion.into();
+                point.normalised = normalised(&problem.elasticity, patch.area_mm2, limit, &motion);
+            }
+            let [along, y_share, z_share] = forces.sheared;
+            point.force_y_n = y_share * cos + z_share * sin;
+            point.force_track_n = Some(forces.in_track());
+            point.friction_power_without_spin_n = (point.motion.creepage_x * along).abs()
+                + (point.motion.creepage_y * point.force_y_n).abs();
+            if let Some(task) = &self.case.run.after.damage {
+                let across = point.damage.take().and_then(|damage| damage.across);
+                let of = DamagedPatch {
+                    patch: &load,
+                    point,
+                    limit,
+                    speed: *speed,
+                };
+                point.damage = Some(Box::new(Damage {
+                    across,
+                    ..damage(task, of)
+                }));
+            }
+        }
+        Ok(())
+    }
+
+    /// The errors of the forces of a part in a motion in track axes, and of its moment about the vertical line through a point `[x, y]`.
+    pub(super) fn error_of(
+        &self,
+        part: &Part,
+        index: usize,
+        about: [f64; 2],
+    ) -> Option<ErrorEstimate> {
+        let [x, s] = part.origin;
+        let arm = [x - about[0], self.curve.at(s).at[0] - about[1]];
+        let error = part.solution.total[index].error_estimate?;
+        Some(ErrorEstimate {
+            moment_z_n_mm: error.moment_z_n_mm
+                + arm[0].abs() * error.force_y_n
+                + arm[1].abs() * error.force_x_n,
+            ..error
+        })
+    }
+}
+
+/// Removes values per cell that were not asked for.
+pub(super) fn drop_unasked(run: &Run, fields: &mut Fields) {
+    let kept = |output| run.wants(output);
+    if !run.outputs.iter().any(|output| output.is_per_cell()) {
+        fields.patches.clear();
+        return;
+    }
+    for PatchFields { meshes, points } in &mut fields.patches {
+        if !kept(Output::Pressure) {
+            meshes
+                .iter_mut()
+                .for_each(|cells| cells.pressure_mpa = None);
+        }
+        if !kept(Output::Tractions) {
+            for point in points {
+                (point.traction_x_mpa, point.traction_y_mpa) = (None, None);
+            }
+        }
+    }
+}
+
+/// The turn of the surface from the first to the last strip in contact, in rad.
+pub(super) fn turn(contact: &CurveContact) -> f64 {
+    let nx = contact.grid.x.len();
+    let rows = contact.pressure.chunks_exact(nx).zip(&contact.grid.places);
+    let touching = rows.filter(|(row, _)| row.iter().any(|p| *p > 0.0));
+    let nothing = [f64::INFINITY, f64::NEG_INFINITY];
+    let [low, high] = touching.fold(nothing, |[low, high], (_, place)| {
+        [low.min(place.angle), high.max(place.angle)]
+    });
+    (high - low).max(0.0)
+}
+
+/// Mean place `[x, y]` of all patches in track axes, weighted with their normal forces.
+pub(super) fn load_centre_of_all(curve: &ReferenceCurve, parts: &[Part]) -> [f64; 2] {
+    let (mut load, mut sum) = (0.0, [0.0; 2]);
+    for part in parts {
+        for k in 0..part.solution.patches.len() {
+            each_cell(part, k, 0, |[x, s], _, area, [.., p]| {
+                load += area * p;
+                sum = [sum[0] + area * p * x, sum[1] + area * p * curve.at(s).at[0]];
+            });
+        }
+    }
+    sum.map(|sum| sum / load.max(f64::MIN_POSITIVE))
+}

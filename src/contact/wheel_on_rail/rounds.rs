@@ -1,0 +1,370 @@
+//! Pressures and tractions of a wheel on a rail in turn, until each belongs to the other.
+
+use crate::contact::case::words::solver::Output;
+use crate::contact::error::SolveError;
+use crate::contact::geometry::reference_curve::RigidMotion;
+use crate::contact::normal::gap::answer::NormalError;
+use crate::contact::normal::on_curve::{CurveContact, Friction, Workspace};
+use crate::contact::normal::wheel::wheel_contact::{WheelContact, WheelPatch};
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::problem::run::Run;
+use crate::contact::remark::list::Remark;
+use crate::contact::solution::words::answer::Total;
+use crate::contact::traction_estimate::{can_estimate, patch_forces};
+use crate::contact::unlike_bodies::LEFT_BY_PRESSURE;
+use crate::contact::vertical_equilibrium::{next_share, tolerance};
+use crate::contact::wheel_on_rail::tractions::{Part, creepages};
+use crate::contact::wheel_on_rail::{BeforeMotions, WheelSolve, minus};
+
+/// Allowed error of the resultants relative to μN on the coarse grid: that of the coarsest meshes, whatever the few cells of a small patch leave open.
+const TARGET_ROUGH: f64 = 0.2;
+/// Rounds at most; 3 to 6 suffice.
+const ROUNDS_MAX: u32 = 16;
+/// Change of the forces relative to μN over the target that ends the rounds.
+const CHANGE: f64 = 0.1;
+/// Part by which the gap that tractions open is off if they are taken to be proportional to the pressure.
+const FORECAST_OFF: f64 = 0.3;
+/// Change of the forces relative to μN that ends the rounds on the coarse grid.
+const CHANGE_ROUGH: f64 = 0.02;
+/// When the rounds are used up, a change of the forces relative to μN up to this is answered with a remark.
+const CHANGE_POOR: f64 = 5e-3;
+
+/// The end of the rounds.
+pub(super) struct Found {
+    pub(super) contact: CurveContact,
+    pub(super) parts: Vec<Part>,
+    /// How much the forces of each motion would change if its tractions and the pressures agreed, relative to μN.
+    pub(super) changes: Vec<f64>,
+}
+
+/// What pressures do not follow of the tractions.
+pub(super) struct Neglected {
+    /// Change of the forces of each motion relative to μN.
+    pub(super) changes: Vec<f64>,
+    /// The largest change of the vertical force by friction, relative to it.
+    pub(super) by_lift: f64,
+}
+
+impl WheelSolve<'_> {
+    /// Pressures and tractions in turn: on a coarse grid until friction is known about, then on the fine one. `before` is asked of the wheel at rest
+    /// on the fine grid. Unless `with_friction`, tractions are solved once, on pressures without them.
+    pub(super) fn rounds(
+        &self,
+        with_friction: bool,
+        before: &mut BeforeMotions,
+        workspace: &mut Workspace,
+    ) -> Result<(WheelContact, Found), SolveError> {
+        let run = &self.case.run;
+        let problem = &self.case.problem;
+        let of_gap = self.is_corrected() || problem.elasticity.difference != 0.0;
+        let coupled = with_friction
+            && (self.is_vertical() || of_gap && !self.curve.is_flat())
+            && !problem.friction.is_frictionless();
+        let task = self.task();
+        let (mut friction, coarse) = self.coarse(coupled, workspace)?;
+        let mut contact = task.fine(&coarse, &friction, workspace, self.watch)?;
+        friction.opened.clone_from(&contact.opened);
+        let first = self.wheel(&contact)?;
+        before(&first)?;
+        let exact = with_tractions(run, &run.outputs);
+        let target = run.resolution.target_or_usual();
+        let balance = tolerance(run.resolution);
+        let open = match with_friction && !self.curve.is_flat() {
+            true => LEFT_BY_PRESSURE * problem.elasticity.difference.abs(),
+            false => problem.first_order_error(run.method),
+        };
+        let last = problem.motions.len() - 1;
+        let mut earlier = None;
+        for round in 1..=ROUNDS_MAX {
+            let parts = self.tractions(&contact, &exact, open, workspace)?;
+            let (mut next, mut change) = (Friction::default(), 0.0);
+            if coupled {
+                next = self.friction(&contact, &parts, last, workspace);
+                let [by_lift, by_gap] = contact.change_by(&friction, &next, self.shared());
+                let by_gap = by_gap * contact.normal_force() / limit(&parts);
+                change = (by_lift / balance).max(by_gap / (CHANGE * target));
+            }
+            if change <= 1.0 || round == ROUNDS_MAX {
+                let residual = change * CHANGE * target;
+                if change > 1.0 && residual > CHANGE_POOR {
+                    return Err(SolveError::NormalProblem {
+                        reason: format!(
+                            "pressures and tractions on the curve of the rail do not come to agree in {ROUNDS_MAX} rounds: forces still change by \
+                             {:.1} % of the friction limit; give reference_surface \"plane\"",
+                            100.0 * residual
+                        ),
+                    });
+                }
+                let remark = Remark::IterationInexact {
+                    iteration: "pressures and tractions on the curve of the rail",
+                    reason: "the rounds were used up",
+                    residual,
+                    tolerance: CHANGE * target,
+                };
+                let mut wheel = match round {
+                    1 => first,
+                    _ => self.wheel(&contact)?,
+                };
+                let mut changes = vec![residual; problem.motions.len()];
+                if problem.history.is_some() || !with_friction {
+                    let reference = with_friction.then_some(last);
+                    let neglected = self.neglected(coarse, &parts, reference, workspace)?;
+                    let sums = changes.iter_mut().zip(&neglected.changes);
+                    sums.for_each(|(sum, change)| *sum += change);
+                    if with_friction && neglected.by_lift > balance {
+                        let remark = Remark::PressuresOfLastPoint {
+                            part: neglected.by_lift,
+                        };
+                        wheel.remarks.push(remark.into());
+                    }
+                }
+                wheel.remarks.extend((change > 1.0).then(|| remark.into()));
+                let found = Found {
+                    contact,
+                    parts,
+                    changes,
+                };
+                return Ok((wheel, found));
+            }
+            friction = accelerated(&friction, next, &mut earlier);
+            contact = task.again(contact, &friction, workspace, self.watch)?;
+            friction.opened.clone_from(&contact.opened);
+        }
+        unreachable!("the last round ends them")
+    }
+
+    /// What the tractions of each motion would change of the pressures, which belong to the tractions of the motion `reference`, or to none. The effect of the
+    /// gap comes from one more normal problem on the coarse grid, under the tractions that open it most.
+    pub(super) fn neglected(
+        &self,
+        coarse: CurveContact,
+        parts: &[Part],
+        reference: Option<usize>,
+        workspace: &mut Workspace,
+    ) -> Result<Neglected, SolveError> {
+        let task = self.task();
+        let from = match reference {
+            Some(index) => self.friction(&coarse, parts, index, workspace),
+            None => Friction::default(),
+        };
+        let contact = task.again(coarse, &from, workspace, self.watch)?;
+        let limit = limit(parts);
+        let mut largest = (0.0, from.clone());
+        let (mut by_gap, mut by_lift) = (Vec::new(), Vec::new());
+        for index in 0..self.case.problem.motions.len() {
+            let friction = self.friction(&contact, parts, index, workspace);
+            let [lift, gap] = contact.change_by(&from, &friction, 0.0);
+            by_lift.push(lift);
+            by_gap.push(gap);
+            if gap > largest.0 {
+                largest = (gap, friction);
+            }
+        }
+        let (most, friction) = largest;
+        let mut share = 0.0;
+        if most > 0.0 {
+            let (before, normal) = (resultant(&contact), contact.normal_force());
+            let change = match task.again(contact, &friction, workspace, self.watch) {
+                Ok(opened) => {
+                    let [across, down] = minus(resultant(&opened), before);
+                    across.hypot(down)
+                }
+                Err(NormalError::NoAnswer(_)) => most * normal,
+                Err(error) => return Err(error.into()),
+            };
+            share = change / most / limit;
+        }
+        // Tractions change in proportion to the pressures at most.
+        let force = |index: usize| {
+            let totals = parts.iter().map(|part| &part.solution.total[index]);
+            let of_part = |total: &Total| total.force_x_n.hypot(total.force_y_n);
+            totals.map(of_part).sum::<f64>() / limit
+        };
+        let changes = by_gap.iter().zip(&by_lift).enumerate();
+        Ok(Neglected {
+            changes: changes
+                .map(|(index, (gap, lift))| share * gap + lift * force(index))
+                .collect(),
+            by_lift: by_lift.into_iter().fold(0.0, f64::max),
+        })
+    }
+
+    /// The wheel at rest on a coarse grid, with about the friction that it will have: by the table of creep forces where that is enough, else with coarse
+    /// tractions.
+    pub(super) fn coarse(
+        &self,
+        coupled: bool,
+        workspace: &mut Workspace,
+    ) -> Result<(Friction, CurveContact), SolveError> {
+        let CheckedCase { problem, run, .. } = self.case;
+        let task = self.task();
+        let mut coarse = task.coarse(workspace, self.watch)?;
+        let mut friction = Friction::default();
+        let rough = with_tractions(&run.for_resultants(TARGET_ROUGH), &[]);
+        let enough = CHANGE * run.resolution.target_or_usual() / FORECAST_OFF;
+        let mut by_table = problem.history.is_none() && can_estimate(problem);
+        let mut earlier = None;
+        for _ in 0..if coupled { ROUNDS_MAX } else { 0 } {
+            let limit = problem.friction.largest() * coarse.normal_force();
+            let by_gap = |from: &Friction, to: &Friction| {
+                let [by_lift, by_gap] = coarse.change_by(from, to, self.shared());
+                (by_lift, by_gap * coarse.normal_force() / limit)
+            };
+            let estimate = match by_table {
+                true => Some(self.estimate(&coarse, workspace)?),
+                false => None,
+            };
+            let estimate = estimate.filter(|next| by_gap(&Friction::default(), next).1 <= enough);
+            by_table = estimate.is_some();
+            let next = match estimate {
+                Some(next) => next,
+                None => {
+                    let parts = self.tractions(&coarse, &rough, 0.0, workspace)?;
+                    self.friction(&coarse, &parts, problem.motions.len() - 1, workspace)
+                }
+            };
+            let (by_lift, by_gap) = by_gap(&friction, &next);
+            friction = accelerated(&friction, next, &mut earlier);
+            if by_table && by_lift <= CHANGE_ROUGH || by_lift.max(by_gap) <= CHANGE_ROUGH {
+                break;
+            }
+            coarse = task.again(coarse, &friction, workspace, self.watch)?;
+            friction.opened.clone_from(&coarse.opened);
+        }
+        Ok((friction, coarse))
+    }
+
+    /// What friction does about, by the table of creep forces, with tractions proportional to the pressures.
+    pub(super) fn estimate(
+        &self,
+        contact: &CurveContact,
+        workspace: &mut Workspace,
+    ) -> Result<Friction, SolveError> {
+        let patches = self.patches(contact)?;
+        let mut forces = Vec::with_capacity(patches.len());
+        for patch in &patches {
+            let CheckedCase { problem, .. } = self.case;
+            let motion = match &problem.wheelset {
+                None => problem.motions[0],
+                Some(wheelset) => {
+                    let geometry = &self.contact.geometry;
+                    let rigid = RigidMotion::of_wheelset(geometry, contact.centre, wheelset);
+                    creepages(&rigid, patch.x, &patch.place, &patch.wheel)
+                }
+            };
+            let extents = std::iter::once(patch.patch().extent);
+            let friction = self.friction_at([patch.x, patch.place.s], extents);
+            let problem = problem.of_gap(friction, vec![motion]);
+            forces.push((patch, patch_forces(&problem, patch, &motion)));
+        }
+        let lift = match self.is_vertical() {
+            true => {
+                let lifts = forces
+                    .iter()
+                    .map(|(patch, force)| force[1] * patch.place.angle.sin());
+                lifts.sum()
+            }
+            false => 0.0,
+        };
+        let mut traction = [Vec::new(), Vec::new()];
+        let rows = contact.pressure.chunks_exact(contact.grid.x.len());
+        for (row, place) in rows.zip(&contact.grid.places) {
+            let far = |patch: &WheelPatch| (patch.place.s - place.s).abs();
+            let nearest = forces
+                .iter()
+                .min_by(|(a, _), (b, _)| far(a).total_cmp(&far(b)));
+            let share = nearest.map_or([0.0; 2], |(patch, force)| {
+                force.map(|force| force / patch.normal_force())
+            });
+            for (traction, share) in traction.iter_mut().zip(share) {
+                traction.extend(row.iter().map(|p| share * p));
+            }
+        }
+        let opened = self.opened(contact, &traction, workspace);
+        Ok(Friction { lift, opened })
+    }
+
+    /// The gap in mm that tractions open; none on planes.
+    pub(super) fn opened(
+        &self,
+        contact: &CurveContact,
+        traction: &[Vec<f64>; 2],
+        workspace: &mut Workspace,
+    ) -> Option<Vec<f64>> {
+        match self.curve.is_flat() {
+            true => None,
+            false => contact.operator.opened_by_traction(traction, workspace),
+        }
+    }
+
+    /// Effect of the tractions of all parts in a motion on the contact.
+    pub(super) fn friction(
+        &self,
+        contact: &CurveContact,
+        parts: &[Part],
+        index: usize,
+        workspace: &mut Workspace,
+    ) -> Friction {
+        let lift = match self.is_vertical() {
+            true => {
+                let forces = self.forces(contact, parts, index);
+                forces.iter().flatten().map(|patch| patch.sheared[2]).sum()
+            }
+            false => 0.0,
+        };
+        let traction = self.on_grid(contact, parts, index);
+        let opened = self.opened(contact, &traction, workspace);
+        Friction { lift, opened }
+    }
+
+    /// Change of the tangential forces caused by a change of the pressures, relative to the normal force; 0 for equal bodies.
+    pub(super) fn shared(&self) -> f64 {
+        let CheckedCase { problem, .. } = self.case;
+        match problem.elasticity.difference == 0.0 {
+            true => 0.0,
+            false => problem.friction.largest(),
+        }
+    }
+}
+
+/// The friction to count on next: what was found, with a secant step for the vertical force.
+pub(super) fn accelerated(
+    counted: &Friction,
+    found: Friction,
+    earlier: &mut Option<(f64, f64)>,
+) -> Friction {
+    let pair = (counted.lift, found.lift);
+    Friction {
+        lift: next_share(pair, earlier.replace(pair)),
+        ..found
+    }
+}
+
+/// A run with tractions and pressures among its outputs.
+pub(super) fn with_tractions(run: &Run, outputs: &[Output]) -> Run {
+    let needed = [Output::Resultants, Output::Tractions, Output::Pressure];
+    let mut outputs: Vec<Output> = outputs.iter().copied().chain(needed).collect();
+    outputs.sort_unstable();
+    outputs.dedup();
+    Run {
+        outputs,
+        ..run.clone()
+    }
+}
+
+/// Pressures times the sine and the cosine of the angles of their strips, in N.
+pub(super) fn resultant(contact: &CurveContact) -> [f64; 2] {
+    let rows = contact.pressure.chunks_exact(contact.grid.x.len());
+    let rows = rows.zip(&contact.grid.places);
+    let sum = rows.fold([0.0; 2], |sum, (row, place)| {
+        let (load, (sin, cos)) = (row.iter().sum::<f64>(), place.angle.sin_cos());
+        [sum[0] + load * sin, sum[1] + load * cos]
+    });
+    sum.map(|sum| sum * contact.grid.area())
+}
+
+/// The friction limit of some parts in N.
+pub(super) fn limit(parts: &[Part]) -> f64 {
+    let patches = parts.iter().flat_map(|part| &part.solution.patches);
+    patches.filter_map(|patch| patch.friction_limit_n).sum()
+}
