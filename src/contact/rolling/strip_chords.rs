@@ -15,8 +15,6 @@ pub struct StripChord {
     pub load_y: f64,
     /// Load of the strip over its width in N/mm; nothing where a strip has several chords.
     pub load: Option<f64>,
-    /// Mean length of the chords on all lines of the strip; nothing where any of them has several.
-    mean_length: Option<f64>,
 }
 
 impl StripChord {
@@ -58,15 +56,9 @@ impl StripChord {
 /// The mid-line's chord is too long where the patch ends inside a strip, the mean chord (exact area) too short for the
 /// forces. `(1 − θ)` of the one and θ of the other, `θ = ½ / (1 + ½ (a/b)²)` with the longest half chord a and the half
 /// width b of the patch, lowers the errors of the resultants on 62 Hertz cases by a third and Kalker's C33 with it.
-/// Where a strip has several chords the mid-line's are kept. `halves` are the chords of twice as many strips, two of which are one of these, if
-/// they are known: what a strip carries is then that of both.
+/// Where a strip has several chords the mid-line's are kept.
 #[must_use]
-pub fn chords(
-    footprint: &Footprint,
-    patch: usize,
-    strips: &[(f64, f64)],
-    halves: &[StripChord],
-) -> Vec<StripChord> {
+pub fn chords(footprint: &Footprint, patch: usize, strips: &[(f64, f64)]) -> Vec<StripChord> {
     let lines = footprint.chords(patch, strips);
     let alone = |line: &Chord| {
         lines
@@ -83,10 +75,7 @@ pub fn chords(
     let share = 0.5 / (1.0 + 0.5 * (longest / width).powi(2));
     let mut across = StripBuffer::new();
     let fit = |line: &Chord| {
-        let strip = alone(line).then(|| {
-            StripLoad::of_halves(halves, line)
-                .unwrap_or_else(|| StripLoad::of(footprint, line, &mut across))
-        });
+        let strip = alone(line).then(|| StripLoad::of(footprint, line, &mut across));
         let mean = strip.and_then(|strip| strip.length);
         let length = line.right - line.left;
         let half = 0.5 * ((1.0 - share) * length + share * mean.unwrap_or(length));
@@ -100,7 +89,6 @@ pub fn chords(
             line: *line,
             load_y: strip.map_or(line.y, |strip| strip.load_y),
             load: strip.map(|strip| strip.load).filter(|load| *load > 0.0),
-            mean_length: mean,
         }
     };
     lines.iter().map(fit).collect()
@@ -138,26 +126,6 @@ struct StripLoad {
 }
 
 impl StripLoad {
-    /// The strip about a line from both of its halves; nothing where one of them has no load of its own.
-    fn of_halves(halves: &[StripChord], line: &Chord) -> Option<StripLoad> {
-        let of = |strip: usize| {
-            let first = halves
-                .partition_point(|half| (half.line.patch, half.line.strip) < (line.patch, strip));
-            let half = halves.get(first)?;
-            let own = half.line.patch == line.patch && half.line.strip == strip;
-            Some((half, half.load.filter(|_| own)? * half.line.dy))
-        };
-        let both = [of(2 * line.strip)?, of(2 * line.strip + 1)?];
-        let load: f64 = both.iter().map(|(_, load)| load).sum();
-        let moment: f64 = both.iter().map(|(half, load)| load * half.load_y).sum();
-        let [one, other] = both.map(|(half, _)| Some(half.mean_length? * half.line.dy));
-        Some(StripLoad {
-            length: one.zip(other).map(|(one, other)| (one + other) / line.dy),
-            load_y: moment / load,
-            load: load / line.dy,
-        })
-    }
-
     /// The strip about a line.
     fn of(
         footprint: &Footprint,
@@ -205,7 +173,7 @@ mod tests {
     }
 
     fn area(strips: usize) -> (f64, f64) {
-        let fitted = chords(&circle(), 0, &equal_strips(-1.0, 1.0, strips), &[]);
+        let fitted = chords(&circle(), 0, &equal_strips(-1.0, 1.0, strips));
         let sum = |f: fn(&StripChord) -> f64| fitted.iter().map(f).sum::<f64>();
         (
             sum(|f| (f.chord.right - f.chord.left) * f.chord.dy),
@@ -228,37 +196,12 @@ mod tests {
     #[test]
     fn the_pressure_still_ends_at_the_ends_of_the_chord() {
         let footprint = circle();
-        for fitted in chords(&footprint, 0, &equal_strips(-1.0, 1.0, 6), &[]) {
+        for fitted in chords(&footprint, 0, &equal_strips(-1.0, 1.0, 6)) {
             let Chord { left, right, .. } = fitted.chord;
             let near = fitted.mean_pressure(&footprint, right - 1e-6 * (right - left), right);
             let middle = fitted.mean_pressure(&footprint, -1e-6, 1e-6);
             assert!(near < 2e-3 * middle && near > 0.0, "{near} {middle}");
         }
-    }
-
-    #[test]
-    fn strips_carry_what_their_halves_do() {
-        let footprint = circle();
-        let edges = |strips: usize| equal_strips(-1.0, 1.0, strips);
-        let halves = chords(&footprint, 0, &edges(16), &[]);
-        let own = chords(&footprint, 0, &edges(8), &[]);
-        for (own, both) in own.iter().zip(chords(&footprint, 0, &edges(8), &halves)) {
-            let carried = |strip: &StripChord| strip.load.expect("one chord");
-            assert!((carried(&both) / carried(own) - 1.0).abs() < 2e-3);
-            assert!((both.load_y - own.load_y).abs() < 2e-3);
-            let length = |strip: &StripChord| strip.chord.right - strip.chord.left;
-            assert!((length(&both) / length(own) - 1.0).abs() < 2e-3);
-        }
-        let load: f64 = halves
-            .iter()
-            .map(|half| half.load.unwrap() * half.line.dy)
-            .sum();
-        let both = chords(&footprint, 0, &edges(8), &halves);
-        let sum: f64 = both
-            .iter()
-            .map(|strip| strip.load.unwrap() * strip.line.dy)
-            .sum();
-        assert!((sum / load - 1.0).abs() < 1e-12);
     }
 
     /// Of a pressure that was given every interval of the samples is integrated, of one that was computed a few points of the line.
@@ -274,8 +217,8 @@ mod tests {
         let (field, _) = PressureField::new(&axis, &axis, &rows).unwrap();
         let [.., low, high] = field.patches()[0].extent;
         let strips = equal_strips(low, high, 8);
-        let exact = chords(&Footprint::given(field.clone()), 0, &strips, &[]);
-        let found = chords(&Footprint::computed(field, 0.0), 0, &strips, &[]);
+        let exact = chords(&Footprint::given(field.clone()), 0, &strips);
+        let found = chords(&Footprint::computed(field, 0.0), 0, &strips);
         for (exact, found) in exact.iter().zip(&found) {
             let ratio = found.load.unwrap() / exact.load.unwrap();
             assert!((ratio - 1.0).abs() < 5e-4, "{}: {ratio}", exact.line.y);

@@ -147,18 +147,7 @@ impl StripMesh {
         operators: Arc<CaseOperators>,
     ) -> Result<StripMesh, SolveError> {
         let plan: MeshPlan = plan.into();
-        let fitted = fitted_chords(task.footprint, &plan, &[])?;
-        Ok(StripMesh::of_chords(task, plan, &fitted, operators))
-    }
-
-    /// The same from the chords of the plan's strips ([`fitted_chords`]).
-    #[must_use]
-    pub(crate) fn of_chords(
-        task: &RollingTask,
-        plan: MeshPlan,
-        fitted: &[StripChord],
-        operators: Arc<CaseOperators>,
-    ) -> StripMesh {
+        let fitted = fitted_chords(task.footprint, &plan)?;
         let Elasticity {
             shear_modulus,
             poisson_ratio,
@@ -177,9 +166,9 @@ impl StripMesh {
             mesh.load_y = fitted.iter().map(|f| f.load_y).collect();
         }
         let area = mesh.areas();
-        let pressure = cell_pressures(footprint, fitted, &mesh, &grading, &area);
+        let pressure = cell_pressures(footprint, &fitted, &mesh, &grading, &area);
         let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
-        let bound = bounds(task, fitted, &mesh, &pressure, largest);
+        let bound = bounds(task, &fitted, &mesh, &pressure, largest);
         // Pressures enter the equations through their bounds only, so that bounds decide the symmetry.
         let mirror = mesh
             .mirror_line()
@@ -207,7 +196,7 @@ impl StripMesh {
             let relative: Vec<f64> = pressure.iter().map(|p| p * unit).collect();
             pressure_slips(&normalised, task.elasticity.difference, &relative)
         });
-        StripMesh {
+        Ok(StripMesh {
             plan,
             mesh,
             pressure,
@@ -222,7 +211,7 @@ impl StripMesh {
             precision,
             mirrored: mirror.is_some(),
             operators,
-        }
+        })
     }
 
     /// The operator of the dimensionless mesh, from the store or computed.
@@ -347,16 +336,11 @@ fn bounds(
     bound
 }
 
-/// The strips of all patches, fitted to the region; they depend on the number of strips and on where these gather. `halves` are those of a plan of
-/// twice as many, gathered in the same place, or empty.
+/// The strips of all patches, fitted to the region; they depend on the number of strips and on where these gather.
 ///
 /// # Errors
 /// [`SolveError::Unmeshable`] if no strip meets a patch.
-pub(crate) fn fitted_chords(
-    footprint: &Footprint,
-    plan: &MeshPlan,
-    halves: &[StripChord],
-) -> Result<Vec<StripChord>, SolveError> {
+fn fitted_chords(footprint: &Footprint, plan: &MeshPlan) -> Result<Vec<StripChord>, SolveError> {
     let strips = plan.size.strips;
     let mut fitted = Vec::new();
     for (k, patch) in footprint.patches().iter().enumerate() {
@@ -365,7 +349,7 @@ pub(crate) fn fitted_chords(
             Some([_, y]) => strips_about(y, low, high, strips as usize),
             None => equal_strips(low, high, strips as usize),
         };
-        let chords = strip_chords::chords(footprint, k, &edges, halves);
+        let chords = strip_chords::chords(footprint, k, &edges);
         if chords.is_empty() {
             return Err(SolveError::Unmeshable { patch: k, strips });
         }

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use crate::contact::error::SolveError;
 use crate::contact::rolling::operator_store::{CaseOperators, OperatorStore};
 use crate::contact::rolling::resolution::MeshPlan;
-use crate::contact::rolling::strip_chords::StripChord;
-use crate::contact::rolling::strip_mesh::{StripMesh, fitted_chords};
+use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::RollingTask;
 
 /// Levels that are kept from one motion to the next: a few paths of about four levels. Sweeps return to the levels of the last few
@@ -14,44 +13,11 @@ use crate::contact::rolling::task::RollingTask;
 /// creep-map`).
 pub const LEVELS_KEPT: usize = 32;
 
-/// What strips were made for: their number, and where across the patch they gather, if anywhere.
-type StripsKey = (u32, Option<f64>);
-
-/// The strips made last, and those before: a mesh and its companion of half the strips.
-#[derive(Debug, Default)]
-struct KeptStrips([Option<(StripsKey, Vec<StripChord>)>; 2]);
-
-impl KeptStrips {
-    /// The strips of a plan; they are made if they are not there.
-    fn of(&mut self, task: &RollingTask, plan: &MeshPlan) -> Result<&[StripChord], SolveError> {
-        let key = (plan.size.strips, plan.pole.map(|pole| pole[1]));
-        let is_known =
-            |kept: &Option<(StripsKey, _)>| matches!(kept, Some((made, _)) if *made == key);
-        match self.0.iter().position(is_known) {
-            Some(place) => self.0[..=place].rotate_right(1),
-            None => {
-                let (strips, pole) = key;
-                let halved = (2 * strips, pole);
-                let mut kept = self.0.iter().flatten();
-                let halves = kept.find(|(made, _)| *made == halved);
-                let halves = halves.map_or(&[][..], |(_, strips)| strips);
-                let found = fitted_chords(task.footprint, plan, halves)?;
-                self.0.rotate_right(1);
-                self.0[0] = Some((key, found));
-            }
-        }
-        let first = self.0[0].as_ref();
-        Ok(first.map_or(&[], |(_, strips)| strips))
-    }
-}
-
 /// The levels of a case that exist; the least recently used are dropped between motions.
 #[derive(Debug)]
 pub struct Levels<'a> {
     task: &'a RollingTask<'a>,
     operators: Arc<CaseOperators>,
-    /// Strips of the meshes made last, with what they were made for: meshes that differ in the cells along them share them.
-    strips: KeptStrips,
     /// With their numbers, which are never given twice, in the order of their last use.
     kept: Vec<(usize, Arc<StripMesh>)>,
     made: usize,
@@ -64,7 +30,6 @@ impl<'a> Levels<'a> {
         Levels {
             task,
             operators: CaseOperators::new(store),
-            strips: KeptStrips::default(),
             kept: Vec::new(),
             made: 0,
         }
@@ -81,14 +46,13 @@ impl<'a> Levels<'a> {
             return Ok(self.kept[self.kept.len() - 1].0);
         }
         let operators = Arc::clone(&self.operators);
-        let strips = self.strips.of(self.task, &plan)?;
-        let level = StripMesh::of_chords(self.task, plan, strips, operators);
+        let level = StripMesh::with_operators(self.task, plan, operators)?;
         self.kept.push((self.made, Arc::new(level)));
         self.made += 1;
         Ok(self.made - 1)
     }
 
-    /// A level by its number; it must have been used since the last [`Levels::trim`], or lie on the path.
+    /// A level by its number; it must have been used since the last [`Levels::trim`].
     #[must_use]
     pub fn get(&self, level: usize) -> Arc<StripMesh> {
         let found = self.kept.iter().rev().find(|(number, _)| *number == level);
@@ -96,15 +60,6 @@ impl<'a> Levels<'a> {
             unreachable!("level {level} was dropped while it was in use")
         };
         Arc::clone(level)
-    }
-
-    /// The same, counted as a use.
-    #[must_use]
-    pub fn used(&mut self, level: usize) -> Arc<StripMesh> {
-        if let Some(place) = self.kept.iter().position(|(number, _)| *number == level) {
-            self.kept[place..].rotate_left(1);
-        }
-        self.get(level)
     }
 
     /// Drops the least recently used levels beyond [`LEVELS_KEPT`] and gives their numbers. Called between motions: no answer may refer to
