@@ -124,8 +124,8 @@ impl SizeInput {
             all.max(operator)
         };
         let solve = match self.method {
-            // Factored blocks of two unknowns per cell, for three steps (see `StripFactors`).
-            Method::BoundaryElement => 3.0 * 32.0 * cells * cells / segments.max(1.0),
+            // Factored blocks of two unknowns per cell (see `StripFactors`).
+            Method::BoundaryElement => 32.0 * cells * cells / segments.max(1.0),
             Method::LiuHsu => (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
             Method::Fastsim | Method::Table => 0.0,
         };

@@ -7,7 +7,7 @@ use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
 
 /// Own blocks of the operator, fixed for a rule and mesh.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 pub struct OwnBlocks {
     /// `M_xx` of every segment, column by column, one segment after the other.
     xx: Vec<f64>,

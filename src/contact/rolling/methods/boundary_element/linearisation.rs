@@ -52,40 +52,6 @@ impl Linearisation {
     pub fn stiffness(&self, cell: usize) -> f64 {
         self.stiffness[cell].max(0.0)
     }
-
-    /// Do these cells of a segment have nearly the same rows in another one: the same zones, and tangents and diagonals no farther apart than
-    /// `change_max`? `xx` and `yy` are the segment's own blocks.
-    pub(crate) fn is_like(
-        &self,
-        other: &Linearisation,
-        cells: Range<usize>,
-        (xx, yy): (&[f64], &[f64]),
-        change_max: f64,
-    ) -> bool {
-        let n = cells.len();
-        cells.enumerate().all(|(k, i)| {
-            if self.slips(i) != other.slips(i) {
-                return false;
-            }
-            let ((ax, ay), (bx, by)) = (self.direction(i), other.direction(i));
-            let diagonal = xx[k * n + k].abs().max(yy[k * n + k].abs()) + self.stiffness(i);
-            let stiffer = (other.stiffness(i) - self.stiffness(i)).abs();
-            (ax * by - ay * bx).abs() <= change_max && stiffer <= change_max * diagonal
-        })
-    }
-
-    /// Becomes another one, whose bounds do not fall.
-    pub(crate) fn copy(&mut self, other: &Linearisation) {
-        self.clear();
-        self.direction.extend_from_slice(&other.direction);
-        self.stiffness.extend_from_slice(&other.stiffness);
-    }
-
-    /// Takes over these cells of another one.
-    pub(crate) fn take_over(&mut self, other: &Linearisation, cells: Range<usize>) {
-        self.direction[cells.clone()].copy_from_slice(&other.direction[cells.clone()]);
-        self.stiffness[cells.clone()].copy_from_slice(&other.stiffness[cells]);
-    }
 }
 
 /// The law of such a cell linearised at `z = T + r s`, `d = z/|z|` and `t ⟂ d`: `t·δs − D t·δT = D t·T − t·s` turns the traction with

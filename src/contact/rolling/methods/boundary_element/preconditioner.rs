@@ -1,7 +1,6 @@
 //! The preconditioner: every segment's own block of the Newton matrix, factored on its own.
 
 use std::ops::Range;
-use std::sync::Arc;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor;
@@ -22,24 +21,10 @@ use crate::contact::rolling::slip_equations::SlipEquations;
 /// under spin, five of eleven targets then found no solution, one block each misses one.
 const SKEW_MAX: f64 = 0.5;
 
-/// Near a start a segment's blocks are kept for the next step, or for the next motion on the mesh, where no cell changes its zone, and neither its
-/// tangent (sine of the angle between both) nor its diagonal (relative to what it was) by more than this. A creep curve of 51 points takes 12 % fewer
-/// instructions (callgrind) and as many products as without; a map of 300 motions under spin 14 % and 1.2 % more products. 0.1 saves 4 % on the curve,
-/// 0.5 14 % and 16 %, 1 takes 2 % more products on the curve.
-const KEPT: f64 = 0.3;
-
 /// Factored blocks of one Newton step.
 #[derive(Debug, Default)]
 pub struct StripFactors {
-    newest: StripBlocks,
-    /// Those of the step before, if both are near a start.
-    before: StripBlocks,
-    /// The last of the other kind: far from a start, or near one. Motions that are solved from far between others leave what these keep.
-    set_aside: StripBlocks,
-    is_near: bool,
-    /// The blocks of which strips were factored, and the linearisation of every cell then, if the next step may keep some of them.
-    kept: Option<Arc<OwnBlocks>>,
-    kept_linear: Linearisation,
+    blocks: StripBlocks,
     gathered: Vec<f64>,
     /// Cells of the newest block that have two unknowns.
     stick: Vec<usize>,
@@ -103,52 +88,25 @@ impl FactorScratch {
 
 impl StripFactors {
     /// Builds and factors the blocks of a linearisation: one block per segment, or one for each axis where nothing slips (sticking x and y do
-    /// not touch each other inside a segment) and, `near` a start, where all slip along an axis, nearly. There blocks of the step before are kept where little
-    /// changes; what they are off by is left to GMRES.
+    /// not touch each other inside a segment) and, `near` a start, where all cells slip nearly along an axis.
     pub fn factor(
         &mut self,
-        own: &Arc<OwnBlocks>,
+        own: &OwnBlocks,
         equations: &SlipEquations,
         linear: &Linearisation,
         near: bool,
     ) {
-        if std::mem::replace(&mut self.is_near, near) != near {
-            std::mem::swap(&mut self.newest, &mut self.set_aside);
-        }
-        let may_keep = near && linear.falling.is_empty();
-        let kept = may_keep && self.kept.take().is_some_and(|kept| is_same(&kept, own));
-        if near {
-            std::mem::swap(&mut self.newest, &mut self.before);
-            if !kept {
-                self.kept_linear.copy(linear);
-            }
-        }
-        self.newest.clear();
+        self.blocks.clear();
         for (j, blocks) in own.blocks().enumerate() {
-            self.newest.segments.push(self.newest.offsets.len());
-            let cells = equations.segment(j);
-            if kept {
-                if self
-                    .kept_linear
-                    .is_like(linear, cells.clone(), blocks, KEPT)
-                {
-                    self.newest.copy(&self.before, j);
-                    continue;
-                }
-                self.kept_linear.take_over(linear, cells.clone());
-            }
-            self.factor_segment(blocks, cells, linear, near, equations.padded());
+            self.factor_segment(
+                blocks,
+                equations.segment(j),
+                linear,
+                near,
+                equations.padded(),
+            );
         }
-        self.newest.segments.push(self.newest.offsets.len());
-        self.newest.starts.push(self.newest.places.len());
-        if near {
-            self.kept = may_keep.then(|| Arc::clone(own));
-        }
-    }
-
-    /// Forgets which blocks there are.
-    pub fn forget(&mut self) {
-        self.kept = None;
+        self.blocks.starts.push(self.blocks.places.len());
     }
 
     fn factor_segment(
@@ -171,7 +129,7 @@ impl StripFactors {
             }
         } else if !falling.is_empty() || skew.is_some() {
             let start = self.open_block();
-            let places = &mut self.newest.places;
+            let places = &mut self.blocks.places;
             places.extend(cells.clone());
             let sticking = cells.clone().filter(|i| !linear.slips(*i));
             places.extend(sticking.map(|i| padded + i));
@@ -185,8 +143,8 @@ impl StripFactors {
             // Two factorisations of half the size take a quarter of the work of one.
             for (matrix, shift) in [(xx, 0), (yy, padded)] {
                 let start = self.open_block();
-                self.newest.places.extend(cells.clone().map(|i| shift + i));
-                self.newest.factors.extend_from_slice(matrix);
+                self.blocks.places.extend(cells.clone().map(|i| shift + i));
+                self.blocks.factors.extend_from_slice(matrix);
                 self.close_block(start);
             }
         }
@@ -211,7 +169,7 @@ impl StripFactors {
             if !slips || usize::from(y.abs() > x.abs()) == axis {
                 rows.push(k);
                 let shift = if slips { 0 } else { axis * padded };
-                self.newest.places.push(i + shift);
+                self.blocks.places.push(i + shift);
             }
         }
     }
@@ -239,33 +197,33 @@ impl StripFactors {
             for r in 0..n {
                 line[r] = ux * x[r] * xx[r] + uy * y[r] * yy[r];
             }
-            let start = self.newest.factors.len();
-            self.newest
+            let start = self.blocks.factors.len();
+            self.blocks
                 .factors
                 .extend(rows.iter().map(|row| line[*row]));
-            self.newest.factors[start + c] -= linear.stiffness(first + column);
+            self.blocks.factors[start + c] -= linear.stiffness(first + column);
         }
     }
 
     fn open_block(&mut self) -> usize {
-        let start = self.newest.places.len();
-        self.newest.starts.push(start);
-        self.newest.offsets.push(self.newest.factors.len());
+        let start = self.blocks.places.len();
+        self.blocks.starts.push(start);
+        self.blocks.offsets.push(self.blocks.factors.len());
         start
     }
 
     /// Factors the newest block, whose matrix is complete.
     fn close_block(&mut self, start: usize) {
-        let size = self.newest.places.len() - start;
+        let size = self.blocks.places.len() - start;
         let scratch = &mut self.scratch;
-        let offset = self.newest.offsets[self.newest.offsets.len() - 1];
-        scratch.factor(&mut self.newest.factors[offset..], size);
+        let offset = self.blocks.offsets[self.blocks.offsets.len() - 1];
+        scratch.factor(&mut self.blocks.factors[offset..], size);
         // The rows are exchanged while values are gathered, so that an application needs no permutation of its own.
-        self.newest.pivot_places.extend(
+        self.blocks.pivot_places.extend(
             scratch
                 .pivots
                 .iter()
-                .map(|row| self.newest.places[start + row]),
+                .map(|row| self.blocks.places[start + row]),
         );
         self.gathered.resize(self.gathered.len().max(size), 0.0);
     }
@@ -281,9 +239,9 @@ impl StripFactors {
         linear: &Linearisation,
         size: usize,
     ) {
-        let base = self.newest.factors.len();
-        self.newest.factors.resize(base + size * size, 0.0);
-        let block = &mut self.newest.factors[base..];
+        let base = self.blocks.factors.len();
+        self.blocks.factors.resize(base + size * size, 0.0);
+        let block = &mut self.blocks.factors[base..];
         self.stick.clear();
         self.stick
             .extend((0..n).filter(|k| !linear.slips(first + k)));
@@ -325,19 +283,14 @@ impl StripFactors {
             let place = stick.binary_search(&k).ok()?;
             Some((*row, [k, cells.len() + place]))
         });
-        let offset = self.newest.offsets[self.newest.offsets.len() - 1];
-        turn_rows(&mut self.newest.factors[offset..], size, rows);
+        let offset = self.blocks.offsets[self.blocks.offsets.len() - 1];
+        turn_rows(&mut self.blocks.factors[offset..], size, rows);
     }
 
     /// `x ← P⁻¹ x`, block by block.
     pub fn apply(&mut self, x: &mut [f64]) {
-        self.newest.apply(&mut self.gathered, x);
+        self.blocks.apply(&mut self.gathered, x);
     }
-}
-
-/// Are these the blocks of one mesh and rule? Kept operators may have been computed again.
-fn is_same(a: &Arc<OwnBlocks>, b: &Arc<OwnBlocks>) -> bool {
-    Arc::ptr_eq(a, b) || a == b
 }
 
 /// How far a tangent of a segment's slipping cells is from the nearest axis, at most (its sine); nothing if no cell slips.

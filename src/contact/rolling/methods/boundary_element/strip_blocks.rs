@@ -16,8 +16,6 @@ pub(super) struct StripBlocks {
     pub(super) starts: Vec<usize>,
     /// Start of each block's matrix in `factors`.
     pub(super) offsets: Vec<usize>,
-    /// The first block of each segment, and one more.
-    pub(super) segments: Vec<usize>,
 }
 
 impl StripBlocks {
@@ -29,26 +27,10 @@ impl StripBlocks {
             places,
             starts,
             offsets,
-            segments,
         } = self;
         factors.clear();
-        for list in [pivot_places, places, starts, offsets, segments] {
+        for list in [pivot_places, places, starts, offsets] {
             list.clear();
-        }
-    }
-
-    /// Takes over the blocks of a segment.
-    pub(super) fn copy(&mut self, from: &StripBlocks, segment: usize) {
-        for block in from.segments[segment]..from.segments[segment + 1] {
-            self.starts.push(self.places.len());
-            self.offsets.push(self.factors.len());
-            let range = from.starts[block]..from.starts[block + 1];
-            let (offset, size) = (from.offsets[block], range.len());
-            self.factors
-                .extend_from_slice(&from.factors[offset..offset + size * size]);
-            self.pivot_places
-                .extend_from_slice(&from.pivot_places[range.clone()]);
-            self.places.extend_from_slice(&from.places[range]);
         }
     }
 

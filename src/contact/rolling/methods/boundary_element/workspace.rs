@@ -40,8 +40,7 @@ impl NewtonWorkspace {
     }
 
     /// Leaves the workspace to the next solve of this thread, unless it is large.
-    pub fn give_back(mut self) {
-        self.blocks.forget();
+    pub fn give_back(self) {
         if self.slip.capacity() <= KEPT_LENGTH {
             LAST.set(Some(self));
         }
