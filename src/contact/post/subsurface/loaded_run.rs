@@ -2,9 +2,8 @@
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
-use std::hash::{BuildHasherDefault, Hasher};
 
-use crate::contact::half_space::point_loads::{LANES, Lanes, LoadPack};
+use crate::contact::half_space::point_loads::{LANES, LoadPack};
 use crate::contact::mesh::strips::{Chord, Segment};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::numerics::quadrature::RULES;
@@ -91,32 +90,6 @@ struct Turns {
 
 /// Tractions over pressure along and across at the points of a rule along a strip.
 type StripRatios = [[f32; POINTS_MAX]; 2];
-
-/// The rows of two neighbouring strips with their numbers.
-struct TwoRows([(usize, StripRatios); 2]);
-
-impl TwoRows {
-    const NONE: TwoRows = TwoRows([(usize::MAX, [[0.0; POINTS_MAX]; 2]); 2]);
-
-    /// Moves on to these strips, with what makes their rows.
-    fn move_to(
-        &mut self,
-        pair: [usize; 2],
-        make: impl Fn(usize) -> StripRatios,
-    ) -> [&StripRatios; 2] {
-        let TwoRows(rows) = self;
-        if rows[1].0 == pair[0] {
-            rows[0] = rows[1];
-        }
-        for (row, strip) in rows.iter_mut().zip(pair) {
-            if row.0 != strip {
-                *row = (strip, make(strip));
-            }
-        }
-        let [(_, below), (_, above)] = &*rows;
-        [below, above]
-    }
-}
 
 impl<'a> LoadedRun<'a> {
     /// The run of these segments, the `number`-th of the mesh, with the tractions of an answer, which are in `unit` MPa.
@@ -249,7 +222,6 @@ impl<'a> LoadedRun<'a> {
             LoadPack::default(),
         );
         let mut passed = below(&self.lines, self.outline.y(part.across.share(0.0)));
-        let mut rows = TwoRows::NONE;
         let width = 0.5 * self.outline.width * part.across.width();
         let angles = (&turns.cosines, &turns.sines);
         let cosines = turns.cosines.map(|cosine| cosine as f32);
@@ -259,7 +231,7 @@ impl<'a> LoadedRun<'a> {
                 continue;
             };
             let between = Between::new(&self.lines, chord.y, &mut passed);
-            let [below, above] = rows.move_to(between.pair, |strip| self.row(strip, &turns));
+            let [below, above] = between.pair.map(|strip| self.row(strip, &turns));
             let pressures = self.outline.footprint.pressures(&chord, angles);
             let half = 0.5 * (chord.right - chord.left);
             let reach = half * width * weight;
@@ -278,7 +250,7 @@ impl<'a> LoadedRun<'a> {
             let pack = &mut to[first + k * count / LANES];
             let lane = k * count % LANES;
             for (place, values) in pack.at.iter_mut().chain(&mut pack.force).zip(&values) {
-                put(place, lane, &values[..count]);
+                place[lane..lane + count].copy_from_slice(&values[..count]);
             }
         }
     }
@@ -297,7 +269,7 @@ impl<'a> LoadedRun<'a> {
         let mut passed = below(&self.nodes, middle - half);
         for (k, (at, weight)) in RULES[rule].iter().enumerate() {
             let turn = half * at;
-            let (sine_turn, cosine_turn) = small_sin_cos(turn);
+            let (sine_turn, cosine_turn) = turn.sin_cos();
             turns.sines[k] = sine * cosine_turn + cosine * sine_turn;
             turns.cosines[k] = cosine * cosine_turn - sine * sine_turn;
             turns.weights[k] = half * weight * turns.sines[k];
@@ -318,18 +290,6 @@ impl<'a> LoadedRun<'a> {
             row[1][k] = low[1] + share * (high[1] - low[1]);
         }
         row
-    }
-}
-
-/// Puts values in their place; a whole rule at once, which is the usual case.
-#[inline]
-fn put(place: &mut Lanes, lane: usize, values: &[f32]) {
-    if let Ok(whole) = <&[f32; POINTS_MAX]>::try_from(values) {
-        place[lane..lane + POINTS_MAX].copy_from_slice(whole);
-    } else {
-        for (place, value) in place[lane..].iter_mut().zip(values) {
-            *place = *value;
-        }
     }
 }
 
@@ -381,53 +341,12 @@ fn steepest(level: &StripMesh, segments: &[Segment]) -> f64 {
     steepest
 }
 
-/// Sine and cosine. Most angles are small, for which a few terms of the series are exact to 1e-13.
-fn small_sin_cos(angle: f64) -> (f64, f64) {
-    if angle.abs() > 0.2 {
-        return angle.sin_cos();
-    }
-    let square = angle * angle;
-    let term = |number: f64, rest: f64| 1.0 - square / (number * (number + 1.0)) * rest;
-    let sine = angle * term(2.0, term(4.0, term(6.0, term(8.0, 1.0))));
-    let cosine = term(1.0, term(3.0, term(5.0, term(7.0, term(9.0, 1.0)))));
-    (sine, cosine)
-}
-
 /// Lines that are kept, at 80 bytes each; only memory depends on it.
 const LINES_MAX: usize = 200_000;
 
 /// Lines across the runs of one mesh that were looked up, by the run and the place in it. Hertz's ellipse is asked again each time.
 #[derive(Debug, Default)]
-pub(crate) struct KnownLines(HashMap<(usize, u64), Option<Chord>, BuildHasherDefault<LineHasher>>);
-
-/// Hashes the number of a run and a place in it. Nobody chooses these to collide, and they are looked up for every part.
-#[derive(Debug, Default)]
-pub(crate) struct LineHasher(u64);
-
-impl LineHasher {
-    /// Digits of the golden ratio, whose multiples are spread evenly (Knuth 1998, §6.4).
-    const SPREAD: u64 = 0x9e37_79b9_7f4a_7c15;
-}
-
-impl Hasher for LineHasher {
-    fn finish(&self) -> u64 {
-        self.0 ^ (self.0 >> 32)
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.write_u64(u64::from(*byte));
-        }
-    }
-
-    fn write_u64(&mut self, word: u64) {
-        self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(LineHasher::SPREAD);
-    }
-
-    fn write_usize(&mut self, word: usize) {
-        self.write_u64(word as u64);
-    }
-}
+pub(crate) struct KnownLines(HashMap<(usize, u64), Option<Chord>>);
 
 /// Chords of the region on lines across a run of strips.
 #[derive(Debug, Clone, Copy)]

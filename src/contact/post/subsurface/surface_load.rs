@@ -274,19 +274,10 @@ fn for_each_code(codes: &PartCodes, lanes: u16, mut with: impl FnMut(u8, u16)) {
     }
 }
 
-/// The lanes that have a code; all codes are less than 128.
+/// The lanes that have a code.
 fn lanes_of(codes: &PartCodes, code: u8) -> u16 {
-    const ONES: u64 = 0x0101_0101_0101_0101;
-    let (eights, _) = codes.as_chunks::<8>();
-    let mut lanes = 0;
-    for (k, eight) in eights.iter().enumerate() {
-        // Bytes of the others become 0x80, then bits of the same bytes are gathered in the uppermost byte.
-        let others = (u64::from_le_bytes(*eight) ^ (u64::from(code) * ONES)) + 0x7f * ONES;
-        let same = (!others >> 7) & ONES;
-        let bits = same.wrapping_mul(0x0102_0408_1020_4080) >> 56;
-        lanes |= (bits as u16) << (8 * k);
-    }
-    lanes
+    let alike = codes.iter().enumerate().filter(|(_, own)| **own == code);
+    alike.fold(0, |lanes, (lane, _)| lanes | 1 << lane)
 }
 
 /// The loads on a rectangle.
