@@ -15,8 +15,6 @@ use crate::contact::geometry::wheel_rail::{WheelCircle, WheelRail};
 pub(crate) const STEP: f64 = 0.04;
 /// Spacing of the points along the curves, in mm.
 const CURVE_STEP: f64 = 0.08;
-/// Points of the wheel that are left out together where they lie beside the rail. It changes times, no answer.
-const LEFT_OUT: usize = 16;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
 /// Lowering in mm under a light load, where the estimate for others begins.
@@ -63,8 +61,12 @@ fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
         let [_, wheel] = geometry.parameters(CURVE_STEP);
         wheel.into_iter().map(|s| geometry.circle(s)).collect()
     });
-    let beside = [rail.first, rail.first + rail.points.len() as i64].map(|k| k as f64 * STEP);
-    let wheel = wheel_points(geometry, circles, beside);
+    // The lowest point of every circle, if it has one.
+    let point = |circle: &WheelCircle| {
+        let found = geometry.lowest_of(circle);
+        found.map(|[_, y, z]| [y, -z, circle.s])
+    };
+    let wheel: Vec<Option<[f64; 3]>> = circles.iter().map(point).collect();
     if wheel.iter().all(Option::is_none) {
         return Err(nothing_above());
     }
@@ -102,37 +104,6 @@ fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
 
 fn nothing_above() -> String {
     "no part of the wheel lies above the rail; check gauge, flange-back distance and position, lateral shift".to_owned()
-}
-
-/// Lowest points `[y, −z, s]` of circles of the wheel in mm, for an [`envelope`] between `first` and `last` in y: far beside that there are
-/// none.
-fn wheel_points(
-    geometry: &WheelRail,
-    circles: &[WheelCircle],
-    [first, last]: [f64; 2],
-) -> Vec<Option<[f64; 3]>> {
-    let point = |circle: &WheelCircle| {
-        let found = geometry.lowest_of(circle);
-        found.map(|[_, y, z]| [y, -z, circle.s])
-    };
-    let mut points = Vec::with_capacity(circles.len());
-    for part in circles.chunks(LEFT_OUT) {
-        let ends = [&part[0], &part[part.len() - 1]];
-        // Yaw turns circles into ellipses, whose lowest points move a little faster along y than the parameter does.
-        let margin = 2.0 * (ends[1].s - ends[0].s + CURVE_STEP);
-        let beside = match ends.map(point) {
-            [Some([from, ..]), Some([to, ..])] => {
-                from.max(to) < first - margin || from.min(to) > last + margin
-            }
-            _ => false,
-        };
-        if beside {
-            points.extend(part.iter().map(|_| None));
-        } else {
-            points.extend(part.iter().map(point));
-        }
-    }
-    points
 }
 
 impl<'g> ContactLocus<'g> {

@@ -13,7 +13,7 @@ use crate::contact::geometry::orientation::{
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::noise;
 use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead};
-use crate::contact::geometry::profile_quality::samples::{KnownPoints, Points};
+use crate::contact::geometry::profile_quality::samples::Points;
 use crate::contact::lazy_field::LazyField;
 use crate::contact::remark::list::Remark;
 
@@ -92,7 +92,6 @@ struct MeasuredCurve {
     digits: f64,
     flange: Option<Flange>,
     sure_body: LazyField<Option<SureBody>>,
-    known: KnownPoints,
 }
 
 impl Profile {
@@ -173,7 +172,6 @@ impl Profile {
             along.push(along[along.len() - 1] + distance(pair[0], pair[1]));
         }
         let measured = MeasuredCurve {
-            known: KnownPoints::new(points.len()),
             points,
             along,
             smoothing: reading.smoothing,
@@ -233,7 +231,6 @@ impl Profile {
         Points {
             at: &self.measured.points,
             along: &self.measured.along,
-            known: Some(&self.measured.known),
         }
     }
 

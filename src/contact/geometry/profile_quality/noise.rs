@@ -103,8 +103,8 @@ pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
     let (mut fine, mut coarse) = (Vec::new(), Vec::new());
     let mut length = 0.0;
     for k in range[0]..range[1].saturating_sub(NOISE_CHORDS) {
-        let found = || window_at(points, k).and_then(fourth_difference);
-        let Some((span, difference)) = points.known(k, |known| &known.difference, found) else {
+        let found = window_at(points, k).and_then(fourth_difference);
+        let Some((span, difference)) = found else {
             continue;
         };
         if span <= NOISE_SPAN_MAX {
@@ -131,10 +131,7 @@ pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
 #[must_use]
 pub fn is_white(points: Points, range: [usize; 2]) -> bool {
     let differences: Vec<f64> = (range[0]..range[1].saturating_sub(NOISE_CHORDS))
-        .filter_map(|k| {
-            let found = || window_at(points, k).and_then(fourth_difference);
-            points.known(k, |known| &known.difference, found)
-        })
+        .filter_map(|k| window_at(points, k).and_then(fourth_difference))
         .map(|(_, difference)| difference)
         .collect();
     let pairs = differences.windows(2);
@@ -172,8 +169,7 @@ pub fn oddity(points: Points, range: [usize; 2]) -> Option<Oddity> {
         (range[1] + ODD_WINDOW).min(points.at.len()),
     ];
     let off: Vec<f64> = (around[0]..around[1])
-        .map(|k| points.known(k, |known| &known.off, || off_neighbours(points, k)))
-        .map(Option::unwrap_or_default)
+        .map(|k| off_neighbours(points, k).unwrap_or_default())
         .collect();
     let size = |j: usize| off[j].abs();
     let mut worst: Option<Oddity> = None;
@@ -328,7 +324,7 @@ pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
     // The points since the last straight one, and their turns.
     let mut open: Option<Vec<(usize, f64)>> = None;
     for k in range[0].max(1)..last {
-        let turned = points.known(k, |known| &known.turn, || turn(points.at, k));
+        let turned = turn(points.at, k);
         if turned.abs() <= bound(k) {
             match open.replace(Vec::new()).as_deref() {
                 Some([(at, turned)]) => kinks.push([points.along[*at], *turned]),
@@ -467,7 +463,6 @@ pub fn stray_ends(points: &[[f64; 2]]) -> [Option<(usize, f64)>; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::geometry::profile_quality::samples::KnownPoints;
 
     fn chords(at: &[[f64; 2]]) -> Vec<f64> {
         let mut along = vec![0.0];
@@ -478,28 +473,11 @@ mod tests {
         along
     }
 
-    /// What `of` finds, the same whether what points tell is kept or not.
-    fn with<T: PartialEq + std::fmt::Debug>(
-        at: &[[f64; 2]],
-        of: impl Fn(Points, [usize; 2]) -> T,
-    ) -> T {
+    /// What `of` finds in all points.
+    fn with<T>(at: &[[f64; 2]], of: impl Fn(Points, [usize; 2]) -> T) -> T {
         let along = chords(at);
-        let points = Points {
-            at,
-            along: &along,
-            known: None,
-        };
-        let found = of(points, [0, at.len()]);
-        let known = KnownPoints::new(at.len());
-        let kept = Points {
-            known: Some(&known),
-            ..points
-        };
-        // In a part first, so that some of it is known then.
-        let part = [at.len() / 4, at.len() / 2];
-        assert_eq!(of(kept, part), of(points, part));
-        assert_eq!(of(kept, [0, at.len()]), found);
-        found
+        let points = Points { at, along: &along };
+        of(points, [0, at.len()])
     }
 
     /// Points of a circle of 80 mm every 0.3 mm.

@@ -262,11 +262,7 @@ mod tests {
     }
 
     fn found(at: &[[f64; 2]], along: &[f64], smoothing: f64) -> Roughness {
-        let points = Points {
-            at,
-            along,
-            known: None,
-        };
+        let points = Points { at, along };
         let reading = PointsRead {
             points,
             curve: &PlaneCurve::through(at, along, smoothing),
