@@ -6,7 +6,6 @@
 //! | a root of an increasing function without bounds, without slopes | [`bracketed_root`] |
 //! | two arguments at which two values are 0, without bounds, without slopes | [`pair_root`] |
 //! | the boundary of a condition | [`bracketed_root`] |
-//! | where something that falls to 0 ends | [`vanishing`] |
 //! | the largest value in an interval | [`bracketed_root`] |
 //! | values between nodes | [`cubic`] (one interval), [`hermite`] (given slopes, or slopes without overshoot), [`spline`] (smoothing), [`lagrange`] (one polynomial) |
 //! | integrals | [`quadrature`] |
@@ -43,4 +42,3 @@ pub mod simd;
 pub mod simd_ln;
 pub mod small_lu;
 pub mod spline;
-pub mod vanishing;
