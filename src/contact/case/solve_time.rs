@@ -39,8 +39,6 @@ const PRESCRIBED_TIMES: f64 = 2.0;
 const JUMP_TIMES: f64 = 4.0;
 /// Time of a product in double precision over that in single precision.
 const DOUBLE_TIMES: f64 = 2.5;
-/// Least time of a solve in s.
-const SECONDS_MIN: f64 = 5e-5;
 /// A motion by the table, with its place in the answer, in s; twice what a row of a run of a million takes on an idle machine
 /// (`cargo bench --bench load -- rows`).
 pub(crate) const TABLE_SECONDS: f64 = 5e-6;
@@ -48,10 +46,8 @@ pub(crate) const TABLE_SECONDS: f64 = 5e-6;
 const TABLE_BOUND: f64 = 0.003;
 /// Time in s to gather and pack the values of a cell.
 const FIELDS_SECONDS_PER_CELL: f64 = 3e-7;
-/// Time in s to find region and pressure of a gap with one patch.
+/// Time in s to find region and pressure of a gap with one patch; it grows with the square of their number.
 const GAP_SECONDS: f64 = 1.5e-3;
-/// Power of the number of patches with which that time grows.
-const GAP_POWER: f64 = 2.0;
 /// Time in s to bring a wheel to rest on its rail.
 const WHEEL_SECONDS: f64 = 9e-3;
 /// A relative radius of curvature across a rail in mm, for the length over width of a patch that is not known yet.
@@ -130,11 +126,7 @@ impl ExpectedPatches {
         let preview = task.preview();
         let count = preview.asperities;
         let half = preview.half.map(|half| half / (count as f64).sqrt());
-        (
-            vec![half; count],
-            1.0,
-            GAP_SECONDS * (count as f64).powf(GAP_POWER),
-        )
+        (vec![half; count], 1.0, GAP_SECONDS * (count as f64).powi(2))
     }
 }
 
@@ -228,7 +220,7 @@ impl CheckedCase {
         let (steps, usual) = usual_work(history, &extents, along);
         let cells = along.map_or(usual, |_| self.size_input().cells());
         let step = STEP_SECONDS + STEP_CELLS_SECONDS * cells * cells;
-        SECONDS_MIN + steps * self.solves(0) * step
+        steps * self.solves(0) * step
     }
 
     fn to_target(&self, patches: &ExpectedPatches, target: f64) -> f64 {
@@ -264,7 +256,7 @@ impl CheckedCase {
             };
             self.solves(k) * spin * following * usual * shapes + fields
         });
-        SECONDS_MIN + motions.sum::<f64>()
+        motions.sum::<f64>()
     }
 
     fn on_one_mesh(&self, method: Method) -> f64 {
@@ -283,18 +275,14 @@ impl CheckedCase {
             1
         };
         let solves: f64 = (0..motions).map(|k| self.solves(k)).sum();
-        SECONDS_MIN + first * meshes as f64 + each * solves + fields * motions as f64
+        first * meshes as f64 + each * solves + fields * motions as f64
     }
 }
 
-/// Time in s before the first stress below the surface, and for each; for the worst point of a patch; for the power of all cells of a usual
-/// mesh; for the rest. Of `cargo bench --bench stress -- --only after`, medians over 18 ellipses, the first two with one to twenty times as many
-/// points along x; a fine mesh takes several times as long.
-const LOADS_SECONDS: f64 = 3e-4;
+/// Time in s for each stress below the surface, and for the worst point of a patch (`cargo bench --bench stress -- --only after`, medians over 18
+/// ellipses); a fine mesh takes several times as long. Other outputs of a solved motion take less than 0.1 ms.
 const STRESS_SECONDS: f64 = 4e-7;
 const WORST_SECONDS: f64 = 0.0025;
-const POWER_SECONDS: f64 = 8e-5;
-const DAMAGE_SECONDS: f64 = 3e-6;
 /// For the passages below a patch, for each thing that is judged of them: the same bench.
 const PASSAGE_SECONDS: f64 = 0.03;
 
@@ -314,7 +302,7 @@ impl CheckedCase {
             } else {
                 0.0
             };
-            seconds += LOADS_SECONDS + STRESS_SECONDS * count + WORST_SECONDS * searched;
+            seconds += STRESS_SECONDS * count + WORST_SECONDS * searched;
             if let Some(passage) = task.passage {
                 let judged = 1 + u8::from(passage.dang_van_slope.is_some());
                 seconds += PASSAGE_SECONDS * f64::from(judged) * patches;
@@ -322,12 +310,6 @@ impl CheckedCase {
                     seconds += WORST_SECONDS * patches;
                 }
             }
-        }
-        if after.needs_power(&self.run.outputs) {
-            seconds += POWER_SECONDS * patches;
-        }
-        if after.damage.is_some() {
-            seconds += DAMAGE_SECONDS * patches;
         }
         seconds
     }
