@@ -54,12 +54,6 @@ impl LeadingEdges {
         }
     }
 
-    /// Bytes of the rows of a mesh.
-    #[must_use]
-    pub fn bytes(strips: usize, cells: usize) -> u64 {
-        4 * 8 * (strips * cells) as u64
-    }
-
     /// Displacements at the edge of strip `j` under tractions.
     fn displacement(&self, j: usize, tx: &[f64], ty: &[f64]) -> [f64; 2] {
         let [xx, xy, yx, yy] = &self.rows[j];

@@ -3,8 +3,8 @@
 //! Meshes are dimensionless, so that patches of one shape share their operator whatever their size and load. The store decides how
 //! long an operator is kept, never what an answer is: an operator that is computed again is the same to the last bit.
 
+use std::collections::HashMap;
 use std::collections::hash_map::DefaultHasher;
-use std::collections::{BTreeMap, HashMap};
 use std::hash::{Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -74,12 +74,10 @@ pub struct OperatorStore {
     kept: Mutex<Shelf>,
 }
 
-/// The operators that are kept, by digest, and the order of their last use.
+/// The operators that are kept, by digest.
 #[derive(Debug, Default)]
 struct Shelf {
     operators: HashMap<u64, Kept>,
-    /// Digests by the time of last use, counted in uses.
-    order: BTreeMap<u64, u64>,
     uses: u64,
     bytes: u64,
 }
@@ -89,6 +87,7 @@ struct Kept {
     kind: OperatorKind,
     mesh: Arc<Mesh>,
     bytes: u64,
+    /// When it was used last, counted in uses of the store.
     used: u64,
     operator: Arc<LevelOperator>,
 }
@@ -161,12 +160,6 @@ impl OperatorStore {
         self.shelf().bytes
     }
 
-    /// The bound of the store in bytes.
-    #[must_use]
-    pub fn bytes_max(&self) -> u64 {
-        self.bytes_max
-    }
-
     fn shelf(&self) -> MutexGuard<'_, Shelf> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -179,31 +172,27 @@ impl Shelf {
             return None;
         }
         self.uses += 1;
-        self.order.remove(&found.used);
         found.used = self.uses;
-        self.order.insert(found.used, digest);
         Some(Arc::clone(&found.operator))
     }
 
     fn keep(&mut self, digest: u64, mut new: Kept, bytes_max: u64) {
         self.drop_one(digest);
         while self.bytes + new.bytes > bytes_max {
-            let Some((_, oldest)) = self.order.first_key_value() else {
+            let oldest = self.operators.iter().min_by_key(|(_, kept)| kept.used);
+            let Some((&oldest, _)) = oldest else {
                 break;
             };
-            let oldest = *oldest;
             self.drop_one(oldest);
         }
         self.uses += 1;
         new.used = self.uses;
-        self.order.insert(new.used, digest);
         self.bytes += new.bytes;
         self.operators.insert(digest, new);
     }
 
     fn drop_one(&mut self, digest: u64) {
         if let Some(gone) = self.operators.remove(&digest) {
-            self.order.remove(&gone.used);
             self.bytes -= gone.bytes;
         }
     }

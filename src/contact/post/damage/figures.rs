@@ -6,9 +6,6 @@ use crate::contact::case::words::damage::{
 };
 use crate::contact::solution::words::damage::DamageFiguresUsed;
 
-/// The models that are evaluated where none is named: those whose figures are confirmed.
-pub const DEFAULT_MODELS: [DamageModel; 2] = [DamageModel::TGamma, DamageModel::UsfdWear];
-
 /// Subsurface limit of elastic shakedown, largest pressure over yield in shear (Johnson 1985, chapter 9, for a line contact, less than for
 /// any ellipse).
 pub const SHAKEDOWN_LIMIT: f64 = 4.0;

@@ -289,16 +289,6 @@ pub enum InitialGuess {
 }
 
 impl InitialGuess {
-    /// The name in logs and answers.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            InitialGuess::RigidSlip => "rigid slip",
-            InitialGuess::SpinPole(_) => "spin pole",
-            InitialGuess::Continued => "continued",
-        }
-    }
-
     /// Unit direction at a cell at `(x, y)`, where the previous division gave the traction `before`.
     ///
     /// Where the direction is undefined (at a pole, or without a previous traction) it is that of the rigid slip, and at

@@ -90,14 +90,6 @@ impl Axis {
         axis
     }
 
-    /// The bin of a place; beyond the ends the last one.
-    #[must_use]
-    #[inline(always)]
-    pub fn bin(&self, place: f64) -> usize {
-        let along = (place - self.low) * self.bins_per_unit;
-        (along.max(0.0) as usize).min(self.first.len() - 1)
-    }
-
     /// The weights at a place; beyond the ends those of the end.
     #[must_use]
     #[inline(always)]

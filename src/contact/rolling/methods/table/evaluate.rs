@@ -156,12 +156,6 @@ fn parabola(poisson_ratio: f64) -> [f64; 3] {
 }
 
 impl EllipseTable<'_> {
-    /// `[C11, C22, C23, C33]` of the ellipse.
-    #[must_use]
-    pub fn kalker(&self) -> [f64; 4] {
-        self.kalker
-    }
-
     /// Creep forces of the dimensionless creepages `G c²/(μN) (ν_x, ν_y, c φ)` with c = √(ab), at most μN.
     #[must_use]
     #[inline(always)]
