@@ -2,21 +2,18 @@
 
 use std::process::ExitCode;
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 
 use crate::cli::commands::{KeysAction, KeysArgs};
 use crate::cli::output::{print, print_error};
+use crate::cli::runtime::block_on;
 use crate::jobs::keys::keyring::Keyring;
 use crate::jobs::model::key::Key;
 use crate::jobs::model::labels::{BOUND_MAX, Labels};
 
 /// Runs the action on the keys.
 pub(super) fn run(args: &KeysArgs) -> anyhow::Result<ExitCode> {
-    tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .context("the async runtime could not be started")?
-        .block_on(act(args))
+    block_on(act(args))?
 }
 
 async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {

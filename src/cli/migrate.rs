@@ -2,17 +2,16 @@
 
 use std::process::ExitCode;
 
-use anyhow::Context;
-
 use crate::cli::database_args::{DatabaseUrlArgs, DoctorArgs};
 use crate::cli::output::print;
+use crate::cli::runtime::block_on;
 use crate::jobs::result_place::examine_results;
 use crate::jobs::store::postgres::doctor::examine;
 use crate::jobs::store::postgres::schema::{Migrated, migrate};
 
 /// Makes the job table, or brings it forward.
 pub(super) fn run(args: &DatabaseUrlArgs) -> anyhow::Result<ExitCode> {
-    let made = runtime()?.block_on(migrate(&args.database_url))?;
+    let made = block_on(migrate(&args.database_url))??;
     print(match made {
         Migrated::Made => "the job table was made",
         Migrated::Upgraded => "the job table was brought forward to the version of this program",
@@ -25,11 +24,11 @@ pub(super) fn run(args: &DatabaseUrlArgs) -> anyhow::Result<ExitCode> {
 /// Tells how the database is, one line per question; exit code 1 if something is wrong.
 pub(super) fn doctor(args: &DoctorArgs) -> anyhow::Result<ExitCode> {
     let url = &args.database.database_url;
-    let findings = runtime()?.block_on(async {
+    let findings = block_on(async {
         let mut findings = examine(url).await?;
         findings.push(examine_results(url, args.results.place().as_ref()).await?);
         anyhow::Ok(findings)
-    })?;
+    })??;
     let lines = findings.iter().map(|finding| {
         let mark = if finding.wrong { "WRONG" } else { "ok" };
         format!("{mark}\t{}\t{}", finding.about, finding.says)
@@ -37,11 +36,4 @@ pub(super) fn doctor(args: &DoctorArgs) -> anyhow::Result<ExitCode> {
     print(&lines.collect::<Vec<_>>().join("\n"))?;
     let wrong = findings.iter().any(|finding| finding.wrong);
     Ok(ExitCode::from(u8::from(wrong)))
-}
-
-fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {
-    tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .context("the async runtime could not be started")
 }

@@ -19,6 +19,7 @@ mod migrate;
 mod output;
 #[cfg(feature = "cluster")]
 mod relocate;
+mod runtime;
 mod serve;
 mod serve_args;
 mod solve;

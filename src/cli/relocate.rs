@@ -3,21 +3,21 @@
 use std::process::ExitCode;
 
 use anyhow::Context;
-use tokio::runtime::Runtime;
 
 use crate::cli::commands::{MoveArgs, MoveResultsArgs};
 use crate::cli::output::print;
+use crate::cli::runtime::block_on;
 use crate::jobs::relocate::relocate;
 use crate::jobs::result_place::change::move_results;
 
 /// Moves everything and says what it was.
 pub(super) fn run(args: &MoveArgs) -> anyhow::Result<ExitCode> {
     let place = args.results.place();
-    let moved = runtime()?.block_on(relocate(
+    let moved = block_on(relocate(
         &args.data_dir,
         &args.database.database_url,
         place.as_ref(),
-    ))?;
+    ))??;
     let mut lines: Vec<String> = moved
         .rows
         .iter()
@@ -35,7 +35,7 @@ pub(super) fn run_results(args: &MoveResultsArgs) -> anyhow::Result<ExitCode> {
         .results
         .place()
         .context("say by --results-url where the results are to be")?;
-    let moved = runtime()?.block_on(move_results(&args.database.database_url, &place))?;
+    let moved = block_on(move_results(&args.database.database_url, &place))??;
     let from = match moved.from.as_str() {
         "" => "the database",
         place => place,
@@ -48,11 +48,4 @@ pub(super) fn run_results(args: &MoveResultsArgs) -> anyhow::Result<ExitCode> {
         format!("large results that are missing\t{}", moved.missing),
     ];
     print(&lines.join("\n"))
-}
-
-fn runtime() -> anyhow::Result<Runtime> {
-    tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .context("the async runtime could not be started")
 }
