@@ -9,6 +9,7 @@ use crate::jobs::disk_reserve::make_private_folder;
 use crate::jobs::error::JobsError;
 use crate::jobs::open_store::table_file;
 use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::sync::blocking;
 
 /// Copies the jobs and their results into a new folder, from which a service can be started.
 ///
@@ -33,14 +34,9 @@ pub async fn backup(data_dir: &Path, to: &Path) -> Result<(), JobsError> {
     if !from.exists() {
         return Ok(());
     }
-    let copied = tokio::task::spawn_blocking({
-        let from = from.clone();
-        move || copy_folder(&from, &to)
-    });
-    copied
-        .await
-        .map_err(|error| JobsError::Damaged(error.to_string()))?
-        .map_err(|source| failed(&from, source))
+    let source = from.clone();
+    let copied = blocking(move || copy_folder(&source, &to)).await?;
+    copied.map_err(|source| failed(&from, source))
 }
 
 /// Copies what is there; what goes away meanwhile is left out.

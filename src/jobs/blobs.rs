@@ -23,6 +23,7 @@ use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;
 use crate::jobs::store::claim::Claim;
+use crate::jobs::sync::blocking;
 
 /// The folder of the data folder in which results lie.
 pub(crate) const ROOT: &str = "results";
@@ -236,12 +237,8 @@ impl Blobs {
             .collect();
         let pieces = self.objects.get_ranges(&path, &ranges).await?;
         // Decompression is arithmetic; it stays off the threads that answer requests.
-        let decoded =
-            tokio::task::spawn_blocking(move || header.decode(patch, point, &pieces.concat()))
-                .await;
-        decoded
-            .map_err(|error| JobsError::Damaged(error.to_string()))?
-            .map_err(damaged)
+        let decoded = blocking(move || header.decode(patch, point, &pieces.concat()));
+        decoded.await?.map_err(damaged)
     }
 
     /// Writes so many bytes and removes them again.

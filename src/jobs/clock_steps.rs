@@ -1,9 +1,10 @@
 //! Wall clocks that are set while the service runs. A step forward makes nothing late or old at once: what began before the
 //! step is judged as if the clock had not been set.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 use crate::jobs::clock::Clock;
+use crate::jobs::sync::lock;
 
 /// A smaller difference between the clocks, in ms, is no leap.
 const LEAP_MS: i64 = 60_000;
@@ -42,7 +43,7 @@ impl ClockStep {
 impl ClockSteps {
     /// Reads the clocks and notes whether the wall clock was set.
     pub(crate) fn measure(&self, clock: &Clock) -> ClockStep {
-        let mut seen = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut seen = lock(&self.0);
         let wall = clock.now_ms();
         let offset = wall - clock.steady_ms();
         let moved = offset - seen.offset.unwrap_or(offset);

@@ -16,13 +16,13 @@ pub enum JobsError {
     #[error(transparent)]
     Case(#[from] CaseError),
     /// The queue is full; nothing was stored.
-    #[error("the queue holds {queue_max} jobs, which is its limit; try again later")]
+    #[error("{queue_max} jobs are waiting, which is the limit; nothing was stored")]
     QueueFull {
         /// Bound of queued jobs.
         queue_max: u64,
     },
     /// The tenant has as many queued jobs as it may; nothing was stored.
-    #[error("this tenant has {queue_max} queued jobs, which is its limit; try again later")]
+    #[error("{queue_max} jobs of this tenant are waiting, which is its limit; nothing was stored")]
     QuotaExceeded {
         /// Bound of queued jobs of one tenant.
         queue_max: u64,
@@ -55,21 +55,19 @@ pub enum JobsError {
     #[error("a tenant is named by 1 to 64 letters, digits, dots, dashes and underscores")]
     BadTenant,
     /// The idempotency key was used before with another case, or with other options.
-    #[error(
-        "this idempotency key was used before with another case, or with another priority, deadline or `no-cache`"
-    )]
+    #[error("this `Idempotency-Key` was used before with a different case")]
     IdempotencyConflict,
     /// There is no such job.
-    #[error("there is no such job")]
+    #[error("no job has this id")]
     NotFound,
     /// There was such a job or batch, but its time is over.
-    #[error("its time is over, it has been removed")]
+    #[error("ended longer ago than this service keeps ended jobs, so it was removed")]
     Expired,
     /// There is no batch, or no run for [`Kind::Rows`], with this id.
-    #[error("there is no such {}", .0.noun())]
+    #[error("no {} has this id", .0.noun())]
     BatchNotFound(Kind),
     /// The job must end first.
-    #[error("the job is {}; only an ended job can be deleted, cancel it first", .0.name())]
+    #[error("the job is queued or running; cancel it first, then delete it")]
     NotEnded(State),
     /// The key is bound to labels, and this concerns the whole tenant.
     #[error("this key is bound to {labels}; it may not {action}, use a key without labels")]
@@ -80,7 +78,7 @@ pub enum JobsError {
         action: &'static str,
     },
     /// There is no such profile.
-    #[error("there is no such profile")]
+    #[error("no profile has this digest")]
     ProfileNotFound,
     /// The tenant keeps as many bytes of profiles as it may.
     #[error(
@@ -91,31 +89,33 @@ pub enum JobsError {
     #[error("the run has more than the {0} rows that are allowed (`--run-max-rows`)")]
     TooManyRows(u64),
     /// This many jobs of the batch, or chunks of the run, must end first.
-    #[error("the {} has not ended; cancel it first", .0.noun())]
+    #[error("{}", not_ended(*.0, *.1))]
     BatchNotEnded(Kind, u64),
     /// There is no result yet.
-    #[error("the job is {}; its result is not there yet", .0.name())]
+    #[error("the job is {}, so there is no result yet", .0.name())]
     NotReady(State),
     /// The job ended without a result; the job says why.
-    #[error("the job ended as {} and has no result", .0.state.name())]
+    #[error("{}", without_result(.0))]
     NotSucceeded(Box<Job>),
     /// The patch asked for is not among the stored fields.
-    #[error("there is no such patch; fields are stored for {patches} patch(es)")]
+    #[error("`patch` is too large; allowed: 0 to {}", patches.saturating_sub(1))]
     NoSuchPatch {
         /// Patches with stored fields; 0 if the case asked for no field.
         patches: usize,
     },
     /// The motion asked for is not among the stored fields.
-    #[error("there is no such point; fields are stored for {points} point(s)")]
+    #[error("`point` is too large; allowed: 0 to {}", points.saturating_sub(1))]
     NoSuchPoint {
         /// Motions of the case.
         points: usize,
     },
     /// The cursor was not made by this service, or for another filter.
-    #[error("the cursor is not one of ours, or belongs to another filter")]
+    #[error(
+        "`cursor` is not one that this service gave out for the same filters; start again without it"
+    )]
     BadCursor,
     /// The service is about to stop.
-    #[error("the service is shutting down")]
+    #[error("the service is shutting down and takes no new jobs")]
     Draining,
     /// Another process uses the data folder.
     #[error("the data folder {} is in use by another process", .0.display())]
@@ -196,4 +196,25 @@ pub enum JobsError {
     /// Something stored cannot be read back.
     #[error("stored data is damaged: {0}")]
     Damaged(String),
+}
+
+fn not_ended(kind: Kind, jobs: u64) -> String {
+    match kind {
+        Kind::Rows => {
+            "rows of the run are waiting or being solved; cancel it first, then delete it"
+                .to_owned()
+        }
+        _ => format!(
+            "{jobs} jobs of the batch are queued or running; cancel it first, then delete it"
+        ),
+    }
+}
+
+fn without_result(job: &Job) -> String {
+    if job.state == State::Cancelled {
+        return "the job was cancelled, so it has no result".to_owned();
+    }
+    let reason = job.failure.as_ref();
+    let reason = reason.map_or("the reason is not known", |failure| &failure.detail);
+    format!("the job failed, so it has no result: {reason}")
 }

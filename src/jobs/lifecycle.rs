@@ -4,7 +4,7 @@ use std::fs::{File, TryLockError};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 use std::sync::atomic::{AtomicI64, AtomicUsize};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::available_parallelism;
 use std::time::Duration;
 
@@ -38,6 +38,7 @@ use crate::jobs::staged_bytes::StagedBytes;
 use crate::jobs::storage_fault::StorageFaults;
 use crate::jobs::store::Store;
 use crate::jobs::store::cluster::Node;
+use crate::jobs::sync::lock;
 use crate::jobs::worker::pool::Worker;
 
 /// How long a shutdown waits for workers that were told to stop.
@@ -60,9 +61,9 @@ impl Jobs {
     /// # Errors
     /// As [`Jobs::open`].
     pub async fn open_with(options: Options, engine: Engine) -> Result<Jobs, JobsError> {
-        let lock = lock(&options.data_dir)?;
+        let lock = lock_folder(&options.data_dir)?;
         let store = open_for_service(&options.data_dir, options.database.as_ref()).await?;
-        let metrics = Metrics::new();
+        let (metrics, registry) = Metrics::new();
         let blobs = open_blobs(&*store, &options, &metrics).await?;
         let clock_offset_ms = Arc::<AtomicI64>::default();
         let options = Options {
@@ -99,6 +100,7 @@ impl Jobs {
                 stopping: CancellationToken::new(),
                 tasks: TaskTracker::new(),
                 metrics,
+                registry,
                 storage: StorageFaults::default(),
                 trusted: Mutex::default(),
                 checks: Semaphore::new(available_parallelism().map_or(1, usize::from)),
@@ -209,13 +211,7 @@ impl Jobs {
         if self.shared.options.database.is_none() && !self.shared.storage.damaged() {
             note_closed(&self.shared.options.data_dir);
         }
-        drop(
-            self.shared
-                .lock
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .take(),
-        );
+        drop(lock(&self.shared.lock).take());
     }
 }
 
@@ -239,7 +235,7 @@ async fn open_blobs(
 
 /// Creates the data folder if needed and takes it for this process alone. The system frees the lock when the process
 /// ends, however it ends.
-pub(crate) fn lock(data_dir: &Path) -> Result<File, JobsError> {
+pub(crate) fn lock_folder(data_dir: &Path) -> Result<File, JobsError> {
     let failed = |path: &Path, source| JobsError::DataDir {
         path: path.to_owned(),
         source,

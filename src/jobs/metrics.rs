@@ -1,13 +1,12 @@
 //! What the jobs room counts for the operator. Labels have few values, all known beforehand: never an id, never a name
 //! that a client chose.
 
-use prometheus_client::encoding::EncodeLabelSet;
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::metrics::info::Info;
-use prometheus_client::registry::Registry;
+use prometheus_client::registry::{Metric, Registry};
 
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::evaluate::many_answer::ManyAnswer;
@@ -23,25 +22,8 @@ const SOLVE_SECONDS: [f64; 14] = [
 /// Upper bounds of Newton iterations of one motion on one patch.
 const ITERATIONS: [f64; 9] = [2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0, 200.0];
 
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(crate) struct StateLabel {
-    state: &'static str,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct MethodLabel {
-    method: &'static str,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct ReasonLabel {
-    reason: &'static str,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct StatusLabel {
-    status: &'static str,
-}
+/// A label with its value.
+type Label = [(&'static str, &'static str); 1];
 
 /// A solver at work.
 #[derive(Debug)]
@@ -56,17 +38,17 @@ impl Drop for BusyWorker {
 /// Counters of one service; clones share them.
 #[derive(Debug, Clone)]
 pub(crate) struct Metrics {
-    pub(crate) jobs: Family<StateLabel, Gauge>,
+    pub(crate) jobs: Family<Label, Gauge>,
     pub(crate) oldest_queued_seconds: Gauge<f64, std::sync::atomic::AtomicU64>,
     pub(crate) queue_cost_seconds: Gauge<f64, std::sync::atomic::AtomicU64>,
     pub(crate) database_bytes: Gauge,
     pub(crate) result_bytes: Gauge,
     pub(crate) operator_bytes: Gauge,
-    solve_seconds: Family<MethodLabel, Histogram>,
-    iterations: Family<MethodLabel, Histogram>,
-    rows: Family<StatusLabel, Counter>,
-    ended: Family<StateLabel, Counter>,
-    failures: Family<ReasonLabel, Counter>,
+    solve_seconds: Family<Label, Histogram>,
+    iterations: Family<Label, Histogram>,
+    rows: Family<Label, Counter>,
+    ended: Family<Label, Counter>,
+    failures: Family<Label, Counter>,
     storage_failing: Gauge,
     pub(crate) parked: Gauge,
     pub(crate) abandoned: Gauge,
@@ -78,16 +60,13 @@ pub(crate) struct Metrics {
     pub(crate) store_requests: StoreRequests,
 }
 
-/// Requests to an object store.
+/// Requests to an object store, by method and by class of the answer: `2xx` to `5xx`, or `none` if there was none.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct StoreRequests(Family<RequestLabel, Counter>);
-
-#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-struct RequestLabel {
-    method: String,
-    /// `2xx` to `5xx`, or `none` if there was no answer.
-    status: &'static str,
-}
+#[cfg_attr(
+    not(feature = "cluster"),
+    expect(dead_code, reason = "only clusters keep results in object stores")
+)]
+pub(crate) struct StoreRequests(Family<[(&'static str, String); 2], Counter>);
 
 impl StoreRequests {
     /// A request was answered with this status, or not at all.
@@ -100,37 +79,141 @@ impl StoreRequests {
             Some(_) => "5xx",
             None => "none",
         };
-        let label = RequestLabel {
-            method: method.to_owned(),
-            status,
-        };
-        self.0.get_or_create(&label).inc();
+        let labels = [("method", method.to_owned()), ("status", status.to_owned())];
+        self.0.get_or_create_owned(&labels).inc();
     }
 }
 
+/// Registers a metric and returns it.
+fn registered<M: Metric + Clone>(registry: &mut Registry, name: &str, about: &str, metric: M) -> M {
+    registry.register(name, about, metric.clone());
+    metric
+}
+
 impl Metrics {
-    pub(crate) fn new() -> Metrics {
+    /// Counters at zero, and the registry that shows them.
+    #[expect(clippy::too_many_lines, reason = "one entry for each metric")]
+    pub(crate) fn new() -> (Metrics, Registry) {
+        let mut registry = Registry::with_prefix("railhead");
+        let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);
+        registry.register("build", "The running version", version);
+        let all = &mut registry;
         let metrics = Metrics {
-            jobs: Family::default(),
-            oldest_queued_seconds: Gauge::default(),
-            queue_cost_seconds: Gauge::default(),
-            database_bytes: Gauge::default(),
-            result_bytes: Gauge::default(),
-            operator_bytes: Gauge::default(),
-            solve_seconds: Family::new_with_constructor(|| Histogram::new(SOLVE_SECONDS)),
-            iterations: Family::new_with_constructor(|| Histogram::new(ITERATIONS)),
-            rows: Family::default(),
-            ended: Family::default(),
-            failures: Family::default(),
-            storage_failing: Gauge::default(),
-            parked: Gauge::default(),
-            abandoned: Gauge::default(),
-            workers: Gauge::default(),
-            working: Gauge::default(),
-            cache_hits: Counter::default(),
-            cache_misses: Counter::default(),
-            results_swept: Counter::default(),
-            store_requests: StoreRequests::default(),
+            jobs: registered(all, "jobs", "Jobs in the store by state", Family::default()),
+            oldest_queued_seconds: registered(
+                all,
+                "queue_oldest_age_seconds",
+                "Age of the oldest queued job; 0 if none is queued",
+                Gauge::default(),
+            ),
+            queue_cost_seconds: registered(
+                all,
+                "queue_cost_seconds",
+                "Expected solver seconds of all queued jobs, from the mean of up to 1000 of them",
+                Gauge::default(),
+            ),
+            database_bytes: registered(
+                all,
+                "database_bytes",
+                "Size of the job table with its write-ahead log",
+                Gauge::default(),
+            ),
+            result_bytes: registered(
+                all,
+                "result_bytes",
+                "Size of the results kept outside the job table",
+                Gauge::default(),
+            ),
+            operator_bytes: registered(
+                all,
+                "operator_store_bytes",
+                "Size of the operators of meshes that are kept in memory for the next cases",
+                Gauge::default(),
+            ),
+            store_requests: StoreRequests(registered(
+                all,
+                "result_store_requests",
+                "Requests to the object store of the results, repeated ones included, by the class of the answer",
+                Family::default(),
+            )),
+            results_swept: registered(
+                all,
+                "results_swept",
+                "Results without a job removed from outside the database",
+                Counter::default(),
+            ),
+            rows: registered(
+                all,
+                "run_rows",
+                "Rows of runs that were answered, by what became of them",
+                Family::default(),
+            ),
+            storage_failing: registered(
+                all,
+                "storage_failing",
+                "1 while the disk is full or cannot be written, or database or object store cannot be reached",
+                Gauge::default(),
+            ),
+            parked: registered(
+                all,
+                "solves_waiting",
+                "Solves that wait for their next turn, with all that they have in memory",
+                Gauge::default(),
+            ),
+            abandoned: registered(
+                all,
+                "solver_threads_abandoned",
+                "Solver threads that did not stop when they were told to and still run",
+                Gauge::default(),
+            ),
+            workers: registered(
+                all,
+                "workers",
+                "Workers, each with one solver at work at most",
+                Gauge::default(),
+            ),
+            working: registered(
+                all,
+                "workers_busy",
+                "Workers whose solver is at work",
+                Gauge::default(),
+            ),
+            solve_seconds: registered(
+                all,
+                "solve_seconds",
+                "Wall time of one case on a solver thread, by the method that gave the numbers",
+                Family::new_with_constructor(|| Histogram::new(SOLVE_SECONDS)),
+            ),
+            iterations: registered(
+                all,
+                "newton_iterations",
+                "Newton iterations of one motion on one patch",
+                Family::new_with_constructor(|| Histogram::new(ITERATIONS)),
+            ),
+            ended: registered(
+                all,
+                "jobs_ended",
+                "Jobs that ended, by state",
+                Family::default(),
+            ),
+            cache_hits: registered(
+                all,
+                "cache_hits",
+                "Cases answered with the result of an identical earlier one",
+                Counter::default(),
+            ),
+            cache_misses: registered(
+                all,
+                "cache_misses",
+                "Cases for which an earlier result was looked for in vain",
+                Counter::default(),
+            ),
+            failures: registered(
+                all,
+                "job_failures",
+                "Jobs that failed, by reason",
+                Family::default(),
+            ),
         };
         // A series that appears only with its first event hides that event from a rate.
         for state in State::ALL.into_iter().filter(|state| state.ended()) {
@@ -139,7 +222,7 @@ impl Metrics {
         for kind in FailureKind::ALL {
             drop(metrics.failures.get_or_create(&reason_label(kind)));
         }
-        metrics
+        (metrics, registry)
     }
 
     /// A solver is at work as long as this is held.
@@ -152,14 +235,11 @@ impl Metrics {
     pub(crate) fn solved(&self, asked: MethodName, solution: &Solution, seconds: f64) {
         let points = || solution.patches.iter().flat_map(|patch| &patch.points);
         let used = points().next().map_or(asked, |point| point.solver.method);
-        let used = MethodLabel {
-            method: used.name(),
-        };
-        self.solve_seconds.get_or_create(&used).observe(seconds);
+        let label = |method: MethodName| [("method", method.name())];
+        let taken = self.solve_seconds.get_or_create_owned(&label(used));
+        taken.observe(seconds);
         for point in points() {
-            let method = MethodLabel {
-                method: point.solver.method.name(),
-            };
+            let method = label(point.solver.method);
             self.iterations
                 .get_or_create(&method)
                 .observe(f64::from(point.solver.iterations));
@@ -169,10 +249,7 @@ impl Metrics {
     /// Rows of a run were answered.
     pub(crate) fn rows_ended(&self, answer: &ManyAnswer) {
         for status in &answer.status {
-            let status = StatusLabel {
-                status: status.name(),
-            };
-            self.rows.get_or_create(&status).inc();
+            self.rows.get_or_create(&[("status", status.name())]).inc();
         }
     }
 
@@ -206,124 +283,12 @@ impl Metrics {
     pub(crate) fn storage_failing(&self, failing: bool) {
         self.storage_failing.set(i64::from(failing));
     }
-
-    pub(crate) fn register(&self, registry: &mut Registry) {
-        registry.register(
-            "build",
-            "The running version",
-            Info::new([("version", env!("CARGO_PKG_VERSION"))]),
-        );
-        registry.register("jobs", "Jobs in the store by state", self.jobs.clone());
-        registry.register(
-            "queue_oldest_age_seconds",
-            "Age of the oldest queued job; 0 if none is queued",
-            self.oldest_queued_seconds.clone(),
-        );
-        registry.register(
-            "queue_cost_seconds",
-            "Expected solver seconds of all queued jobs, from the mean of up to 1000 of them",
-            self.queue_cost_seconds.clone(),
-        );
-        registry.register(
-            "database_bytes",
-            "Size of the job table with its write-ahead log",
-            self.database_bytes.clone(),
-        );
-        registry.register(
-            "result_bytes",
-            "Size of the results kept outside the job table",
-            self.result_bytes.clone(),
-        );
-        registry.register(
-            "operator_store_bytes",
-            "Size of the operators of meshes that are kept in memory for the next cases",
-            self.operator_bytes.clone(),
-        );
-        registry.register(
-            "result_store_requests",
-            "Requests to the object store of the results, repeated ones included, by the class of the answer",
-            self.store_requests.0.clone(),
-        );
-        registry.register(
-            "results_swept",
-            "Results without a job removed from outside the database",
-            self.results_swept.clone(),
-        );
-        registry.register(
-            "run_rows",
-            "Rows of runs that were answered, by what became of them",
-            self.rows.clone(),
-        );
-        registry.register(
-            "storage_failing",
-            "1 while the disk is full or cannot be written, or database or object store cannot be reached",
-            self.storage_failing.clone(),
-        );
-        registry.register(
-            "solves_waiting",
-            "Solves that wait for their next turn, with all that they have in memory",
-            self.parked.clone(),
-        );
-        registry.register(
-            "solver_threads_abandoned",
-            "Solver threads that did not stop when they were told to and still run",
-            self.abandoned.clone(),
-        );
-        self.register_solves(registry);
-    }
-
-    fn register_solves(&self, registry: &mut Registry) {
-        registry.register(
-            "workers",
-            "Workers, each with one solver at work at most",
-            self.workers.clone(),
-        );
-        registry.register(
-            "workers_busy",
-            "Workers whose solver is at work",
-            self.working.clone(),
-        );
-        registry.register(
-            "solve_seconds",
-            "Wall time of one case on a solver thread, by the method that gave the numbers",
-            self.solve_seconds.clone(),
-        );
-        registry.register(
-            "newton_iterations",
-            "Newton iterations of one motion on one patch",
-            self.iterations.clone(),
-        );
-        registry.register(
-            "jobs_ended",
-            "Jobs that ended, by state",
-            self.ended.clone(),
-        );
-        registry.register(
-            "cache_hits",
-            "Cases answered with the result of an identical earlier one",
-            self.cache_hits.clone(),
-        );
-        registry.register(
-            "cache_misses",
-            "Cases for which an earlier result was looked for in vain",
-            self.cache_misses.clone(),
-        );
-        registry.register(
-            "job_failures",
-            "Jobs that failed, by reason",
-            self.failures.clone(),
-        );
-    }
 }
 
-pub(crate) fn state_label(state: State) -> StateLabel {
-    StateLabel {
-        state: state.name(),
-    }
+pub(crate) fn state_label(state: State) -> Label {
+    [("state", state.name())]
 }
 
-fn reason_label(kind: FailureKind) -> ReasonLabel {
-    ReasonLabel {
-        reason: kind.name(),
-    }
+fn reason_label(kind: FailureKind) -> Label {
+    [("reason", kind.name())]
 }

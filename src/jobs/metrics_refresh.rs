@@ -11,9 +11,10 @@ use crate::jobs::model::job::State;
 use crate::jobs::storage_fault::StoragePlace;
 
 impl Jobs {
-    /// Adds what this room counts to a registry.
-    pub fn register_metrics(&self, registry: &mut Registry) {
-        self.shared.metrics.register(registry);
+    /// The registry of what this room counts.
+    #[must_use]
+    pub fn metrics(&self) -> &Registry {
+        &self.shared.registry
     }
 
     /// Updates the metrics that are read from the store, not counted as they happen.

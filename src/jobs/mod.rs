@@ -83,6 +83,7 @@ pub mod storage_health;
 pub mod store;
 pub mod store_error;
 pub mod submit;
+pub(crate) mod sync;
 #[cfg(feature = "otlp")]
 pub mod trace;
 #[cfg(not(feature = "otlp"))]

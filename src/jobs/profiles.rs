@@ -16,6 +16,7 @@ use crate::jobs::handle::{Jobs, PAGE_MAX};
 use crate::jobs::idempotency;
 use crate::jobs::store::list::Page;
 use crate::jobs::store::profile::{ProfileCursor, ProfileEntry, ProfileKept, StoredProfile};
+use crate::jobs::sync::blocking;
 
 /// Cross-sections that were read a moment ago, by their digests.
 pub(crate) type KnownSections = HashMap<String, Value>;
@@ -32,14 +33,12 @@ impl Jobs {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
-        let read = tokio::task::spawn_blocking(move || {
+        let read = blocking(move || {
             let report = check_section(&section);
             let digest = blake3::Hash::from(idempotency::digest(&section)).to_hex();
             (report, digest.to_string(), section.to_string())
         });
-        let (report, digest, text) = read
-            .await
-            .map_err(|error| JobsError::Damaged(error.to_string()))?;
+        let (report, digest, text) = read.await?;
         let (report, tenant) = (report?, &*self.tenant);
         let new = StoredProfile {
             digest,

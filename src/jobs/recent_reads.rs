@@ -2,11 +2,13 @@
 
 use std::collections::HashMap;
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use tokio::time::Instant;
 use uuid::Uuid;
+
+use crate::jobs::sync::lock;
 
 /// Whose thing, and which.
 type OwnedId = (Arc<str>, Uuid);
@@ -37,7 +39,7 @@ impl<T: Clone> RecentReads<T> {
         read: impl Future<Output = Result<T, E>>,
     ) -> Result<T, E> {
         let last = {
-            let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut all = lock(&self.0);
             Arc::clone(all.entry((tenant.clone(), id)).or_default())
         };
         let mut seen = last.lock().await;
@@ -56,7 +58,7 @@ impl<T: Clone> RecentReads<T> {
 
     /// Forgets what is not read any more.
     fn forget(&self, age: Duration) {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = lock(&self.0);
         all.retain(|_, read| {
             Arc::strong_count(read) > 1
                 || read.try_lock().is_ok_and(|seen| {

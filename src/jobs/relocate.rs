@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::jobs::blobs::Blobs;
 use crate::jobs::error::JobsError;
-use crate::jobs::lifecycle::lock;
-use crate::jobs::metrics::Metrics;
+use crate::jobs::lifecycle::lock_folder;
+use crate::jobs::metrics::StoreRequests;
 use crate::jobs::open_store::table_file;
 use crate::jobs::options::Options;
 use crate::jobs::result_place::settle::settle;
@@ -51,14 +51,14 @@ pub async fn relocate(
     };
     // Not made by the lock of the folder.
     std::fs::metadata(&table).map_err(failed)?;
-    let _lock = lock(data_dir)?;
+    let _lock = lock_folder(data_dir)?;
     let from = SqliteStore::open_existing(&table).await?;
     let to = PostgresStore::open(url, 4).await?;
     to.require_empty().await?;
     let now = jiff::Timestamp::now().as_millisecond();
     let attempts_max = Options::new(data_dir).attempts_max;
     Upkeep::reap(&from, Reap::Dead, now, attempts_max).await?;
-    let results = settle(&to, place, Metrics::new().store_requests.clone()).await?;
+    let results = settle(&to, place, StoreRequests::default()).await?;
     let mut moved = Moved {
         rows: Vec::new(),
         results: 0,

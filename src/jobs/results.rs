@@ -12,20 +12,10 @@ use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::job::Job;
 use crate::jobs::store::ending::{ResultRef, StoredResult};
+use crate::jobs::sync::blocking;
 
 /// Solutions from this size on are read off the threads that answer requests.
 const LARGE_BYTES: usize = 64 << 10;
-
-/// The answer of a succeeded job as it is stored, without fields.
-#[derive(Debug, Clone)]
-pub struct FetchedResult {
-    /// What was computed, as JSON text.
-    pub solution: Bytes,
-    /// It was computed for an identical case before.
-    pub cached: bool,
-    /// What the case asked for.
-    pub outputs: Vec<Output>,
-}
 
 /// The answer of a succeeded job, read from where it is stored while it is taken.
 pub struct ResultStream {
@@ -54,10 +44,7 @@ impl Jobs {
         if case.template.is_none() {
             return Ok(case.body);
         }
-        let filled = tokio::task::spawn_blocking(move || case.value());
-        let filled = filled
-            .await
-            .map_err(|error| JobsError::Damaged(error.to_string()))??;
+        let filled = blocking(move || case.value()).await??;
         Ok(Bytes::from(filled.to_string()))
     }
 
@@ -66,17 +53,15 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotReady`], [`JobsError::NotSucceeded`], [`JobsError::NotFound`], or a failed store.
     pub async fn solution(&self, id: Uuid) -> Result<Solution, JobsError> {
-        let text = self.answer(id).await?.solution;
-        let damaged = |error: String| JobsError::Damaged(format!("solution of job {id}: {error}"));
+        let text = self.answer(id).await?;
+        let damaged = |error| JobsError::Damaged(format!("solution of job {id}: {error}"));
         let large = text.len() >= LARGE_BYTES;
         let read = move || serde_json::from_slice(&text);
         let solution = match large {
             false => read(),
-            true => tokio::task::spawn_blocking(read)
-                .await
-                .map_err(|error| damaged(error.to_string()))?,
+            true => blocking(read).await?,
         };
-        solution.map_err(|error| damaged(error.to_string()))
+        solution.map_err(|error: serde_json::Error| damaged(error))
     }
 
     /// Size of the answer of a succeeded job as it is stored, without fields.
@@ -86,10 +71,10 @@ impl Jobs {
     pub async fn answer_bytes(&self, id: Uuid) -> Result<usize, JobsError> {
         let (_, stored) = self.stored(id).await?;
         match &stored.result {
-            StoredResult::Blob(key, _) => match self.shared.blobs.solution_bytes(key).await {
-                Err(error) => Err(self.gone_meanwhile(id, error).await),
-                read => read,
-            },
+            StoredResult::Blob(key, _) => {
+                let size = self.shared.blobs.solution_bytes(key).await;
+                self.unless_gone(id, size).await
+            }
             StoredResult::Inline(result) => Ok(result.solution.len()),
         }
     }
@@ -98,20 +83,15 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::solution`].
-    pub async fn answer(&self, id: Uuid) -> Result<FetchedResult, JobsError> {
-        let (job, stored) = self.stored(id).await?;
-        let solution = match &stored.result {
-            StoredResult::Blob(key, _) => match self.shared.blobs.solution(key).await {
-                Ok(text) => text,
-                Err(error) => return Err(self.gone_meanwhile(id, error).await),
-            },
-            StoredResult::Inline(result) => result.solution.clone(),
-        };
-        Ok(FetchedResult {
-            solution,
-            cached: job.cached,
-            outputs: outputs_of(id, &stored)?,
-        })
+    pub async fn answer(&self, id: Uuid) -> Result<Bytes, JobsError> {
+        let (_, stored) = self.stored(id).await?;
+        match stored.result {
+            StoredResult::Blob(key, _) => {
+                let text = self.shared.blobs.solution(&key).await;
+                self.unless_gone(id, text).await
+            }
+            StoredResult::Inline(result) => Ok(result.solution),
+        }
     }
 
     /// As [`Jobs::answer`], read piece by piece: a client that does not take it holds no memory for it.
@@ -122,10 +102,11 @@ impl Jobs {
         let (job, stored) = self.stored(id).await?;
         let outputs = outputs_of(id, &stored)?;
         let (bytes, held_bytes, open_solution) = match &stored.result {
-            StoredResult::Blob(key, _) => match self.shared.blobs.open_solution(key).await {
-                Ok((bytes, pieces)) => (bytes, 0, pieces),
-                Err(error) => return Err(self.gone_meanwhile(id, error).await),
-            },
+            StoredResult::Blob(key, _) => {
+                let opened = self.shared.blobs.open_solution(key).await;
+                let (bytes, pieces) = self.unless_gone(id, opened).await?;
+                (bytes, 0, pieces)
+            }
             StoredResult::Inline(result) => {
                 let text = &result.solution;
                 if !text.ends_with(b"}") {
@@ -190,12 +171,18 @@ impl Jobs {
         }
         match &stored.result {
             StoredResult::Blob(key, _) => {
-                match self.shared.blobs.patch_fields(key, patch, point).await {
-                    Err(error) => Err(self.gone_meanwhile(id, error).await),
-                    read => read,
-                }
+                let fields = self.shared.blobs.patch_fields(key, patch, point).await;
+                self.unless_gone(id, fields).await
             }
             StoredResult::Inline(result) => result.patch_fields(patch, point),
+        }
+    }
+
+    /// What was read from the place of the results, or why it is not there: the job may have gone meanwhile.
+    async fn unless_gone<T>(&self, id: Uuid, read: Result<T, JobsError>) -> Result<T, JobsError> {
+        match read {
+            Err(error) => Err(self.gone_meanwhile(id, error).await),
+            read => read,
         }
     }
 

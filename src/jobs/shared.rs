@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 use std::fs::File;
 use std::sync::atomic::{AtomicI64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use std::time::Duration;
 
+use prometheus_client::registry::Registry;
 use tokio::sync::{Notify, Semaphore, SetOnce, broadcast};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
@@ -28,6 +29,7 @@ use crate::jobs::storage_fault::StorageFaults;
 use crate::jobs::store::Store;
 use crate::jobs::store::claim::Lease;
 use crate::jobs::store::cluster::{Node, Notification};
+use crate::jobs::sync::lock;
 
 /// How often a waiting caller reads again although nothing was announced.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_secs(1);
@@ -60,6 +62,7 @@ pub(crate) struct Shared {
     pub(crate) stopping: CancellationToken,
     pub(crate) tasks: TaskTracker,
     pub(crate) metrics: Metrics,
+    pub(crate) registry: Registry,
     /// Which of the places that it writes to fail.
     pub(crate) storage: StorageFaults,
     /// Keys found good a moment ago.
@@ -202,7 +205,7 @@ impl Shared {
 impl Shared {
     /// Batches that are not acknowledged.
     pub(crate) fn unfinished_batches(&self) -> MutexGuard<'_, UnfinishedBatches> {
-        self.batches.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.batches)
     }
 }
 

@@ -2,9 +2,10 @@
 //! its template, per tenant and in all.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use crate::jobs::error::JobsError;
+use crate::jobs::sync::lock;
 
 /// Bounds of staged bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +28,7 @@ impl StagedBytes {
         bytes: u64,
         bounds: StagingBounds,
     ) -> Result<(), JobsError> {
-        let mut staged = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut staged = lock(&self.0);
         let of_tenant = staged.get(tenant).copied().unwrap_or(0);
         if of_tenant + bytes > bounds.tenant {
             return Err(JobsError::StagingQuotaExceeded {
@@ -45,13 +46,13 @@ impl StagedBytes {
 
     /// The bytes of a tenant.
     pub(crate) fn of(&self, tenant: &str) -> u64 {
-        let staged = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let staged = lock(&self.0);
         staged.get(tenant).copied().unwrap_or(0)
     }
 
     /// Gives bytes of a tenant back.
     pub(crate) fn give_back(&self, tenant: &str, bytes: u64) {
-        let mut staged = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut staged = lock(&self.0);
         let left = staged.get(tenant).map_or(0, |of| of.saturating_sub(bytes));
         if left == 0 {
             staged.remove(tenant);

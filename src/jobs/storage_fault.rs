@@ -2,10 +2,11 @@
 
 use std::error::Error;
 use std::io;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store_error::StorageFault;
+use crate::jobs::sync::lock;
 
 /// What a folder is called in errors.
 const DISK: &str = "LocalFileSystem";
@@ -140,7 +141,7 @@ impl StorageFaults {
     }
 
     fn places(&self) -> MutexGuard<'_, [PlaceState; StoragePlace::ALL.len()]> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0)
     }
 }
 

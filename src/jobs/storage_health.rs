@@ -14,6 +14,7 @@ use crate::jobs::handle::Jobs;
 use crate::jobs::shared::Shared;
 use crate::jobs::storage_fault::{FaultChange, StoragePlace};
 use crate::jobs::store_error::{StorageFault, StoreError};
+use crate::jobs::sync::blocking;
 
 /// Tries to write where the cause is not the disk, with pauses that double from [`FIRST_PAUSE`].
 const WRITE_TRIES: u32 = 6;
@@ -159,10 +160,7 @@ impl Shared {
             StoragePlace::Spool => {
                 let path = self.options.data_dir.clone();
                 let folder = path.clone();
-                let written = tokio::task::spawn_blocking(move || disk_reserve::try_write(&folder));
-                let written = written
-                    .await
-                    .map_err(|error| JobsError::Damaged(error.to_string()))?;
+                let written = blocking(move || disk_reserve::try_write(&folder)).await?;
                 written.map_err(|source| JobsError::DataDir { path, source })
             }
         }

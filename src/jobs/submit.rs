@@ -18,6 +18,7 @@ use crate::jobs::model::job::{Job, created_at};
 use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds, Refusal};
+use crate::jobs::sync::blocking;
 use crate::jobs::trace::KeyValue;
 
 impl Jobs {
@@ -148,8 +149,7 @@ impl Jobs {
             // Checking a large case is arithmetic. It stays off the threads that answer requests, and a crowd of submitters does
             // not take the cores from them either.
             let _turn = self.shared.checks.acquire().await;
-            let read = tokio::task::spawn_blocking(read).await;
-            read.map_err(|error| JobsError::Damaged(error.to_string()))?
+            blocking(read).await?
         };
         if let Some((key, digest)) = &idempotency
             && let Some(enqueued) = self

@@ -1,9 +1,10 @@
-//! Attributes of the types that are exchanged as JSON.
+//! Attributes of the types that are exchanged as JSON, and of the calls of the job table.
 
 use proc_macro::TokenStream;
 use quote::{ToTokens, quote};
 use syn::{
-    Attribute, Field, Item, ItemEnum, LitStr, Type, Variant, parse_macro_input, parse_quote,
+    Attribute, Field, ImplItem, Item, ItemEnum, ItemImpl, LitStr, Type, Variant, parse_macro_input,
+    parse_quote,
 };
 
 /// Omits the `Option` members of a struct, or of the variants of an enum, from the JSON while they are `None`, and declares them in the
@@ -47,6 +48,27 @@ fn omit_none(field: &mut Field) {
     if !field.attrs.iter().any(nullable) {
         field.attrs.push(parse_quote!(#[schema(nullable = false)]));
     }
+}
+
+/// Runs the body of each async method of an `impl` by `engine::again`, which repeats it if its transaction gave way to another one.
+///
+/// It stands above `#[async_trait]`. A method with `#[once]` stays as it is.
+#[proc_macro_attribute]
+pub fn repeat_conflicts(_: TokenStream, item: TokenStream) -> TokenStream {
+    let mut item = parse_macro_input!(item as ItemImpl);
+    for member in &mut item.items {
+        let ImplItem::Fn(method) = member else {
+            continue;
+        };
+        let once = |it: &Attribute| it.path().is_ident("once");
+        if method.attrs.iter().any(once) {
+            method.attrs.retain(|it| !once(it));
+        } else if method.sig.asyncness.is_some() {
+            let body = &method.block;
+            method.block = parse_quote!({ engine::again(|| async move #body).await });
+        }
+    }
+    item.into_token_stream().into()
 }
 
 /// Gives an enum of unit variants `WORDS`: the words of a request and what they mean, in the order of the variants. A word is the name of its

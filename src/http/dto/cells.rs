@@ -3,16 +3,13 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::solver::Output;
 use crate::contact::post::outlines::outline::{outlines, patch_outline};
-use crate::contact::post::resample::{resample, resample_zone};
-use crate::contact::solution::words::fields::Zone;
-use crate::contact::solution::words::fields::{PatchCells, PointFields};
+use crate::contact::solution::words::fields::{PatchCells, PointFields, Zone};
 
 /// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run
 /// counter-clockwise, holes clockwise.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
-pub struct Outlines {
+pub(crate) struct Outlines {
     /// The border of the patch.
     pub patch: Vec<Vec<[f64; 2]>>,
     /// Around the cells that stick; only with zones.
@@ -26,7 +23,7 @@ pub struct Outlines {
 impl Outlines {
     /// The border of a patch, and those of its zones if they are wanted and known.
     #[must_use]
-    pub fn of(cells: &PatchCells, point: &PointFields, with_zones: bool) -> Outlines {
+    pub(crate) fn of(cells: &PatchCells, point: &PointFields, with_zones: bool) -> Outlines {
         let zones = point.zone.as_deref().filter(|_| with_zones);
         let around = |zone| zones.map(|zones| outlines(cells, Some(zones), Some(zone)));
         Outlines {
@@ -39,8 +36,8 @@ impl Outlines {
 
 /// Values per cell, strip by strip from smaller to larger y, in each strip from smaller to larger x. All arrays have
 /// the same length; those of other fields are absent.
-#[derive(Debug, Default, Serialize, ToSchema)]
-pub struct Cells {
+#[derive(Serialize, ToSchema)]
+pub(crate) struct Cells {
     /// Centre of the cell along x in mm.
     pub x_mm: Vec<f64>,
     /// Centre of the cell across in mm.
@@ -76,8 +73,8 @@ pub struct Cells {
 
 /// Values on a regular grid over the bounding box of the patch: `values[iy][ix]` at `(x_mm[ix], y_mm[iy])`, null
 /// outside the patch; those of other fields are absent.
-#[derive(Debug, Default, Serialize, ToSchema)]
-pub struct GriddedField {
+#[derive(Serialize, ToSchema)]
+pub(crate) struct GriddedField {
     /// Number of the patch, counted from 0.
     pub patch: usize,
     /// Number of the motion, counted from 0.
@@ -109,82 +106,4 @@ pub struct GriddedField {
     /// Temperature of both surfaces in °C.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<Vec<Vec<Option<f64>>>>,
-}
-
-/// The cells with the values of these outputs.
-pub(crate) fn per_cell(fields: PatchCells, point: PointFields, outputs: &[Output]) -> Cells {
-    let mut cells = Cells {
-        x_mm: fields.x_mm,
-        y_mm: fields.y_mm,
-        dx_mm: fields.dx_mm,
-        dy_mm: fields.dy_mm,
-        strip: fields.strip,
-        ..Cells::default()
-    };
-    let wanted = |output| outputs.contains(&output);
-    if wanted(Output::Tractions) {
-        cells.traction_x_mpa = point.traction_x_mpa;
-        cells.traction_y_mpa = point.traction_y_mpa;
-    }
-    if wanted(Output::Pressure) {
-        cells.pressure_mpa = fields.pressure_mpa;
-    }
-    if wanted(Output::Slip) {
-        (cells.slip_x, cells.slip_y) = (point.slip_x, point.slip_y);
-    }
-    if wanted(Output::Temperature) {
-        cells.temperature_c = point.temperature_c;
-    }
-    if wanted(Output::Zones) {
-        cells.zone = point.zone;
-    }
-    cells
-}
-
-/// The values of these outputs on a grid of `nx × ny` samples; neither patch, point nor outlines are filled in.
-pub(crate) fn gridded(
-    fields: &PatchCells,
-    point: &PointFields,
-    outputs: &[Output],
-    nx: usize,
-    ny: usize,
-) -> GriddedField {
-    let mut answer = GriddedField::default();
-    let mut sample = |output, values: &Option<Vec<f64>>| {
-        if !outputs.contains(&output) {
-            return None;
-        }
-        let grid = resample(fields, values.as_deref()?, nx, ny);
-        (answer.x_mm, answer.y_mm) = (grid.x_mm, grid.y_mm);
-        Some(grid.values)
-    };
-    let tractions = Output::Tractions;
-    let (traction_x_mpa, traction_y_mpa) = (
-        sample(tractions, &point.traction_x_mpa),
-        sample(tractions, &point.traction_y_mpa),
-    );
-    let pressure_mpa = sample(Output::Pressure, &fields.pressure_mpa);
-    let (slip_x, slip_y) = (
-        sample(Output::Slip, &point.slip_x),
-        sample(Output::Slip, &point.slip_y),
-    );
-    let temperature_c = sample(Output::Temperature, &point.temperature_c);
-    if let Some(zone) = point
-        .zone
-        .as_ref()
-        .filter(|_| outputs.contains(&Output::Zones))
-    {
-        let grid = resample_zone(fields, zone, nx, ny);
-        (answer.x_mm, answer.y_mm) = (grid.x_mm, grid.y_mm);
-        answer.zone = Some(grid.values);
-    }
-    GriddedField {
-        pressure_mpa,
-        traction_x_mpa,
-        traction_y_mpa,
-        slip_x,
-        slip_y,
-        temperature_c,
-        ..answer
-    }
 }

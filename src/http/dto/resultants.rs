@@ -112,13 +112,6 @@ impl Resultants {
             origin: solution.origin,
         }
     }
-
-    /// What it takes in memory, in bytes.
-    #[must_use]
-    pub(crate) fn bytes(&self) -> usize {
-        let points = self.patches.iter().map(|patch| patch.points.len());
-        points.sum::<usize>() * size_of::<PointResultants>() + self.total.len() * size_of::<Total>()
-    }
 }
 
 /// What a line of CSV holds besides forces and their errors.

@@ -8,7 +8,6 @@ use axum::http::header;
 use futures_util::StreamExt;
 use tokio::time::{Instant, timeout_at};
 
-use crate::http::extract::json::unreadable;
 use crate::http::layers::admission::{PackedLength, too_long};
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
@@ -16,6 +15,7 @@ use crate::http::problem::kinds::ProblemKind;
 /// Bytes per second of a body at least, on average and after a head start of the time that a piece may take: otherwise
 /// one byte at a time could keep a connection and a file open for ever.
 const LOWEST_RATE: f64 = 1024.0;
+
 /// A body on its way, held to its limits of size and time.
 pub struct BodyReader {
     timeout: Duration,
@@ -105,4 +105,16 @@ impl BodyReader {
             ),
         )
     }
+}
+
+/// A body that broke off or could not be unpacked.
+pub fn unreadable(error: &(dyn std::error::Error + 'static)) -> ApiError {
+    let mut deepest = error;
+    while let Some(next) = deepest.source() {
+        deepest = next;
+    }
+    ApiError::new(
+        ProblemKind::UnreadableBody,
+        format!("the body broke off or cannot be unpacked: {deepest}"),
+    )
 }

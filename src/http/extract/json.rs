@@ -9,6 +9,7 @@ use http_body_util::{BodyExt, Limited};
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 
+use crate::http::extract::body_reader::unreadable;
 use crate::http::extract::caller::Tenant;
 use crate::http::extract::json_weight::{MEMBERS_MAX, weigh};
 use crate::http::layers::admission::too_long;
@@ -17,6 +18,7 @@ use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
+use crate::jobs::sync::blocking;
 
 /// The JSON body of a request. What it means is for others to judge.
 #[derive(Debug)]
@@ -57,13 +59,13 @@ where
             share,
             turn: Some(turn),
         };
-        let read = tokio::task::spawn_blocking(move || {
+        let read = blocking(move || {
             let value = read_json(&bytes);
             drop((bytes, held));
             // The memory is held until the work ends, even if the client has gone away.
             value.map(|value| JsonBody { value, room })
         });
-        read.await.map_err(|error| ApiError::internal(&error))?
+        read.await?
     }
 }
 
@@ -78,11 +80,11 @@ async fn weigh_in_turn(
         return weigh_case(text, max_bytes);
     }
     let (text, turn) = (text.clone(), memory.turn(tenant, text.len()).await?);
-    let weighed = tokio::task::spawn_blocking(move || {
+    let weighed = blocking(move || {
         let _turn = turn;
         weigh_case(&text, max_bytes)
     });
-    weighed.await.map_err(|error| ApiError::internal(&error))?
+    weighed.await?
 }
 
 /// What the text of a case will take in memory once it is parsed.
@@ -239,18 +241,6 @@ async fn read_whole(
         share.shrink_to(held.len());
     }
     Ok((Bytes::from(held), share))
-}
-
-/// A body that broke off or could not be unpacked.
-pub fn unreadable(error: &(dyn std::error::Error + 'static)) -> ApiError {
-    let mut deepest = error;
-    while let Some(next) = deepest.source() {
-        deepest = next;
-    }
-    ApiError::new(
-        ProblemKind::UnreadableBody,
-        format!("the body broke off or cannot be unpacked: {deepest}"),
-    )
 }
 
 /// A JSON value in which no object names a member twice; `Value` itself would keep the last one silently.

@@ -11,7 +11,8 @@ use uuid::Uuid;
 
 use crate::contact::case::words::question::Case;
 use crate::http::extract::body_reader::BodyReader;
-use crate::http::extract::json::{essence, read_json, unreadable, weigh_case};
+use crate::http::extract::body_reader::unreadable;
+use crate::http::extract::json::{essence, read_json, weigh_case};
 use crate::http::extract::titles::faulty;
 use crate::http::limits::memory::Memory;
 use crate::http::limits::tenant_semaphore::Permit;

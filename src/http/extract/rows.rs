@@ -6,9 +6,8 @@ use std::fmt;
 use axum::body::Bytes;
 use axum::extract::Request;
 use axum::http::header;
-use serde::de::{
-    Deserialize, DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor,
-};
+use serde::Deserialize;
+use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
 
 use crate::contact::evaluate::varied::Values;
@@ -59,62 +58,18 @@ pub fn read_json_columns(text: &[u8]) -> Result<(Value, NamedValues), ApiError> 
     let read: RowsBody =
         serde_json::from_slice(text).map_err(|error| ApiError::malformed(&error))?;
     require_few(read.columns.count)?;
-    Ok((read.template, read.columns.columns))
+    Ok((read.template.0, read.columns.columns))
 }
 
 /// Columns with their names.
 pub type NamedValues = Vec<(String, Values)>;
 
 /// The JSON body of rows.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct RowsBody {
-    template: Value,
+    template: Strict,
     columns: RowColumns,
-}
-
-impl<'de> Deserialize<'de> for RowsBody {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_map(BodyVisitor)
-    }
-}
-
-struct BodyVisitor;
-
-impl<'de> Visitor<'de> for BodyVisitor {
-    type Value = RowsBody;
-
-    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-        formatter.write_str("an object with `template` and `columns`")
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<RowsBody, A::Error> {
-        let (mut template, mut columns) = (None, None);
-        while let Some(name) = members.next_key::<String>()? {
-            let twice = match name.as_str() {
-                "template" => {
-                    let Strict(value) = members.next_value()?;
-                    template.replace(value).is_some()
-                }
-                "columns" => columns
-                    .replace(members.next_value::<RowColumns>()?)
-                    .is_some(),
-                _ => {
-                    let known = "allowed: `template`, `columns`";
-                    return Err(A::Error::custom(format_args!(
-                        "`{name}` is not known here; {known}"
-                    )));
-                }
-            };
-            if twice {
-                return Err(A::Error::custom(format_args!(
-                    "the member `{name}` is written twice"
-                )));
-            }
-        }
-        Ok(RowsBody {
-            template: template.ok_or_else(|| A::Error::missing_field("template"))?,
-            columns: columns.ok_or_else(|| A::Error::missing_field("columns"))?,
-        })
-    }
 }
 
 /// Columns; of those beyond [`COLUMNS_MAX`] only the count is kept.
@@ -212,43 +167,11 @@ impl RowValues<'_> {
 }
 
 /// The first value of a column, which decides what it holds.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "expected a number or a text")]
 enum First {
     Number(f64),
     Text(String),
-}
-
-impl<'de> Deserialize<'de> for First {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<First, D::Error> {
-        deserializer.deserialize_any(FirstVisitor)
-    }
-}
-
-struct FirstVisitor;
-
-impl Visitor<'_> for FirstVisitor {
-    type Value = First;
-
-    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-        formatter.write_str("a number or a text")
-    }
-
-    fn visit_f64<E: Error>(self, number: f64) -> Result<First, E> {
-        Ok(First::Number(number))
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "as every number of JSON")]
-    fn visit_i64<E: Error>(self, number: i64) -> Result<First, E> {
-        Ok(First::Number(number as f64))
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "as every number of JSON")]
-    fn visit_u64<E: Error>(self, number: u64) -> Result<First, E> {
-        Ok(First::Number(number as f64))
-    }
-
-    fn visit_str<E: Error>(self, text: &str) -> Result<First, E> {
-        Ok(First::Text(text.to_owned()))
-    }
 }
 
 #[cfg(test)]

@@ -713,7 +713,7 @@ fn refusal<'a>(faults: impl Iterator<Item = (&'a str, String)>, good: &[RunColum
         pointer: Some(column_pointer(title)),
         ..Fault::invalid(detail)
     });
-    ApiError::faulty_table(parts.join("; "), errors.collect())
+    ApiError::listing(ProblemKind::FaultyTable, parts.join("; "), errors.collect())
 }
 
 /// Reads `TITLE:NAME` of the query; the title may contain colons.

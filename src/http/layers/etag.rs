@@ -9,6 +9,7 @@ use std::fs::File;
 
 use axum::body::Body;
 use axum::extract::{Query as Pairs, Request};
+use axum::http::response::Parts;
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
@@ -155,10 +156,7 @@ async fn tag(request: Request, next: Next, lifetime: HeaderValue) -> Response {
     if parts.headers.contains_key(header::ETAG) {
         parts.headers.insert(header::CACHE_CONTROL, lifetime);
         if asks_for_any(&known) {
-            parts.status = StatusCode::NOT_MODIFIED;
-            parts.headers.remove(header::CONTENT_TYPE);
-            parts.headers.remove(header::CONTENT_LENGTH);
-            return Response::from_parts(parts, Body::empty());
+            return not_modified(parts);
         }
         return Response::from_parts(parts, body);
     }
@@ -170,16 +168,20 @@ async fn tag(request: Request, next: Next, lifetime: HeaderValue) -> Response {
     parts.headers.insert(header::CACHE_CONTROL, lifetime);
     let digest = digest(&body);
     if let Some(known) = matching(&known, &digest) {
-        parts.status = StatusCode::NOT_MODIFIED;
         parts.headers.insert(header::ETAG, known);
-        parts.headers.remove(header::CONTENT_TYPE);
-        parts.headers.remove(header::CONTENT_LENGTH);
-        return Response::from_parts(parts, Body::empty());
+        return not_modified(parts);
     }
     if let Ok(tag) = HeaderValue::from_str(&format!("\"{digest}\"")) {
         parts.headers.insert(header::ETAG, tag);
     }
     Response::from_parts(parts, Body::from(body))
+}
+
+fn not_modified(mut parts: Parts) -> Response {
+    parts.status = StatusCode::NOT_MODIFIED;
+    parts.headers.remove(header::CONTENT_TYPE);
+    parts.headers.remove(header::CONTENT_LENGTH);
+    Response::from_parts(parts, Body::empty())
 }
 
 /// Is `If-None-Match` the wildcard `*`?

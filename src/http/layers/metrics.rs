@@ -8,7 +8,7 @@ use axum::http::Method;
 use axum::middleware::Next;
 use axum::response::Response;
 use prometheus_client::encoding::EncodeLabelSet;
-use prometheus_client::encoding::text::encode;
+use prometheus_client::encoding::text::{encode, encode_registry};
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::histogram::Histogram;
@@ -44,6 +44,7 @@ pub struct Metrics {
     requests: Family<RequestLabel, Counter>,
     seconds: Family<RouteLabel, Histogram>,
     registry: Arc<Registry>,
+    jobs: Jobs,
 }
 
 impl Metrics {
@@ -51,7 +52,6 @@ impl Metrics {
     #[must_use]
     pub fn new(jobs: &Jobs, dropped_lines: fn() -> u64) -> Metrics {
         let mut registry = Registry::with_prefix("railhead");
-        jobs.register_metrics(&mut registry);
         let requests = Family::default();
         let seconds: Family<RouteLabel, Histogram> =
             Family::new_with_constructor(|| Histogram::new(REQUEST_SECONDS));
@@ -75,6 +75,7 @@ impl Metrics {
             requests,
             seconds,
             registry: Arc::new(registry),
+            jobs: jobs.clone(),
         }
     }
 
@@ -83,6 +84,7 @@ impl Metrics {
     /// # Errors
     /// As the writing of text.
     pub fn write(&self, text: &mut String) -> std::fmt::Result {
+        encode_registry(text, self.jobs.metrics())?;
         encode(text, &self.registry)
     }
 }

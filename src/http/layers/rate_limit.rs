@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::net::IpAddr;
 use std::num::NonZeroU32;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use axum::extract::Request;
@@ -21,6 +21,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::server::connections::Peer;
 use crate::http::server::connections::network;
+use crate::jobs::sync::lock;
 
 /// Size of a burst: the requests of so many seconds.
 const BURST_SECONDS: u32 = 2;
@@ -60,7 +61,7 @@ pub(crate) struct RateLeft(Arc<Mutex<Option<u32>>>);
 
 impl RateLeft {
     fn note(&self, requests: u32) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(requests);
+        *lock(&self.0) = Some(requests);
     }
 }
 
@@ -77,7 +78,7 @@ pub(crate) async fn add_rate_limit_headers(
     let left = RateLeft::default();
     request.extensions_mut().insert(left.clone());
     let mut response = next.run(request).await;
-    let left = *left.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let left = *lock(&left.0);
     if let Some(left) = left {
         let burst = per_second.saturating_mul(BURST_SECONDS);
         // Until everything is there again.
@@ -172,10 +173,7 @@ impl RateLimit {
 
     /// Is it time for another clean-up?
     fn may_forget(&self) -> bool {
-        let mut last = self
-            .forgotten
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut last = lock(&self.forgotten);
         let due = last.elapsed() > FORGET_EVERY;
         if due {
             *last = Instant::now();
@@ -190,7 +188,7 @@ impl RateLimit {
         address: Option<IpAddr>,
     ) -> Option<OwnedSemaphorePermit> {
         let many = {
-            let failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
+            let failures = lock(&self.failures);
             let of_address = address.and_then(|address| failures.get(&address));
             of_address.is_some_and(|failures| {
                 failures.count >= FAILURES_MAX && failures.since.elapsed() < FAILURES_WITHIN
@@ -211,7 +209,7 @@ impl RateLimit {
         let Some(address) = address else {
             return Ok(());
         };
-        let mut failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut failures = lock(&self.failures);
         if failures.len() > SENDERS_KEPT {
             failures.retain(|_, failures| failures.since.elapsed() < FAILURES_WITHIN);
         }

@@ -1,7 +1,7 @@
 //! A body that holds a resource until it has been sent, such as a share of memory.
 
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 
 use axum::body::{Body, Bytes, HttpBody};
@@ -11,6 +11,7 @@ use axum::response::Response;
 use hyper::body::{Frame, SizeHint};
 
 use crate::http::limits::tenant_semaphore::Permit;
+use crate::jobs::sync::lock;
 
 /// A body and the resource that it holds.
 struct HoldingBody<T>(Body, T);
@@ -47,18 +48,12 @@ pub(crate) struct HeldPermits(Arc<Mutex<Vec<Permit>>>);
 impl HeldPermits {
     /// Holds one more share.
     pub(crate) fn add(&self, share: Permit) {
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .push(share);
+        lock(&self.0).push(share);
     }
 
     /// Gives all shares back; the caller counts the rest of the request elsewhere.
     pub(crate) fn release(&self) {
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clear();
+        lock(&self.0).clear();
     }
 }
 

@@ -9,6 +9,7 @@ use crate::http::limits::turns::{Computation, Turn, Turns};
 use crate::http::options::HttpOptions;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
+use crate::jobs::sync::blocking;
 
 /// Bytes of one unit, in which shares are counted.
 const UNIT: usize = 1 << 10;
@@ -193,12 +194,12 @@ impl Rendering {
         size: impl Fn(&T) -> usize,
     ) -> Result<(T, Option<Permit>), ApiError> {
         let turn = self.turn;
-        let work = tokio::task::spawn_blocking(move || {
+        let work = blocking(move || {
             // The turn is held until the work ends, even if the client has gone away.
             let _turn = turn;
             work()
         });
-        let done = work.await.map_err(|error| ApiError::internal(&error))??;
+        let done = work.await??;
         let bytes = size(&done);
         let share = match self.share {
             Some(mut share) => {

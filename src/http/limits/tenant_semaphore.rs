@@ -1,11 +1,13 @@
 //! A semaphore that all tenants share, of which one tenant may hold a part.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
+
+use crate::jobs::sync::lock;
 
 /// Units of memory, requests or turns, in all and for each tenant. Clones share the semaphore.
 #[derive(Debug, Clone)]
@@ -62,7 +64,7 @@ impl TenantSemaphore {
     }
 
     fn of(&self, tenant: &str) -> Arc<Semaphore> {
-        let mut tenants = self.tenants.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut tenants = lock(&self.tenants);
         if let Some(own) = tenants.get(tenant) {
             return own.clone();
         }

@@ -4,7 +4,7 @@
 //! after its client has left, and is bounded in time.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use tokio::runtime::Handle;
@@ -13,6 +13,7 @@ use tokio_util::sync::{CancellationToken, DropGuard};
 
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
+use crate::jobs::sync::{blocking, lock};
 
 /// How long a request waits for its first turn.
 const WITHIN: Duration = Duration::from_secs(20);
@@ -86,7 +87,7 @@ impl Turns {
     }
 
     fn queue(&self) -> MutexGuard<'_, Queue> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0)
     }
 }
 
@@ -169,11 +170,11 @@ impl Computation {
             begun: Instant::now(),
             left: self.left.clone(),
         };
-        let work = tokio::task::spawn_blocking(move || {
+        let work = blocking(move || {
             let done = work(&mut pace);
             (done, pace.spent + pace.begun.elapsed())
         });
-        let (done, spent) = work.await.map_err(|error| ApiError::internal(&error))?;
+        let (done, spent) = work.await?;
         self.spent = spent;
         done
     }

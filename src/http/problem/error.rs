@@ -10,7 +10,7 @@ use crate::http::problem::body::{Fault, ProblemBody};
 use crate::http::problem::kinds::ProblemKind;
 use crate::jobs::StorageFault;
 use crate::jobs::error::JobsError;
-use crate::jobs::model::job::{Job, State};
+use crate::jobs::model::job::State;
 use crate::jobs::model::kind::Kind;
 
 /// Content type of every failure.
@@ -104,18 +104,10 @@ impl ApiError {
         )
     }
 
-    /// A batch that is refused; `faults` names its faulty cases.
+    /// A problem of this kind with faults that clients can find.
     #[must_use]
-    pub fn faulty_batch(detail: String, faults: Vec<Fault>) -> Self {
-        let mut failure = ApiError::new(ProblemKind::FaultyBatch, detail);
-        failure.problem.errors = faults;
-        failure
-    }
-
-    /// A table whose columns have these faults.
-    #[must_use]
-    pub fn faulty_table(detail: String, faults: Vec<Fault>) -> Self {
-        let mut failure = ApiError::new(ProblemKind::FaultyTable, detail);
+    pub fn listing(kind: ProblemKind, detail: impl Into<String>, faults: Vec<Fault>) -> Self {
+        let mut failure = ApiError::new(kind, detail);
         failure.problem.errors = faults;
         failure
     }
@@ -123,10 +115,8 @@ impl ApiError {
     /// A query with faults; `faults` is not empty.
     #[must_use]
     pub fn bad_query(faults: Vec<Fault>) -> Self {
-        let names: Vec<String> = faults.iter().map(|fault| fault.detail.clone()).collect();
-        let mut failure = ApiError::new(ProblemKind::BadQuery, names.join("; "));
-        failure.problem.errors = faults;
-        failure
+        let details: Vec<&str> = faults.iter().map(|fault| &*fault.detail).collect();
+        ApiError::listing(ProblemKind::BadQuery, details.join("; "), faults)
     }
 
     /// One query parameter with a value that is not allowed.
@@ -135,28 +125,15 @@ impl ApiError {
         ApiError::bad_query(vec![Fault::parameter(name, detail)])
     }
 
-    /// A number of a motion or patch beyond the `count` that there are.
-    #[must_use]
-    pub fn no_such_index(name: &str, count: usize) -> Self {
-        ApiError::bad_parameter(
-            name,
-            format!(
-                "`{name}` is too large; allowed: 0 to {}",
-                count.saturating_sub(1)
-            ),
-        )
-    }
-
     /// A request header with a value that is not allowed.
     #[must_use]
     pub fn bad_header(name: &str, detail: impl Into<String>) -> Self {
         let detail = detail.into();
-        let mut failure = ApiError::new(ProblemKind::BadHeader, detail.clone());
-        failure.problem.errors = vec![Fault {
+        let fault = Fault {
             header: Some(name.to_owned()),
-            ..Fault::invalid(detail)
-        }];
-        failure
+            ..Fault::invalid(detail.clone())
+        };
+        ApiError::listing(ProblemKind::BadHeader, detail, vec![fault])
     }
 }
 
@@ -176,108 +153,60 @@ impl From<CaseError> for ApiError {
             ),
             faults => format!("the case has {} faults", faults.len()),
         };
-        let mut failure = ApiError::new(ProblemKind::FaultyCase, detail);
-        failure.problem.errors = faults
-            .into_iter()
-            .take(FAULTS_LISTED)
-            .map(Fault::from)
-            .collect();
-        failure
+        let faults = faults.into_iter().take(FAULTS_LISTED).map(Fault::from);
+        ApiError::listing(ProblemKind::FaultyCase, detail, faults.collect())
     }
 }
 
 impl From<JobsError> for ApiError {
     fn from(error: JobsError) -> Self {
-        match error {
-            JobsError::Case(faults) => faults.into(),
-            JobsError::NotFound => ApiError::new(ProblemKind::JobNotFound, "no job has this id"),
-            JobsError::Expired => ApiError::new(
-                ProblemKind::Expired,
-                "ended longer ago than this service keeps ended jobs, so it was removed",
-            ),
-            JobsError::BatchNotFound(Kind::Rows) => {
-                ApiError::new(ProblemKind::RunNotFound, "no run has this id")
+        let kind = match error {
+            JobsError::Case(faults) => return faults.into(),
+            JobsError::NoSuchPatch { .. } => {
+                return ApiError::bad_parameter("patch", error.to_string());
             }
-            JobsError::BatchNotFound(_) => {
-                ApiError::new(ProblemKind::BatchNotFound, "no batch has this id")
+            JobsError::NoSuchPoint { .. } => {
+                return ApiError::bad_parameter("point", error.to_string());
             }
-            JobsError::NotReady(state) => ApiError::new(
-                ProblemKind::ResultNotReady,
-                format!("the job is {}, so there is no result yet", state.name()),
-            ),
-            JobsError::NotSucceeded(job) => without_result(&job),
-            JobsError::NotEnded(_) => ApiError::new(
-                ProblemKind::JobNotEnded,
-                "the job is queued or running; cancel it first, then delete it",
-            ),
-            JobsError::BatchNotEnded(Kind::Rows, _) => ApiError::new(
-                ProblemKind::RunNotEnded,
-                "rows of the run are waiting or being solved; cancel it first, then delete it",
-            ),
-            JobsError::BatchNotEnded(_, jobs) => ApiError::new(
-                ProblemKind::BatchNotEnded,
-                format!(
-                    "{jobs} jobs of the batch are queued or running; cancel it first, then delete it"
-                ),
-            ),
-            JobsError::NoSuchPatch { patches } => ApiError::no_such_index("patch", patches),
-            JobsError::NoSuchPoint { points } => ApiError::no_such_index("point", points),
-            JobsError::IdempotencyConflict => ApiError::new(
-                ProblemKind::IdempotencyConflict,
-                "this `Idempotency-Key` was used before with a different case",
-            ),
-            JobsError::QueueFull { queue_max } => ApiError::new(
-                ProblemKind::QueueFull,
-                format!("{queue_max} jobs are waiting, which is the limit; nothing was stored"),
-            ),
-            JobsError::QuotaExceeded { queue_max } => ApiError::new(
-                ProblemKind::QuotaExceeded,
-                format!(
-                    "{queue_max} jobs of this tenant are waiting, which is its limit; nothing was stored"
-                ),
-            ),
-            JobsError::StagingQuotaExceeded { .. } => {
-                ApiError::new(ProblemKind::QuotaExceeded, error.to_string())
+            JobsError::BadCursor => return ApiError::bad_parameter("cursor", error.to_string()),
+            JobsError::NotFound => ProblemKind::JobNotFound,
+            JobsError::BatchNotFound(Kind::Rows) => ProblemKind::RunNotFound,
+            JobsError::BatchNotFound(_) => ProblemKind::BatchNotFound,
+            JobsError::ProfileNotFound => ProblemKind::ProfileNotFound,
+            JobsError::Expired => ProblemKind::Expired,
+            JobsError::NotReady(_) => ProblemKind::ResultNotReady,
+            JobsError::NotSucceeded(ref job) if job.state == State::Cancelled => {
+                ProblemKind::JobCancelled
             }
-            JobsError::StagingFull { .. } => {
-                ApiError::new(ProblemKind::QueueFull, error.to_string())
+            JobsError::NotSucceeded(_) => ProblemKind::JobFailed,
+            JobsError::NotEnded(_) => ProblemKind::JobNotEnded,
+            JobsError::BatchNotEnded(Kind::Rows, _) => ProblemKind::RunNotEnded,
+            JobsError::BatchNotEnded(..) => ProblemKind::BatchNotEnded,
+            JobsError::IdempotencyConflict => ProblemKind::IdempotencyConflict,
+            JobsError::QueueFull { .. } | JobsError::StagingFull { .. } => ProblemKind::QueueFull,
+            JobsError::QuotaExceeded { .. } | JobsError::StagingQuotaExceeded { .. } => {
+                ProblemKind::QuotaExceeded
             }
-            JobsError::BadCursor => ApiError::bad_parameter(
-                "cursor",
-                "`cursor` is not one that this service gave out for the same filters; start again without it",
-            ),
-            JobsError::Draining => ApiError::new(
-                ProblemKind::Draining,
-                "the service is shutting down and takes no new jobs",
-            ),
-            other => of_rows(other),
-        }
+            JobsError::StoredQuotaExceeded { .. } => ProblemKind::StoredQuotaExceeded,
+            JobsError::ProfilesFull(_) => ProblemKind::ProfilesFull,
+            JobsError::TooManyRows(_) => ProblemKind::BodyTooLarge,
+            JobsError::BoundKey { .. } => ProblemKind::Forbidden,
+            JobsError::Draining => ProblemKind::Draining,
+            other => {
+                return match other.storage_fault() {
+                    Some(fault) => storage_failed(fault, &other),
+                    None => ApiError::internal(&other),
+                };
+            }
+        };
+        ApiError::new(kind, error.to_string())
     }
 }
 
-/// What went wrong with a run or a kept profile, or with the store.
-fn of_rows(error: JobsError) -> ApiError {
-    match error {
-        JobsError::ProfileNotFound => {
-            ApiError::new(ProblemKind::ProfileNotFound, "no profile has this digest")
-        }
-        JobsError::BoundKey { .. } => ApiError::new(ProblemKind::Forbidden, error.to_string()),
-        JobsError::StoredQuotaExceeded { .. } => {
-            ApiError::new(ProblemKind::StoredQuotaExceeded, error.to_string())
-        }
-        JobsError::ProfilesFull(_) => ApiError::new(ProblemKind::ProfilesFull, error.to_string()),
-        JobsError::TooManyRows(_) => ApiError::new(ProblemKind::BodyTooLarge, error.to_string()),
-        other => match other.storage_fault() {
-            Some(trouble) => troubled(trouble, &other),
-            None => ApiError::internal(&other),
-        },
-    }
-}
-
-/// The storage takes nothing; the log has the message of the system.
-fn troubled(trouble: StorageFault, reason: &JobsError) -> ApiError {
+/// The storage rejects writes; the log has the message of the system.
+fn storage_failed(fault: StorageFault, reason: &JobsError) -> ApiError {
     tracing::warn!(%reason, "a request failed for want of its storage");
-    let (kind, what) = match trouble {
+    let (kind, what) = match fault {
         StorageFault::Full => (ProblemKind::StorageFull, "the disk of the service is full"),
         StorageFault::Unwritable => (
             ProblemKind::StorageUnwritable,
@@ -293,24 +222,6 @@ fn troubled(trouble: StorageFault, reason: &JobsError) -> ApiError {
         ),
     };
     ApiError::new(kind, what).after(DISK_RETRY_SECONDS)
-}
-
-/// Why an ended job has no result.
-fn without_result(job: &Job) -> ApiError {
-    if job.state == State::Cancelled {
-        return ApiError::new(
-            ProblemKind::JobCancelled,
-            "the job was cancelled, so it has no result",
-        );
-    }
-    let reason = job
-        .failure
-        .as_ref()
-        .map_or("the reason is not known", |failure| &failure.detail);
-    ApiError::new(
-        ProblemKind::JobFailed,
-        format!("the job failed, so it has no result: {reason}"),
-    )
 }
 
 impl IntoResponse for ApiError {

@@ -4,48 +4,45 @@ use std::borrow::Cow;
 use std::fmt::Write;
 use std::ops::Range;
 
-use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table};
+use crate::http::render::table::{ArrayData, Precision, Rows, Table};
 
 /// The line with the names.
 ///
 /// # Errors
-/// None that memory does not have.
+/// Never, as memory takes all that is written.
 pub(crate) fn head(table: &Table) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
-    let places: &[&str] = match table.rows {
-        Rows::Cells { .. } => &["strip"],
-        Rows::Grid { .. } => &[],
+    let axes: &[&str] = match table.rows {
+        Rows::Cells => &[],
+        Rows::Grid { .. } => &["x_mm", "y_mm"],
     };
-    let axes = match table.rows {
-        Rows::Cells { .. } => &PLACES[..],
-        Rows::Grid { .. } => &PLACES[..2],
-    };
-    let values = table.values.iter().map(|column| column.name);
-    out.write_record(axes.iter().chain(places).copied().chain(values))?;
+    let columns = table.columns.iter().map(|column| column.name);
+    out.write_record(axes.iter().copied().chain(columns))?;
     finish(out)
 }
 
 /// Some lines. Numbers have as many digits as it takes to read the same number back.
 ///
 /// # Errors
-/// None that memory does not have.
+/// Never, as memory takes all that is written.
 pub(crate) fn lines(table: &Table, rows: Range<usize>) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
     let written = |value: f64| number_as(value, table.precision);
     for row in rows {
-        match &table.rows {
-            Rows::Cells { places, strip } => {
-                for place in places {
-                    out.write_field(written(place[row]))?;
+        if let Rows::Grid { x_mm, y_mm } = &table.rows {
+            out.write_field(written(x_mm[row % x_mm.len()]))?;
+            out.write_field(written(y_mm[row / x_mm.len()]))?;
+        }
+        for column in &table.columns {
+            match &column.data {
+                ArrayData::Numbers(values) => out.write_field(written(values[row]))?,
+                ArrayData::Integers(values) => out.write_field(values[row].to_string())?,
+                ArrayData::Zones(zones) => {
+                    out.write_field(zones[row].map_or("", |zone| zone.name()))?;
                 }
-                out.write_field(strip[row].to_string())?;
-            }
-            Rows::Grid { x_mm, y_mm } => {
-                out.write_field(written(x_mm[row % x_mm.len()]))?;
-                out.write_field(written(y_mm[row / x_mm.len()]))?;
             }
         }
-        end_row(&mut out, table, row)?;
+        out.write_record(None::<&[u8]>)?;
     }
     finish(out)
 }
@@ -77,20 +74,6 @@ fn is_number(text: &str) -> bool {
 pub(crate) fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
     out.into_inner()
         .map_err(|error| csv::Error::from(error.into_error()))
-}
-
-fn end_row(out: &mut csv::Writer<Vec<u8>>, table: &Table, row: usize) -> Result<(), csv::Error> {
-    for column in &table.values {
-        match &column.data {
-            ArrayData::Numbers(values) => {
-                out.write_field(number_as(values[row], table.precision))?;
-            }
-            ArrayData::Zones(zones) => {
-                out.write_field(zones[row].map_or("", |zone| zone.name()))?;
-            }
-        }
-    }
-    out.write_record(None::<&[u8]>)
 }
 
 /// The shortest text that reads back as the same number; empty for NaN.

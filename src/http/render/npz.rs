@@ -13,7 +13,7 @@ use zip::{CompressionMethod, ZipWriter};
 use crate::contact::evaluate::answer::RowsAnswer;
 use crate::http::dto::cells::Outlines;
 use crate::http::render::csv::single;
-use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table, zone_code};
+use crate::http::render::table::{ArrayData, Precision, Rows, Table, zone_code};
 
 /// What an NPY header has to be a multiple of, the parts before it included.
 const ALIGNMENT: usize = 64;
@@ -32,24 +32,22 @@ pub(crate) fn write(table: &Table, outlines: &Outlines) -> ZipResult<Vec<u8>> {
         method: CompressionMethod::Deflated,
     };
     let shape = match &table.rows {
-        Rows::Cells { places, strip } => {
-            for (name, place) in PLACES.iter().zip(places) {
-                archive.numbers(name, &[place.len()], place)?;
-            }
-            let bytes: Vec<u8> = strip.iter().flat_map(|value| value.to_le_bytes()).collect();
-            archive.add("strip", "<u4", &[strip.len()], &bytes)?;
-            vec![strip.len()]
-        }
+        Rows::Cells => vec![table.len()],
         Rows::Grid { x_mm, y_mm } => {
             archive.numbers("x_mm", &[x_mm.len()], x_mm)?;
             archive.numbers("y_mm", &[y_mm.len()], y_mm)?;
             vec![y_mm.len(), x_mm.len()]
         }
     };
-    for column in &table.values {
+    for column in &table.columns {
         match &column.data {
             ArrayData::Numbers(values) => {
                 archive.numbers(column.name, &shape, values)?;
+            }
+            ArrayData::Integers(values) => {
+                let bytes = values.iter().flat_map(|value| value.to_le_bytes());
+                let bytes: Vec<u8> = bytes.collect();
+                archive.add(column.name, "<u4", &shape, &bytes)?;
             }
             ArrayData::Zones(zones) => {
                 let codes = zones.iter().flat_map(|zone| zone_code(*zone).to_le_bytes());

@@ -8,7 +8,7 @@ use futures_util::stream;
 
 use crate::contact::solution::words::fields::Zone;
 use crate::http::render::csv;
-use crate::http::render::table::{ArrayData, PLACES, Precision, Rows, Table};
+use crate::http::render::table::{ArrayData, Precision, Rows, Table};
 
 /// Pieces are at least this large, but for the last one.
 const PIECE_BYTES: usize = 32 << 10;
@@ -24,8 +24,6 @@ enum JsonPart {
 
 #[derive(Clone, Copy)]
 enum ColumnName {
-    Place(usize),
-    Strip,
     X,
     Y,
     Value(usize),
@@ -73,29 +71,19 @@ where
 
 fn parts(table: &Table, members: &str) -> Vec<JsonPart> {
     let mut parts = Vec::new();
-    let open = match table.rows {
-        Rows::Cells { .. } => ",\"cells\":{",
-        Rows::Grid { .. } => ",",
+    let (open, close) = match &table.rows {
+        Rows::Cells => (",\"cells\":{", "}}"),
+        Rows::Grid { .. } => (",", "}"),
     };
     parts.push(JsonPart::Text(format!("{{{members}{open}")));
-    let close = match &table.rows {
-        Rows::Cells { .. } => {
-            for (number, name) in PLACES.iter().enumerate() {
-                array(&mut parts, name, ColumnName::Place(number), table.len());
-            }
-            array(&mut parts, "strip", ColumnName::Strip, table.len());
-            "}}"
-        }
-        Rows::Grid { x_mm, y_mm } => {
-            array(&mut parts, "x_mm", ColumnName::X, x_mm.len());
-            array(&mut parts, "y_mm", ColumnName::Y, y_mm.len());
-            "}"
-        }
-    };
-    for (number, column) in table.values.iter().enumerate() {
+    if let Rows::Grid { x_mm, y_mm } = &table.rows {
+        array(&mut parts, "x_mm", ColumnName::X, x_mm.len());
+        array(&mut parts, "y_mm", ColumnName::Y, y_mm.len());
+    }
+    for (number, column) in table.columns.iter().enumerate() {
         let values = ColumnName::Value(number);
         match &table.rows {
-            Rows::Cells { .. } => array(&mut parts, column.name, values, table.len()),
+            Rows::Cells => array(&mut parts, column.name, values, table.len()),
             Rows::Grid { x_mm, y_mm } => {
                 let nx = x_mm.len();
                 parts.push(JsonPart::Text(format!("\"{}\":[", column.name)));
@@ -136,17 +124,14 @@ fn values(table: &Table, column: ColumnName, rows: Range<usize>) -> String {
             out.push(',');
         }
         match (column, &table.rows) {
-            (ColumnName::Place(number), Rows::Cells { places, .. }) => {
-                push(&mut out, places[number][row], table.precision);
-            }
-            (ColumnName::Strip, Rows::Cells { strip, .. }) => {
-                // Writing to a string cannot fail.
-                let _ = write!(out, "{}", strip[row]);
-            }
             (ColumnName::X, Rows::Grid { x_mm, .. }) => push(&mut out, x_mm[row], table.precision),
             (ColumnName::Y, Rows::Grid { y_mm, .. }) => push(&mut out, y_mm[row], table.precision),
-            (ColumnName::Value(number), _) => match &table.values[number].data {
+            (ColumnName::Value(number), _) => match &table.columns[number].data {
                 ArrayData::Numbers(numbers) => push(&mut out, numbers[row], table.precision),
+                ArrayData::Integers(numbers) => {
+                    // Writing to a string cannot fail.
+                    let _ = write!(out, "{}", numbers[row]);
+                }
                 ArrayData::Zones(zones) => push_zone(&mut out, zones[row]),
             },
             _ => unreachable!("the parts were made from this table"),
@@ -176,11 +161,12 @@ fn push_zone(out: &mut String, zone: Option<Zone>) {
 #[cfg(test)]
 mod tests {
     use http_body_util::BodyExt;
-    use serde_json::Value;
+    use serde_json::{Value, json};
 
     use super::*;
-    use crate::http::dto::cells::{Cells, GriddedField, Outlines};
-    use crate::http::routes::fields::Field;
+    use crate::contact::case::words::solver::Output;
+    use crate::contact::solution::words::fields::{PatchCells, PointFields};
+    use crate::http::render::table::TableColumn;
 
     async fn text(body: Body) -> String {
         let bytes = body.collect().await.unwrap().to_bytes();
@@ -192,78 +178,80 @@ mod tests {
         (1..=count).map(|number| 1.0 / number as f64).collect()
     }
 
-    async fn reads_back(make: impl Fn() -> Field) {
-        let whole: Value = serde_json::from_str(&serde_json::to_string(&make()).unwrap()).unwrap();
-        let (table, outlines): (Table, Outlines) = make().into();
-        let outlines = serde_json::to_string(&outlines).unwrap();
-        let members = format!("\"patch\":1,\"point\":2,\"outlines\":{outlines}");
-        let pieces = text(json_body(table, &members)).await;
-        assert_eq!(serde_json::from_str::<Value>(&pieces).unwrap(), whole);
+    fn column(name: &'static str, data: ArrayData) -> TableColumn {
+        TableColumn { name, data }
+    }
+
+    fn on_grid(x_mm: Vec<f64>, y_mm: Vec<f64>, columns: Vec<TableColumn>) -> Table {
+        Table {
+            rows: Rows::Grid { x_mm, y_mm },
+            columns,
+            precision: Precision::Double,
+        }
+    }
+
+    async fn read(table: Table) -> Value {
+        serde_json::from_str(&text(json_body(table, "\"patch\":1")).await).unwrap()
     }
 
     #[tokio::test]
     async fn pieces_of_json_are_what_the_whole_would_be() {
         for count in [0, 1, ROWS, 3 * ROWS + 1] {
-            reads_back(|| Field::PerCell {
-                patch: 1,
-                point: 2,
-                outlines: Outlines::default(),
-                cells: Cells {
-                    x_mm: numbers(count),
-                    y_mm: numbers(count),
-                    dx_mm: numbers(count),
-                    dy_mm: numbers(count),
-                    strip: (0..count as u32).collect(),
-                    zone: Some(vec![Zone::Slip; count]),
-                    slip_x: Some(numbers(count)),
-                    ..Cells::default()
-                },
-            })
-            .await;
+            let cells = PatchCells {
+                x_mm: numbers(count),
+                y_mm: numbers(count),
+                dx_mm: numbers(count),
+                dy_mm: numbers(count),
+                strip: (0..count as u32).collect(),
+                ..PatchCells::default()
+            };
+            let values = PointFields {
+                zone: Some(vec![Zone::Slip; count]),
+                slip_x: Some(numbers(count)),
+                traction_x_mpa: Some(numbers(count)),
+                ..PointFields::default()
+            };
+            let whole = json!({ "patch": 1, "cells": {
+                "x_mm": cells.x_mm, "y_mm": cells.y_mm, "dx_mm": cells.dx_mm, "dy_mm": cells.dy_mm, "strip": cells.strip,
+                "zone": values.zone, "slip_x": values.slip_x,
+            } });
+            let table = Table::of(&[Output::Zones, Output::Slip], None, cells, values);
+            assert_eq!(read(table).await, whole);
         }
-        reads_back(|| {
-            let row = vec![Some(0.1), None, Some(-3e-300)];
-            Field::Gridded(GriddedField {
-                patch: 1,
-                point: 2,
-                x_mm: numbers(3),
-                y_mm: numbers(700),
-                zone: Some(vec![vec![Some(Zone::Stick), None, Some(Zone::Slip)]; 700]),
-                pressure_mpa: Some(vec![row; 700]),
-                ..GriddedField::default()
-            })
-        })
-        .await;
+        let row = [0.1, f64::NAN, -3e-300];
+        let zones = [Some(Zone::Stick), None, Some(Zone::Slip)];
+        let table = on_grid(
+            numbers(3),
+            numbers(700),
+            vec![
+                column("zone", ArrayData::Zones(zones.repeat(700))),
+                column("pressure_mpa", ArrayData::Numbers(row.repeat(700))),
+            ],
+        );
+        let whole = json!({
+            "patch": 1, "x_mm": numbers(3), "y_mm": numbers(700),
+            "zone": vec![zones; 700], "pressure_mpa": vec![json!([0.1, null, -3e-300]); 700],
+        });
+        assert_eq!(read(table).await, whole);
     }
 
     #[tokio::test]
     async fn single_precision_is_the_nearest_number_of_32_bits() {
-        let field = Field::Gridded(GriddedField {
-            x_mm: vec![1.0 / 3.0],
-            y_mm: vec![1e-300],
-            pressure_mpa: Some(vec![vec![Some(1e9 + 1.0)]]),
-            ..GriddedField::default()
-        });
-        let (mut table, _): (Table, Outlines) = field.into();
+        let pressure = column("pressure_mpa", ArrayData::Numbers(vec![1e9 + 1.0]));
+        let mut table = on_grid(vec![1.0 / 3.0], vec![1e-300], vec![pressure]);
         table.precision = Precision::Single;
         let csv = text(csv_body(table.clone())).await;
         assert_eq!(csv.lines().nth(1), Some("0.33333334,0.0,1000000000.0"));
-        let json: Value =
-            serde_json::from_str(&text(json_body(table, "\"patch\":0")).await).unwrap();
+        let json = read(table).await;
         assert_eq!(json["x_mm"][0].as_f64().map(csv::single), Some(1.0 / 3.0));
         assert_eq!(json["pressure_mpa"][0][0], 1e9);
     }
 
     #[tokio::test]
     async fn a_table_has_one_line_per_row_after_its_head() {
-        let field = Field::Gridded(GriddedField {
-            x_mm: numbers(2),
-            y_mm: numbers(400),
-            pressure_mpa: Some(vec![vec![Some(1.5), None]; 400]),
-            ..GriddedField::default()
-        });
-        let (table, _): (Table, Outlines) = field.into();
-        let text = text(csv_body(table)).await;
+        let pressure = ArrayData::Numbers([1.5, f64::NAN].repeat(400));
+        let pressure = vec![column("pressure_mpa", pressure)];
+        let text = text(csv_body(on_grid(numbers(2), numbers(400), pressure))).await;
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 801);
         assert_eq!(

@@ -1,94 +1,9 @@
-//! Forces and moments as JSON and as a table, piece by piece as the client takes them.
-
-use std::ops::Range;
-
-use axum::body::Body;
-use serde::Serialize;
+//! Forces and moments as a table.
 
 use crate::contact::solution::words::answer::HistoryPoint;
-use crate::http::dto::resultants::{PatchResultants, Resultants, Sum};
+use crate::http::dto::resultants::{Resultants, Sum};
 use crate::http::render::csv::{finish, number};
 use crate::http::render::forces::Forces;
-use crate::http::render::pieces::body;
-
-/// Motions written at once.
-const POINTS: usize = 64;
-
-/// A part of the text.
-enum Section {
-    Text(String),
-    /// Motions of the patch at this place.
-    Points(usize, Range<usize>),
-    /// Sums over the patches.
-    Total(Range<usize>),
-}
-
-/// The JSON that [`Resultants`] is as a whole.
-///
-/// # Errors
-/// The origin cannot be written.
-pub(crate) fn json_body(resultants: Resultants) -> Result<Body, serde_json::Error> {
-    let mut parts = Vec::new();
-    for (place, patch) in resultants.patches.iter().enumerate() {
-        let before = if place == 0 { "{\"patches\":[" } else { "]}," };
-        let load = serde_json::to_string(&patch.normal_force_n)?;
-        let number = patch.patch;
-        parts.push(Section::Text(format!(
-            "{before}{{\"patch\":{number},\"normal_force_n\":{load},\"points\":["
-        )));
-        parts.extend(ranges(patch.points.len()).map(|range| Section::Points(place, range)));
-    }
-    let open = if resultants.patches.is_empty() {
-        "{\"patches\":["
-    } else {
-        "]}"
-    };
-    parts.push(Section::Text(format!("{open}],\"total\":[")));
-    parts.extend(ranges(resultants.total.len()).map(Section::Total));
-    let origin = serde_json::to_string(&resultants.origin)?;
-    parts.push(Section::Text(format!("],\"origin\":{origin}}}")));
-    Ok(body(parts.into_iter().map(move |part| match part {
-        Section::Text(text) => Ok(text.into_bytes()),
-        Section::Points(patch, range) => values(&resultants.patches[patch].points, range),
-        Section::Total(range) => values(&resultants.total, range),
-    })))
-}
-
-/// One line per patch and motion, then one per motion with the sums over all patches.
-pub(crate) fn csv_body(resultants: Resultants, sums: Vec<Sum>) -> Body {
-    let with_history = sums.first().is_some_and(|sum| sum.history.is_some());
-    let head = head(with_history);
-    let mut parts = Vec::new();
-    for (place, patch) in resultants.patches.iter().enumerate() {
-        parts.extend(ranges(patch.points.len()).map(|range| Section::Points(place, range)));
-    }
-    parts.extend(ranges(resultants.total.len()).map(Section::Total));
-    let lines = parts.into_iter().map(move |part| match part {
-        Section::Text(text) => Ok(text.into_bytes()),
-        Section::Points(patch, range) => patch_lines(&resultants.patches[patch], range),
-        Section::Total(range) => total_lines(&resultants, &sums, range),
-    });
-    body(std::iter::once(head).chain(lines))
-}
-
-fn ranges(count: usize) -> impl Iterator<Item = Range<usize>> {
-    (0..count)
-        .step_by(POINTS)
-        .map(move |start| start..(start + POINTS).min(count))
-}
-
-/// Some elements of an array, with a comma before them unless they are the first.
-fn values<T: Serialize>(all: &[T], range: Range<usize>) -> Result<Vec<u8>, serde_json::Error> {
-    let first = range.start == 0;
-    let mut text = serde_json::to_vec(&all[range])?;
-    // The bracket before the elements makes way for the comma, that behind them for what follows.
-    text.pop();
-    match first {
-        true => drop(text.drain(..1)),
-        false => text[0] = b',',
-    }
-    Ok(text)
-}
 
 /// Before and behind the columns of [`Forces`].
 const PLACE: [&str; 2] = ["patch", "point"];
@@ -111,11 +26,45 @@ const HISTORY: [&str; 9] = [
     "shift_y_error_mm",
 ];
 
-fn head(with_history: bool) -> Result<Vec<u8>, csv::Error> {
+/// One line per patch and motion, then one per motion with the sums over all patches.
+///
+/// # Errors
+/// Never, as memory takes all that is written.
+pub(crate) fn csv(resultants: &Resultants, sums: &[Sum]) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
-    let history = if with_history { &HISTORY[..] } else { &[] };
+    let history: &[&str] = match sums.first().and_then(|sum| sum.history) {
+        Some(_) => &HISTORY,
+        None => &[],
+    };
     let columns = PLACE.iter().chain(&Forces::COLUMNS).chain(&REST);
     out.write_record(columns.chain(history))?;
+    for patch in &resultants.patches {
+        for point in &patch.points {
+            let sum = Sum {
+                motion: point.motion,
+                normal_force_n: patch.normal_force_n,
+                friction_power_n: point.friction_power_n,
+                friction_power_without_spin_n: point.friction_power_without_spin_n,
+                saturated: point.saturated,
+                history: point.history.as_deref().copied(),
+            };
+            let forces = Forces {
+                motion: Some(point.motion),
+                resultants: [point.force_x_n, point.force_y_n, point.moment_z_n_mm],
+                error: point.error_estimate,
+            };
+            let number = patch.patch.to_string();
+            out.write_record(csv_line(&number, point.point, &sum, &forces))?;
+        }
+    }
+    // The numbers of the motions are those of any patch.
+    let points = resultants.patches.first().map(|patch| &patch.points);
+    for (point, total) in points.into_iter().flatten().zip(&resultants.total) {
+        if let Some(sum) = sums.get(point.point) {
+            let forces = Forces::of_total(Some(sum.motion), total);
+            out.write_record(csv_line("total", point.point, sum, &forces))?;
+        }
+    }
     finish(out)
 }
 
@@ -132,48 +81,6 @@ fn of_history(history: &HistoryPoint) -> [Option<f64>; 9] {
         history.shift_x_error_mm,
         history.shift_y_error_mm,
     ]
-}
-
-fn patch_lines(patch: &PatchResultants, range: Range<usize>) -> Result<Vec<u8>, csv::Error> {
-    let mut out = csv::Writer::from_writer(Vec::new());
-    let number = patch.patch.to_string();
-    for point in &patch.points[range] {
-        let sum = Sum {
-            motion: point.motion,
-            normal_force_n: patch.normal_force_n,
-            friction_power_n: point.friction_power_n,
-            friction_power_without_spin_n: point.friction_power_without_spin_n,
-            saturated: point.saturated,
-            history: point.history.as_deref().copied(),
-        };
-        let forces = Forces {
-            motion: Some(point.motion),
-            resultants: [point.force_x_n, point.force_y_n, point.moment_z_n_mm],
-            error: point.error_estimate,
-        };
-        out.write_record(csv_line(&number, point.point, &sum, &forces))?;
-    }
-    finish(out)
-}
-
-fn total_lines(
-    resultants: &Resultants,
-    sums: &[Sum],
-    range: Range<usize>,
-) -> Result<Vec<u8>, csv::Error> {
-    let mut out = csv::Writer::from_writer(Vec::new());
-    // The numbers of the motions are those of any patch.
-    let points = resultants.patches.first().map(|patch| &patch.points[..]);
-    for place in range {
-        let point = points.and_then(|points| points.get(place));
-        if let Some((point, sum)) =
-            point.and_then(|point| Some((point.point, sums.get(point.point)?)))
-        {
-            let forces = Forces::of_total(Some(sum.motion), &resultants.total[place]);
-            out.write_record(csv_line("total", point, sum, &forces))?;
-        }
-    }
-    finish(out)
 }
 
 fn csv_line(
@@ -200,13 +107,10 @@ fn csv_line(
 
 #[cfg(test)]
 mod tests {
-    use http_body_util::BodyExt;
-    use serde_json::Value;
-
     use super::*;
     use crate::contact::case::words::motion::MotionWords;
     use crate::contact::solution::words::answer::{Origin, Total};
-    use crate::http::dto::resultants::PointResultants;
+    use crate::http::dto::resultants::{PatchResultants, PointResultants};
 
     fn resultants(patches: usize, points: usize) -> Resultants {
         let point = |point: usize| PointResultants {
@@ -252,17 +156,9 @@ mod tests {
         }
     }
 
-    async fn text(body: Body) -> String {
-        let bytes = body.collect().await.unwrap().to_bytes();
-        String::from_utf8(bytes.to_vec()).unwrap()
-    }
-
-    #[tokio::test]
-    async fn the_pieces_together_are_the_whole() {
-        for (patches, points) in [(0, 0), (1, 1), (2, POINTS), (3, 2 * POINTS + 1)] {
-            let whole = serde_json::to_value(resultants(patches, points)).unwrap();
-            let pieces = text(json_body(resultants(patches, points)).unwrap()).await;
-            assert_eq!(serde_json::from_str::<Value>(&pieces).unwrap(), whole);
+    #[test]
+    fn a_table_has_a_line_per_patch_and_motion_and_one_per_motion_in_sum() {
+        for (patches, points) in [(0, 0), (1, 1), (2, 64), (3, 129)] {
             let sum = Sum {
                 motion: resultants(1, 1).patches[0].points[0].motion,
                 normal_force_n: 1.0,
@@ -271,8 +167,8 @@ mod tests {
                 saturated: false,
                 history: None,
             };
-            let table = csv_body(resultants(patches, points), vec![sum; points]);
-            let lines = text(table).await.lines().count();
+            let table = csv(&resultants(patches, points), &vec![sum; points]).unwrap();
+            let lines = String::from_utf8(table).unwrap().lines().count();
             let totals = if patches == 0 { 0 } else { points };
             assert_eq!(lines, 1 + patches * points + totals);
         }

@@ -3,8 +3,9 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::solution::words::fields::Zone;
-use crate::http::dto::cells::{Cells, GriddedField};
+use crate::contact::case::words::solver::Output;
+use crate::contact::post::resample::{Gridded, resample, resample_zone};
+use crate::contact::solution::words::fields::{PatchCells, PointFields, Zone};
 
 /// A file, byte for byte.
 #[derive(Debug, ToSchema)]
@@ -14,11 +15,11 @@ pub(crate) struct File(Vec<u8>);
 
 /// Named columns of equal length.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Table {
+pub(crate) struct Table {
     /// What a row belongs to.
     pub rows: Rows,
-    /// The values of the field.
-    pub values: Vec<TableColumn>,
+    /// Its columns; on a grid without those of the axes.
+    pub columns: Vec<TableColumn>,
     /// How exactly its numbers are written.
     pub precision: Precision,
 }
@@ -26,7 +27,7 @@ pub struct Table {
 /// How exactly numbers are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Precision {
+pub(crate) enum Precision {
     /// As they were computed: 64 bits.
     #[default]
     Double,
@@ -35,36 +36,120 @@ pub enum Precision {
 }
 
 impl Table {
-    /// How many rows it has.
+    /// The values of these outputs: per cell, or resampled on a grid of `nx × ny` samples.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn of(
+        outputs: &[Output],
+        grid: Option<(usize, usize)>,
+        mut cells: PatchCells,
+        values: PointFields,
+    ) -> Table {
+        let wanted = |output| outputs.contains(&output);
+        let zones = values.zone.filter(|_| wanted(Output::Zones));
+        let numbers = [
+            ("pressure_mpa", Output::Pressure, cells.pressure_mpa.take()),
+            ("traction_x_mpa", Output::Tractions, values.traction_x_mpa),
+            ("traction_y_mpa", Output::Tractions, values.traction_y_mpa),
+            ("slip_x", Output::Slip, values.slip_x),
+            ("slip_y", Output::Slip, values.slip_y),
+            ("temperature_c", Output::Temperature, values.temperature_c),
+        ];
+        let numbers = numbers.into_iter().filter_map(|(name, output, values)| {
+            let values = values.filter(|_| wanted(output))?;
+            Some((name, values))
+        });
+        match grid {
+            None => Table::of_cells(cells, zones, numbers),
+            Some((nx, ny)) => Table::on_grid(&cells, zones, numbers, (nx, ny)),
+        }
+    }
+
+    fn of_cells(
+        cells: PatchCells,
+        zones: Option<Vec<Zone>>,
+        numbers: impl Iterator<Item = (&'static str, Vec<f64>)>,
+    ) -> Table {
+        let places = [cells.x_mm, cells.y_mm, cells.dx_mm, cells.dy_mm];
+        let places = PLACES.into_iter().zip(places);
+        let zones = zones.map(|zones| zones.into_iter().map(Some).collect());
+        let column = |name, data| TableColumn { name, data };
+        let number = |(name, values)| column(name, ArrayData::Numbers(values));
+        Table {
+            rows: Rows::Cells,
+            columns: places
+                .map(number)
+                .chain([column("strip", ArrayData::Integers(cells.strip))])
+                .chain(zones.map(|zones| column("zone", ArrayData::Zones(zones))))
+                .chain(numbers.map(number))
+                .collect(),
+            precision: Precision::Double,
+        }
+    }
+
+    fn on_grid(
+        cells: &PatchCells,
+        zones: Option<Vec<Zone>>,
+        numbers: impl Iterator<Item = (&'static str, Vec<f64>)>,
+        (nx, ny): (usize, usize),
+    ) -> Table {
+        fn flat<T: Copy>(grid: Gridded<T>, axes: &mut [Vec<f64>; 2]) -> Vec<Option<T>> {
+            *axes = [grid.x_mm, grid.y_mm];
+            grid.values.concat()
+        }
+        let mut axes = [Vec::new(), Vec::new()];
+        let mut columns = Vec::new();
+        if let Some(zones) = zones {
+            let zones = flat(resample_zone(cells, &zones, nx, ny), &mut axes);
+            columns.push(TableColumn {
+                name: "zone",
+                data: ArrayData::Zones(zones),
+            });
+        }
+        for (name, values) in numbers {
+            let values = flat(resample(cells, &values, nx, ny), &mut axes).into_iter();
+            let values = values.map(|value| value.unwrap_or(f64::NAN)).collect();
+            columns.push(TableColumn {
+                name,
+                data: ArrayData::Numbers(values),
+            });
+        }
+        let [x_mm, y_mm] = axes;
+        Table {
+            rows: Rows::Grid { x_mm, y_mm },
+            columns,
+            precision: Precision::Double,
+        }
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub(crate) fn len(&self) -> usize {
         match &self.rows {
-            Rows::Cells { strip, .. } => strip.len(),
+            Rows::Cells => self.numbers(PLACES[0]).map_or(0, <[f64]>::len),
             Rows::Grid { x_mm, y_mm } => x_mm.len() * y_mm.len(),
         }
     }
 
-    /// What it takes in memory, in bytes.
+    /// Size in memory in bytes.
     #[must_use]
-    pub fn bytes(&self) -> usize {
-        let columns = match &self.rows {
-            Rows::Cells { .. } => PLACES.len() + 1,
-            Rows::Grid { .. } => 0,
-        };
-        self.len() * (columns + self.values.len()) * size_of::<f64>()
+    pub(crate) fn bytes(&self) -> usize {
+        self.len() * self.columns.len() * size_of::<f64>()
+    }
+
+    /// The numbers of a column.
+    pub(crate) fn numbers(&self, name: &str) -> Option<&[f64]> {
+        self.columns.iter().find_map(|column| match &column.data {
+            ArrayData::Numbers(values) if column.name == name => Some(&**values),
+            _ => None,
+        })
     }
 }
 
 /// What the rows of a table belong to.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Rows {
-    /// One row per cell, with the columns that say where the cell lies: `x_mm`, `y_mm`, `dx_mm`, `dy_mm`, `strip`.
-    Cells {
-        /// Centre along x, centre across, width along x, width across; in mm.
-        places: [Vec<f64>; 4],
-        /// Number of the strip.
-        strip: Vec<u32>,
-    },
+pub(crate) enum Rows {
+    /// One row per cell. The columns [`PLACES`] and `strip` say where the cell lies.
+    Cells,
     /// One row per sample of a regular grid, x running fastest.
     Grid {
         /// Samples along x in mm, ascending.
@@ -74,12 +159,12 @@ pub enum Rows {
     },
 }
 
-/// The columns of [`Rows::Cells`] before `strip`.
+/// The columns with the centre and the width of a cell.
 pub(crate) const PLACES: [&str; 4] = ["x_mm", "y_mm", "dx_mm", "dy_mm"];
 
 /// One value per row.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TableColumn {
+pub(crate) struct TableColumn {
     /// The same name in every format.
     pub name: &'static str,
     /// The values.
@@ -88,9 +173,11 @@ pub struct TableColumn {
 
 /// The values of a column.
 #[derive(Debug, Clone, PartialEq)]
-pub enum ArrayData {
+pub(crate) enum ArrayData {
     /// Numbers; NaN outside the patch.
     Numbers(Vec<f64>),
+    /// Whole numbers.
+    Integers(Vec<u32>),
     /// Zones; `None` outside the patch.
     Zones(Vec<Option<Zone>>),
 }
@@ -103,69 +190,4 @@ pub(crate) fn zone_code(zone: Option<Zone>) -> i8 {
         Some(Zone::Slip) => 1,
         None => -1,
     }
-}
-
-impl From<Cells> for Table {
-    fn from(cells: Cells) -> Self {
-        let zone = cells.zone.map(|zones| TableColumn {
-            name: "zone",
-            data: ArrayData::Zones(zones.into_iter().map(Some).collect()),
-        });
-        let numbers = [
-            ("pressure_mpa", cells.pressure_mpa),
-            ("traction_x_mpa", cells.traction_x_mpa),
-            ("traction_y_mpa", cells.traction_y_mpa),
-            ("slip_x", cells.slip_x),
-            ("slip_y", cells.slip_y),
-            ("temperature_c", cells.temperature_c),
-        ];
-        Table {
-            rows: Rows::Cells {
-                places: [cells.x_mm, cells.y_mm, cells.dx_mm, cells.dy_mm],
-                strip: cells.strip,
-            },
-            values: zone.into_iter().chain(columns(numbers)).collect(),
-            precision: Precision::Double,
-        }
-    }
-}
-
-impl From<GriddedField> for Table {
-    fn from(field: GriddedField) -> Self {
-        let zone = field.zone.map(|rows| TableColumn {
-            name: "zone",
-            data: ArrayData::Zones(rows.concat()),
-        });
-        let flat = |rows: Option<Vec<Vec<Option<f64>>>>| {
-            let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
-            rows.map(|rows| rows.into_iter().flatten().map(number).collect())
-        };
-        let numbers = [
-            ("pressure_mpa", flat(field.pressure_mpa)),
-            ("traction_x_mpa", flat(field.traction_x_mpa)),
-            ("traction_y_mpa", flat(field.traction_y_mpa)),
-            ("slip_x", flat(field.slip_x)),
-            ("slip_y", flat(field.slip_y)),
-            ("temperature_c", flat(field.temperature_c)),
-        ];
-        Table {
-            rows: Rows::Grid {
-                x_mm: field.x_mm,
-                y_mm: field.y_mm,
-            },
-            values: zone.into_iter().chain(columns(numbers)).collect(),
-            precision: Precision::Double,
-        }
-    }
-}
-
-fn columns<const N: usize>(
-    numbers: [(&'static str, Option<Vec<f64>>); N],
-) -> impl Iterator<Item = TableColumn> {
-    numbers.into_iter().filter_map(|(name, values)| {
-        Some(TableColumn {
-            name,
-            data: ArrayData::Numbers(values?),
-        })
-    })
 }

@@ -4,7 +4,7 @@
 //! points with the values as point data, NaN outside the patch. Pairs such as `traction_x_mpa`, `traction_y_mpa` come as
 //! one vector `traction_mpa` (z is 0), ready for glyphs; zones are 0 stick, 1 slip, -1 outside.
 
-use crate::http::render::table::{ArrayData, Rows, Table, TableColumn, zone_code};
+use crate::http::render::table::{ArrayData, PLACES, Rows, Table, zone_code};
 
 /// Longest title that the format allows, its line break not counted.
 const TITLE_MAX: usize = 255;
@@ -32,26 +32,21 @@ pub(crate) fn write(table: &Table, title: &str) -> Vec<u8> {
     line(&mut out, &title.map(plain).collect::<String>());
     line(&mut out, "BINARY");
     match &table.rows {
-        Rows::Cells { places, strip } => {
+        Rows::Cells => {
+            let places = PLACES.map(|name| table.numbers(name).unwrap_or_default());
             write_quads(&mut out, places);
-            line(&mut out, &format!("CELL_DATA {}", strip.len()));
-            line(&mut out, "SCALARS strip int 1");
-            line(&mut out, "LOOKUP_TABLE default");
-            let numbers = strip
-                .iter()
-                .map(|strip| i32::try_from(*strip).unwrap_or(i32::MAX));
-            integers(&mut out, numbers);
+            line(&mut out, &format!("CELL_DATA {}", table.len()));
         }
         Rows::Grid { x_mm, y_mm } => {
             write_points(&mut out, x_mm, y_mm);
             line(&mut out, &format!("POINT_DATA {}", x_mm.len() * y_mm.len()));
         }
     }
-    write_values(&mut out, &table.values);
+    write_values(&mut out, table);
     out
 }
 
-fn write_quads(out: &mut Vec<u8>, [x, y, dx, dy]: &[Vec<f64>; 4]) {
+fn write_quads(out: &mut Vec<u8>, [x, y, dx, dy]: [&[f64]; 4]) {
     let count = x.len();
     line(out, "DATASET UNSTRUCTURED_GRID");
     line(out, &format!("POINTS {} double", 4 * count));
@@ -85,15 +80,19 @@ fn write_points(out: &mut Vec<u8>, x: &[f64], y: &[f64]) {
     line(out, &format!("SPACING {:?} {:?} 1", step(x), step(y)));
 }
 
-fn write_values(out: &mut Vec<u8>, columns: &[TableColumn]) {
-    let numbers = |name: &str| {
-        columns.iter().find_map(|column| match &column.data {
-            ArrayData::Numbers(values) if column.name == name => Some(values),
-            _ => None,
-        })
-    };
-    for column in columns {
+fn write_values(out: &mut Vec<u8>, table: &Table) {
+    let columns = table.columns.iter();
+    for column in columns.filter(|column| !PLACES.contains(&column.name)) {
         match &column.data {
+            ArrayData::Integers(values) => {
+                line(out, &format!("SCALARS {} int 1", column.name));
+                line(out, "LOOKUP_TABLE default");
+                let values = values.iter();
+                integers(
+                    out,
+                    values.map(|value| i32::try_from(*value).unwrap_or(i32::MAX)),
+                );
+            }
             ArrayData::Zones(zones) => {
                 line(out, &format!("SCALARS {} int 1", column.name));
                 line(out, "LOOKUP_TABLE default");
@@ -111,7 +110,7 @@ fn write_values(out: &mut Vec<u8>, columns: &[TableColumn]) {
                 };
                 // Both components are written where the first one stands.
                 if column.name == *x_name
-                    && let Some(across) = numbers(y_name)
+                    && let Some(across) = table.numbers(y_name)
                 {
                     line(out, &format!("VECTORS {name} double"));
                     let pairs = values.iter().zip(across);

@@ -27,6 +27,7 @@ use crate::jobs::codec::table::RowTable;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::batch::{BatchItem, ItemFault, ItemResult};
 use crate::jobs::model::job::State as JobState;
+use crate::jobs::sync::blocking;
 
 /// What a reader holds of small results: those of a page, and the text written of them.
 pub(crate) const STREAM_BYTES: usize = 2 * PAGE_BYTES;
@@ -114,7 +115,7 @@ impl Lines {
                     let small = self.read.iter().take_while(|item| !large(item)).count();
                     let small: Vec<BatchItem> = self.read.drain(..small).collect();
                     let columns = self.source.columns.clone();
-                    let written = tokio::task::spawn_blocking(move || match columns {
+                    let written = blocking(move || match columns {
                         Some(columns) => Ok(Piece::Table(table_of_small(&columns, &small))),
                         None => Ok(Piece::Text(write_ndjson(&small)?.into())),
                     });

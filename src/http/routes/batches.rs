@@ -100,7 +100,8 @@ fn refusal(draft: &BatchUpload) -> ApiError {
         0 => String::new(),
         _ => format!("; the faults of the first {kept} of them are listed"),
     };
-    ApiError::faulty_batch(
+    ApiError::listing(
+        ProblemKind::FaultyBatch,
         format!(
             "{} of {} cases have faults, so nothing was stored{more}",
             draft.rejected, draft.cases

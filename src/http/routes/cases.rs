@@ -19,6 +19,7 @@ use crate::http::limits::memory::{Memory, MemoryPermit};
 use crate::http::options::HttpOptions;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
+use crate::jobs::sync::blocking;
 
 /// A case that can be solved, and its expected cost.
 #[none_is_absent]
@@ -85,15 +86,14 @@ pub(crate) async fn check(
     let value = jobs.with_profiles(value).await?;
     let MemoryPermit { share, turn } = room;
     // A large grid takes long enough to check that it must not hold up other requests.
-    let checked = tokio::task::spawn_blocking(move || {
+    let checked = blocking(move || {
         // The turn is held until the work ends, even if the client has gone away.
         let _turn = turn;
         let checked = jobs.check(&value)?;
         let report = report(&checked);
         Ok::<_, ApiError>((jobs, checked, report))
     });
-    let checked = checked.await.map_err(|error| ApiError::internal(&error))?;
-    let (jobs, case, mut report) = checked?;
+    let (jobs, case, mut report) = checked.await??;
     let limit = options.check_trial;
     let turn = if limit.is_zero() {
         None
@@ -101,7 +101,7 @@ pub(crate) async fn check(
         memory.trial(jobs.tenant(), limit).await
     };
     if let Some(turn) = turn {
-        let probed = tokio::task::spawn_blocking(move || {
+        let probed = blocking(move || {
             let _held = (turn, share);
             jobs.probe(&case, limit)
         });

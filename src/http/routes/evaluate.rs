@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
 use axum::response::Response;
+use railhead_macros::none_is_absent;
 use serde::Serialize;
 use serde_json::Value;
 use tokio::runtime::Handle;
@@ -84,6 +85,7 @@ pub(crate) struct EvaluateAnswer {
 }
 
 /// Columns of an answer.
+#[none_is_absent]
 #[derive(Debug, Serialize, ToSchema)]
 #[allow(
     dead_code,
@@ -103,61 +105,42 @@ pub(crate) struct EvaluateColumns {
     /// Share of the patch that sticks, 0 to 1.
     stick_share: Vec<Option<f64>>,
     /// ∂`force_x_n`/∂`creepage_x`; with `gradients` only.
-    #[schema(nullable = false)]
     force_x_n_by_creepage_x: Option<Vec<Option<f64>>>,
     /// ∂`force_x_n`/∂`creepage_y`; with `gradients` only.
-    #[schema(nullable = false)]
     force_x_n_by_creepage_y: Option<Vec<Option<f64>>>,
     /// ∂`force_x_n`/∂`spin_per_mm`; with `gradients` only.
-    #[schema(nullable = false)]
     force_x_n_by_spin_per_mm: Option<Vec<Option<f64>>>,
     /// ∂`force_y_n`/∂`creepage_x`; with `gradients` only.
-    #[schema(nullable = false)]
     force_y_n_by_creepage_x: Option<Vec<Option<f64>>>,
     /// ∂`force_y_n`/∂`creepage_y`; with `gradients` only.
-    #[schema(nullable = false)]
     force_y_n_by_creepage_y: Option<Vec<Option<f64>>>,
     /// ∂`force_y_n`/∂`spin_per_mm`; with `gradients` only.
-    #[schema(nullable = false)]
     force_y_n_by_spin_per_mm: Option<Vec<Option<f64>>>,
     /// ∂`moment_z_n_mm`/∂`creepage_x`; with `gradients` only.
-    #[schema(nullable = false)]
     moment_z_n_mm_by_creepage_x: Option<Vec<Option<f64>>>,
     /// ∂`moment_z_n_mm`/∂`creepage_y`; with `gradients` only.
-    #[schema(nullable = false)]
     moment_z_n_mm_by_creepage_y: Option<Vec<Option<f64>>>,
     /// ∂`moment_z_n_mm`/∂`spin_per_mm`; with `gradients` only.
-    #[schema(nullable = false)]
     moment_z_n_mm_by_spin_per_mm: Option<Vec<Option<f64>>>,
     /// Sum of the normal forces in N. This and the next columns are there only if the template needs the solver.
-    #[schema(nullable = false)]
     normal_force_n: Option<Vec<Option<f64>>>,
     /// Estimated error of the moment in N·mm.
-    #[schema(nullable = false)]
     moment_error_estimate: Option<Vec<Option<f64>>>,
     /// Contact area in mm².
-    #[schema(nullable = false)]
     area_mm2: Option<Vec<Option<f64>>>,
     /// Largest pressure in MPa.
-    #[schema(nullable = false)]
     pressure_max_mpa: Option<Vec<Option<f64>>>,
     /// Number of patches.
-    #[schema(nullable = false)]
     patches: Option<Vec<Option<f64>>>,
     /// Iterations of the solver.
-    #[schema(nullable = false)]
     iterations: Option<Vec<Option<f64>>>,
     /// Longitudinal creepage found for a prescribed force.
-    #[schema(nullable = false)]
     creepage_x: Option<Vec<Option<f64>>>,
     /// Lateral creepage found for a prescribed force.
-    #[schema(nullable = false)]
     creepage_y: Option<Vec<Option<f64>>>,
     /// Angular velocity found for a prescribed force or torque, in rad/s.
-    #[schema(nullable = false)]
     angular_velocity_rad_per_s: Option<Vec<Option<f64>>>,
     /// Lateral velocity found for a prescribed force, in mm/s.
-    #[schema(nullable = false)]
     lateral_velocity_mm_per_s: Option<Vec<Option<f64>>>,
     /// `ok`; `target_missed`: the estimated error is above the target; `needs_solver`: with `auto`, the table does not answer the row, and more
     /// than 200 rows of the request need the solver: submit them as a run; `not_covered`: the method does not cover the patch; `refused`: the

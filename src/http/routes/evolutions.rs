@@ -27,6 +27,7 @@ use crate::http::routes::results::ResultProblems;
 use crate::http::routes::submission::{JobAccepted, NamedQuery, Submission, SubmitParameters};
 use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::model::kind::Kind;
+use crate::jobs::sync::blocking;
 use crate::jobs::{Jobs, JobsError};
 
 /// The forms of the tables.
@@ -158,7 +159,7 @@ pub(crate) async fn result(
 ) -> Result<Response, ApiError> {
     let jobs = jobs.of_kind(Kind::Evolution);
     let share = memory.ready_answer(jobs.tenant(), jobs.answer_bytes(id).await?)?;
-    let text = jobs.answer(id).await?.solution;
+    let text = jobs.answer(id).await?;
     let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
     Ok(hold_while_sent((head, text).into_response(), share))
 }
@@ -291,13 +292,12 @@ async fn read(
     let jobs = jobs.of_kind(Kind::Evolution);
     // Once as text, and about as much as numbers.
     let share = memory.ready_answer(jobs.tenant(), 2 * jobs.answer_bytes(id).await?)?;
-    let text = jobs.answer(id).await?.solution;
-    let made = tokio::task::spawn_blocking(move || {
+    let text = jobs.answer(id).await?;
+    let made = blocking(move || {
         let read = serde_json::from_slice(&text);
         make(&read.map_err(|error| ApiError::internal(&error))?)
     });
-    let made = made.await.map_err(|error| ApiError::internal(&error))??;
-    Ok(hold_while_sent(made, share))
+    Ok(hold_while_sent(made.await??, share))
 }
 
 fn records_table(evolution: &EvolutionAnswer) -> RowTable {

@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::fields::{PatchCells, PointFields};
-use crate::http::dto::cells::{Cells, GriddedField, Outlines, gridded, per_cell};
+use crate::http::dto::cells::{Cells, GriddedField, Outlines};
 use crate::http::dto::result::name_of;
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::query::{Parameters, Reader, index, query, reader, whole, word};
@@ -41,9 +41,10 @@ const FORMATS: &[Format] = &[
 ];
 
 /// A field of one patch for one motion.
-#[derive(Debug, Serialize, ToSchema)]
+#[derive(Serialize, ToSchema)]
 #[serde(untagged)]
-pub enum Field {
+#[expect(dead_code, reason = "describes an answer in the contract")]
+pub(crate) enum Field {
     /// Without `grid`: the values where they were computed.
     PerCell {
         /// Number of the patch, counted from 0.
@@ -57,48 +58,6 @@ pub enum Field {
     },
     /// With `grid`: resampled.
     Gridded(GriddedField),
-}
-
-impl Field {
-    /// The values of these outputs, as the selection asks for them.
-    #[must_use]
-    pub fn of(
-        selection: Selection,
-        outputs: &[Output],
-        cells: PatchCells,
-        values: PointFields,
-    ) -> Field {
-        let (patch, point) = (selection.patch, selection.point);
-        let outlines = Outlines::of(&cells, &values, outputs.contains(&Output::Zones));
-        match selection.grid {
-            None => Field::PerCell {
-                patch,
-                point,
-                outlines,
-                cells: per_cell(cells, values, outputs),
-            },
-            Some((nx, ny)) => Field::Gridded(GriddedField {
-                patch,
-                point,
-                outlines,
-                ..gridded(&cells, &values, outputs, nx, ny)
-            }),
-        }
-    }
-}
-
-impl From<Field> for (Table, Outlines) {
-    fn from(field: Field) -> Self {
-        match field {
-            Field::PerCell {
-                cells, outlines, ..
-            } => (cells.into(), outlines),
-            Field::Gridded(mut field) => {
-                let outlines = std::mem::take(&mut field.outlines);
-                (field.into(), outlines)
-            }
-        }
-    }
 }
 
 query! {
@@ -123,7 +82,7 @@ query! {
 
 /// Which patch and motion are wanted, on which grid and in which form.
 #[derive(Debug, Clone, Copy)]
-pub struct Selection {
+pub(crate) struct Selection {
     /// Number of the patch.
     pub patch: usize,
     /// Number of the motion.
@@ -141,7 +100,7 @@ impl Selection {
     ///
     /// # Errors
     /// `bad-query` with every fault, or `not-acceptable`.
-    pub fn read(request: &PartRequest) -> Result<Self, ApiError> {
+    pub(crate) fn read(request: &PartRequest) -> Result<Self, ApiError> {
         let samples_max = request.shared.options.grid_max_samples;
         let query = FieldQuery::read(&request.uri, &samples_max)?;
         Ok(Selection {
@@ -157,7 +116,7 @@ impl Selection {
     ///
     /// # Errors
     /// `bad-query` if there is a `grid`, else as [`picture`].
-    pub async fn picture(
+    pub(crate) async fn picture(
         &self,
         request: &PartRequest,
         shown: Output,
@@ -187,7 +146,7 @@ impl Selection {
 
     /// What the answer takes in memory before it is taken by the client, in bytes.
     #[must_use]
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         let (nx, ny) = self.grid.unwrap_or_default();
         nx * ny * SAMPLE_BYTES
     }
@@ -259,93 +218,87 @@ async fn answer(request: &PartRequest, output: Output) -> Result<Response, ApiEr
         let rendering = request.rendering(selection.bytes()).await?;
         let (jobs, id) = (&request.jobs, request.id);
         let (cells, values) = stored(jobs, id, selection.patch, selection.point, output).await?;
-        let make = move || Field::of(selection, &[output], cells, values);
-        write_as(rendering, selection, name_of(output), make).await
+        let field = FieldValues {
+            outputs: vec![output],
+            cells,
+            values,
+            members: String::new(),
+        };
+        field.write(rendering, selection, name_of(output)).await
     };
     request.unless_known(selection.format, answer).await
 }
 
-/// What an answer is written from.
-pub(crate) enum Written {
-    /// A table and its outlines, whose text is made when the client takes it.
-    Table(Table, Outlines),
-    /// The whole answer.
-    Whole(Vec<u8>),
+/// The values of a field, and what its JSON has besides.
+pub(crate) struct FieldValues {
+    /// The outputs that are written.
+    pub outputs: Vec<Output>,
+    pub cells: PatchCells,
+    pub values: PointFields,
+    /// Members of the JSON before `outlines`, each with a comma before it.
+    pub members: String,
 }
 
-/// Builds a field when its turn has come, and writes it in the format of the selection.
-///
-/// # Errors
-/// `internal` if that fails.
-pub(crate) async fn write_as(
-    rendering: Rendering,
-    selection: Selection,
-    name: &'static str,
-    make: impl FnOnce() -> Field + Send + 'static,
-) -> Result<Response, ApiError> {
-    write(rendering, selection, name, move |format| {
-        let (mut table, outlines): (Table, Outlines) = make().into();
+enum Written {
+    /// The text is made from the table when the client takes it.
+    Json(Table, String),
+    Csv(Table),
+    File(Vec<u8>),
+}
+
+impl FieldValues {
+    /// Writes the field in the format of the selection when its turn has come. Its memory is held until it has been sent.
+    ///
+    /// # Errors
+    /// `internal` if the field cannot be written.
+    pub(crate) async fn write(
+        self,
+        rendering: Rendering,
+        selection: Selection,
+        name: &'static str,
+    ) -> Result<Response, ApiError> {
+        let size = |written: &Written| match written {
+            Written::Json(table, _) | Written::Csv(table) => table.bytes(),
+            Written::File(bytes) => bytes.len(),
+        };
+        let make = move || self.written(selection, name);
+        let (written, share) = rendering.run(make, size).await?;
+        let body = match written {
+            Written::Json(table, members) => json_body(table, &members),
+            Written::Csv(table) => csv_body(table),
+            Written::File(bytes) => Body::from(bytes),
+        };
+        let (patch, point) = (selection.patch, selection.point);
+        let response = selection
+            .format
+            .answer(&format!("{name}-{patch}-{point}"), body);
+        Ok(hold_while_sent(response, share))
+    }
+
+    fn written(self, selection: Selection, name: &str) -> Result<Written, ApiError> {
+        let (patch, point) = (selection.patch, selection.point);
+        let with_zones = self.outputs.contains(&Output::Zones);
+        let outlines = Outlines::of(&self.cells, &self.values, with_zones);
+        let mut table = Table::of(&self.outputs, selection.grid, self.cells, self.values);
         table.precision = selection.precision;
-        match format {
-            Format::Json | Format::Csv => Ok(Written::Table(table, outlines)),
-            _ => write_file(&table, &outlines, selection, name),
-        }
-    })
-    .await
-}
-
-/// The table as one of the binary files.
-///
-/// # Errors
-/// `internal` if that fails.
-pub(crate) fn write_file(
-    table: &Table,
-    outlines: &Outlines,
-    selection: Selection,
-    name: &'static str,
-) -> Result<Written, ApiError> {
-    let Selection { patch, point, .. } = selection;
-    let bytes = match selection.format {
-        Format::Npz => npz::write(table, outlines).map_err(|error| ApiError::internal(&error))?,
-        _ => vtk::write(
-            table,
-            &format!("{name}, patch {patch}, motion {point}; mm, N, MPa"),
-        ),
-    };
-    Ok(Written::Whole(bytes))
-}
-
-/// Computes an answer when its turn has come. Its memory is held until it has been sent.
-///
-/// # Errors
-/// What making it fails with.
-pub(crate) async fn write(
-    rendering: Rendering,
-    selection: Selection,
-    name: &'static str,
-    make: impl FnOnce(Format) -> Result<Written, ApiError> + Send + 'static,
-) -> Result<Response, ApiError> {
-    let Selection {
-        patch,
-        point,
-        format,
-        ..
-    } = selection;
-    let size = |written: &Written| match written {
-        Written::Table(table, _) => table.bytes(),
-        Written::Whole(bytes) => bytes.len(),
-    };
-    let (written, share) = rendering.run(move || make(format), size).await?;
-    let body = match written {
-        Written::Table(table, _) if format == Format::Csv => csv_body(table),
-        Written::Table(table, outlines) => {
-            let outlines = serde_json::to_string(&outlines);
-            let outlines = outlines.map_err(|error| ApiError::internal(&error))?;
-            let members = format!("\"patch\":{patch},\"point\":{point},\"outlines\":{outlines}");
-            json_body(table, &members)
-        }
-        Written::Whole(bytes) => Body::from(bytes),
-    };
-    let response = format.answer(&format!("{name}-{patch}-{point}"), body);
-    Ok(hold_while_sent(response, share))
+        Ok(match selection.format {
+            Format::Csv => Written::Csv(table),
+            Format::Npz => {
+                let file = npz::write(&table, &outlines);
+                Written::File(file.map_err(|error| ApiError::internal(&error))?)
+            }
+            Format::Vtk => {
+                let title = format!("{name}, patch {patch}, motion {point}; mm, N, MPa");
+                Written::File(vtk::write(&table, &title))
+            }
+            _ => {
+                let outlines = serde_json::to_string(&outlines);
+                let outlines = outlines.map_err(|error| ApiError::internal(&error))?;
+                let members = self.members;
+                let members =
+                    format!("\"patch\":{patch},\"point\":{point}{members},\"outlines\":{outlines}");
+                Written::Json(table, members)
+            }
+        })
+    }
 }

@@ -16,7 +16,7 @@ use crate::http::state::AppState;
 use crate::jobs::Jobs;
 
 /// A request for a part of the result of a job.
-pub struct PartRequest {
+pub(crate) struct PartRequest {
     /// The jobs of the client.
     pub jobs: Jobs,
     /// The job in the path.
@@ -50,7 +50,7 @@ impl PartRequest {
     ///
     /// # Errors
     /// There is no such job, or those of `answer`.
-    pub async fn unless_known(
+    pub(crate) async fn unless_known(
         &self,
         format: Format,
         answer: impl Future<Output = Result<Response, ApiError>> + Send,
@@ -65,7 +65,7 @@ impl PartRequest {
     ///
     /// # Errors
     /// As [`Memory::rendering`](crate::http::limits::memory::Memory::rendering).
-    pub async fn rendering(&self, bytes: usize) -> Result<Rendering, ApiError> {
+    pub(crate) async fn rendering(&self, bytes: usize) -> Result<Rendering, ApiError> {
         self.shared
             .memory
             .rendering(self.jobs.tenant(), bytes)

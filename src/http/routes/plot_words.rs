@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::PointSolution;
+use crate::jobs::model::names;
 
 /// What a picture shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
@@ -20,25 +21,12 @@ pub(crate) enum View {
     Profiles,
 }
 
-impl View {
-    /// Every view.
-    pub(crate) const ALL: [View; 4] = [View::Patch, View::Curve, View::Section, View::Profiles];
-
-    /// The word for it in the API.
-    #[must_use]
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            View::Patch => "patch",
-            View::Curve => "curve",
-            View::Section => "section",
-            View::Profiles => "profiles",
-        }
-    }
-
-    /// The view of that name, if there is one.
-    #[must_use]
-    pub(crate) fn from_name(name: &str) -> Option<View> {
-        View::ALL.into_iter().find(|view| view.name() == name)
+names! {
+    pub(crate) View {
+        Patch = "patch",
+        Curve = "curve",
+        Section = "section",
+        Profiles = "profiles",
     }
 }
 

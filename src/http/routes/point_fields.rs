@@ -4,7 +4,6 @@ use axum::response::Response;
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::fields::{PatchCells, PointFields};
 use crate::http::dto::result::name_of;
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::query::{Parameters, Reader, index, query, reader};
@@ -12,7 +11,7 @@ use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;
 use crate::http::render::format::Format;
 use crate::http::render::table::{File, Precision};
-use crate::http::routes::fields::{Field, Selection, grid, precision, write_as};
+use crate::http::routes::fields::{Field, FieldValues, Selection, grid, precision};
 use crate::http::routes::part_request::PartRequest;
 use crate::http::routes::stored_fields::{FieldProblems, has, not_asked};
 use crate::jobs::Jobs;
@@ -101,9 +100,8 @@ pub(crate) async fn fields(request: PartRequest) -> Result<Response, ApiError> {
         let most = query.parts.as_ref().map_or(PARTS.len(), Vec::len);
         let rendering = request.rendering(most * selection.bytes()).await?;
         let (jobs, id) = (&request.jobs, request.id);
-        let (parts, cells, values) = stored_parts(jobs, id, selection, query.parts).await?;
-        let make = move || Field::of(selection, &parts, cells, values);
-        write_as(rendering, selection, "fields", make).await
+        let field = stored_parts(jobs, id, selection, query.parts).await?;
+        field.write(rendering, selection, "fields").await
     };
     request.unless_known(selection.format, answer).await
 }
@@ -114,7 +112,7 @@ async fn stored_parts(
     id: Uuid,
     selection: Selection,
     wanted: Option<Vec<Output>>,
-) -> Result<(Vec<Output>, PatchCells, PointFields), ApiError> {
+) -> Result<FieldValues, ApiError> {
     let (patch, point) = (selection.patch, selection.point);
     let mut fields = match jobs.point_fields(id, patch, point).await {
         // Nothing is stored per cell when the case asked for no field at all.
@@ -139,7 +137,12 @@ async fn stored_parts(
         }
         None => PARTS.into_iter().filter(stored).collect(),
     };
-    Ok((parts, cells, values))
+    Ok(FieldValues {
+        outputs: parts,
+        cells,
+        values,
+        members: String::new(),
+    })
 }
 
 fn nothing_per_cell() -> ApiError {

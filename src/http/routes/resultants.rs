@@ -10,7 +10,7 @@ use crate::http::limits::holding_body::hold_while_sent;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;
 use crate::http::render::format::Format;
-use crate::http::render::resultants::{csv_body, json_body};
+use crate::http::render::resultants::csv;
 use crate::http::routes::part_request::PartRequest;
 
 problems! {
@@ -62,29 +62,21 @@ async fn write(
     let (jobs, id) = (&request.jobs, request.id);
     // The stored text is read whole and cut to what was asked for.
     let turn = request.rendering(2 * jobs.answer_bytes(id).await?).await?;
-    let text = jobs.answer(id).await?.solution;
+    let text = jobs.answer(id).await?;
     let read = move || {
         let solution: Solution =
             serde_json::from_slice(&text).map_err(|error| ApiError::internal(&error))?;
+        drop(text);
         require_index("point", point, solution.total.len())?;
         require_index("patch", patch, solution.patches.len())?;
-        let sums = match format {
-            Format::Csv => sums(&solution),
-            _ => Vec::new(),
-        };
-        Ok((Resultants::select(solution, point, patch), sums))
+        let sums = sums(&solution);
+        let resultants = Resultants::select(solution, point, patch);
+        match format {
+            Format::Csv => csv(&resultants, &sums).map_err(|error| ApiError::internal(&error)),
+            _ => serde_json::to_vec(&resultants).map_err(|error| ApiError::internal(&error)),
+        }
     };
-    // The text is made when the client takes it.
-    let (read, share) = turn
-        .run(read, |(resultants, sums)| {
-            resultants.bytes() + size_of_val(&**sums)
-        })
-        .await?;
-    let (resultants, sums) = read;
-    let body = match format {
-        Format::Csv => csv_body(resultants, sums),
-        _ => json_body(resultants).map_err(|error| ApiError::internal(&error))?,
-    };
+    let (body, share) = turn.run(read, Vec::len).await?;
     let response = format.answer("resultants", body);
     Ok(hold_while_sent(response, share))
 }

@@ -31,6 +31,7 @@ use crate::jobs::codec::table::{RowTable, TableKind};
 use crate::jobs::model::kind::Kind;
 use crate::jobs::run::model::Run;
 use crate::jobs::run::results::ChunkRef;
+use crate::jobs::sync::blocking;
 use crate::jobs::{Jobs, JobsError};
 
 /// What a reader of answers holds: a chunk as columns and as text.
@@ -271,7 +272,7 @@ impl Answers {
             let table = self.source.answers(&chunk, self.wanted.clone()).await?;
             let place = |row: u64| usize::try_from(row - own.start).unwrap_or(usize::MAX);
             let cut = place(common.start)..place(common.end);
-            let written = tokio::task::spawn_blocking(move || {
+            let written = blocking(move || {
                 let piece = writer.write(table.cut(&cut));
                 (piece, writer)
             });

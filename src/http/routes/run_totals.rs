@@ -16,6 +16,7 @@ use crate::http::limits::memory::Memory;
 use crate::http::problem::error::ApiError;
 use crate::http::routes::run_results::{ChunkSource, RunResultProblems, require_ended, selected};
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+use crate::jobs::sync::blocking;
 
 /// Columns whose totals are made when none are named.
 const COLUMNS: [&str; 4] = [
@@ -154,13 +155,11 @@ pub(crate) async fn totals(
     }
     let percentiles = query.percentiles.unwrap_or_else(|| PERCENTILES.to_vec());
     let above = query.above.unwrap_or_default();
-    let work = tokio::task::spawn_blocking(move || {
+    let totals = blocking(move || {
         let _share = share;
         gathered.totals(&percentiles, &above)
     });
-    work.await
-        .map(Json)
-        .map_err(|error| ApiError::internal(&error))
+    Ok(Json(totals.await?))
 }
 
 /// How rows are told apart.

@@ -2,36 +2,33 @@
 
 use axum::response::Response;
 use serde::Serialize;
+use serde_json::json;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::http::dto::cells::{Cells, GriddedField, Outlines, per_cell};
+use crate::http::dto::cells::{Cells, GriddedField, Outlines};
 use crate::http::extract::query::require_index;
 use crate::http::problem::error::ApiError;
-use crate::http::render::format::Format;
 use crate::http::render::table::File;
-use crate::http::routes::fields::{Field, FieldQuery, Selection, Written, write, write_file};
+use crate::http::routes::fields::{FieldQuery, FieldValues, Selection};
 use crate::http::routes::part_request::PartRequest;
 use crate::http::routes::stored_fields::{FieldProblems, not_asked, stored};
 use crate::jobs::Jobs;
 
 /// Stick and slip zones of one patch for one motion.
-#[derive(Debug, Serialize, ToSchema)]
+#[derive(Serialize, ToSchema)]
 #[serde(untagged)]
+#[expect(dead_code, reason = "describes an answer in the contract")]
 pub(crate) enum Zones {
     /// Without `grid`: areas, outlines and the zone of every cell.
     PerCell(ZoneCells),
     /// With `grid`: the zone of the nearest cell, resampled.
-    #[expect(
-        dead_code,
-        reason = "for the contract; its text is written piece by piece"
-    )]
     Gridded(GriddedField),
 }
 
 /// Areas, outlines and the zone of every cell.
-#[derive(Debug, Serialize, ToSchema)]
+#[derive(Serialize, ToSchema)]
 pub(crate) struct ZoneCells {
     /// Number of the patch, counted from 0.
     patch: usize,
@@ -86,64 +83,41 @@ async fn cells(request: &PartRequest, selection: Selection) -> Result<Response, 
     let shown = Output::Zones;
     let (jobs, id) = (&request.jobs, request.id);
     let rendering = request.rendering(selection.bytes()).await?;
-    let Some(sizes) = zone_sizes(jobs, id, selection).await? else {
+    let Some(sizes) = sizes_of_zones(jobs, id, selection).await? else {
         return not_asked(jobs, id, shown).await;
     };
-    let (patch, point) = (selection.patch, selection.point);
-    let (fields, values) = stored(jobs, id, patch, point, shown).await?;
-    let written = write(rendering, selection, "zones", move |format| {
-        if selection.grid.is_some() || format != Format::Json {
-            let (mut table, outlines) = Field::of(selection, &[shown], fields, values).into();
-            table.precision = selection.precision;
-            return match format {
-                Format::Json | Format::Csv => Ok(Written::Table(table, outlines)),
-                _ => write_file(&table, &outlines, selection, "zones"),
-            };
-        }
-        let zones = Zones::PerCell(ZoneCells {
-            patch,
-            point,
-            stick_area_mm2: sizes.stick_area_mm2,
-            slip_area_mm2: sizes.slip_area_mm2,
-            stick_cells: sizes.stick_cells,
-            slip_cells: sizes.slip_cells,
-            outlines: Outlines::of(&fields, &values, true),
-            cells: per_cell(fields, values, &[shown]),
-        });
-        let text = serde_json::to_vec(&zones);
-        Ok(Written::Whole(
-            text.map_err(|error| ApiError::internal(&error))?,
-        ))
-    });
-    written.await
+    let (cells, values) = stored(jobs, id, selection.patch, selection.point, shown).await?;
+    let field = FieldValues {
+        outputs: vec![shown],
+        cells,
+        values,
+        members: match selection.grid {
+            None => sizes,
+            Some(_) => String::new(),
+        },
+    };
+    field.write(rendering, selection, "zones").await
 }
 
-/// The areas and cells of the zones of one patch for one motion.
-struct ZoneSizes {
-    stick_area_mm2: f64,
-    slip_area_mm2: f64,
-    stick_cells: u32,
-    slip_cells: u32,
-}
-
-/// Nothing if the case did not ask for zones.
-async fn zone_sizes(
+/// The areas and numbers of cells of the zones as members of JSON; `None` if the case did not ask for zones.
+async fn sizes_of_zones(
     jobs: &Jobs,
     id: Uuid,
     selection: Selection,
-) -> Result<Option<ZoneSizes>, ApiError> {
+) -> Result<Option<String>, ApiError> {
     let solution = jobs.solution(id).await?;
     require_index("patch", Some(selection.patch), solution.patches.len())?;
     let points = &solution.patches[selection.patch].points;
     require_index("point", Some(selection.point), points.len())?;
     let point = &points[selection.point];
     let sizes = || {
-        Some(ZoneSizes {
-            stick_area_mm2: point.stick_area_mm2?,
-            slip_area_mm2: point.slip_area_mm2?,
-            stick_cells: point.stick_cells?,
-            slip_cells: point.slip_cells?,
-        })
+        Some([
+            ("stick_area_mm2", json!(point.stick_area_mm2?)),
+            ("slip_area_mm2", json!(point.slip_area_mm2?)),
+            ("stick_cells", json!(point.stick_cells?)),
+            ("slip_cells", json!(point.slip_cells?)),
+        ])
     };
-    Ok(sizes())
+    let member = |(name, value)| format!(",\"{name}\":{value}");
+    Ok(sizes().map(|sizes| sizes.map(member).concat()))
 }

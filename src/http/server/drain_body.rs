@@ -5,7 +5,7 @@
 //! long rest the connection closes, which the answer announces.
 
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
@@ -17,6 +17,8 @@ use axum::response::Response;
 use http_body_util::{BodyExt, Limited};
 use hyper::body::{Frame, SizeHint};
 use tokio::time::timeout;
+
+use crate::jobs::sync::lock;
 
 /// Longest rest in bytes after which the connection is used again.
 const SHORT_BYTES: u64 = 1 << 20;
@@ -38,7 +40,7 @@ pub(crate) async fn drain_body(request: Request, next: Next) -> Response {
     let kept = slot.clone();
     let request = request.map(|body| Body::new(DrainableBody(Some(body), kept)));
     let mut response = next.run(request).await;
-    let rest = slot.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let rest = lock(&slot).take();
     if let Some(rest) = rest {
         if asks || rest.size_hint().lower() > SHORT_BYTES {
             let close = HeaderValue::from_static("close");
@@ -89,7 +91,7 @@ impl HttpBody for DrainableBody {
 impl Drop for DrainableBody {
     fn drop(&mut self) {
         if let Some(body) = self.0.take().filter(|body| !body.is_end_stream()) {
-            let mut slot = self.1.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut slot = lock(&self.1);
             *slot = Some(body);
         }
     }

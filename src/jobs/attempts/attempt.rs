@@ -15,7 +15,7 @@
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use tokio_util::sync::CancellationToken;
@@ -31,6 +31,7 @@ use crate::jobs::attempts::solver_thread::SolverThread;
 use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::Claim;
 use crate::jobs::store::submission::ClaimedCase;
+use crate::jobs::sync::lock;
 
 /// One claimed job.
 #[derive(Debug)]
@@ -119,10 +120,7 @@ impl Attempt {
     /// Takes the outcomes that there are.
     pub(crate) fn take_outcomes(&mut self) {
         if let Some(solver) = &self.solver {
-            let mut outcomes = solver
-                .outcomes
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner);
+            let mut outcomes = lock(&solver.outcomes);
             for (place, outcome) in outcomes.drain(..) {
                 self.members[place].phase = Phase::Solved(outcome);
             }

@@ -1,33 +1,33 @@
 //! The control block of one attempt: flags that the solver's thread and the async side share.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use std::time::{Duration, Instant};
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::jobs::attempts::pause_point::PausePoint;
+use crate::jobs::sync::lock;
 
 /// Why a running solve was told to stop. The first reason given stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
 pub enum StopReason {
     /// The client cancelled the job.
-    Cancel = 1,
+    Cancel,
     /// The service shuts down; the job goes back to the queue.
-    Shutdown = 2,
+    Shutdown,
     /// The lease is lost; whatever comes out is discarded.
-    Lost = 3,
+    Lost,
     /// The deadline of the job has passed.
-    Deadline = 4,
+    Deadline,
     /// It takes longer than was expected, and no pause point is free to hold it; the job goes back to the queue.
-    TooLong = 5,
+    TooLong,
 }
 
 /// One attempt at a job. The solver ticks; the async side reads the progress and stops it.
 #[derive(Debug, Default)]
 pub struct AttemptControl {
-    reason: AtomicU8,
+    reason: OnceLock<StopReason>,
     ticks: AtomicU64,
     progress: AtomicU64,
     clock: Mutex<SolveClock>,
@@ -103,29 +103,20 @@ impl AttemptControl {
     }
 
     fn clock(&self) -> MutexGuard<'_, SolveClock> {
-        self.clock.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.clock)
     }
 
     /// Tells the solver to stop at its next tick.
     pub fn stop(&self, reason: StopReason) {
         // A second reason changes nothing: the solver is stopping already.
-        let _ = self
-            .reason
-            .compare_exchange(0, reason as u8, Ordering::AcqRel, Ordering::Acquire);
+        let _ = self.reason.set(reason);
         self.pause_point.nudge();
     }
 
     /// Why the solver was told to stop, if it was.
     #[must_use]
     pub fn reason(&self) -> Option<StopReason> {
-        match self.reason.load(Ordering::Acquire) {
-            1 => Some(StopReason::Cancel),
-            2 => Some(StopReason::Shutdown),
-            3 => Some(StopReason::Lost),
-            4 => Some(StopReason::Deadline),
-            5 => Some(StopReason::TooLong),
-            _ => None,
-        }
+        self.reason.get().copied()
     }
 
     /// How often the solver has ticked. If this stands still, so does the solver.

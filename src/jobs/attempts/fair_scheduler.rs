@@ -3,11 +3,12 @@
 //! The seconds are kept in memory, by the process that spends them, and fade: what counts is the last minutes.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use crate::jobs::attempts::attempt::{Attempt, TimeSpentOn};
 use crate::jobs::model::kind::{Kind, Queue};
+use crate::jobs::sync::lock;
 
 /// Time after which a solver second counts half.
 const HALF_LIFE: Duration = Duration::from_secs(60);
@@ -160,7 +161,7 @@ impl FairScheduler {
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0)
     }
 }
 

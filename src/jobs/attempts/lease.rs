@@ -5,13 +5,14 @@
 //! are renewed all the same. A worker gives up by the process' own clock before the table would give its jobs away.
 
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, Weak};
 
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::store::claim::Claim;
+use crate::jobs::sync::lock;
 
 /// The leases of an attempt. They are no longer renewed once this is dropped.
 #[derive(Debug)]
@@ -50,7 +51,7 @@ impl AllLeases {
     }
 
     fn lock(&self) -> MutexGuard<'_, Vec<Weak<HeldLeases>>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0)
     }
 }
 
@@ -99,7 +100,7 @@ impl HeldLeases {
     }
 
     pub(crate) fn leases(&self) -> MutexGuard<'_, Vec<(Claim, Arc<AttemptControl>)>> {
-        self.leases.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.leases)
     }
 
     pub(crate) fn ticks(&self) -> u64 {

@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::Notify;
 
+use crate::jobs::sync::lock;
+
 /// The pause point of the threads of one attempt.
 #[derive(Debug, Default)]
 pub struct PausePoint {
@@ -92,7 +94,7 @@ impl PausePoint {
     }
 
     fn lock(&self) -> MutexGuard<'_, PauseTime> {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.waiting)
     }
 }
 

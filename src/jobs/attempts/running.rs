@@ -1,11 +1,12 @@
 //! The attempts of this process, found by their jobs.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt_control::AttemptControl;
+use crate::jobs::sync::lock;
 
 /// The attempts of this process; clones share them.
 #[derive(Debug, Clone, Default)]
@@ -41,7 +42,7 @@ impl RunningAttempts {
     }
 
     fn lock(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<AttemptControl>>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0)
     }
 }
 

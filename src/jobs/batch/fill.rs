@@ -12,6 +12,7 @@ use crate::jobs::handle::Jobs;
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::submit_options::SubmitOptions;
 use crate::jobs::store::submission::{BatchBegun, NewBatch, NewJob};
+use crate::jobs::sync::blocking;
 use crate::jobs::trace::KeyValue;
 
 /// Jobs queued in one transaction.
@@ -123,13 +124,11 @@ impl Jobs {
             if self.shared.stopping.is_cancelled() {
                 return Err(JobsError::Draining);
             }
-            let taken = tokio::task::spawn_blocking(move || {
+            let taken = blocking(move || {
                 let cases = reader.take(CHUNK_JOBS, CHUNK_BYTES);
                 (reader, cases)
             });
-            let (back, cases) = taken
-                .await
-                .map_err(|error| JobsError::Damaged(error.to_string()))?;
+            let (back, cases) = taken.await?;
             reader = back;
             let cases = cases.map_err(|source| self.staging_failed(source))?;
             if cases.is_empty() {

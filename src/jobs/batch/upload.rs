@@ -150,10 +150,9 @@ impl BatchUpload {
             return Ok(());
         };
         let kept = match wrapped || named {
-            true => serde_json::to_vec(&case),
-            false => Ok(text.to_owned()),
+            true => case.to_string().into_bytes(),
+            false => text.to_owned(),
         };
-        let kept = kept.map_err(|error| JobsError::Damaged(error.to_string()))?;
         self.digest.update(&idempotency::digest(&case));
         let checked = self.jobs.check(&case);
         self.keep(line, checked, prefix, (false, own), &kept)
@@ -224,10 +223,9 @@ impl BatchUpload {
         let Some(case) = self.with_profiles(line, case, "")? else {
             return Ok(());
         };
-        let kept = serde_json::to_vec(&case);
-        let kept = kept.map_err(|error| JobsError::Damaged(error.to_string()))?;
+        let kept = case.to_string();
         let checked = self.jobs.check(&case);
-        self.keep(line, checked, "", (false, own), &kept)
+        self.keep(line, checked, "", (false, own), kept.as_bytes())
     }
 
     /// The case with kept profiles in the place of their names; nothing if one is not kept, which is noted.
@@ -239,11 +237,8 @@ impl BatchUpload {
     ) -> Result<Option<Value>, JobsError> {
         match self.jobs.with_profiles_here(case, &mut self.profiles) {
             Ok(case) => Ok(Some(case)),
-            Err(JobsError::Case(CaseError(mut faults))) => {
-                for fault in &mut faults {
-                    fault.pointer.insert_str(0, prefix);
-                }
-                self.reject(line, faults);
+            Err(JobsError::Case(CaseError(faults))) => {
+                self.reject_within(line, faults, prefix);
                 Ok(None)
             }
             Err(error) => Err(error),
@@ -262,11 +257,8 @@ impl BatchUpload {
     ) -> Result<(), JobsError> {
         self.count(body.len())?;
         self.digest.update(body);
-        let index = self.cases;
-        self.cases += 1;
-        self.require_place()?;
         let staged = StagedCase {
-            index,
+            index: self.cases,
             row: true,
             method: method.to_owned(),
             outputs: outputs_text(&[]),
@@ -277,11 +269,18 @@ impl BatchUpload {
             labels: BTreeMap::new(),
             own: CaseOptions::default(),
         };
+        self.stage(&staged, body)
+    }
+
+    /// Counts the next case as a good one and stages what is kept of it.
+    fn stage(&mut self, staged: &StagedCase, kept: &[u8]) -> Result<(), JobsError> {
+        self.cases += 1;
+        self.require_place()?;
         let Some(staging) = &mut self.staging else {
             return Ok(());
         };
-        self.kept += body.len() as u64;
-        let written = staging.push(&staged, body);
+        self.kept += kept.len() as u64;
+        let written = staging.push(staged, kept);
         written.map_err(|source| self.jobs.staging_failed(source))
     }
 
@@ -300,6 +299,14 @@ impl BatchUpload {
                 None
             }
         }
+    }
+
+    /// As `reject`, of a case that stands at `prefix` in what was sent.
+    fn reject_within(&mut self, line: Option<u64>, mut faults: Vec<Fault>, prefix: &str) {
+        for fault in &mut faults {
+            fault.pointer.insert_str(0, prefix);
+        }
+        self.reject(line, faults);
     }
 
     /// Counts a faulty case and keeps its faults.
@@ -336,19 +343,12 @@ impl BatchUpload {
         let checked = match bound {
             Ok(checked) => checked,
             Err(error) => {
-                let mut faults = error.0;
-                for fault in &mut faults {
-                    fault.pointer.insert_str(0, prefix);
-                }
-                self.reject(line, faults);
+                self.reject_within(line, error.0, prefix);
                 return Ok(());
             }
         };
-        let index = self.cases;
-        self.cases += 1;
-        self.require_place()?;
         let staged = StagedCase {
-            index,
+            index: self.cases,
             row,
             method: checked.run.method.name().to_owned(),
             outputs: outputs_text(&checked.run.outputs),
@@ -359,12 +359,7 @@ impl BatchUpload {
             labels: checked.label.labels,
             own,
         };
-        let Some(staging) = &mut self.staging else {
-            return Ok(());
-        };
-        self.kept += kept.len() as u64;
-        let written = staging.push(&staged, kept);
-        written.map_err(|source| self.jobs.staging_failed(source))
+        self.stage(&staged, kept)
     }
 
     fn count(&mut self, bytes: usize) -> Result<(), JobsError> {

@@ -1,11 +1,11 @@
 //! Finds the key of a request, in memory if it was found a moment ago, else in the store.
 
-use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::key::{Key, MARK};
+use crate::jobs::sync::lock;
 
 /// How long a valid key is not read again; a revoked one stops working within this time.
 const TRUSTED_FOR: Duration = Duration::from_secs(1);
@@ -18,8 +18,7 @@ impl Jobs {
     #[must_use]
     pub fn remembered_key(&self, text: &str) -> Option<Key> {
         let id = id_of(text)?;
-        let trusted = self.shared.trusted.lock();
-        let trusted = trusted.unwrap_or_else(PoisonError::into_inner);
+        let trusted = lock(&self.shared.trusted);
         let (key, since) = trusted.get(id)?;
         let good = since.elapsed() < TRUSTED_FOR && key.hash == blake3::hash(text.as_bytes());
         good.then(|| key.clone())
@@ -34,11 +33,7 @@ impl Jobs {
             return Ok(None);
         };
         let hash = blake3::hash(text.as_bytes());
-        let trusted = || {
-            let trusted = &self.shared.trusted;
-            trusted.lock().unwrap_or_else(PoisonError::into_inner)
-        };
-        if let Some((key, since)) = trusted().get(id)
+        if let Some((key, since)) = lock(&self.shared.trusted).get(id)
             && since.elapsed() < TRUSTED_FOR
         {
             return Ok((key.hash == hash).then(|| key.clone()));
@@ -47,7 +42,7 @@ impl Jobs {
         let now = Instant::now();
         let found = self.shared.store.key(id).await?;
         let good = found.filter(|key| key.hash == hash && key.revoked_at.is_none());
-        let mut trusted = trusted();
+        let mut trusted = lock(&self.shared.trusted);
         match &good {
             Some(key) => {
                 if trusted.len() >= REMEMBERED {

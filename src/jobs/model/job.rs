@@ -124,61 +124,29 @@ pub enum FailureKind {
     Internal,
 }
 
-impl FailureKind {
-    /// Every kind there is.
-    pub const ALL: [FailureKind; 7] = [
-        FailureKind::NotConverged,
-        FailureKind::Unsolvable,
-        FailureKind::OutOfTime,
-        FailureKind::DeadlinePassed,
-        FailureKind::Panic,
-        FailureKind::WorkerLost,
-        FailureKind::Internal,
-    ];
+names! {
+    pub FailureKind {
+        NotConverged = "not_converged",
+        Unsolvable = "unsolvable",
+        OutOfTime = "out_of_time",
+        DeadlinePassed = "deadline_passed",
+        Panic = "panic",
+        WorkerLost = "worker_lost",
+        Internal = "internal",
+    }
+}
 
-    /// The word for this kind in the database and the metrics.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            FailureKind::NotConverged => "not_converged",
-            FailureKind::Unsolvable => "unsolvable",
-            FailureKind::OutOfTime => "out_of_time",
-            FailureKind::DeadlinePassed => "deadline_passed",
-            FailureKind::Panic => "panic",
-            FailureKind::WorkerLost => "worker_lost",
-            FailureKind::Internal => "internal",
-        }
+names! {
+    pub State {
+        Queued = "queued",
+        Running = "running",
+        Succeeded = "succeeded",
+        Failed = "failed",
+        Cancelled = "cancelled",
     }
 }
 
 impl State {
-    /// Every state, in the order a job meets them.
-    pub const ALL: [State; 5] = [
-        State::Queued,
-        State::Running,
-        State::Succeeded,
-        State::Failed,
-        State::Cancelled,
-    ];
-
-    /// The word for this state in the database, the API and the logs.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            State::Queued => "queued",
-            State::Running => "running",
-            State::Succeeded => "succeeded",
-            State::Failed => "failed",
-            State::Cancelled => "cancelled",
-        }
-    }
-
-    /// The state of that name, if there is one.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<State> {
-        State::ALL.into_iter().find(|state| state.name() == name)
-    }
-
     /// Nothing will change any more.
     #[must_use]
     pub fn ended(self) -> bool {

@@ -16,18 +16,16 @@ pub enum Kind {
     Evolution,
 }
 
-impl Kind {
-    /// The name under which the kind is stored.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Case => "case",
-            Kind::Cases => "cases",
-            Kind::Rows => "rows",
-            Kind::Evolution => "evolution",
-        }
+names! {
+    pub Kind {
+        Case = "case",
+        Cases = "cases",
+        Rows = "rows",
+        Evolution = "evolution",
     }
+}
 
+impl Kind {
     /// What clients call work of this kind.
     #[must_use]
     pub fn noun(self) -> &'static str {
@@ -48,13 +46,6 @@ impl Kind {
             Kind::Rows => "runs",
             Kind::Evolution => "evolutions",
         }
-    }
-
-    /// The kind with this name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Kind> {
-        let mut all = [Kind::Case, Kind::Cases, Kind::Rows, Kind::Evolution].into_iter();
-        all.find(|kind| kind.name() == name)
     }
 
     /// The kind of a single job of this work.

@@ -19,26 +19,15 @@ pub enum Priority {
     Low,
 }
 
+names! {
+    pub Priority {
+        High = "high",
+        Normal = "normal",
+        Low = "low",
+    }
+}
+
 impl Priority {
-    /// Every priority, the first to be solved first.
-    pub const ALL: [Priority; 3] = [Priority::High, Priority::Normal, Priority::Low];
-
-    /// The word for it in the API.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Priority::High => "high",
-            Priority::Normal => "normal",
-            Priority::Low => "low",
-        }
-    }
-
-    /// The priority of that name, if there is one.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Priority> {
-        Priority::ALL.into_iter().find(|one| one.name() == name)
-    }
-
     /// The number for it in the database: its place in [`Priority::ALL`].
     pub(crate) fn rank(self) -> i64 {
         match self {

@@ -26,6 +26,7 @@ use crate::jobs::run::chunk::RunChunk;
 use crate::jobs::run::head::{REASON, RunColumn, RunHead};
 use crate::jobs::run::model::Run;
 use crate::jobs::submit::microseconds;
+use crate::jobs::sync::blocking;
 
 /// Expected solve time of a chunk in s: much longer than a claim takes, shorter than a lease, and soon done again.
 const CHUNK_SECONDS: f64 = 3.0;
@@ -134,10 +135,7 @@ impl Jobs {
         draft: RunDraft,
         options: RunOptions,
     ) -> Result<(Run, bool), JobsError> {
-        let finished = tokio::task::spawn_blocking(move || draft.finish());
-        let mut upload = finished
-            .await
-            .map_err(|error| JobsError::Damaged(error.to_string()))??;
+        let mut upload = blocking(move || draft.finish()).await??;
         upload.name = options.name;
         upload.labels = options.labels;
         upload.options = SubmitOptions {

@@ -14,6 +14,7 @@ use crate::jobs::model::job::State;
 use crate::jobs::run::chunk::{RunChunk, parted};
 use crate::jobs::run::head::{RunHead, table_column};
 use crate::jobs::run::model::Run;
+use crate::jobs::sync::blocking;
 
 /// Chunks that are read from the table of jobs at once. Chosen by judgement: one statement for so many files, which take far longer.
 const AT_ONCE: u32 = 64;
@@ -114,9 +115,7 @@ impl Jobs {
             return self.without_answers(head, chunk, wanted.as_deref()).await;
         };
         let file = self.shared.blobs.chunk_answers(key).await?;
-        let read = tokio::task::spawn_blocking(move || read_answers(file, wanted.as_deref()));
-        read.await
-            .map_err(|error| JobsError::Damaged(error.to_string()))?
+        blocking(move || read_answers(file, wanted.as_deref())).await?
     }
 
     async fn without_answers(

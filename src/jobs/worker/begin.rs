@@ -1,7 +1,7 @@
 //! The beginning of an attempt: its jobs are listed as running, their leases kept, its work handed to a thread.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use tokio_util::sync::CancellationToken;
@@ -16,6 +16,7 @@ use crate::jobs::model::job::{Failure, FailureKind};
 use crate::jobs::model::kind::Queue;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::claim::Claim;
+use crate::jobs::sync::lock;
 use crate::jobs::worker::heartbeat;
 use crate::jobs::worker::solve::solve_guarded;
 
@@ -96,7 +97,7 @@ pub(crate) fn begin(
                 let from_queue = matches!(work, Work::New(..));
                 let solve = || solve_guarded(&shared, &control, work);
                 let outcome = JobTrace::solving(traced.as_ref(), from_queue, solve);
-                let mut outcomes = outcomes.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut outcomes = lock(&outcomes);
                 outcomes.push((place, outcome));
                 lease.alive();
             }

@@ -1,8 +1,8 @@
 //! The scale of a heat map.
 
+use crate::http::render::picture::chart::label;
 use crate::http::render::picture::colour::{VIRIDIS_PLACES, at};
 use crate::http::render::picture::frame::{Frame, exponent, ticks};
-use crate::http::render::picture::layers::label;
 use crate::http::render::picture::scene::Heat;
 use crate::http::render::picture::svg::{Anchor, Svg, px};
 

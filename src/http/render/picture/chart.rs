@@ -1,15 +1,34 @@
 //! Axes that have a scale each, for curves and sections; a patch alone has the same along both.
 
-use std::fmt::Write;
-
 use crate::http::render::picture::frame::{WIDTH, ticks};
-use crate::http::render::picture::layers::label;
 use crate::http::render::picture::svg::{Anchor, FONTS, Svg, escape, px, shorten};
 
 /// Characters of a title that fit.
 const TITLE_MAX: usize = 74;
 /// Distance of the ticks of an axis, about.
 const TICK_SPACING: [f64; 2] = [90.0, 55.0];
+
+/// Thin lines across the area at these places.
+pub(super) fn grid_lines(
+    svg: &mut Svg,
+    [left, top, width, height]: [f64; 4],
+    xs: impl Iterator<Item = f64>,
+    ys: impl Iterator<Item = f64>,
+) {
+    let upright = xs.map(|x| format!("M{} {}v{}", px(x), px(top), px(height)));
+    let level = ys.map(|y| format!("M{} {}h{}", px(left), px(y), px(width)));
+    let data: String = upright.chain(level).collect();
+    svg.path(&data, "fill=\"none\" stroke=\"#e6e6e6\"");
+}
+
+/// The border of the area.
+pub(super) fn border(svg: &mut Svg, area: [f64; 4]) {
+    let [x, y, width, height] = area.map(px);
+    svg.element(
+        "rect",
+        &format!("x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" fill=\"none\" stroke=\"#333\""),
+    );
+}
 
 /// Maps numbers to the plotting area; the second of a pair may be the smaller one.
 #[derive(Debug, Clone, Copy)]
@@ -35,40 +54,20 @@ impl Chart {
 
     /// Lines at the ticks, below what is drawn.
     pub(super) fn grid(&self, svg: &mut Svg) {
-        let [left, top, width, height] = self.area;
-        let mut data = String::new();
-        for tick in self.ticks(0).0 {
-            let _ = write!(
-                data,
-                "M{} {}v{}",
-                px(self.at(tick, self.y[0]).0),
-                px(top),
-                px(height)
-            );
-        }
-        for tick in self.ticks(1).0 {
-            let _ = write!(
-                data,
-                "M{} {}h{}",
-                px(left),
-                px(self.at(self.x[0], tick).1),
-                px(width)
-            );
-        }
-        svg.path(&data, "fill=\"none\" stroke=\"#e6e6e6\"");
+        let xs = self.ticks(0).0.into_iter();
+        let ys = self.ticks(1).0.into_iter();
+        grid_lines(
+            svg,
+            self.area,
+            xs.map(|tick| self.at(tick, self.y[0]).0),
+            ys.map(|tick| self.at(self.x[0], tick).1),
+        );
     }
 
     /// Frame, numbers and names, above what is drawn.
     pub(super) fn axes(&self, svg: &mut Svg, [x_name, y_name]: [&str; 2]) {
         let [left, top, width, height] = self.area;
-        let place = self.area.map(px);
-        svg.element(
-            "rect",
-            &format!(
-                "x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#333\"",
-                place[0], place[1], place[2], place[3]
-            ),
-        );
+        border(svg, self.area);
         let (values, digits) = self.ticks(0);
         for tick in values {
             let at = self.at(tick, self.y[0]).0;
@@ -132,6 +131,17 @@ pub(super) fn roomy(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
         length => 0.06 * length,
     };
     [low - room, high + room]
+}
+
+/// A number at a tick; never a minus before zero.
+pub(super) fn label(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    let text = if text.trim_start_matches(['-', '0', '.']).is_empty() {
+        text.trim_start_matches('-').to_owned()
+    } else {
+        text
+    };
+    text.replace('-', "−")
 }
 
 #[cfg(test)]

@@ -31,34 +31,33 @@ pub(super) struct Frame {
 impl Frame {
     /// Shows a box `[x_min, x_max, y_min, y_max]` in mm with a margin around it.
     #[must_use]
-    pub(super) fn around([x0, x1, y0, y1]: [f64; 4]) -> Frame {
-        let wide = ((x1 - x0) * (1.0 + 2.0 * MARGIN)).max(f64::MIN_POSITIVE);
-        let high = ((y1 - y0) * (1.0 + 2.0 * MARGIN)).max(f64::MIN_POSITIVE);
-        let height = (AREA_WIDTH * high / wide).clamp(AREA_HEIGHT[0], AREA_HEIGHT[1]);
-        let scale = (AREA_WIDTH / wide).min(height / high);
-        let (half_x, half_y) = (0.5 * AREA_WIDTH / scale, 0.5 * height / scale);
-        let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
-        Frame {
-            area: [LEFT, TOP, AREA_WIDTH, height],
-            shown: [x - half_x, x + half_x, y - half_y, y + half_y],
-            scale,
-        }
+    pub(super) fn around(shown: [f64; 4]) -> Frame {
+        Frame::fitted(shown, MARGIN, [LEFT, TOP, AREA_WIDTH], AREA_HEIGHT)
     }
 
     /// Shows a box alone, `width` units wide, without room for axes.
     #[must_use]
-    pub(super) fn alone([x0, x1, y0, y1]: [f64; 4], width: f64) -> Frame {
+    pub(super) fn alone(shown: [f64; 4], width: f64) -> Frame {
         let inner = width - 2.0 * ALONE_MARGIN;
-        let (wide, high) = (
-            (x1 - x0).max(f64::MIN_POSITIVE),
-            (y1 - y0).max(f64::MIN_POSITIVE),
-        );
-        let height = (inner * high / wide).clamp(0.25 * inner, 1.5 * inner);
-        let scale = (inner / wide).min(height / high);
-        let (half_x, half_y) = (0.5 * inner / scale, 0.5 * height / scale);
+        let place = [ALONE_MARGIN, ALONE_MARGIN, inner];
+        Frame::fitted(shown, 0.0, place, [0.25 * inner, 1.5 * inner])
+    }
+
+    /// Shows a box with a share of it as margin, in an area whose height follows within limits.
+    fn fitted(
+        [x0, x1, y0, y1]: [f64; 4],
+        margin: f64,
+        [left, top, width]: [f64; 3],
+        [lowest, highest]: [f64; 2],
+    ) -> Frame {
+        let wide = ((x1 - x0) * (1.0 + 2.0 * margin)).max(f64::MIN_POSITIVE);
+        let high = ((y1 - y0) * (1.0 + 2.0 * margin)).max(f64::MIN_POSITIVE);
+        let height = (width * high / wide).clamp(lowest, highest);
+        let scale = (width / wide).min(height / high);
+        let (half_x, half_y) = (0.5 * width / scale, 0.5 * height / scale);
         let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
         Frame {
-            area: [ALONE_MARGIN, ALONE_MARGIN, inner, height],
+            area: [left, top, width, height],
             shown: [x - half_x, x + half_x, y - half_y, y + half_y],
             scale,
         }

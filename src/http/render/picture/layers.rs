@@ -5,6 +5,7 @@ use std::fmt::Write;
 use crate::contact::case::words::solver::Output;
 use crate::contact::post::resample::resample;
 use crate::contact::solution::words::fields::PatchCells;
+use crate::http::render::picture::chart::{border, grid_lines, label};
 use crate::http::render::picture::colour::{SLIP, STICK};
 use crate::http::render::picture::frame::{Frame, ticks};
 use crate::http::render::picture::scene::{Scene, extent, zones_present};
@@ -23,28 +24,22 @@ const TICKS_FEWEST: f64 = 4.0;
 
 /// Thin lines at the ticks.
 pub(super) fn grid(svg: &mut Svg, frame: &Frame) {
-    let [x, y, width, height] = frame.area;
+    let [x0, _, y0, _] = frame.shown;
+    let [xs, ys] = frame_ticks(frame).map(|(values, _)| values.into_iter());
+    grid_lines(
+        svg,
+        frame.area,
+        xs.map(|tick| frame.at(tick, y0).0),
+        ys.map(|tick| frame.at(x0, tick).1),
+    );
+}
+
+/// The ticks of both axes with their digits.
+fn frame_ticks(frame: &Frame) -> [(Vec<f64>, usize); 2] {
+    let [_, _, width, height] = frame.area;
     let [x0, x1, y0, y1] = frame.shown;
-    let mut data = String::new();
-    for tick in ticks(x0, x1, width / TICK_SPACING).0 {
-        let _ = write!(
-            data,
-            "M{} {}v{}",
-            px(frame.at(tick, y0).0),
-            px(y),
-            px(height)
-        );
-    }
-    for tick in ticks(y0, y1, (height / TICK_SPACING).max(TICKS_FEWEST)).0 {
-        let _ = write!(
-            data,
-            "M{} {}h{}",
-            px(x),
-            px(frame.at(x0, tick).1),
-            px(width)
-        );
-    }
-    svg.path(&data, "fill=\"none\" stroke=\"#e6e6e6\"");
+    let wanted = (height / TICK_SPACING).max(TICKS_FEWEST);
+    [ticks(x0, x1, width / TICK_SPACING), ticks(y0, y1, wanted)]
 }
 
 /// Arrows on a regular grid, each beginning at its sample; says whether there was anything to draw.
@@ -113,19 +108,12 @@ fn arrow_path((x, y): (f64, f64), [dx, dy]: [f64; 2]) -> String {
 /// Frame, ticks and names of the axes, and the arrow of the rolling direction.
 pub(super) fn axes(svg: &mut Svg, frame: &Frame) {
     let [x, y, width, height] = frame.area;
-    let [x0, x1, y0, y1] = frame.shown;
-    let place = [x, y, width, height].map(px);
-    svg.element(
-        "rect",
-        &format!(
-            "x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#333\"",
-            place[0], place[1], place[2], place[3]
-        ),
-    );
+    let [x0, _, y0, _] = frame.shown;
+    let [(x_ticks, x_digits), (y_ticks, y_digits)] = frame_ticks(frame);
+    border(svg, frame.area);
     let bottom = y + height;
     let mut marks = String::new();
-    let (values, digits) = ticks(x0, x1, width / TICK_SPACING);
-    for tick in values {
+    for tick in x_ticks {
         let at = frame.at(tick, y0).0;
         let _ = write!(marks, "M{} {}v5", px(at), px(bottom));
         svg.text(
@@ -133,11 +121,10 @@ pub(super) fn axes(svg: &mut Svg, frame: &Frame) {
             12.0,
             Anchor::Middle,
             "",
-            &label(tick, digits),
+            &label(tick, x_digits),
         );
     }
-    let (values, digits) = ticks(y0, y1, (height / TICK_SPACING).max(TICKS_FEWEST));
-    for tick in values {
+    for tick in y_ticks {
         let at = frame.at(x0, tick).1;
         let _ = write!(marks, "M{} {}h-5", px(x), px(at));
         svg.text(
@@ -145,7 +132,7 @@ pub(super) fn axes(svg: &mut Svg, frame: &Frame) {
             12.0,
             Anchor::End,
             "",
-            &label(tick, digits),
+            &label(tick, y_digits),
         );
     }
     svg.path(&marks, "fill=\"none\" stroke=\"#333\"");
@@ -166,17 +153,6 @@ pub(super) fn axes(svg: &mut Svg, frame: &Frame) {
         &arrow_path((end - 24.0, bottom + 35.0), [44.0, 0.0]),
         "fill=\"none\" stroke=\"#111\" stroke-width=\"1.8\"",
     );
-}
-
-/// A number at a tick; never a minus before zero.
-pub(super) fn label(value: f64, digits: usize) -> String {
-    let text = format!("{value:.digits$}");
-    let text = if text.trim_start_matches(['-', '0', '.']).is_empty() {
-        text.trim_start_matches('-').to_owned()
-    } else {
-        text
-    };
-    text.replace('-', "−")
 }
 
 /// What lines and arrows mean, below the axes.

@@ -118,29 +118,27 @@ pub(crate) async fn methods(
 ) -> Json<Capabilities> {
     let own = jobs.options();
     Json(Capabilities {
-        methods: [
-            MethodName::Auto,
-            MethodName::BoundaryElement,
-            MethodName::LiuHsu,
-            MethodName::Fastsim,
-            MethodName::Table,
-        ]
-        .map(describe_method)
-        .into(),
-        contacts: contacts(),
-        outputs: [
-            Output::Resultants,
-            Output::Zones,
-            Output::Tractions,
-            Output::Pressure,
-            Output::Slip,
-            Output::Subsurface,
-            Output::Damage,
-            Output::Temperature,
-            Output::Gradients,
-        ]
-        .map(describe_output)
-        .into(),
+        methods: METHODS
+            .map(|(name, summary)| MethodCapability {
+                name,
+                default: name == MethodName::default(),
+                summary,
+            })
+            .into(),
+        contacts: CONTACTS
+            .map(|(name, needs_load, summary)| ContactCapability {
+                name,
+                needs_load,
+                summary,
+            })
+            .into(),
+        outputs: OUTPUTS
+            .map(|(name, default, summary)| OutputCapability {
+                name,
+                default,
+                summary,
+            })
+            .into(),
         limits: RequestLimits {
             body_max_bytes: options.body_max_bytes,
             wait_max_seconds: WAIT_MAX_SECONDS,
@@ -161,102 +159,110 @@ pub(crate) async fn methods(
     })
 }
 
-fn describe_method(method: MethodName) -> MethodCapability {
-    let summary = match method {
-        MethodName::Auto => {
-            "Resultants by `table` for elliptic contacts of like bodies with one coefficient of friction and given creepages, where the bound of its \
-             error meets `target_error`, and else by `boundary_element`. Values per cell are by `boundary_element`."
-        }
-        MethodName::BoundaryElement => {
-            "Boundary elements with a semismooth Newton iteration: fast, for every motion and any shape of patch."
-        }
-        MethodName::LiuHsu => {
-            "The Newton–Raphson method of Liu and Hsu with its two initial guesses. Slower, for small meshes; \
-             it does not converge at every spin and then says so."
-        }
-        MethodName::Fastsim => {
-            "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one."
-        }
-        MethodName::Table => {
-            "Resultants and their derivatives interpolated in a table that `boundary_element` made, in about a microsecond, with a \
-             bound of the error: elliptic patches with a/b from 0.1 to 10, others by the ellipse that carries their load the same way."
-        }
-    };
-    MethodCapability {
-        name: method,
-        default: method == MethodName::default(),
-        summary,
-    }
-}
+/// Methods with what they are for.
+const METHODS: [(MethodName, &str); 5] = [
+    (
+        MethodName::Auto,
+        "Resultants by `table` for elliptic contacts of like bodies with one coefficient of friction and given creepages, where the bound of its \
+         error meets `target_error`, and else by `boundary_element`. Values per cell are by `boundary_element`.",
+    ),
+    (
+        MethodName::BoundaryElement,
+        "Boundary elements with a semismooth Newton iteration: fast, for every motion and any shape of patch.",
+    ),
+    (
+        MethodName::LiuHsu,
+        "The Newton–Raphson method of Liu and Hsu with its two initial guesses. Slower, for small meshes; \
+         it does not converge at every spin and then says so.",
+    ),
+    (
+        MethodName::Fastsim,
+        "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one.",
+    ),
+    (
+        MethodName::Table,
+        "Resultants and their derivatives interpolated in a table that `boundary_element` made, in about a microsecond, with a \
+         bound of the error: elliptic patches with a/b from 0.1 to 10, others by the ellipse that carries their load the same way.",
+    ),
+];
 
-fn describe_output(output: Output) -> OutputCapability {
-    let (default, summary) = match output {
-        Output::Resultants => (true, "Forces, moment and dissipated power."),
-        Output::Zones => (true, "Stick and slip zones: cells, areas and outlines."),
-        Output::Tractions => (false, "Tangential tractions per cell."),
-        Output::Pressure => (false, "Pressure per cell."),
-        Output::Slip => (false, "Relative slip per cell, divided by rolling speed."),
-        Output::Subsurface => (
-            false,
-            "Stresses below the surface at the points of `subsurface`, and the worst point of every patch.",
-        ),
-        Output::Damage => (
-            false,
-            "Friction power, wear and fatigue of one pass by the models of `damage`.",
-        ),
-        Output::Temperature => (
-            false,
-            "Temperature of both surfaces per cell; needs `thermal` and `speed_mm_per_s` in the motion.",
-        ),
-        Output::Gradients => (
-            false,
-            "Derivatives of forces and moment by creepages and spin, and by the normal force of Hertz contacts; not of a `history`.",
-        ),
-    };
-    OutputCapability {
-        name: output,
-        default,
-        summary,
-    }
-}
+/// Types of contacts: whether they need a load, and how they are given.
+const CONTACTS: [(&str, bool, &str); 7] = [
+    (
+        "radii",
+        true,
+        "Relative radii of curvature: an elliptic patch after Hertz.",
+    ),
+    (
+        "ellipse",
+        true,
+        "An elliptic patch of given semi-axes with Hertz's pressure.",
+    ),
+    (
+        "gap_profile",
+        true,
+        "A gap measured across, between bodies that are circular along rolling: region and pressure are found.",
+    ),
+    (
+        "gap_grid",
+        true,
+        "Any gap on a grid: region and pressure are found, in one or several patches.",
+    ),
+    (
+        "profiles",
+        true,
+        "A wheel on a rail by their cross-sections: every patch is found, with its place and its own frame.",
+    ),
+    (
+        "wheelset",
+        true,
+        "A wheelset on both rails by their cross-sections, in one or several positions: its roll, its height and every patch are found; with \
+         its equivalent conicity if asked.",
+    ),
+    (
+        "pressure_grid",
+        false,
+        "A given pressure on a grid; its positive part is the contact, in one or several patches.",
+    ),
+];
 
-fn contacts() -> Vec<ContactCapability> {
-    vec![
-        ContactCapability {
-            name: "radii",
-            needs_load: true,
-            summary: "Relative radii of curvature: an elliptic patch after Hertz.",
-        },
-        ContactCapability {
-            name: "ellipse",
-            needs_load: true,
-            summary: "An elliptic patch of given semi-axes with Hertz's pressure.",
-        },
-        ContactCapability {
-            name: "gap_profile",
-            needs_load: true,
-            summary: "A gap measured across, between bodies that are circular along rolling: region and pressure are found.",
-        },
-        ContactCapability {
-            name: "gap_grid",
-            needs_load: true,
-            summary: "Any gap on a grid: region and pressure are found, in one or several patches.",
-        },
-        ContactCapability {
-            name: "profiles",
-            needs_load: true,
-            summary: "A wheel on a rail by their cross-sections: every patch is found, with its place and its own frame.",
-        },
-        ContactCapability {
-            name: "wheelset",
-            needs_load: true,
-            summary: "A wheelset on both rails by their cross-sections, in one or several positions: its roll, its height and every patch are found; with \
-                      its equivalent conicity if asked.",
-        },
-        ContactCapability {
-            name: "pressure_grid",
-            needs_load: false,
-            summary: "A given pressure on a grid; its positive part is the contact, in one or several patches.",
-        },
-    ]
-}
+/// Outputs: whether they are the default, and what they are.
+const OUTPUTS: [(Output, bool, &str); 9] = [
+    (
+        Output::Resultants,
+        true,
+        "Forces, moment and dissipated power.",
+    ),
+    (
+        Output::Zones,
+        true,
+        "Stick and slip zones: cells, areas and outlines.",
+    ),
+    (Output::Tractions, false, "Tangential tractions per cell."),
+    (Output::Pressure, false, "Pressure per cell."),
+    (
+        Output::Slip,
+        false,
+        "Relative slip per cell, divided by rolling speed.",
+    ),
+    (
+        Output::Subsurface,
+        false,
+        "Stresses below the surface at the points of `subsurface`, and the worst point of every patch.",
+    ),
+    (
+        Output::Damage,
+        false,
+        "Friction power, wear and fatigue of one pass by the models of `damage`.",
+    ),
+    (
+        Output::Temperature,
+        false,
+        "Temperature of both surfaces per cell; needs `thermal` and `speed_mm_per_s` in the motion.",
+    ),
+    (
+        Output::Gradients,
+        false,
+        "Derivatives of forces and moment by creepages and spin, and by the normal force of Hertz contacts; not of a `history`.",
+    ),
+];

@@ -5,7 +5,7 @@
 //! were accepted by a node whose clock is behind, wait until the place is forgotten.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use sqlx::Row;
@@ -16,6 +16,7 @@ use crate::jobs::store::claim::ClaimRequest;
 use crate::jobs::store::postgres::sql::claim::peek;
 use crate::jobs::store::postgres::sql::rows::{count, read_count};
 use crate::jobs::store_error::StoreError;
+use crate::jobs::sync::lock;
 
 /// Queues that are shorter are counted and walked from their start at every claim.
 const LONG: i64 = 2000;
@@ -92,7 +93,7 @@ pub(crate) struct ClaimMemory(Arc<Mutex<Known>>);
 
 impl ClaimMemory {
     fn known(&self) -> MutexGuard<'_, Known> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0)
     }
 
     /// Jobs went back to the queue: the next claims walk it from the start.

@@ -4,15 +4,16 @@ use std::sync::Arc;
 
 use async_trait::async_trait;
 use object_store::ObjectStore;
+use railhead_macros::repeat_conflicts;
+use sqlx::Row;
 use uuid::Uuid;
 
 use crate::jobs::store::cluster::{Cluster, ClusterView, Deployment, Node, Notification};
-use crate::jobs::store::postgres::answer::in_time;
+use crate::jobs::store::postgres::connection::{FOLD, LOCKS};
 use crate::jobs::store::postgres::database::PostgresStore;
-use crate::jobs::store::postgres::engine::fold_counts;
-use crate::jobs::store::postgres::notifier;
 use crate::jobs::store::postgres::objects::PgObjects;
 use crate::jobs::store::postgres::sql::rows::{count, read_id, read_small};
+use crate::jobs::store::postgres::{engine, notifier};
 use crate::jobs::store_error::StoreError;
 
 const NOW: &str = "SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)";
@@ -33,73 +34,15 @@ const SWEPT_AFTER: i64 = 24 * 3600 * 1000;
 const SWEEP: &str = "DELETE FROM objects WHERE made_at < CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - $1 \
      AND NOT EXISTS (SELECT 1 FROM blobs WHERE blobs.key = regexp_replace(objects.path, '/[^/]+$', ''))";
 
+#[repeat_conflicts]
 #[async_trait]
 impl Cluster for PostgresStore {
     async fn now(&self) -> Result<i64, StoreError> {
-        in_time(self.read_clock()).await
-    }
-
-    async fn beat(&self, node: &Node) -> Result<ClusterView, StoreError> {
-        in_time(self.show(node)).await
-    }
-
-    async fn leave(&self, node: Uuid) -> Result<(), StoreError> {
-        in_time(self.forget(node)).await
-    }
-
-    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError> {
-        in_time(self.read_cancel_requests(running)).await
-    }
-
-    async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError> {
-        in_time(self.renew_batches(batches)).await
-    }
-
-    async fn sweep_objects(&self) -> Result<u64, StoreError> {
-        in_time(self.sweep()).await
-    }
-
-    async fn fold_counts(&self) -> Result<(), StoreError> {
-        in_time(fold_counts(&self.writer)).await
-    }
-
-    async fn deployment(&self) -> Result<Deployment, StoreError> {
-        in_time(self.read_deployment(DEAD_AFTER)).await
-    }
-
-    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool, StoreError> {
-        in_time(self.write_results_place(before, place)).await
-    }
-
-    async fn take_sweep(&self) -> Result<bool, StoreError> {
-        in_time(self.claim_sweep(SWEPT_AFTER)).await
-    }
-
-    fn objects(&self) -> Arc<dyn ObjectStore> {
-        Arc::new(PgObjects::new(self.writer.clone()))
-    }
-
-    fn publish(&self, notification: Notification) {
-        if self.listens_at.is_some() {
-            self.notifier.publish(notification);
-        }
-    }
-
-    async fn listen(&self, heard: &(dyn Fn(Notification) + Send + Sync)) -> Result<(), StoreError> {
-        match &self.listens_at {
-            Some(options) => notifier::listen(options.clone(), heard).await,
-            None => std::future::pending().await,
-        }
-    }
-}
-
-impl PostgresStore {
-    async fn read_clock(&self) -> Result<i64, StoreError> {
         Ok(sqlx::query_scalar(NOW).fetch_one(&self.writer).await?)
     }
 
-    async fn show(&self, node: &Node) -> Result<ClusterView, StoreError> {
-        let now = self.read_clock().await?;
+    async fn beat(&self, node: &Node) -> Result<ClusterView, StoreError> {
+        let now = self.now().await?;
         sqlx::query(
             "INSERT INTO nodes (id, version, workers, seen_at) VALUES ($1, $2, $3, $4) \
              ON CONFLICT (id) DO UPDATE SET workers = $3, seen_at = $4",
@@ -126,7 +69,7 @@ impl PostgresStore {
         })
     }
 
-    async fn forget(&self, node: Uuid) -> Result<(), StoreError> {
+    async fn leave(&self, node: Uuid) -> Result<(), StoreError> {
         sqlx::query("DELETE FROM nodes WHERE id = $1")
             .bind(node.to_string())
             .execute(&self.writer)
@@ -134,7 +77,7 @@ impl PostgresStore {
         Ok(())
     }
 
-    async fn read_cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError> {
+    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError> {
         let ids: Vec<String> = running.iter().map(Uuid::to_string).collect();
         let rows = sqlx::query(
             "SELECT id FROM jobs WHERE id = ANY($1) AND state = 'running' AND cancel_requested = 1",
@@ -145,7 +88,7 @@ impl PostgresStore {
         rows.iter().map(read_id).collect()
     }
 
-    async fn renew_batches(&self, batches: &[Uuid]) -> Result<(), StoreError> {
+    async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError> {
         let ids: Vec<String> = batches.iter().map(Uuid::to_string).collect();
         sqlx::query(
             "UPDATE batches SET filled_until = CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) + $2 \
@@ -158,8 +101,114 @@ impl PostgresStore {
         Ok(())
     }
 
-    async fn sweep(&self) -> Result<u64, StoreError> {
+    async fn sweep_objects(&self) -> Result<u64, StoreError> {
         let swept = sqlx::query(SWEEP).bind(SWEPT_AFTER).execute(&self.writer);
         Ok(swept.await?.rows_affected())
+    }
+
+    // Somebody else may be at it.
+    async fn fold_counts(&self) -> Result<(), StoreError> {
+        let mut transaction = self.writer.begin().await?;
+        let free: bool = sqlx::query_scalar("SELECT pg_try_advisory_xact_lock($1, $2)")
+            .bind(LOCKS)
+            .bind(FOLD)
+            .fetch_one(&mut *transaction)
+            .await?;
+        if free {
+            sqlx::query(
+                "WITH gone AS (DELETE FROM job_counts RETURNING state, tenant, number) \
+                 INSERT INTO job_counts (state, tenant, number) \
+                 SELECT state, tenant, CAST(SUM(number) AS bigint) FROM gone GROUP BY state, tenant HAVING SUM(number) <> 0",
+            )
+            .execute(&mut *transaction)
+            .await?;
+            sqlx::query(
+                "WITH gone AS (DELETE FROM stored_bytes RETURNING tenant, bytes) \
+                 INSERT INTO stored_bytes (tenant, bytes) \
+                 SELECT tenant, CAST(SUM(bytes) AS bigint) FROM gone GROUP BY tenant HAVING SUM(bytes) <> 0",
+            )
+            .execute(&mut *transaction)
+            .await?;
+        }
+        transaction.commit().await?;
+        Ok(())
+    }
+
+    async fn deployment(&self) -> Result<Deployment, StoreError> {
+        let row = sqlx::query(
+            "SELECT id, results_place, EXISTS (SELECT 1 FROM blobs WHERE key IS NOT NULL) AS has_results, \
+             (SELECT COUNT(*) FROM nodes WHERE seen_at > CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - $1) AS nodes \
+             FROM deployment",
+        )
+        .bind(DEAD_AFTER)
+        .fetch_one(&self.writer)
+        .await?;
+        Ok(Deployment {
+            id: row.try_get("id")?,
+            results_place: row.try_get("results_place")?,
+            has_results: row.try_get("has_results")?,
+            nodes: row.try_get::<i64, _>("nodes")?.unsigned_abs(),
+        })
+    }
+
+    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool, StoreError> {
+        let written = sqlx::query(
+            "UPDATE deployment SET results_place = $2 WHERE results_place IS NOT DISTINCT FROM $1",
+        )
+        .bind(before)
+        .bind(place)
+        .execute(&self.writer)
+        .await?;
+        Ok(written.rows_affected() > 0)
+    }
+
+    async fn take_sweep(&self) -> Result<bool, StoreError> {
+        let taken = sqlx::query(
+            "WITH clock AS (SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) AS now) \
+             UPDATE deployment SET swept_at = clock.now FROM clock WHERE swept_at <= clock.now - $1",
+        )
+        .bind(SWEPT_AFTER)
+        .execute(&self.writer)
+        .await?;
+        Ok(taken.rows_affected() > 0)
+    }
+
+    fn objects(&self) -> Arc<dyn ObjectStore> {
+        Arc::new(PgObjects::new(self.writer.clone()))
+    }
+
+    fn publish(&self, notification: Notification) {
+        if self.listens_at.is_some() {
+            self.notifier.publish(notification);
+        }
+    }
+
+    #[once]
+    async fn listen(&self, heard: &(dyn Fn(Notification) + Send + Sync)) -> Result<(), StoreError> {
+        match &self.listens_at {
+            Some(options) => notifier::listen(options.clone(), heard).await,
+            None => std::future::pending().await,
+        }
+    }
+}
+
+impl PostgresStore {
+    /// The keys of all results outside the table, each once, in order.
+    pub(crate) async fn result_keys(&self) -> Result<Vec<String>, StoreError> {
+        let keys = "SELECT DISTINCT key FROM blobs WHERE key IS NOT NULL ORDER BY key";
+        let mut connection = self.writer.acquire().await?;
+        // For a command of the operator, which may take its time.
+        sqlx::raw_sql("SET statement_timeout = 0")
+            .execute(&mut *connection)
+            .await?;
+        Ok(sqlx::query_scalar(keys).fetch_all(&mut *connection).await?)
+    }
+
+    /// Removes all large results that are in the database.
+    pub(crate) async fn remove_objects(&self) -> Result<(), StoreError> {
+        sqlx::raw_sql("TRUNCATE objects")
+            .execute(&self.writer)
+            .await?;
+        Ok(())
     }
 }

@@ -11,7 +11,7 @@ use crate::jobs::store::claim::{ClaimKind, ClaimRequest};
 use crate::jobs::store::cluster::Cluster;
 use crate::jobs::store::postgres::answer::in_time;
 use crate::jobs::store::postgres::claim_memory::{PEEK_BEGUN, first_queued};
-use crate::jobs::store::postgres::connection::{ADMISSION, FOLD, LOCKS, lock};
+use crate::jobs::store::postgres::connection::{ADMISSION, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::postgres::sql::claim::{claimed, push_lease_until};
 use crate::jobs::store::postgres::sql::rows::{count, push_list, read_count, read_flag, read_id};
@@ -185,34 +185,6 @@ impl PostgresStore {
     pub(crate) async fn compact(&self, _: i64, _: u32) -> Result<bool, StoreError> {
         Ok(false)
     }
-}
-
-/// Adds the differences of the counts up, so that few rows are read; somebody else may be at it.
-pub(crate) async fn fold_counts(pool: &DbPool) -> Result<(), StoreError> {
-    let mut transaction = pool.begin().await?;
-    let free: bool = sqlx::query_scalar("SELECT pg_try_advisory_xact_lock($1, $2)")
-        .bind(LOCKS)
-        .bind(FOLD)
-        .fetch_one(&mut *transaction)
-        .await?;
-    if free {
-        sqlx::query(
-            "WITH gone AS (DELETE FROM job_counts RETURNING state, tenant, number) \
-             INSERT INTO job_counts (state, tenant, number) \
-             SELECT state, tenant, CAST(SUM(number) AS bigint) FROM gone GROUP BY state, tenant HAVING SUM(number) <> 0",
-        )
-        .execute(&mut *transaction)
-        .await?;
-        sqlx::query(
-            "WITH gone AS (DELETE FROM stored_bytes RETURNING tenant, bytes) \
-             INSERT INTO stored_bytes (tenant, bytes) \
-             SELECT tenant, CAST(SUM(bytes) AS bigint) FROM gone GROUP BY tenant HAVING SUM(bytes) <> 0",
-        )
-        .execute(&mut *transaction)
-        .await?;
-    }
-    transaction.commit().await?;
-    Ok(())
 }
 
 /// Makes a call, and makes it again if it was the one that had to give way to another transaction, or if a row that it was about

@@ -12,7 +12,6 @@ mod claim_memory;
 pub mod cluster;
 pub mod connection;
 pub mod database;
-mod deployment;
 pub mod doctor;
 pub mod engine;
 mod import;

@@ -13,62 +13,26 @@ use crate::jobs::store::postgres::connection::{self, connect, lock};
 /// The statements that make an empty schema a job table of form 1.
 const SCHEMA: &str = include_str!("schema.sql");
 
-/// A change of the tables.
-struct Step {
-    /// The form that it leads to.
-    form: i64,
-    statements: &'static str,
-    /// The oldest form whose programs can use the tables afterwards.
-    readable_from: i64,
-}
-
-/// What is done to tables of an earlier form, in this order. A step that has landed is never changed.
-const STEPS: &[Step] = &[
-    Step {
-        form: 2,
-        statements: include_str!("steps/2.sql"),
-        readable_from: 2,
-    },
-    Step {
-        form: 3,
-        statements: include_str!("steps/3.sql"),
-        // A program that does not know of the labels would open everything to a key that is bound.
-        readable_from: 3,
-    },
-    Step {
-        form: 4,
-        statements: include_str!("steps/4.sql"),
-        // A new table, which programs before know nothing of.
-        readable_from: 3,
-    },
-    Step {
-        form: 5,
-        statements: include_str!("steps/5.sql"),
-        // Programs before look for templates in a table that is gone.
-        readable_from: 5,
-    },
-    Step {
-        form: 6,
-        statements: include_str!("steps/6.sql"),
-        // Earlier programs look for runs under a tenant that no longer has them.
-        readable_from: 6,
-    },
-    Step {
-        form: 7,
-        statements: include_str!("steps/7.sql"),
-        // Earlier programs cannot read the kind of an evolution.
-        readable_from: 7,
-    },
-    Step {
-        form: 8,
-        statements: include_str!("steps/8.sql"),
-        // An index.
-        readable_from: 7,
-    },
+/// What is done to tables of an earlier form, in this order: the form that a step leads to, its statements, and the oldest form whose
+/// programs can use the tables afterwards. A step that has landed is never changed.
+const STEPS: &[(i64, &str, i64)] = &[
+    (2, include_str!("steps/2.sql"), 2),
+    // A program that does not know of the labels would open everything to a key that is bound.
+    (3, include_str!("steps/3.sql"), 3),
+    // A new table, which programs before know nothing of.
+    (4, include_str!("steps/4.sql"), 3),
+    // Programs before look for templates in a table that is gone.
+    (5, include_str!("steps/5.sql"), 5),
+    // Earlier programs look for runs under a tenant that no longer has them.
+    (6, include_str!("steps/6.sql"), 6),
+    // Earlier programs cannot read the kind of an evolution.
+    (7, include_str!("steps/7.sql"), 7),
+    // An index.
+    (8, include_str!("steps/8.sql"), 7),
 ];
 
 /// The form that is read and written.
-const SCHEMA_VERSION: i64 = STEPS[STEPS.len() - 1].form;
+const SCHEMA_VERSION: i64 = STEPS[STEPS.len() - 1].0;
 
 /// The form without a step.
 const FIRST_SCHEMA_VERSION: i64 = 1;
@@ -117,13 +81,13 @@ async fn make(pool: &PgPool) -> Result<Migrated, JobsError> {
             .await?;
     }
     let reached = before.unwrap_or(FIRST_SCHEMA_VERSION);
-    for step in STEPS.iter().filter(|step| step.form > reached) {
-        sqlx::raw_sql(step.statements)
+    for (form, statements, readable_from) in STEPS.iter().filter(|step| step.0 > reached) {
+        sqlx::raw_sql(*statements)
             .execute(&mut *transaction)
             .await?;
         sqlx::query("UPDATE deployment SET form = $1, readable_from = $2")
-            .bind(step.form)
-            .bind(step.readable_from)
+            .bind(form)
+            .bind(readable_from)
             .execute(&mut *transaction)
             .await?;
     }

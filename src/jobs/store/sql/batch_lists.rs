@@ -1,13 +1,14 @@
 //! Lists of batches, newest first, with the numbers of their jobs.
 
 use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
-use super::rows::{from_json, push_list, read_count, read_id, read_kind, read_small, read_state};
+use super::rows::{push_list, read_count, read_id, read_json, read_kind, read_small, read_state};
 use std::collections::{BTreeMap, HashMap};
 
 use bytes::Bytes;
 use uuid::Uuid;
 
 use async_trait::async_trait;
+use railhead_macros::repeat_conflicts;
 
 use crate::jobs::model::batch::{Batch, RunRecord};
 use crate::jobs::model::job::State;
@@ -62,7 +63,7 @@ impl SqlStore {
                 count: read_small(row, "count")?,
                 rejected: read_small(row, "rejected")?,
                 name: row.try_get("name")?,
-                labels: from_json(row.try_get("labels")?)?,
+                labels: read_json(row, "labels")?,
                 last_ended_at: row.try_get("ended_at")?,
                 states: State::ALL
                     .into_iter()
@@ -128,6 +129,7 @@ const GET_RUN: &str = "SELECT body, head, \
      FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
      WHERE batches.id = $1 AND batches.tenant = $2 AND kind = 'rows' AND complete = 1";
 
+#[repeat_conflicts]
 #[async_trait]
 impl BatchLists for SqlStore {
     async fn batches(
@@ -137,59 +139,50 @@ impl BatchLists for SqlStore {
         after: Option<Uuid>,
         limit: u32,
     ) -> Result<Page<Batch>, StoreError> {
-        engine::again(|| async move {
-            let mut query = page_query(tenant, filter, after);
-            query.push(" LIMIT ").push_bind(i64::from(limit) + 1);
-            let mut rows = query.build().fetch_all(&self.readers).await?;
-            let more = rows.len() > limit as usize;
-            rows.truncate(limit as usize);
-            let batches = self.with_counts(&rows).await?;
-            let last = batches.last().filter(|_| more);
-            let total = self.count_batches(tenant, filter).await?;
-            Ok(Page {
-                next_cursor: last.map(|batch| filter.cursor_after(batch.id)),
-                total,
-                entries: batches,
-            })
+        let mut query = page_query(tenant, filter, after);
+        query.push(" LIMIT ").push_bind(i64::from(limit) + 1);
+        let mut rows = query.build().fetch_all(&self.readers).await?;
+        let more = rows.len() > limit as usize;
+        rows.truncate(limit as usize);
+        let batches = self.with_counts(&rows).await?;
+        let last = batches.last().filter(|_| more);
+        let total = self.count_batches(tenant, filter).await?;
+        Ok(Page {
+            next_cursor: last.map(|batch| filter.cursor_after(batch.id)),
+            total,
+            entries: batches,
         })
-        .await
     }
 
     async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError> {
-        engine::again(|| async move {
-            let mut query = QueryBuilder::new("SELECT ");
-            query
-                .push(COLUMNS)
-                .push(" FROM batches WHERE complete = 1 AND id = ");
-            query
-                .push_bind(id.to_string())
-                .push(" AND tenant = ")
-                .push_bind(tenant)
-                .push(" AND kind = ")
-                .push_bind(kind.name());
-            let rows = query.build().fetch_all(&self.readers).await?;
-            Ok(self.with_counts(&rows).await?.pop())
-        })
-        .await
+        let mut query = QueryBuilder::new("SELECT ");
+        query
+            .push(COLUMNS)
+            .push(" FROM batches WHERE complete = 1 AND id = ");
+        query
+            .push_bind(id.to_string())
+            .push(" AND tenant = ")
+            .push_bind(tenant)
+            .push(" AND kind = ")
+            .push_bind(kind.name());
+        let rows = query.build().fetch_all(&self.readers).await?;
+        Ok(self.with_counts(&rows).await?.pop())
     }
 
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError> {
-        engine::again(|| async move {
-            let row = query(GET_RUN)
-                .bind(id.to_string())
-                .bind(tenant)
-                .fetch_optional(&self.readers)
-                .await?;
-            let Some(row) = row else { return Ok(None) };
-            let template: Vec<u8> = row.try_get("body")?;
-            let head: Option<Vec<u8>> = row.try_get("head")?;
-            Ok(Some(RunRecord {
-                template: template.into(),
-                head: head.map(Bytes::from),
-                without_answer: read_count(&row, "without_answer")?,
-                running: row.try_get("running")?,
-            }))
-        })
-        .await
+        let row = query(GET_RUN)
+            .bind(id.to_string())
+            .bind(tenant)
+            .fetch_optional(&self.readers)
+            .await?;
+        let Some(row) = row else { return Ok(None) };
+        let template: Vec<u8> = row.try_get("body")?;
+        let head: Option<Vec<u8>> = row.try_get("head")?;
+        Ok(Some(RunRecord {
+            template: template.into(),
+            head: head.map(Bytes::from),
+            without_answer: read_count(&row, "without_answer")?,
+            running: row.try_get("running")?,
+        }))
     }
 }

@@ -16,6 +16,7 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 use async_trait::async_trait;
+use railhead_macros::repeat_conflicts;
 
 use crate::jobs::model::batch::{BatchItem, ItemResult};
 use crate::jobs::model::job::{State, created_at};
@@ -37,6 +38,7 @@ const CANCEL: &str = concat!(
      WHERE id IN (SELECT id FROM open) RETURNING id, state, slices"
 );
 
+#[repeat_conflicts]
 #[async_trait]
 impl Batches for SqlStore {
     async fn reserve(
@@ -46,31 +48,28 @@ impl Batches for SqlStore {
         most: u32,
         bounds: QueueBounds,
     ) -> Result<Result<u32, Refusal>, StoreError> {
-        engine::again(|| async move {
-            let mut transaction = engine::begin(&self.writer).await?;
-            engine::lock_admission(&mut transaction).await?;
-            let mut places = Places::of(&mut transaction, [tenant], bounds).await?;
-            let taken = places
-                .store(tenant, 0)
-                .and_then(|()| places.take(tenant, u64::from(most)));
-            let places = match taken {
-                Ok(places) => u32::try_from(places).unwrap_or(most),
-                Err(refusal) => return Ok(Err(refusal)),
-            };
-            query(
-                "INSERT INTO batches (id, tenant, created_at, reserved) VALUES ($1, $2, $3, $4) \
-             ON CONFLICT (id) DO UPDATE SET reserved = batches.reserved + $4",
-            )
-            .bind(id.to_string())
-            .bind(tenant)
-            .bind(created_at(id))
-            .bind(i64::from(places))
-            .execute(&mut *transaction)
-            .await?;
-            transaction.commit().await?;
-            Ok(Ok(places))
-        })
-        .await
+        let mut transaction = engine::begin(&self.writer).await?;
+        engine::lock_admission(&mut transaction).await?;
+        let mut places = Places::of(&mut transaction, [tenant], bounds).await?;
+        let taken = places
+            .store(tenant, 0)
+            .and_then(|()| places.take(tenant, u64::from(most)));
+        let places = match taken {
+            Ok(places) => u32::try_from(places).unwrap_or(most),
+            Err(refusal) => return Ok(Err(refusal)),
+        };
+        query(
+            "INSERT INTO batches (id, tenant, created_at, reserved) VALUES ($1, $2, $3, $4) \
+         ON CONFLICT (id) DO UPDATE SET reserved = batches.reserved + $4",
+        )
+        .bind(id.to_string())
+        .bind(tenant)
+        .bind(created_at(id))
+        .bind(i64::from(places))
+        .execute(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        Ok(Ok(places))
     }
 
     async fn batch_by_key(
@@ -78,11 +77,8 @@ impl Batches for SqlStore {
         new: &NewBatch,
         filled_here: FilledHere<'_>,
     ) -> Result<Option<BatchBegun>, StoreError> {
-        engine::again(|| async move {
-            let mut connection = self.readers.acquire().await?;
-            by_key(&mut connection, new, filled_here).await
-        })
-        .await
+        let mut connection = self.readers.acquire().await?;
+        by_key(&mut connection, new, filled_here).await
     }
 
     async fn begin_batch(
@@ -91,70 +87,67 @@ impl Batches for SqlStore {
         filled_here: FilledHere<'_>,
         bounds: QueueBounds,
     ) -> Result<BatchBegun, StoreError> {
-        engine::again(|| async move {
-            let mut transaction = engine::begin(&self.writer).await?;
-            engine::lock_admission(&mut transaction).await?;
-            if let Some(begun) = by_key(&mut transaction, new, filled_here).await? {
-                return Ok(begun);
-            }
-            let reserved = query("SELECT reserved FROM batches WHERE id = $1")
-                .bind(new.id.to_string())
-                .fetch_optional(&mut *transaction)
-                .await?;
-            let reserved = match &reserved {
-                Some(row) => read_count(row, "reserved")?,
-                None => 0,
-            };
-            let lacking = u64::from(new.count).saturating_sub(reserved);
-            let mut places = Places::of(&mut transaction, [&*new.tenant], bounds).await?;
-            match places.take(&new.tenant, lacking) {
-                Ok(taken) if taken == lacking => {}
-                Ok(_) => return Ok(BatchBegun::Refused(places.refusal_of(&new.tenant))),
-                Err(refusal) => return Ok(BatchBegun::Refused(refusal)),
-            }
-            let template = new.template.as_ref();
-            let template = template.map(|body| (blake3::hash(body).as_bytes().to_vec(), body));
-            let known = match &template {
-                Some((digest, _)) => has_template(&mut transaction, &new.tenant, digest).await?,
-                None => true,
-            };
-            let of_template = template.as_ref().filter(|_| !known);
-            let bytes = new.bytes + of_template.map_or(0, |(_, body)| body.len() as u64);
-            if let Err(refusal) = places.store(&new.tenant, bytes) {
-                return Ok(BatchBegun::Refused(refusal));
-            }
-            if let Some((digest, body)) = of_template {
-                query(
-                    "INSERT INTO templates (tenant, digest, body) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
-                )
-                .bind(&*new.tenant)
-                .bind(digest)
-                .bind(body.as_ref())
-                .execute(&mut *transaction)
-                .await?;
-            }
-            query(
-                "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head, kind) \
-                 VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9, $10) \
-                 ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9, kind = $10",
-            )
+        let mut transaction = engine::begin(&self.writer).await?;
+        engine::lock_admission(&mut transaction).await?;
+        if let Some(begun) = by_key(&mut transaction, new, filled_here).await? {
+            return Ok(begun);
+        }
+        let reserved = query("SELECT reserved FROM batches WHERE id = $1")
             .bind(new.id.to_string())
+            .fetch_optional(&mut *transaction)
+            .await?;
+        let reserved = match &reserved {
+            Some(row) => read_count(row, "reserved")?,
+            None => 0,
+        };
+        let lacking = u64::from(new.count).saturating_sub(reserved);
+        let mut places = Places::of(&mut transaction, [&*new.tenant], bounds).await?;
+        match places.take(&new.tenant, lacking) {
+            Ok(taken) if taken == lacking => {}
+            Ok(_) => return Ok(BatchBegun::Refused(places.refusal_of(&new.tenant))),
+            Err(refusal) => return Ok(BatchBegun::Refused(refusal)),
+        }
+        let template = new.template.as_ref();
+        let template = template.map(|body| (blake3::hash(body).as_bytes().to_vec(), body));
+        let known = match &template {
+            Some((digest, _)) => has_template(&mut transaction, &new.tenant, digest).await?,
+            None => true,
+        };
+        let of_template = template.as_ref().filter(|_| !known);
+        let bytes = new.bytes + of_template.map_or(0, |(_, body)| body.len() as u64);
+        if let Err(refusal) = places.store(&new.tenant, bytes) {
+            return Ok(BatchBegun::Refused(refusal));
+        }
+        if let Some((digest, body)) = of_template {
+            query(
+                "INSERT INTO templates (tenant, digest, body) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
+            )
             .bind(&*new.tenant)
-            .bind(new.created_at)
-            .bind(i64::from(new.count))
-            .bind(i64::from(new.rejected))
-            .bind(&new.name)
-            .bind(to_json(&new.labels)?)
-            .bind(template.as_ref().map(|(digest, _)| digest))
-            .bind(new.head.as_deref())
-            .bind(new.kind.name())
+            .bind(digest)
+            .bind(body.as_ref())
             .execute(&mut *transaction)
             .await?;
-            keep_key(&mut transaction, new).await?;
-            transaction.commit().await?;
-            Ok(BatchBegun::Created)
-        })
-        .await
+        }
+        query(
+            "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head, kind) \
+             VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9, $10) \
+             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9, kind = $10",
+        )
+        .bind(new.id.to_string())
+        .bind(&*new.tenant)
+        .bind(new.created_at)
+        .bind(i64::from(new.count))
+        .bind(i64::from(new.rejected))
+        .bind(&new.name)
+        .bind(to_json(&new.labels)?)
+        .bind(template.as_ref().map(|(digest, _)| digest))
+        .bind(new.head.as_deref())
+        .bind(new.kind.name())
+        .execute(&mut *transaction)
+        .await?;
+        keep_key(&mut transaction, new).await?;
+        transaction.commit().await?;
+        Ok(BatchBegun::Created)
     }
 
     async fn fill_batch(
@@ -162,89 +155,76 @@ impl Batches for SqlStore {
         batch: Uuid,
         jobs: &[(u32, NewJob)],
     ) -> Result<Vec<Uuid>, StoreError> {
-        engine::again(|| async move {
-            let jobs: Vec<_> = jobs
-                .iter()
-                .map(|(index, job)| (Some(*index), job))
-                .collect();
-            let mut transaction = engine::begin(&self.writer).await?;
-            let filled = query(concat!(
-                "UPDATE batches SET reserved = ",
-                greatest!(),
-                "(reserved - $1, 0) WHERE id = $2 AND dropped = 0"
-            ))
-            .bind(count(jobs.len()))
-            .bind(batch.to_string())
-            .execute(&mut *transaction)
-            .await?;
-            require_batch(batch, filled.rows_affected())?;
-            let ended = insert_jobs(&mut transaction, Some(batch), &jobs).await?;
-            transaction.commit().await?;
-            Ok(ended)
-        })
-        .await
+        let jobs: Vec<_> = jobs
+            .iter()
+            .map(|(index, job)| (Some(*index), job))
+            .collect();
+        let mut transaction = engine::begin(&self.writer).await?;
+        let filled = query(concat!(
+            "UPDATE batches SET reserved = ",
+            greatest!(),
+            "(reserved - $1, 0) WHERE id = $2 AND dropped = 0"
+        ))
+        .bind(count(jobs.len()))
+        .bind(batch.to_string())
+        .execute(&mut *transaction)
+        .await?;
+        require_batch(batch, filled.rows_affected())?;
+        let ended = insert_jobs(&mut transaction, Some(batch), &jobs).await?;
+        transaction.commit().await?;
+        Ok(ended)
     }
 
     async fn complete_batch(&self, id: Uuid) -> Result<(), StoreError> {
-        engine::again(|| async move {
-            let complete = query(
-                "UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1 AND dropped = 0",
-            )
-            .bind(id.to_string())
-            .execute(&self.writer)
-            .await?;
-            require_batch(id, complete.rows_affected())
-        })
-        .await
+        let complete =
+            query("UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1 AND dropped = 0")
+                .bind(id.to_string())
+                .execute(&self.writer)
+                .await?;
+        require_batch(id, complete.rows_affected())
     }
 
     async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool, StoreError> {
-        engine::again(|| async move {
-            let mut transaction = engine::begin(&self.writer).await?;
-            for statement in [
-                "UPDATE batches SET reserved = 0, dropped = 1 WHERE id = $1 AND complete = 0 AND dropped = 0",
-                "DELETE FROM batch_keys WHERE batch_id = $1 \
-                 AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0)",
-            ] {
-                query(statement)
-                    .bind(id.to_string())
-                    .execute(&mut *transaction)
-                    .await?;
-            }
-            let gone = query(
-                "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 ORDER BY id LIMIT $2) \
-                 AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0) RETURNING blob_id",
-            )
-            .bind(id.to_string())
-            .bind(i64::from(limit))
-            .fetch_all(&mut *transaction)
-            .await?;
-            release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
-            let last = gone.len() < limit as usize;
-            if last {
-                query("DELETE FROM batches WHERE id = $1 AND complete = 0")
-                    .bind(id.to_string())
-                    .execute(&mut *transaction)
-                    .await?;
-            }
-            transaction.commit().await?;
-            Ok(last)
-        })
-        .await
+        let mut transaction = engine::begin(&self.writer).await?;
+        for statement in [
+            "UPDATE batches SET reserved = 0, dropped = 1 WHERE id = $1 AND complete = 0 AND dropped = 0",
+            "DELETE FROM batch_keys WHERE batch_id = $1 \
+             AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0)",
+        ] {
+            query(statement)
+                .bind(id.to_string())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        let gone = query(
+            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 ORDER BY id LIMIT $2) \
+             AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0) RETURNING blob_id",
+        )
+        .bind(id.to_string())
+        .bind(i64::from(limit))
+        .fetch_all(&mut *transaction)
+        .await?;
+        release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
+        let last = gone.len() < limit as usize;
+        if last {
+            query("DELETE FROM batches WHERE id = $1 AND complete = 0")
+                .bind(id.to_string())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        transaction.commit().await?;
+        Ok(last)
     }
 
     async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError> {
-        engine::again(|| async move {
-            let rows = query(concat!(
-                "SELECT id FROM batches WHERE complete = 0 AND ",
-                being_filled!(),
-                " = 0"
-            ))
-            .fetch_all(&self.readers)
-            .await?;
-            rows.iter().map(read_id).collect()
-        })
-        .await
+        let rows = query(concat!(
+            "SELECT id FROM batches WHERE complete = 0 AND ",
+            being_filled!(),
+            " = 0"
+        ))
+        .fetch_all(&self.readers)
+        .await?;
+        rows.iter().map(read_id).collect()
     }
 
     async fn cancel_batch(
@@ -254,53 +234,47 @@ impl Batches for SqlStore {
         limit: u32,
         now: i64,
     ) -> Result<Vec<(Uuid, State)>, StoreError> {
-        engine::again(|| async move {
-            let mut transaction = engine::begin(&self.writer).await?;
-            let rows = query(CANCEL)
-                .bind(now)
-                .bind(id.to_string())
-                .bind(i64::from(limit))
-                .bind(tenant)
-                .fetch_all(&mut *transaction)
-                .await?;
-            drop_slices_of_ended(&mut transaction, &rows).await?;
-            transaction.commit().await?;
-            rows.iter()
-                .map(|row| Ok((read_id(row)?, read_state(row)?)))
-                .collect()
-        })
-        .await
-    }
-
-    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool, StoreError> {
-        engine::again(|| async move {
-            let mut transaction = engine::begin(&self.writer).await?;
-            let gone = query(
-                "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs \
-             WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $3) AND \
-             state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING blob_id",
-            )
+        let mut transaction = engine::begin(&self.writer).await?;
+        let rows = query(CANCEL)
+            .bind(now)
             .bind(id.to_string())
             .bind(i64::from(limit))
             .bind(tenant)
             .fetch_all(&mut *transaction)
             .await?;
-            release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
-            let last = gone.len() < limit as usize;
-            if last {
-                query(
-                    "DELETE FROM batches WHERE id = $1 AND tenant = $2 AND complete = 1 \
-                 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)",
-                )
-                .bind(id.to_string())
-                .bind(tenant)
-                .execute(&mut *transaction)
-                .await?;
-            }
-            transaction.commit().await?;
-            Ok(last)
-        })
-        .await
+        drop_slices_of_ended(&mut transaction, &rows).await?;
+        transaction.commit().await?;
+        rows.iter()
+            .map(|row| Ok((read_id(row)?, read_state(row)?)))
+            .collect()
+    }
+
+    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool, StoreError> {
+        let mut transaction = engine::begin(&self.writer).await?;
+        let gone = query(
+            "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs \
+         WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $3) AND \
+         state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING blob_id",
+        )
+        .bind(id.to_string())
+        .bind(i64::from(limit))
+        .bind(tenant)
+        .fetch_all(&mut *transaction)
+        .await?;
+        release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
+        let last = gone.len() < limit as usize;
+        if last {
+            query(
+                "DELETE FROM batches WHERE id = $1 AND tenant = $2 AND complete = 1 \
+             AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)",
+            )
+            .bind(id.to_string())
+            .bind(tenant)
+            .execute(&mut *transaction)
+            .await?;
+        }
+        transaction.commit().await?;
+        Ok(last)
     }
 
     async fn batch_items(
@@ -311,37 +285,34 @@ impl Batches for SqlStore {
         limit: u32,
         bytes: usize,
     ) -> Result<Vec<BatchItem>, StoreError> {
-        engine::again(|| async move {
-            let rows = query(concat!(
-                "SELECT ",
-                job_columns!(),
-                ", batch_index, outputs, blob_key, solution FROM jobs \
-                 LEFT JOIN (SELECT id AS blob, key AS blob_key, solution FROM blobs) AS stored ON blob = blob_id \
-                 WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $4) AND id > $2 ORDER BY id LIMIT $3"
-            ))
-            .bind(id.to_string())
-            .bind(after.map_or_else(String::new, |id| id.to_string()))
-            .bind(i64::from(limit))
-            .bind(tenant);
-            let mut items = Vec::new();
-            let mut read = 0;
-            engine::for_each(rows, &self.readers, |row| {
-                let solution: Option<Vec<u8>> = row.try_get("solution")?;
-                read += solution.as_ref().map_or(0, Vec::len);
-                let key: Option<String> = row.try_get("blob_key")?;
-                let inline = solution.map(|solution| ItemResult::Solution(solution.into()));
-                items.push(BatchItem {
-                    index: read_small(row, "batch_index")?,
-                    job: read_job(row)?,
-                    outputs: row.try_get("outputs")?,
-                    result: key.map(ItemResult::Stored).or(inline),
-                });
-                Ok(read < bytes)
-            })
-            .await?;
-            Ok(items)
+        let rows = query(concat!(
+            "SELECT ",
+            job_columns!(),
+            ", batch_index, outputs, blob_key, solution FROM jobs \
+             LEFT JOIN (SELECT id AS blob, key AS blob_key, solution FROM blobs) AS stored ON blob = blob_id \
+             WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $4) AND id > $2 ORDER BY id LIMIT $3"
+        ))
+        .bind(id.to_string())
+        .bind(after.map_or_else(String::new, |id| id.to_string()))
+        .bind(i64::from(limit))
+        .bind(tenant);
+        let mut items = Vec::new();
+        let mut read = 0;
+        engine::for_each(rows, &self.readers, |row| {
+            let solution: Option<Vec<u8>> = row.try_get("solution")?;
+            read += solution.as_ref().map_or(0, Vec::len);
+            let key: Option<String> = row.try_get("blob_key")?;
+            let inline = solution.map(|solution| ItemResult::Solution(solution.into()));
+            items.push(BatchItem {
+                index: read_small(row, "batch_index")?,
+                job: read_job(row)?,
+                outputs: row.try_get("outputs")?,
+                result: key.map(ItemResult::Stored).or(inline),
+            });
+            Ok(read < bytes)
         })
-        .await
+        .await?;
+        Ok(items)
     }
 
     async fn batch_label_keys(
@@ -350,24 +321,21 @@ impl Batches for SqlStore {
         id: Uuid,
         limit: u32,
     ) -> Result<Vec<String>, StoreError> {
-        engine::again(|| async move {
-            let rows = query(concat!(
-                "SELECT DISTINCT label.key AS key FROM jobs, ",
-                pairs_of_labels!(),
-                " AS label WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $2) ORDER BY label.key LIMIT $3"
-            ))
-            .bind(id.to_string())
-            .bind(tenant)
-            .bind(i64::from(limit))
-            .fetch_all(&self.readers)
-            .await?;
-            let key = |row: &DbRow| {
-                let key = row.try_get("key")?;
-                Ok(key)
-            };
-            rows.iter().map(key).collect()
-        })
-        .await
+        let rows = query(concat!(
+            "SELECT DISTINCT label.key AS key FROM jobs, ",
+            pairs_of_labels!(),
+            " AS label WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $2) ORDER BY label.key LIMIT $3"
+        ))
+        .bind(id.to_string())
+        .bind(tenant)
+        .bind(i64::from(limit))
+        .fetch_all(&self.readers)
+        .await?;
+        let key = |row: &DbRow| {
+            let key = row.try_get("key")?;
+            Ok(key)
+        };
+        rows.iter().map(key).collect()
     }
 }
 

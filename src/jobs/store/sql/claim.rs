@@ -5,6 +5,7 @@ use super::rows::{count, read_cache_key, read_count, read_flag, read_id, read_ki
 use std::sync::Arc;
 
 use async_trait::async_trait;
+use railhead_macros::repeat_conflicts;
 
 use crate::jobs::model::kind::Queue;
 use crate::jobs::store::Claims;
@@ -40,43 +41,38 @@ pub(crate) use claimed;
 /// Queues with jobs in them.
 pub(crate) const QUEUES: &str = "SELECT tenant, kind FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0 ORDER BY tenant, kind";
 
+#[repeat_conflicts]
 #[async_trait]
 impl Claims for SqlStore {
     async fn queues(&self) -> Result<Vec<Queue>, StoreError> {
-        engine::again(|| async move {
-            if let Some(known) = self.known_queues() {
-                return Ok(known);
-            }
-            let mut connection = self.readers.acquire().await?;
-            let rows = query(QUEUES).fetch_all(&mut *connection).await?;
-            drop(connection);
-            let read = |row: &DbRow| {
-                Ok(Queue {
-                    tenant: row.try_get::<String, _>("tenant")?.into(),
-                    kind: read_kind(row)?,
-                })
-            };
-            let queues = rows
-                .iter()
-                .map(read)
-                .collect::<Result<Vec<_>, StoreError>>()?;
-            self.remember_queues(&queues);
-            Ok(queues)
-        })
-        .await
+        if let Some(known) = self.known_queues() {
+            return Ok(known);
+        }
+        let mut connection = self.readers.acquire().await?;
+        let rows = query(QUEUES).fetch_all(&mut *connection).await?;
+        drop(connection);
+        let read = |row: &DbRow| {
+            Ok(Queue {
+                tenant: row.try_get::<String, _>("tenant")?.into(),
+                kind: read_kind(row)?,
+            })
+        };
+        let queues = rows
+            .iter()
+            .map(read)
+            .collect::<Result<Vec<_>, StoreError>>()?;
+        self.remember_queues(&queues);
+        Ok(queues)
     }
 
     async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError> {
-        engine::again(|| async move {
-            let mut claims = Vec::with_capacity(request.jobs);
-            for row in &self.claim_next(request, new_token()?).await? {
-                let rank: i64 = row.try_get("rank")?;
-                claims.push((rank, read_claim(row)?));
-            }
-            claims.sort_unstable_by_key(|(rank, claim)| (*rank, claim.id));
-            Ok(claims.into_iter().map(|(_, claim)| claim).collect())
-        })
-        .await
+        let mut claims = Vec::with_capacity(request.jobs);
+        for row in &self.claim_next(request, new_token()?).await? {
+            let rank: i64 = row.try_get("rank")?;
+            claims.push((rank, read_claim(row)?));
+        }
+        claims.sort_unstable_by_key(|(rank, claim)| (*rank, claim.id));
+        Ok(claims.into_iter().map(|(_, claim)| claim).collect())
     }
 }
 

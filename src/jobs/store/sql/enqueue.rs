@@ -6,13 +6,16 @@ use std::sync::Arc;
 use tokio::sync::oneshot;
 
 use async_trait::async_trait;
+use railhead_macros::repeat_conflicts;
 
 use crate::jobs::store::SubmitJobs;
 use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
 use crate::jobs::store_error::StoreError;
 
+#[repeat_conflicts]
 #[async_trait]
 impl SubmitJobs for SqlStore {
+    #[once]
     async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, StoreError> {
         let gone = || {
             StoreError::Failed(Arc::new(std::io::Error::other(
@@ -34,15 +37,12 @@ impl SubmitJobs for SqlStore {
     }
 
     async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), StoreError> {
-        engine::again(|| async move {
-            query("DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2")
-                .bind(tenant)
-                .bind(key)
-                .execute(&self.writer)
-                .await?;
-            Ok(())
-        })
-        .await
+        query("DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2")
+            .bind(tenant)
+            .bind(key)
+            .execute(&self.writer)
+            .await?;
+        Ok(())
     }
 
     async fn job_by_key(
@@ -51,10 +51,7 @@ impl SubmitJobs for SqlStore {
         key: &str,
         digest: &[u8; 32],
     ) -> Result<Option<Enqueued>, StoreError> {
-        engine::again(|| async move {
-            let mut connection = self.readers.acquire().await?;
-            by_key(&mut connection, tenant, key, digest).await
-        })
-        .await
+        let mut connection = self.readers.acquire().await?;
+        by_key(&mut connection, tenant, key, digest).await
     }
 }

@@ -2,9 +2,10 @@
 
 use super::blob_refs::{drop_slices_of_ended, leave_to_collector, release_blobs};
 use super::cached::{Pair, SOURCE, end_pairs};
-use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore};
-use super::rows::{fence, read_cache_key, read_id, read_move, to_json};
+use super::engine::{self, DbConnection, DbRow, QueryBuilder, SqlStore};
+use super::rows::{fence, read_cache_key, read_move, read_optional_id, to_json};
 use async_trait::async_trait;
+use railhead_macros::repeat_conflicts;
 
 use crate::jobs::store::submission::CacheKey;
 use std::collections::HashMap;
@@ -74,6 +75,7 @@ fn read_ended(rows: &[DbRow]) -> Result<HashSet<Uuid>, StoreError> {
         .collect()
 }
 
+#[repeat_conflicts]
 #[async_trait]
 impl Ends for SqlStore {
     async fn finish(
@@ -81,72 +83,63 @@ impl Ends for SqlStore {
         ends: &[(Claim, Ending)],
         now: i64,
     ) -> Result<HashSet<Uuid>, StoreError> {
-        engine::again(|| async move {
-            if ends.is_empty() {
-                return Ok(HashSet::new());
-            }
-            let pairs: Vec<Pair> = ends
-                .iter()
-                .filter_map(|(claim, ending)| match ending {
-                    Ending::Cached { source } => Some(Pair {
-                        job: claim.id,
-                        source: *source,
-                        at: now,
-                        lease_token: Some(fence(claim)),
-                    }),
-                    _ => None,
-                })
-                .collect();
-            let rows = ends
-                .iter()
-                .filter(|(_, ending)| !matches!(ending, Ending::Cached { .. }))
-                .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
-                .collect::<Result<Vec<_>, StoreError>>()?;
-            let mut transaction = engine::begin(&self.writer).await?;
-            let (made, rows_ended) = self.end_solved(&mut transaction, &rows, now).await?;
-            drop_slices_of_ended(&mut transaction, &rows_ended).await?;
-            let mut ended = read_ended(&rows_ended)?;
-            if ended.len() < rows.len() {
-                // Results whose lease was lost meanwhile have no owner.
-                release_blobs(&mut transaction, made).await?;
-                let lost = rows.iter().filter(|(claim, _)| !ended.contains(&claim.id));
-                let lost = lost.filter_map(|(_, end)| match end.result {
-                    Some(StoredResult::Blob(key, _)) => Some(key.clone()),
-                    _ => None,
-                });
-                leave_to_collector(&mut transaction, &lost.collect::<Vec<_>>()).await?;
-            }
-            ended.extend(end_pairs(&mut transaction, &pairs).await?);
-            transaction.commit().await?;
-            Ok(ended)
-        })
-        .await
+        if ends.is_empty() {
+            return Ok(HashSet::new());
+        }
+        let pairs: Vec<Pair> = ends
+            .iter()
+            .filter_map(|(claim, ending)| match ending {
+                Ending::Cached { source } => Some(Pair {
+                    job: claim.id,
+                    source: *source,
+                    at: now,
+                    lease_token: Some(fence(claim)),
+                }),
+                _ => None,
+            })
+            .collect();
+        let rows = ends
+            .iter()
+            .filter(|(_, ending)| !matches!(ending, Ending::Cached { .. }))
+            .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
+            .collect::<Result<Vec<_>, StoreError>>()?;
+        let mut transaction = engine::begin(&self.writer).await?;
+        let (made, rows_ended) = self.end_solved(&mut transaction, &rows, now).await?;
+        drop_slices_of_ended(&mut transaction, &rows_ended).await?;
+        let mut ended = read_ended(&rows_ended)?;
+        if ended.len() < rows.len() {
+            // Results whose lease was lost meanwhile have no owner.
+            release_blobs(&mut transaction, made).await?;
+            let lost = rows.iter().filter(|(claim, _)| !ended.contains(&claim.id));
+            let lost = lost.filter_map(|(_, end)| match end.result {
+                Some(StoredResult::Blob(key, _)) => Some(key.clone()),
+                _ => None,
+            });
+            leave_to_collector(&mut transaction, &lost.collect::<Vec<_>>()).await?;
+        }
+        ended.extend(end_pairs(&mut transaction, &pairs).await?);
+        transaction.commit().await?;
+        Ok(ended)
     }
 
     async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, StoreError> {
-        engine::again(|| async move {
-            if keys.is_empty() {
-                return Ok(HashMap::new());
-            }
-            let mut query = QueryBuilder::new("WITH asked (cache_key) AS (");
-            query.push_values(keys, |mut row, key| {
-                row.push_bind(key.as_slice());
-            });
-            query.push(") SELECT cache_key, ").push(SOURCE);
-            query.push(" AS id FROM asked");
-            let mut connection = self.readers.acquire().await?;
-            let rows = query.build().fetch_all(&mut *connection).await?;
-            let mut sources = HashMap::new();
-            for row in &rows {
-                if row.try_get::<Option<&str>, _>("id")?.is_some()
-                    && let Some(key) = read_cache_key(row)?
-                {
-                    sources.insert(key, read_id(row)?);
-                }
-            }
-            Ok(sources)
-        })
-        .await
+        if keys.is_empty() {
+            return Ok(HashMap::new());
+        }
+        let mut query = QueryBuilder::new("WITH asked (cache_key) AS (");
+        query.push_values(keys, |mut row, key| {
+            row.push_bind(key.as_slice());
+        });
+        query.push(") SELECT cache_key, ").push(SOURCE);
+        query.push(" AS id FROM asked");
+        let mut connection = self.readers.acquire().await?;
+        let rows = query.build().fetch_all(&mut *connection).await?;
+        let mut sources = HashMap::new();
+        for row in &rows {
+            let id = read_optional_id(row, "id")?;
+            sources.extend(read_cache_key(row)?.zip(id));
+        }
+        Ok(sources)
     }
 }
 

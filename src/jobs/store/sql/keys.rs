@@ -1,8 +1,9 @@
 //! API keys in the embedded job table.
 
 use super::engine::{self, DbRow, Row, SqlStore, query};
-use super::rows::{from_json, read_flag, to_json};
+use super::rows::{read_flag, read_json, to_json};
 use async_trait::async_trait;
+use railhead_macros::repeat_conflicts;
 
 use crate::jobs::model::key::Key;
 use crate::jobs::store::KeyStore;
@@ -14,63 +15,51 @@ const ALL: &str =
 
 const ONE: &str = "SELECT id, hash, tenant, name, created_at, revoked_at, read_only, labels FROM api_keys WHERE id = $1";
 
+#[repeat_conflicts]
 #[async_trait]
 impl KeyStore for SqlStore {
     async fn add_key(&self, key: &Key) -> Result<(), StoreError> {
-        engine::again(|| async move {
-            query(
-                "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only, labels) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
-            )
-            .bind(&key.id)
-            .bind(key.hash.as_bytes().as_slice())
-            .bind(&*key.tenant)
-            .bind(&key.name)
-            .bind(key.created_at)
-            .bind(key.revoked_at)
-            .bind(i64::from(key.read_only))
-            .bind(to_json(&*key.labels)?)
-            .execute(&self.writer)
-            .await?;
-            Ok(())
-        })
-        .await
+        query(
+            "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only, labels) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
+        )
+        .bind(&key.id)
+        .bind(key.hash.as_bytes().as_slice())
+        .bind(&*key.tenant)
+        .bind(&key.name)
+        .bind(key.created_at)
+        .bind(key.revoked_at)
+        .bind(i64::from(key.read_only))
+        .bind(to_json(&*key.labels)?)
+        .execute(&self.writer)
+        .await?;
+        Ok(())
     }
 
     async fn key(&self, id: &str) -> Result<Option<Key>, StoreError> {
-        engine::again(|| async move {
-            let row = query(ONE).bind(id).fetch_optional(&self.readers).await?;
-            row.as_ref().map(read_key).transpose()
-        })
-        .await
+        let row = query(ONE).bind(id).fetch_optional(&self.readers).await?;
+        row.as_ref().map(read_key).transpose()
     }
 
     async fn keys(&self) -> Result<Vec<Key>, StoreError> {
-        engine::again(|| async move {
-            let rows = query(ALL).fetch_all(&self.readers).await?;
-            let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
-            keys.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
-            Ok(keys)
-        })
-        .await
+        let rows = query(ALL).fetch_all(&self.readers).await?;
+        let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
+        keys.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
+        Ok(keys)
     }
 
     async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, StoreError> {
-        engine::again(|| async move {
-            query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
-                .bind(now)
-                .bind(id)
-                .execute(&self.writer)
-                .await?;
-            self.key(id).await
-        })
-        .await
+        query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
+            .bind(now)
+            .bind(id)
+            .execute(&self.writer)
+            .await?;
+        self.key(id).await
     }
 }
 
 fn read_key(row: &DbRow) -> Result<Key, StoreError> {
     let hash: Vec<u8> = row.try_get("hash")?;
     let tenant: String = row.try_get("tenant")?;
-    let labels: String = row.try_get("labels")?;
     Ok(Key {
         id: row.try_get("id")?,
         hash: blake3::Hash::from_slice(&hash)
@@ -80,6 +69,6 @@ fn read_key(row: &DbRow) -> Result<Key, StoreError> {
         created_at: row.try_get("created_at")?,
         revoked_at: row.try_get("revoked_at")?,
         read_only: read_flag(row, "read_only")?,
-        labels: Arc::new(from_json(&labels)?),
+        labels: Arc::new(read_json(row, "labels")?),
     })
 }

@@ -1,12 +1,13 @@
 //! Lists of the embedded job table: one indexed statement per page and state, whatever the filter.
 
 use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
-use super::rows::{job_columns, read_count, read_id, read_job, read_kind};
+use super::rows::{job_columns, read_count, read_id, read_job, read_kind, read_optional_id};
 use std::cmp::Reverse;
 
 use uuid::Uuid;
 
 use async_trait::async_trait;
+use railhead_macros::repeat_conflicts;
 
 use crate::jobs::model::job::{Job, State};
 use crate::jobs::store::JobLists;
@@ -18,6 +19,7 @@ const EXAMINED_MAX: i64 = 20_000;
 /// How far the jobs of a list are counted.
 const COUNTED: i64 = 1_000;
 
+#[repeat_conflicts]
 #[async_trait]
 impl JobLists for SqlStore {
     async fn list(
@@ -27,40 +29,37 @@ impl JobLists for SqlStore {
         after: Option<Uuid>,
         limit: u32,
     ) -> Result<Page<Job>, StoreError> {
-        engine::again(|| async move {
-            let (mut jobs, mut looked_to) = (Vec::new(), None);
-            for state in walked(filter) {
-                let mut query = page_query(tenant, filter, state, after, limit);
-                for row in &query.build().fetch_all(&self.readers).await? {
-                    jobs.push(read_job(row)?);
-                }
-                if filter.reads_jobs() {
-                    let mut query = end_query(tenant, filter, state, after);
-                    let end = query.build().fetch_optional(&self.readers).await?;
-                    looked_to = looked_to.max(end.as_ref().map(read_id).transpose()?);
-                }
+        let (mut jobs, mut looked_to) = (Vec::new(), None);
+        for state in walked(filter) {
+            let mut query = page_query(tenant, filter, state, after, limit);
+            for row in &query.build().fetch_all(&self.readers).await? {
+                jobs.push(read_job(row)?);
             }
-            jobs.sort_unstable_by_key(|job| Reverse(job.id));
-            // Below, not every state was looked at.
-            jobs.retain(|job| looked_to.is_none_or(|to| job.id >= to));
-            // One job more than asked for was read: it says whether there is a next page.
-            let more = jobs.len() > limit as usize;
-            jobs.truncate(limit as usize);
-            let last = if more {
-                jobs.last().map(|job| job.id)
-            } else {
-                looked_to
-            };
-            Ok(Page {
-                next_cursor: last.map(|last| filter.cursor_after(last)),
-                total: match filter.reads_jobs() {
-                    true => Total::AtLeast(jobs.len() as u64),
-                    false => self.count(tenant, filter).await?,
-                },
-                entries: jobs,
-            })
+            if filter.reads_jobs() {
+                let mut query = end_query(tenant, filter, state, after);
+                let end = query.build().fetch_optional(&self.readers).await?;
+                looked_to = looked_to.max(end.as_ref().map(read_id).transpose()?);
+            }
+        }
+        jobs.sort_unstable_by_key(|job| Reverse(job.id));
+        // Below, not every state was looked at.
+        jobs.retain(|job| looked_to.is_none_or(|to| job.id >= to));
+        // One job more than asked for was read: it says whether there is a next page.
+        let more = jobs.len() > limit as usize;
+        jobs.truncate(limit as usize);
+        let last = if more {
+            jobs.last().map(|job| job.id)
+        } else {
+            looked_to
+        };
+        Ok(Page {
+            next_cursor: last.map(|last| filter.cursor_after(last)),
+            total: match filter.reads_jobs() {
+                true => Total::AtLeast(jobs.len() as u64),
+                false => self.count(tenant, filter).await?,
+            },
+            entries: jobs,
         })
-        .await
     }
 
     async fn changes(
@@ -70,28 +69,22 @@ impl JobLists for SqlStore {
         after: Option<Uuid>,
         limit: u32,
     ) -> Result<Vec<Change>, StoreError> {
-        engine::again(|| async move {
-            let rows = query(CHANGES)
-                .bind(tenant)
-                .bind(since)
-                .bind(after.map_or_else(String::new, |id| id.to_string()))
-                .bind(i64::from(limit))
-                .fetch_all(&self.readers)
-                .await?;
-            let change = |row: &DbRow| {
-                let batch: Option<&str> = row.try_get("batch_id")?;
-                let batch = batch.map(Uuid::try_parse).transpose();
-                Ok(Change {
-                    id: read_id(row)?,
-                    batch: batch
-                        .map_err(|error| StoreError::Corrupt(format!("batch id: {error}")))?,
-                    kind: read_kind(row)?,
-                    at: row.try_get("updated_at")?,
-                })
-            };
-            rows.iter().map(change).collect()
-        })
-        .await
+        let rows = query(CHANGES)
+            .bind(tenant)
+            .bind(since)
+            .bind(after.map_or_else(String::new, |id| id.to_string()))
+            .bind(i64::from(limit))
+            .fetch_all(&self.readers)
+            .await?;
+        let change = |row: &DbRow| {
+            Ok(Change {
+                id: read_id(row)?,
+                batch: read_optional_id(row, "batch_id")?,
+                kind: read_kind(row)?,
+                at: row.try_get("updated_at")?,
+            })
+        };
+        rows.iter().map(change).collect()
     }
 }
 

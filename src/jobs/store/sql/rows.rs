@@ -22,20 +22,14 @@ pub(crate) use job_columns;
 
 /// Reads a row that has the columns of `job_columns`.
 pub(crate) fn read_job(row: &DbRow) -> Result<Job, StoreError> {
-    let failure: Option<String> = row.try_get("failure")?;
-    let batch: Option<String> = row.try_get("batch_id")?;
     Ok(Job {
         id: read_id(row)?,
         tenant: row.try_get("tenant")?,
         kind: read_kind(row)?,
         state: read_state(row)?,
         name: row.try_get("name")?,
-        labels: from_json(row.try_get("labels")?)?,
-        batch_id: batch
-            .as_deref()
-            .map(Uuid::try_parse)
-            .transpose()
-            .map_err(|error| StoreError::Corrupt(format!("batch id: {error}")))?,
+        labels: read_json(row, "labels")?,
+        batch_id: read_optional_id(row, "batch_id")?,
         priority: Priority::from_rank(read_small(row, "rank")?)
             .ok_or_else(|| StoreError::Corrupt("a rank is none of 0 to 2".to_owned()))?,
         created_at: row.try_get("created_at")?,
@@ -46,8 +40,11 @@ pub(crate) fn read_job(row: &DbRow) -> Result<Job, StoreError> {
         expires_at: None,
         attempt: read_small(row, "attempt")?,
         progress: row.try_get("progress")?,
-        remarks: from_json(row.try_get("remarks")?)?,
-        failure: failure.as_deref().map(from_json).transpose()?,
+        remarks: read_json(row, "remarks")?,
+        failure: match row.try_get::<Option<String>, _>("failure")? {
+            Some(_) => Some(read_json(row, "failure")?),
+            None => None,
+        },
         cached: read_flag(row, "cached")?,
         version: read_count(row, "version")?,
         queue: None,
@@ -55,8 +52,15 @@ pub(crate) fn read_job(row: &DbRow) -> Result<Job, StoreError> {
 }
 
 pub(crate) fn read_id(row: &DbRow) -> Result<Uuid, StoreError> {
-    let text: &str = row.try_get("id")?;
-    Uuid::try_parse(text).map_err(|error| StoreError::Corrupt(format!("job id {text:?}: {error}")))
+    let id = read_optional_id(row, "id")?;
+    id.ok_or_else(|| StoreError::Corrupt("a row without an id".to_owned()))
+}
+
+/// An id, if the row has one.
+pub(crate) fn read_optional_id(row: &DbRow, column: &str) -> Result<Option<Uuid>, StoreError> {
+    let text: Option<String> = row.try_get(column)?;
+    let id = text.as_deref().map(Uuid::try_parse).transpose();
+    id.map_err(|error| StoreError::Corrupt(format!("{column} {text:?}: {error}")))
 }
 
 /// The key of identical cases, if the row has one.
@@ -64,7 +68,7 @@ pub(crate) fn read_cache_key(row: &DbRow) -> Result<Option<CacheKey>, StoreError
     let key: Option<Vec<u8>> = row.try_get("cache_key")?;
     key.map(CacheKey::try_from)
         .transpose()
-        .map_err(|_| StoreError::Corrupt("a reuse key has a wrong length".to_owned()))
+        .map_err(|_| StoreError::Corrupt("a cache key has a wrong length".to_owned()))
 }
 
 /// The blob a row refers to.
@@ -84,13 +88,13 @@ pub(crate) fn read_blob_ids(rows: &[DbRow]) -> Result<Vec<i64>, StoreError> {
 
 /// The kind of the work in a row.
 pub(crate) fn read_kind(row: &DbRow) -> Result<Kind, StoreError> {
-    let name: &str = row.try_get("kind")?;
-    Kind::from_name(name).ok_or_else(|| StoreError::Corrupt(format!("kind {name:?}")))
+    let name: String = row.try_get("kind")?;
+    Kind::from_name(&name).ok_or_else(|| StoreError::Corrupt(format!("kind {name:?}")))
 }
 
 pub(crate) fn read_state(row: &DbRow) -> Result<State, StoreError> {
-    let name: &str = row.try_get("state")?;
-    State::from_name(name).ok_or_else(|| StoreError::Corrupt(format!("job state {name:?}")))
+    let name: String = row.try_get("state")?;
+    State::from_name(&name).ok_or_else(|| StoreError::Corrupt(format!("job state {name:?}")))
 }
 
 /// The id of a row and its state, into which a job that was in `from` has moved.
@@ -120,8 +124,9 @@ pub(crate) fn to_json<T: Serialize>(value: &T) -> Result<String, StoreError> {
     serde_json::to_string(value).map_err(|error| StoreError::Corrupt(error.to_string()))
 }
 
-pub(crate) fn from_json<T: DeserializeOwned>(text: &str) -> Result<T, StoreError> {
-    serde_json::from_str(text).map_err(|error| StoreError::Corrupt(format!("{text:.80}: {error}")))
+pub(crate) fn read_json<T: DeserializeOwned>(row: &DbRow, column: &str) -> Result<T, StoreError> {
+    let text: String = row.try_get(column)?;
+    serde_json::from_str(&text).map_err(|error| StoreError::Corrupt(format!("{text:.80}: {error}")))
 }
 
 /// Ids as the list of an `IN`, without the brackets.

@@ -6,6 +6,7 @@ use super::rows::{push_list, read_blob_ids, read_id, read_move, read_state, to_j
 use uuid::Uuid;
 
 use async_trait::async_trait;
+use railhead_macros::repeat_conflicts;
 
 use crate::jobs::model::job::{Failure, State};
 use crate::jobs::store::Upkeep;
@@ -43,6 +44,7 @@ pub(crate) const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
          OR (SELECT COUNT(*) FROM jobs AS other WHERE other.state = 'running' AND other.solving = 1) > 1) \
      RETURNING id, state, slices";
 
+#[repeat_conflicts]
 #[async_trait]
 impl Upkeep for SqlStore {
     async fn reap(
@@ -51,33 +53,30 @@ impl Upkeep for SqlStore {
         now: i64,
         attempts_max: u32,
     ) -> Result<Vec<(Uuid, State)>, StoreError> {
-        engine::again(|| async move {
-            let mut transaction = engine::begin(&self.writer).await?;
-            let mut rows = Vec::new();
-            let late = match which {
-                Reap::Expired { now } => self.lease_now(now),
-                Reap::Dead => {
-                    let bystanders = query(REAP_BYSTANDERS).bind(now);
-                    rows = bystanders.fetch_all(&mut *transaction).await?;
-                    Some(i64::MAX)
-                }
-            };
-            let expired = query(REAP)
-                .bind(i64::from(attempts_max))
-                .bind(to_json(&Failure::worker_lost(attempts_max))?)
-                .bind(now)
-                .bind(late)
-                .fetch_all(&mut *transaction)
-                .await?;
-            rows.extend(expired);
-            drop_slices_of_ended(&mut transaction, &rows).await?;
-            transaction.commit().await?;
-            self.requeued();
-            rows.iter()
-                .map(|row| read_move(row, State::Running))
-                .collect()
-        })
-        .await
+        let mut transaction = engine::begin(&self.writer).await?;
+        let mut rows = Vec::new();
+        let late = match which {
+            Reap::Expired { now } => self.lease_now(now),
+            Reap::Dead => {
+                let bystanders = query(REAP_BYSTANDERS).bind(now);
+                rows = bystanders.fetch_all(&mut *transaction).await?;
+                Some(i64::MAX)
+            }
+        };
+        let expired = query(REAP)
+            .bind(i64::from(attempts_max))
+            .bind(to_json(&Failure::worker_lost(attempts_max))?)
+            .bind(now)
+            .bind(late)
+            .fetch_all(&mut *transaction)
+            .await?;
+        rows.extend(expired);
+        drop_slices_of_ended(&mut transaction, &rows).await?;
+        transaction.commit().await?;
+        self.requeued();
+        rows.iter()
+            .map(|row| read_move(row, State::Running))
+            .collect()
     }
 
     async fn pass_deadlines(
@@ -85,94 +84,85 @@ impl Upkeep for SqlStore {
         failure: &Failure,
         moment: Moment,
     ) -> Result<Overdue, StoreError> {
-        engine::again(|| async move {
-            // Late jobs are rare, and a read holds no writer up.
-            let rows = query(LATE)
-                .bind(moment.now)
-                .bind(moment.set_at)
-                .bind(moment.unset)
-                .fetch_all(&self.readers)
-                .await?;
-            let (mut queued, mut overdue) = (false, Overdue::default());
-            for row in &rows {
-                match read_state(row)? {
-                    State::Queued => queued = true,
-                    _ => overdue.running.push(read_id(row)?),
-                }
+        // Late jobs are rare, and a read holds no writer up.
+        let rows = query(LATE)
+            .bind(moment.now)
+            .bind(moment.set_at)
+            .bind(moment.unset)
+            .fetch_all(&self.readers)
+            .await?;
+        let (mut queued, mut overdue) = (false, Overdue::default());
+        for row in &rows {
+            match read_state(row)? {
+                State::Queued => queued = true,
+                _ => overdue.running.push(read_id(row)?),
             }
-            if queued {
-                overdue.ended = self.fail_late(failure, moment).await?;
-            }
-            Ok(overdue)
-        })
-        .await
+        }
+        if queued {
+            overdue.ended = self.fail_late(failure, moment).await?;
+        }
+        Ok(overdue)
     }
 
     async fn expire(&self, expiry: RetentionRule) -> Result<u64, StoreError> {
-        engine::again(|| async move {
-            let mut transaction = engine::begin(&self.writer).await?;
-            let young = first_id_at(expiry.ended_before.saturating_add(1)).to_string();
-            let rows = query(EXPIRED)
-                .bind(&young)
-                .bind(expiry.ended_before)
-                .bind(i64::from(expiry.jobs))
-                .fetch_all(&mut *transaction)
-                .await?;
-            let mut blobs = Vec::with_capacity(rows.len());
-            for some in rows.chunks(250) {
-                let ids = some.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
-                blobs.extend(read_blob_ids(some)?);
-                let mut bury = QueryBuilder::new(
-                    "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, ",
-                );
-                bury.push_bind(expiry.now);
-                bury.push(" FROM jobs WHERE id IN (");
-                push_list(&mut bury, &ids);
-                bury.push(") ON CONFLICT (id) DO NOTHING");
-                bury.build().execute(&mut *transaction).await?;
-                let mut delete = QueryBuilder::new("DELETE FROM jobs WHERE id IN (");
-                push_list(&mut delete, &ids);
-                delete.push(")");
-                delete.build().execute(&mut *transaction).await?;
-            }
-            release_blobs(&mut transaction, blobs).await?;
-            query(
-                "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, $1 FROM batches \
-                 WHERE id < $2 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id) \
-                 ON CONFLICT (id) DO NOTHING",
-            )
-            .bind(expiry.now)
+        let mut transaction = engine::begin(&self.writer).await?;
+        let young = first_id_at(expiry.ended_before.saturating_add(1)).to_string();
+        let rows = query(EXPIRED)
             .bind(&young)
+            .bind(expiry.ended_before)
+            .bind(i64::from(expiry.jobs))
+            .fetch_all(&mut *transaction)
+            .await?;
+        let mut blobs = Vec::with_capacity(rows.len());
+        for some in rows.chunks(250) {
+            let ids = some.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
+            blobs.extend(read_blob_ids(some)?);
+            let mut bury = QueryBuilder::new(
+                "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, ",
+            );
+            bury.push_bind(expiry.now);
+            bury.push(" FROM jobs WHERE id IN (");
+            push_list(&mut bury, &ids);
+            bury.push(") ON CONFLICT (id) DO NOTHING");
+            bury.build().execute(&mut *transaction).await?;
+            let mut delete = QueryBuilder::new("DELETE FROM jobs WHERE id IN (");
+            push_list(&mut delete, &ids);
+            delete.push(")");
+            delete.build().execute(&mut *transaction).await?;
+        }
+        release_blobs(&mut transaction, blobs).await?;
+        query(
+            "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, $1 FROM batches \
+             WHERE id < $2 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id) \
+             ON CONFLICT (id) DO NOTHING",
+        )
+        .bind(expiry.now)
+        .bind(&young)
+        .execute(&mut *transaction)
+        .await?;
+        query(
+            "DELETE FROM batches \
+             WHERE id < $1 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id)",
+        )
+        .bind(&young)
+        .execute(&mut *transaction)
+        .await?;
+        query("DELETE FROM tombstones WHERE id < $1 AND gone_at <= $2")
+            .bind(first_id_at(expiry.forget_before.saturating_add(1)).to_string())
+            .bind(expiry.forget_before)
             .execute(&mut *transaction)
             .await?;
-            query(
-                "DELETE FROM batches \
-                 WHERE id < $1 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id)",
-            )
-            .bind(&young)
-            .execute(&mut *transaction)
-            .await?;
-            query("DELETE FROM tombstones WHERE id < $1 AND gone_at <= $2")
-                .bind(first_id_at(expiry.forget_before.saturating_add(1)).to_string())
-                .bind(expiry.forget_before)
-                .execute(&mut *transaction)
-                .await?;
-            transaction.commit().await?;
-            Ok(rows.len() as u64)
-        })
-        .await
+        transaction.commit().await?;
+        Ok(rows.len() as u64)
     }
 
     async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool, StoreError> {
-        engine::again(|| async move {
-            let found = query("SELECT 1 FROM tombstones WHERE id = $1 AND tenant = $2")
-                .bind(id.to_string())
-                .bind(tenant)
-                .fetch_optional(&self.readers)
-                .await?;
-            Ok(found.is_some())
-        })
-        .await
+        let found = query("SELECT 1 FROM tombstones WHERE id = $1 AND tenant = $2")
+            .bind(id.to_string())
+            .bind(tenant)
+            .fetch_optional(&self.readers)
+            .await?;
+        Ok(found.is_some())
     }
 }
 

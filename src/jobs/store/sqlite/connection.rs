@@ -5,15 +5,16 @@
 
 use std::borrow::Cow;
 use std::ops::{Deref, DerefMut};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use rusqlite::types::{ToSqlOutput, Value};
+use rusqlite::types::{FromSql, ToSqlOutput, Value};
 use rusqlite::{ErrorCode, Statement, ToSql};
 use tokio::runtime::{Handle, RuntimeFlavor};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::jobs::store_error::{StorageFault, StoreError};
+use crate::jobs::sync::lock;
 
 /// How long a statement waits for a lock that another process holds.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(10);
@@ -130,10 +131,6 @@ impl Shared {
 fn closed() -> StoreError {
     let cause = std::io::Error::other("the job table is closed");
     StoreError::Away(StorageFault::Unwritable, Arc::new(cause))
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A connection in use. An open transaction is rolled back when it is given back.
@@ -458,14 +455,14 @@ impl ScalarQuery {
         ScalarQuery(self.0.bind(parameter))
     }
 
-    pub(crate) async fn fetch_one<T: for<'r> Decode<'r>>(
+    pub(crate) async fn fetch_one<T: FromSql>(
         self,
         executor: impl Executor,
     ) -> Result<T, StoreError> {
         self.0.fetch_one(executor).await?.try_get(0)
     }
 
-    pub(crate) async fn fetch_all<T: for<'r> Decode<'r>>(
+    pub(crate) async fn fetch_all<T: FromSql>(
         self,
         executor: impl Executor,
     ) -> Result<Vec<T>, StoreError> {
@@ -484,15 +481,15 @@ pub(crate) struct SqliteRow {
 /// Access to the columns of a row.
 pub(crate) trait Row {
     /// The value of a column, given by its name or its place.
-    fn try_get<'r, T: Decode<'r>, C: Column>(&'r self, column: C) -> Result<T, StoreError>;
+    fn try_get<T: FromSql, C: Column>(&self, column: C) -> Result<T, StoreError>;
 }
 
 impl Row for SqliteRow {
-    fn try_get<'r, T: Decode<'r>, C: Column>(&'r self, column: C) -> Result<T, StoreError> {
-        let value = column
-            .place(&self.names)
-            .and_then(|place| self.values.get(place));
-        value.and_then(T::decode).ok_or_else(|| {
+    fn try_get<T: FromSql, C: Column>(&self, column: C) -> Result<T, StoreError> {
+        let place = column.place(&self.names);
+        let value = place.and_then(|place| self.values.get(place));
+        let read = value.and_then(|value| T::column_result(value.into()).ok());
+        read.ok_or_else(|| {
             let kind = std::any::type_name::<T>();
             StoreError::Corrupt(format!("column {column:?} is no {kind}"))
         })
@@ -513,63 +510,6 @@ impl Column for &str {
 impl Column for usize {
     fn place(self, _: &[String]) -> Option<usize> {
         Some(self)
-    }
-}
-
-/// A type that a value of a column is read as.
-pub(crate) trait Decode<'r>: Sized {
-    fn decode(value: &'r Value) -> Option<Self>;
-}
-
-impl<'r> Decode<'r> for &'r str {
-    fn decode(value: &'r Value) -> Option<Self> {
-        match value {
-            Value::Text(text) => Some(text),
-            _ => None,
-        }
-    }
-}
-
-impl Decode<'_> for String {
-    fn decode(value: &Value) -> Option<Self> {
-        <&str>::decode(value).map(str::to_owned)
-    }
-}
-
-impl Decode<'_> for i64 {
-    fn decode(value: &Value) -> Option<Self> {
-        match value {
-            Value::Integer(number) => Some(*number),
-            _ => None,
-        }
-    }
-}
-
-impl Decode<'_> for f64 {
-    fn decode(value: &Value) -> Option<Self> {
-        match value {
-            Value::Real(number) => Some(*number),
-            Value::Integer(number) => Some(*number as f64),
-            _ => None,
-        }
-    }
-}
-
-impl Decode<'_> for Vec<u8> {
-    fn decode(value: &Value) -> Option<Self> {
-        match value {
-            Value::Blob(bytes) => Some(bytes.clone()),
-            _ => None,
-        }
-    }
-}
-
-impl<'r, T: Decode<'r>> Decode<'r> for Option<T> {
-    fn decode(value: &'r Value) -> Option<Self> {
-        match value {
-            Value::Null => Some(None),
-            value => T::decode(value).map(Some),
-        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Do the statements take the indices that were made for them?
 
+use tempfile::TempDir;
 use uuid::Uuid;
 
 use crate::jobs::model::job::State;
@@ -17,12 +18,41 @@ use crate::jobs::store::sqlite::sql::upkeep::{FAIL_LATE, LATE};
 use crate::jobs::store::sqlite::sql::upkeep::{REAP, REAP_BYSTANDERS};
 use crate::jobs::store::sqlite::sql::{batch_lists, lists};
 
+/// A job table in a folder of its own.
+struct Opened(
+    SqliteStore,
+    #[expect(dead_code, reason = "removed at the end")] TempDir,
+);
+
+impl Opened {
+    async fn new() -> Opened {
+        let folder = tempfile::tempdir().unwrap();
+        let store = SqliteStore::open(&folder.path().join("jobs.db")).await;
+        Opened(store.unwrap(), folder)
+    }
+
+    /// The steps in which a statement is carried out.
+    async fn plan(&self, statement: &str) -> Vec<String> {
+        let mut explain = query(format!("EXPLAIN QUERY PLAN {statement}"));
+        for _ in 0..20 {
+            explain = explain.bind(0_i64);
+        }
+        let steps = explain.fetch_all(&self.0.writer).await.unwrap();
+        let details = steps.iter().map(|row| row.try_get("detail").unwrap());
+        details.collect()
+    }
+}
+
+/// Asserts that some step contains `seek`, and that none begins with or contains one of the others.
+fn assert_seeks(steps: &[String], seek: &str, others: &[&str]) {
+    assert!(steps.iter().any(|step| step.contains(seek)), "{steps:?}");
+    let other = |step: &String| others.iter().any(|other| step.contains(other));
+    assert!(!steps.iter().any(other), "{steps:?}");
+}
+
 #[tokio::test]
 async fn the_list_of_batches_walks_its_index_without_sorting() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = Opened::new().await;
     for after in [None, Some(Uuid::now_v7())] {
         let filter = Filter {
             labels: vec![("line".to_owned(), "A12".to_owned())],
@@ -30,22 +60,16 @@ async fn the_list_of_batches_walks_its_index_without_sorting() {
             ..Filter::of(Kind::Cases)
         };
         let query = batch_lists::page_query("t", &filter, after);
-        let steps = plan(&store, query.sql()).await;
-        assert!(
-            steps[0].contains("batches_by_tenant (tenant=? AND kind=?"),
-            "{steps:?}"
-        );
-        let sorts = |step: &String| step.contains("TEMP B-TREE");
-        assert!(!steps.iter().any(sorts), "{steps:?}");
+        let steps = store.plan(query.sql()).await;
+        let seek = "batches_by_tenant (tenant=? AND kind=?";
+        assert_seeks(&steps[..1], seek, &[]);
+        assert_seeks(&steps, seek, &["TEMP B-TREE"]);
     }
 }
 
 #[tokio::test]
 async fn references_to_a_blob_are_found_by_index() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = Opened::new().await;
     let free = "DELETE FROM blobs WHERE id IN (1, 2) AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.blob_id = blobs.id) \
         AND NOT EXISTS (SELECT 1 FROM job_slices WHERE job_slices.blob_id = blobs.id)";
     let known = "SELECT key FROM blobs WHERE key IN ('a', 'b')";
@@ -53,21 +77,14 @@ async fn references_to_a_blob_are_found_by_index() {
         (free, "jobs_by_blob (blob_id=?"),
         (known, "blobs_by_key (key=?"),
     ] {
-        let steps = plan(&store, statement).await;
-        assert!(steps.iter().any(|step| step.contains(seek)), "{steps:?}");
-        assert!(
-            !steps.iter().any(|step| step.starts_with("SCAN")),
-            "{steps:?}"
-        );
+        let steps = store.plan(statement).await;
+        assert_seeks(&steps, seek, &["SCAN"]);
     }
 }
 
 #[tokio::test]
 async fn slices_are_found_by_their_job_and_blobs_by_their_slice() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = Opened::new().await;
     // The last is what the database asks itself when a blob goes.
     let referring = "SELECT 1 FROM job_slices WHERE blob_id = 1";
     for (statement, seek) in [
@@ -75,38 +92,24 @@ async fn slices_are_found_by_their_job_and_blobs_by_their_slice() {
         (RESULTS, "PRIMARY KEY (job_id=?"),
         (referring, "job_slices_by_blob (blob_id=?"),
     ] {
-        let steps = plan(&store, statement).await;
-        assert!(steps[0].contains(seek), "{steps:?}");
-        assert!(
-            !steps.iter().any(|step| step.starts_with("SCAN")),
-            "{steps:?}"
-        );
+        let steps = store.plan(statement).await;
+        assert_seeks(&steps[..1], seek, &[]);
+        assert_seeks(&steps, seek, &["SCAN"]);
     }
 }
 
 #[tokio::test]
 async fn a_source_is_found_by_one_seek() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = Opened::new().await;
     let statement =
         format!("WITH asked (cache_key) AS (VALUES (x'00')) SELECT {SOURCE} FROM asked");
-    let steps = plan(&store, &statement).await;
-    assert!(
-        steps
-            .iter()
-            .any(|step| step.contains("jobs_by_cache_key (cache_key=?)")),
-        "{steps:?}"
-    );
+    let steps = store.plan(&statement).await;
+    assert_seeks(&steps, "jobs_by_cache_key (cache_key=?)", &[]);
 }
 
 #[tokio::test]
 async fn the_claim_and_the_reaper_find_their_jobs_by_index() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = Opened::new().await;
     let bystanders = REAP_BYSTANDERS;
     for (statement, seek) in [
         (QUEUES, "PRIMARY KEY (state=?"),
@@ -116,85 +119,47 @@ async fn the_claim_and_the_reaper_find_their_jobs_by_index() {
         (REAP, "jobs_by_state (state=?"),
         (bystanders, "jobs_by_state (state=?"),
     ] {
-        let steps = plan(&store, statement).await;
-        assert!(steps.iter().any(|step| step.contains(seek)), "{steps:?}");
-        assert!(
-            !steps
-                .iter()
-                .any(|step| step.starts_with("SCAN j") || step.contains("TEMP B-TREE")),
-            "{steps:?}"
-        );
+        let steps = store.plan(statement).await;
+        assert_seeks(&steps, seek, &["SCAN j", "TEMP B-TREE"]);
     }
 }
 
 #[tokio::test]
 async fn jobs_without_a_deadline_are_not_looked_at() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = Opened::new().await;
     for statement in [LATE, FAIL_LATE] {
-        let steps = plan(&store, statement).await;
-        let seeks = |step: &String| step.contains("jobs_by_deadline (deadline");
-        assert!(steps.iter().any(seeks), "{steps:?}");
-        assert!(
-            !steps.iter().any(|step| step.starts_with("SCAN jobs")),
-            "{steps:?}"
-        );
+        let steps = store.plan(statement).await;
+        assert_seeks(&steps, "jobs_by_deadline (deadline", &["SCAN jobs"]);
     }
 }
 
 #[tokio::test]
 async fn the_sweep_looks_at_old_jobs_only() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
-    let steps = plan(&store, EXPIRED).await;
+    let store = Opened::new().await;
+    let steps = store.plan(EXPIRED).await;
     assert_eq!(steps[0], "SEARCH jobs USING PRIMARY KEY (id<?)");
     // Of a chunk, its run and its neighbours that have not ended are looked at.
     let looks = steps.iter().filter(|step| step.starts_with("SEARCH"));
     assert_eq!(looks.count(), 3, "{steps:?}");
-    assert!(
-        steps
-            .iter()
-            .any(|step| step.contains("beside") && step.contains("(batch_id=? AND state=?")),
-        "{steps:?}"
-    );
-    assert!(
-        !steps
-            .iter()
-            .any(|step| step.starts_with("SCAN") || step.contains("TEMP B-TREE")),
-        "{steps:?}"
-    );
-}
-
-/// The steps SQLite takes for a statement.
-pub(crate) async fn plan(store: &SqliteStore, statement: &str) -> Vec<String> {
-    // The plan does not depend on the values.
-    let parameters = vec![0_i64; 20];
-    let mut explain = query(format!("EXPLAIN QUERY PLAN {statement}"));
-    for value in parameters {
-        explain = explain.bind(value);
-    }
-    let steps = explain.fetch_all(&store.writer).await.unwrap();
-    let details = steps.iter().map(|row| row.try_get("detail").unwrap());
-    details.collect()
+    let beside: Vec<String> = steps
+        .iter()
+        .filter(|step| step.contains("beside"))
+        .cloned()
+        .collect();
+    assert_seeks(&beside, "(batch_id=? AND state=?", &[]);
+    assert_seeks(&steps, "SEARCH", &["SCAN", "TEMP B-TREE"]);
 }
 
 #[tokio::test]
 async fn the_list_of_a_batch_walks_its_index_and_nothing_of_the_batch_of_another_tenant() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = Opened::new().await;
     for (state, after) in [(None, None), (Some(State::Queued), Some(Uuid::now_v7()))] {
         let filter = Filter {
             member: Some(Membership::Batch(Uuid::now_v7())),
             ..Filter::default()
         };
         let query = lists::page_query("t", &filter, state, after, 50);
-        let steps = plan(&store, query.sql()).await;
+        let steps = store.plan(query.sql()).await;
         let seek = match state {
             None => "jobs_by_batch (batch_id=?",
             Some(_) => "jobs_by_batch_and_state (batch_id=? AND state=?",
@@ -211,10 +176,7 @@ async fn the_list_of_a_batch_walks_its_index_and_nothing_of_the_batch_of_another
 
 #[tokio::test]
 async fn a_label_within_a_batch_is_walked_no_further_than_the_batch_goes() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = Opened::new().await;
     for (state, after) in [(None, Some(Uuid::now_v7())), (Some(State::Failed), None)] {
         let filter = Filter {
             member: Some(Membership::Batch(Uuid::now_v7())),
@@ -222,21 +184,17 @@ async fn a_label_within_a_batch_is_walked_no_further_than_the_batch_goes() {
             ..Filter::default()
         };
         let query = lists::page_query("t", &filter, state, after, 50);
-        let steps = plan(&store, query.sql()).await;
-        assert!(steps[0].contains("job_id>? AND job_id<?)"), "{steps:?}");
+        let steps = store.plan(query.sql()).await;
+        assert_seeks(&steps[..1], "job_id>? AND job_id<?)", &[]);
         let ends = steps.iter().filter(|step| step.contains("(batch_id=?)"));
         assert_eq!(ends.count(), 2, "{steps:?}");
-        let scans = |step: &String| step.starts_with("SCAN") || step.contains("TEMP B-TREE");
-        assert!(!steps.iter().any(scans), "{steps:?}");
+        assert_seeks(&steps, "SEARCH", &["SCAN", "TEMP B-TREE"]);
     }
 }
 
 #[tokio::test]
 async fn every_form_of_the_list_walks_an_index_without_sorting() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = Opened::new().await;
     let label = Some(("line".to_owned(), "A12".to_owned()));
     for state in [None, Some(State::Queued)] {
         for label in [None, label.clone()] {
@@ -249,15 +207,7 @@ async fn every_form_of_the_list_walks_an_index_without_sorting() {
                         ..Filter::default()
                     };
                     let query = lists::page_query("t", &filter, state, after, 50);
-                    let steps = plan(&store, query.sql()).await;
-                    assert!(
-                        !steps.iter().any(|step| step.contains("TEMP B-TREE")),
-                        "{filter:?}: {steps:?}"
-                    );
-                    assert!(
-                        !steps.iter().any(|step| step.starts_with("SCAN")),
-                        "{filter:?}: {steps:?}"
-                    );
+                    let steps = store.plan(query.sql()).await;
                     let seek = match (&label, state) {
                         (None, None) => "jobs_by_tenant (tenant=?",
                         (None, Some(_)) => "jobs_by_state (state=? AND tenant=?",
@@ -266,7 +216,8 @@ async fn every_form_of_the_list_walks_an_index_without_sorting() {
                             "job_labels_by_state (of_tenant=? AND key=? AND value=? AND state=?"
                         }
                     };
-                    assert!(steps[0].contains(seek), "{steps:?}");
+                    assert_seeks(&steps[..1], seek, &[]);
+                    assert_seeks(&steps, seek, &["SCAN", "TEMP B-TREE"]);
                 }
             }
         }
@@ -275,10 +226,7 @@ async fn every_form_of_the_list_walks_an_index_without_sorting() {
 
 #[tokio::test]
 async fn the_list_of_jobs_submitted_alone_walks_its_index() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
+    let store = Opened::new().await;
     for after in [None, Some(Uuid::now_v7())] {
         for updated_after in [None, Some(5)] {
             let filter = Filter {
@@ -287,42 +235,32 @@ async fn the_list_of_jobs_submitted_alone_walks_its_index() {
                 ..Filter::default()
             };
             let query = lists::page_query("t", &filter, Some(State::Failed), after, 50);
-            let steps = plan(&store, query.sql()).await;
-            let seeks =
-                |step: &String| step.contains("jobs_alone (tenant=? AND kind=? AND state=?");
-            assert!(steps.iter().any(seeks), "{steps:?}");
-            let sorts = |step: &String| step.contains("TEMP B-TREE");
-            assert!(!steps.iter().any(sorts), "{steps:?}");
+            let steps = store.plan(query.sql()).await;
+            let seek = "jobs_alone (tenant=? AND kind=? AND state=?";
+            assert_seeks(&steps, seek, &["TEMP B-TREE"]);
         }
     }
 }
 
 #[tokio::test]
 async fn figures_are_read_from_indices_alone() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
-    let steps = plan(&store, RESULT_BYTES).await;
+    let store = Opened::new().await;
+    let steps = store.plan(RESULT_BYTES).await;
     assert!(steps[0].contains("COVERING INDEX"), "{steps:?}");
-    let steps = plan(&store, COUNT).await;
+    let steps = store.plan(COUNT).await;
     assert_eq!(steps, ["SCAN job_counts"], "a row per state and tenant");
-    let steps = plan(&store, OLDEST).await;
-    let seeks =
-        |step: &String| step.contains("jobs_queued (tenant=? AND kind=? AND rank>? AND rank<?");
-    assert!(steps.iter().any(seeks), "{steps:?}");
-    let walks =
-        |step: &String| step.contains("SCAN jobs") || step.contains("TEMP B-TREE FOR ORDER");
-    assert!(!steps.iter().any(walks), "{steps:?}");
+    let steps = store.plan(OLDEST).await;
+    let seek = "jobs_queued (tenant=? AND kind=? AND rank>? AND rank<?";
+    assert_seeks(&steps, seek, &["SCAN jobs", "TEMP B-TREE FOR ORDER"]);
 }
 
 #[tokio::test]
 async fn a_place_in_the_queue_is_read_from_an_index_alone() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = SqliteStore::open(&folder.path().join("jobs.db"))
-        .await
-        .unwrap();
-    let steps = plan(&store, BEFORE).await;
-    let seeks = |step: &String| step.contains("COVERING INDEX jobs_queued (tenant=? AND kind=?");
-    assert!(steps.iter().any(seeks), "{steps:?}");
+    let store = Opened::new().await;
+    let steps = store.plan(BEFORE).await;
+    assert_seeks(
+        &steps,
+        "COVERING INDEX jobs_queued (tenant=? AND kind=?",
+        &[],
+    );
 }

@@ -1,0 +1,21 @@
+//! Locks and work outside the threads of the runtime.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use crate::jobs::error::JobsError;
+
+/// Locks a mutex, also after a panic of another holder.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Runs work that takes long, or waits for the disk, on a thread of its own.
+///
+/// # Errors
+/// [`JobsError::Damaged`] if the work panics.
+pub(crate) async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, JobsError> {
+    let done = tokio::task::spawn_blocking(work).await;
+    done.map_err(|error| JobsError::Damaged(error.to_string()))
+}
