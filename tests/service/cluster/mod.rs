@@ -7,6 +7,7 @@ mod database_tls;
 mod fairness;
 pub mod faketime;
 pub mod faulty_server;
+mod folded_counts;
 mod migrations;
 mod nodes;
 mod object_store;

@@ -116,9 +116,9 @@ impl Cluster for PostgresStore {
             .await?;
         if free {
             sqlx::query(
-                "WITH gone AS (DELETE FROM job_counts RETURNING state, tenant, number) \
-                 INSERT INTO job_counts (state, tenant, number) \
-                 SELECT state, tenant, CAST(SUM(number) AS bigint) FROM gone GROUP BY state, tenant HAVING SUM(number) <> 0",
+                "WITH gone AS (DELETE FROM job_counts RETURNING state, tenant, kind, number) \
+                 INSERT INTO job_counts (state, tenant, kind, number) \
+                 SELECT state, tenant, kind, CAST(SUM(number) AS bigint) FROM gone GROUP BY state, tenant, kind HAVING SUM(number) <> 0",
             )
             .execute(&mut *transaction)
             .await?;
