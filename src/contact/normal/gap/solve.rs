@@ -47,26 +47,13 @@ impl GapTask {
         }
     }
 
-    /// Finds region and pressure for a target of the resultants' error, relative to μN: finer below 0.002, and coarser above 0.005.
+    /// Finds region and pressure on grids of a fineness.
     ///
     /// Measured on Hertz's contact and on crowns of arcs, at targets of 0.002 to 0.005: approach within 0.02 %, area within 0.3 %, largest
     /// pressure within 0.3 %. At 0.02 lengths and pressures are within 1 %.
     ///
     /// # Errors
     /// A reason why there is no answer; or the monitor stopped the work.
-    pub fn solve_for(
-        &self,
-        target: f64,
-        workspace: &mut GridWorkspace<f32>,
-        monitor: &dyn Monitor,
-    ) -> Result<NormalAnswer, NormalError> {
-        self.solve_as(GridFineness::for_answer(target), workspace, monitor)
-    }
-
-    /// The same with grids as fine as told.
-    ///
-    /// # Errors
-    /// As [`Self::solve_for`].
     pub(crate) fn solve_as(
         &self,
         resolution: GridFineness,
@@ -264,13 +251,8 @@ impl GridFineness {
         }
     }
 
-    /// That for an answer: [`GapTask::solve_for`].
+    /// That for a target of the resultants' error, relative to μN: finer below 0.002, and coarser above 0.005.
     pub(crate) fn for_answer(target: f64) -> GridFineness {
-        RESOLUTION.for_target(target)
-    }
-
-    /// The resolution for a target of the resultants' error relative to μN; without one, that of [`TARGET_USUAL`].
-    fn for_target(self, target: f64) -> GridFineness {
         let mut cells = (target.min(TARGET_USUAL) / TARGET_USUAL).powf(TARGET_POWER);
         let mut looser = 1.0;
         if target.is_finite() {
@@ -279,10 +261,10 @@ impl GridFineness {
         }
         cells *= looser.powf(LOOSE_POWER);
         GridFineness {
-            contact: cells * self.contact,
-            patch: cells * self.patch,
-            tolerance: looser * self.tolerance,
-            ..self
+            contact: cells * RESOLUTION.contact,
+            patch: cells * RESOLUTION.patch,
+            tolerance: looser * RESOLUTION.tolerance,
+            ..RESOLUTION
         }
     }
 }

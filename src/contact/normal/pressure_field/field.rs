@@ -163,13 +163,4 @@ impl PressureField {
         self.grids = grids.map(|grid| grid.from_origin(origin)).collect();
         self
     }
-
-    /// The same contact with the force multiplied by a factor near 1 and approaches increased by the given amount in mm: lengths
-    /// from the origin and pressures are multiplied by the cube root of the factor, as in Hertzian contact.
-    #[must_use]
-    pub fn corrected(mut self, factor: f64, approach: f64) -> PressureField {
-        let grids = self.grids.into_iter();
-        self.grids = grids.map(|grid| grid.corrected(factor, approach)).collect();
-        self
-    }
 }

@@ -98,28 +98,6 @@ impl GridPressure {
         }
         self
     }
-
-    /// The same contact with the force multiplied by a factor near 1 and approaches increased by the given amount in mm: lengths
-    /// from the origin and pressures are multiplied by the cube root of the factor, as in Hertzian contact.
-    #[must_use]
-    pub fn corrected(mut self, factor: f64, approach: f64) -> GridPressure {
-        let root = factor.cbrt();
-        self.pressure_max *= root;
-        let axes = [&mut self.grid.x, &mut self.grid.y];
-        axes.into_iter().flatten().for_each(|at| *at *= root);
-        for shape in &mut self.shapes {
-            let patch = &mut shape.patch;
-            patch.normal_force *= factor;
-            patch.pressure_max *= root;
-            patch.area *= root * root;
-            patch.extent = patch.extent.map(|at| root * at);
-            patch.approach = patch.approach.map(|before| before + approach);
-            let SampledLoad { weight, centre } = &mut shape.load;
-            *weight *= root * root;
-            *centre = centre.map(|at| root * at);
-        }
-        self
-    }
 }
 
 #[cfg(test)]
@@ -189,29 +167,5 @@ mod tests {
         }
         let (here, there) = (chord_at(&field, -4.2), chord_at(&moved, 0.8));
         assert!((here.left - there.left - 0.3).abs() < 1e-12);
-    }
-
-    #[test]
-    fn correcting_grows_the_contact_as_hertz_does() {
-        let field = two_bumps();
-        let corrected = field.clone().corrected(1.03, 0.002);
-        let root = 1.03_f64.cbrt();
-        for (before, after) in field.patches().iter().zip(corrected.patches()) {
-            assert!((after.normal_force / before.normal_force - 1.03).abs() < 1e-12);
-            assert!((after.pressure_max / before.pressure_max - root).abs() < 1e-12);
-            assert!((after.area / before.area - root * root).abs() < 1e-12);
-        }
-        // The pressures on the cells carry just that force: a line's load times its width grows with the third power.
-        let load = |field: &GridPressure, y: f64| {
-            let chord = chord_at(field, y);
-            let length = chord.right - chord.left;
-            (
-                length,
-                length * field.mean_pressure(&chord, chord.left, chord.right),
-            )
-        };
-        let (before, after) = (load(&field, -4.2), load(&corrected, -4.2 * root));
-        assert!((after.0 / before.0 - root).abs() < 1e-9);
-        assert!((after.1 / before.1 - root * root).abs() < 1e-9);
     }
 }
