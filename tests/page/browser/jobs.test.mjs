@@ -44,12 +44,12 @@ test('a job is followed from the queue to its end, and another is cancelled', ()
 }));
 
 test('the result appears by itself though the service died meanwhile', () => onPage('#/compose', async (page) => {
-  const { id } = await service.ask('/v1/jobs', { json: { ...slow('survivor', 60), solver: { mesh: { strips: 24, cells: 24 } } } });
+  const { id } = await service.ask('/v1/jobs', { json: { ...slow('survivor', 240), solver: { mesh: { strips: 24, cells: 24 } } } });
   await page.goto(`${service.base}/#/jobs/${id}`);
   await page.locator('progress').waitFor();
   await service.kill();
   await service.start();
-  await page.locator('creep-curve canvas').waitFor({ timeout: 40_000 });
+  await page.locator('creep-curve canvas').waitFor({ timeout: 120_000 });
   await drawn(page);
 }));
 
