@@ -178,7 +178,7 @@ impl Jobs {
         }
     }
 
-    /// What was read from the place of the results, or why it is not there: the job may have gone meanwhile.
+    /// Returns a result that was read from storage. If it could not be read because its job was deleted in the meantime, the error says so.
     async fn unless_gone<T>(&self, id: Uuid, read: Result<T, JobsError>) -> Result<T, JobsError> {
         match read {
             Err(error) => Err(self.gone_meanwhile(id, error).await),

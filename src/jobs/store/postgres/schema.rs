@@ -13,21 +13,21 @@ use crate::jobs::store::postgres::connection::{self, connect, lock};
 /// The statements that make an empty schema a job table of form 1.
 const SCHEMA: &str = include_str!("schema.sql");
 
-/// What is done to tables of an earlier form, in this order: the form that a step leads to, its statements, and the oldest form whose
-/// programs can use the tables afterwards. A step that has landed is never changed.
+/// Migrations, in order: the version after the migration, its statements, and the oldest version whose programs can still use the tables.
+/// A released migration is never changed.
 const STEPS: &[(i64, &str, i64)] = &[
     (2, include_str!("steps/2.sql"), 2),
-    // A program that does not know of the labels would open everything to a key that is bound.
+    // Earlier programs ignore labels, so that a key bound to some of them could read everything.
     (3, include_str!("steps/3.sql"), 3),
-    // A new table, which programs before know nothing of.
+    // Adds a table that earlier programs do not use.
     (4, include_str!("steps/4.sql"), 3),
-    // Programs before look for templates in a table that is gone.
+    // Earlier programs read templates from a table that this migration drops.
     (5, include_str!("steps/5.sql"), 5),
-    // Earlier programs look for runs under a tenant that no longer has them.
+    // Earlier programs read runs from a tenant that no longer holds them.
     (6, include_str!("steps/6.sql"), 6),
     // Earlier programs cannot read the kind of an evolution.
     (7, include_str!("steps/7.sql"), 7),
-    // An index.
+    // Adds an index.
     (8, include_str!("steps/8.sql"), 7),
 ];
 

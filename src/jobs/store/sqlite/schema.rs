@@ -17,8 +17,7 @@ const APPLICATION: i64 = 0x7268_6a62;
 /// The form of `schema.sql`.
 const FIRST_SCHEMA_VERSION: i64 = 7;
 
-/// What is done to tables of an earlier form, in this order: the form that each step leads to, and its statements. A step that has landed
-/// is never changed.
+/// Migrations, in order: the version after the migration, and its statements. A released migration is never changed.
 const STEPS: &[(i64, &str)] = &[
     (8, include_str!("steps/8.sql")),
     (9, include_str!("steps/9.sql")),
