@@ -1,5 +1,12 @@
 //! Prints where `liu_hsu` converges, by rule, mesh and region. Nothing is timed but the whole row.
 
+use std::time::Instant;
+
+use convergence_domain::{count, motions};
+use railhead::contact::mesh::Grading;
+use railhead::contact::rolling::slip_rules::Rule;
+use regions::REGIONS;
+
 extern crate railhead_contact as railhead;
 
 #[allow(
@@ -14,14 +21,6 @@ mod convergence_domain;
 )]
 #[path = "../tests/physics/regions.rs"]
 mod regions;
-
-use std::time::Instant;
-
-use railhead::contact::mesh::strips::Grading;
-use railhead::contact::rolling::slip_rules::Rule;
-
-use convergence_domain::{count, motions};
-use regions::REGIONS;
 
 fn main() {
     // Every second motion, to match the published counts of the same sweep.

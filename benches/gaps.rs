@@ -3,19 +3,17 @@
 //! `cargo bench --bench gaps` prints for every case: the share of both problems in the time of a default solve in µs, and
 //! the errors of approach, area and largest pressure against the converged reference.
 
+use std::hint::black_box;
+
+use machine::{lu_seconds, median, quantile, seconds_of};
+use railhead::contact::case::solver::Limits;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::{check, normal_stage, solve};
+use serde_json::{Value, json};
+
 extern crate railhead_contact as railhead;
 
 mod machine;
-
-use std::hint::black_box;
-
-use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal_stage;
-use railhead::contact::{check, solve};
-use serde_json::{Value, json};
-
-use machine::{lu_seconds, median, quantile, seconds_of};
 
 const REPEATS: usize = 21;
 

@@ -1,18 +1,17 @@
 //! What the pieces of a solve cost: rows of the influence, one product, a whole level, by mesh and storage.
 
-extern crate railhead_contact as railhead;
-
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator::{OperatorScratch, StripOperator};
-use railhead::contact::mesh::strips::Chord;
-use railhead::contact::mesh::strips::{Grading, Mesh, equal_strips};
+use railhead::contact::mesh::{Chord, Grading, Mesh, equal_strips};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};
 use serde_json::json;
+
+extern crate railhead_contact as railhead;
 
 const MESHES: [(usize, usize); 3] = [(12, 6), (24, 12), (32, 16)];
 

@@ -1,6 +1,6 @@
 //! Draws the forces of a wheel on its rail over the lateral shift of the wheelset, and says how smooth they are.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};

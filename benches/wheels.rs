@@ -5,6 +5,18 @@
 //! `-- shift` draws forces over the shift of the wheelset into `docs/wheel-rail/shift.svg`; the worn pair needs the reference files.
 //! `-- curve 20` prints the ratio of the time on the reference curve to that on planes, for 20 random placements of each class.
 
+use std::hint::black_box;
+use std::sync::Arc;
+
+use machine::{lu_seconds, median, quantile, seconds_of};
+use railhead::contact::case::solver::{KnownPair, Limits};
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::problem::checked_case::CheckedCase;
+use railhead::contact::{check, check_with, solve, solve_with};
+use serde_json::{Value, json};
+use wheel_shift::{Shifted, draw};
+use worn_pair::worn_pair;
+
 extern crate railhead_contact as railhead;
 
 #[path = "figures/drawing.rs"]
@@ -13,20 +25,6 @@ mod drawing;
 mod machine;
 mod wheel_shift;
 mod worn_pair;
-
-use std::hint::black_box;
-use std::sync::Arc;
-
-use railhead::contact::case::known_pair::KnownPair;
-use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::{check, check_with, solve, solve_with};
-use serde_json::{Value, json};
-
-use machine::{lu_seconds, median, quantile, seconds_of};
-use wheel_shift::{Shifted, draw};
-use worn_pair::worn_pair;
 
 /// Lateral shifts of the wheelset in mm, from the tread to the gauge corner.
 const SHIFTS: [f64; 7] = [3.0, 1.0, 0.0, -1.0, -2.0, -4.0, -5.5];

@@ -3,20 +3,19 @@
 //! `cargo bench --bench worn` needs the reference files beside the checkout (or `RAILHEAD_REFERENCE`). It ends with an error if
 //! more than one state in a hundred has no answer.
 
-extern crate railhead_contact as railhead;
-
-mod worn_pair;
-
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
-
 use worn_pair::worn_pair;
+
+extern crate railhead_contact as railhead;
+
+mod worn_pair;
 
 fn main() -> ExitCode {
     let Some(pair) = worn_pair() else {

@@ -13,10 +13,10 @@
 //!
 //! Inside [`contact`] a case passes these stages, each returns a type of its own; [`contact`] has the recipe:
 //!
-//! 1. [`contact::case`]: [`contact::check`] turns the text into a [`Case`](contact::case::words::question::Case), names every fault at once,
+//! 1. [`contact::case`]: [`contact::check`] turns the text into a [`Case`](contact::case::words::solver::Case), names every fault at once,
 //!    and makes a [`Problem`](contact::problem::physics::Problem) of checked numbers.
 //! 2. [`contact::normal`]: patches and pressures, known in closed form or found from a gap or from profiles
-//!    ([`contact::geometry`], [`contact::normal_stage`]): a [`NormalTask`](contact::normal::normal_task::NormalTask) becomes a [`Footprint`](contact::normal::footprint::Footprint).
+//!    ([`contact::geometry`], [`contact::normal_stage`]): a [`NormalTask`](contact::normal::footprint::NormalTask) becomes a [`Footprint`](contact::normal::footprint::Footprint).
 //! 3. [`contact::rolling`]: for every motion, [`refinement`](contact::rolling::refinement) makes meshes from coarse to fine
 //!    ([`contact::mesh`]) and takes their operators ([`contact::half_space`]); a [method](contact::rolling::methods) solves each under
 //!    the law of [`friction`](contact::friction) until the estimate of the error meets the target.

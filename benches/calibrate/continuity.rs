@@ -1,7 +1,7 @@
 //! How much does the estimate jump along a sweep?
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use serde_json::{Value, json};
 

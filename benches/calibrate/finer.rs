@@ -3,19 +3,18 @@
 use std::sync::Arc;
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal::footprint::Footprint;
-use railhead::contact::normal::normal_task::NormalTask;
-use railhead::contact::normal::patch::Patch;
+use railhead::contact::normal::footprint::{Footprint, NormalTask};
+use railhead::contact::normal::hertz::Patch;
 use railhead::contact::normal_stage;
 use railhead::contact::problem::checked_case::CheckedCase;
+use railhead::contact::rolling::answer::Resultants;
+use railhead::contact::rolling::refinement::interpolate::RefinementState;
 use railhead::contact::rolling::refinement::mesh_family::MeshFamily;
 use railhead::contact::rolling::refinement::on_mesh::{MotionTask, solve_on_mesh};
-use railhead::contact::rolling::refinement::state::RefinementState;
-use railhead::contact::rolling::resolution::Resolution;
-use railhead::contact::rolling::resultants::Resultants;
+use railhead::contact::rolling::task::Resolution;
 use serde_json::{Value, json};
 
 use crate::patches::{self, PatchAnswer};
@@ -122,7 +121,7 @@ fn one_mesh(
     cells: u32,
 ) -> Result<(Resultants, usize), SolveError> {
     let mut exact = checked.clone();
-    exact.run.resolution = Resolution::Mesh(contact::mesh::strips::MeshSize {
+    exact.run.resolution = Resolution::Mesh(contact::mesh::MeshSize {
         strips: 8,
         cells: 8,
     });

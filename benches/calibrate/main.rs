@@ -5,6 +5,16 @@
 //! `tests/data/finer_meshes.json`; `-- truths [classes]` finds the missing ones, some seconds each; `-- continuity`
 //! prints how the estimate changes along a sweep, `-- sweeps` how right it is along many, `-- case gap 42` one case as JSON.
 
+use cpu_time::ThreadTime;
+use judge::judged;
+use population::{Class, case, on_planes};
+use railhead::contact;
+use railhead::contact::case::solver::Limits;
+use railhead::contact::monitor::Unmonitored;
+use railhead::contact::solution::words::answer::Solution;
+use serde_json::json;
+use truth::{Judged, Truths};
+
 extern crate railhead_contact as railhead;
 
 mod continuity;
@@ -18,17 +28,6 @@ mod profile_shapes;
 mod random;
 mod sweeps;
 mod truth;
-
-use cpu_time::ThreadTime;
-use railhead::contact;
-use railhead::contact::case::limits::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::Solution;
-use serde_json::json;
-
-use judge::judged;
-use population::{Class, case, on_planes};
-use truth::{Judged, Truths};
 
 const CLASSES: [Class; 6] = [
     Class::Ellipse,

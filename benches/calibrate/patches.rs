@@ -1,11 +1,10 @@
 //! Wheels on rails: each patch has its own frame, its own estimate, and a moment about its own load centre.
 
 use railhead::contact::geometry::reference_curve::ReferenceCurve;
-use railhead::contact::normal::normal_task::NormalTask;
+use railhead::contact::normal::footprint::NormalTask;
 use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::resultants::Resultants;
-use railhead::contact::solution::words::answer::{PatchSolution, Solution};
-use railhead::contact::solution::words::fields::Fields;
+use railhead::contact::rolling::answer::Resultants;
+use railhead::contact::solution::words::answer::{Fields, PatchSolution, Solution};
 
 use crate::truth::{Judged, TrueResultants, Truth};
 

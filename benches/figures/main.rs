@@ -3,22 +3,20 @@
 //!
 //! `cargo bench --bench figures` writes `docs/paper-figures/*.svg` and prints what they show in numbers.
 
-extern crate railhead_contact as railhead;
-
-mod drawing;
-
 use std::path::{Path, PathBuf};
 
-use railhead::contact::case::limits::Limits;
+use drawing::{Curve, Frame, Picture};
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::post::smooth::sheet::Sheet;
-use railhead::contact::rolling::motion::Motion;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::solution::words::fields::Fields;
+use railhead::contact::post::smooth::Sheet;
+use railhead::contact::rolling::task::Motion;
+use railhead::contact::solution::words::answer::{Fields, Solution};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 
-use drawing::{Curve, Frame, Picture};
+extern crate railhead_contact as railhead;
+
+mod drawing;
 
 /// Fine enough for a border without steps that the eye minds.
 const STRIPS: u32 = 44;

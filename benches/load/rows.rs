@@ -224,7 +224,9 @@ async fn run_of(
 
 /// Seconds of a row by the bare solver on one thread.
 fn bare(columns: &[Vec<f64>]) -> f64 {
-    use railhead::contact::{self, case::limits::Limits, monitor::Unmonitored};
+    use railhead::contact;
+    use railhead::contact::case::solver::Limits;
+    use railhead::contact::monitor::Unmonitored;
     let pointers = [
         "/load/normal_force_n",
         "/contact/rolling_mm",

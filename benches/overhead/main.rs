@@ -5,24 +5,24 @@
 //! that of a step of a simulation on a pair of profiles. Where `strace` is installed, also the system calls of a job. Another program is
 //! measured with `program=PATH`, such as `target/release/railhead`.
 
-#[path = "../machine.rs"]
-mod machine;
-#[path = "../load/service.rs"]
-#[expect(dead_code, reason = "other benches use the rest")]
-mod service;
-
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::jobs::engine::Engine;
 use serde_json::{Value, json};
 
 use crate::machine::{median, quantile, seconds_of};
 use crate::service::Service;
+
+#[path = "../machine.rs"]
+mod machine;
+#[path = "../load/service.rs"]
+#[expect(dead_code, reason = "other benches use the rest")]
+mod service;
 
 /// Requests of each kind.
 const JOBS: usize = 300;

@@ -1,6 +1,6 @@
 //! The reference cases as questions, and the errors of their answers.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::solution::words::answer::{Solution, Total};

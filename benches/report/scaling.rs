@@ -9,8 +9,8 @@ use railhead::contact::half_space::strip_operator::operator;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal_stage;
 use railhead::contact::rolling::refinement::adapt;
+use railhead::contact::rolling::refinement::interpolate::RefinementState;
 use railhead::contact::rolling::refinement::on_mesh::MotionTask;
-use railhead::contact::rolling::refinement::state::RefinementState;
 use serde_json::json;
 
 use crate::plot::{Plot, Series};

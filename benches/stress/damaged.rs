@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use railhead::contact::case::limits::Limits;
-use railhead::contact::geometry::formats::format::{Format, read};
+use railhead::contact::case::solver::Limits;
+use railhead::contact::geometry::formats::{Format, read};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::answer::Solution;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::answer::{PatchSolution, PointSolution};
 use serde_json::{Value, json};

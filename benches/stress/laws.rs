@@ -1,10 +1,10 @@
 //! What every answer must obey, whatever the case.
 
 use railhead::contact::case::words::solver::MethodName;
-use railhead::contact::rolling::resultants::Resultants;
-use railhead::contact::solution::words::answer::{PatchSolution, Solution};
-use railhead::contact::solution::words::fields::Zone;
-use railhead::contact::solution::words::fields::{Fields, PatchCells, PatchFields, PointFields};
+use railhead::contact::rolling::answer::Resultants;
+use railhead::contact::solution::words::answer::{
+    Fields, PatchCells, PatchFields, PatchSolution, PointFields, Solution, Zone,
+};
 use serde_json::Value;
 
 /// Rounding, relative to the largest value of its kind.

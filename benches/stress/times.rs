@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use railhead::contact::case::limits::Limits;
-use railhead::contact::solution::words::understanding::FoundBy;
+use railhead::contact::case::solver::Limits;
+use railhead::contact::solution::words::answer::FoundBy;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -5,11 +5,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
 use cpu_time::ThreadTime;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::{Monitor, Stop};
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::solution::words::fields::Fields;
+use railhead::contact::solution::words::answer::{Fields, Solution};
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 

@@ -3,10 +3,10 @@
 use railhead::contact::rolling::linear_theory::{coefficients, spin_coefficient};
 use railhead::contact::rolling::methods::table::coordinates::Shape;
 use railhead::contact::rolling::methods::table::evaluate::{growth, linear, linear_part};
-use railhead::contact::rolling::methods::table::grid::{
-    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, direction, pole, ratio, size,
+use railhead::contact::rolling::methods::table::spline::{
+    DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, VALUES, direction, pole,
+    ratio, size,
 };
-use railhead::contact::rolling::methods::table::spline::{OUTPUTS, VALUES};
 
 use crate::nodes::column_of;
 use crate::solver::Answer;

@@ -3,10 +3,9 @@
 use std::ops::Range;
 
 use railhead::contact::rolling::methods::table::evaluate::growth;
-use railhead::contact::rolling::methods::table::grid::{
-    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, size,
+use railhead::contact::rolling::methods::table::spline::{
+    DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, size,
 };
-use railhead::contact::rolling::methods::table::spline::OUTPUTS;
 
 /// Nodes along a/b, pole, direction and size.
 const NODES: [usize; 4] = [RATIOS, POLES, DIRECTIONS, SIZES.len()];

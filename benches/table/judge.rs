@@ -3,9 +3,7 @@
 use railhead::contact::rolling::linear_theory::coefficients;
 use railhead::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
 use railhead::contact::rolling::methods::table::evaluate::CreepTable;
-
-use railhead::contact::rolling::methods::table::grid::{cell, sigma};
-
+use railhead::contact::rolling::methods::table::spline::{cell, sigma};
 use serde_json::{Value, json};
 
 use crate::held_out::{CONTACTS, contact, name};

@@ -5,6 +5,14 @@
 //! was stopped goes on. `-- report` prints errors and bounds from these motions, and solves those that are missing, `-- recompute` solves 200 random
 //! nodes and 200 random motions anew and compares, `-- speed` prints times of the table beside those of `fastsim`.
 
+use std::path::Path;
+
+use railhead::contact::case::digest::SOLVER_REVISION;
+use railhead::contact::rolling::methods::table::evaluate::CreepTable;
+use railhead::contact::rolling::methods::table::file::{TableFile, table};
+use railhead::contact::rolling::methods::table::spline::{CELLS, RATIOS};
+use serde_json::json;
+
 extern crate railhead_contact as railhead;
 
 mod assemble;
@@ -17,14 +25,6 @@ mod nodes;
 mod random;
 mod solver;
 mod speed;
-
-use std::path::Path;
-
-use railhead::contact::case::digest::SOLVER_REVISION;
-use railhead::contact::rolling::methods::table::evaluate::CreepTable;
-use railhead::contact::rolling::methods::table::file::{TableFile, table};
-use railhead::contact::rolling::methods::table::grid::{CELLS, RATIOS};
-use serde_json::json;
 
 /// Bounds are fitted for this part of half of the contacts, so that they hold for 99 % of the others.
 const HELD: f64 = 0.992;

@@ -2,9 +2,8 @@
 
 use cpu_time::ThreadTime;
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
-use railhead::contact::evaluate::rows::Column;
-use railhead::contact::evaluate::rows::Rows;
+use railhead::contact::case::solver::Limits;
+use railhead::contact::evaluate::rows::{Column, Rows};
 use railhead::contact::rolling::methods::table::file::table;
 use serde_json::{Value, json};
 

@@ -2,9 +2,9 @@
 //! service try those that were interesting once (`fuzz/seeds`).
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
-use railhead::contact::geometry::formats::format as formats;
-use railhead::contact::geometry::formats::format::Format;
+use railhead::contact::case::solver::Limits;
+use railhead::contact::geometry::formats;
+use railhead::contact::geometry::formats::Format;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::http::extract::batch::splitter::{Element, Layout, Splitter};
 use railhead::http::extract::batch::table::TableBody;

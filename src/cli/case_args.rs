@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use crate::contact::case::limits::Limits;
+use crate::contact::case::solver::Limits;
 use crate::contact::rolling::operator_store::{BYTES_DEFAULT, OperatorStore};
 
 /// What one case may use.

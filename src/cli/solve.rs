@@ -15,8 +15,9 @@ use crate::cli::commands::SolveArgs;
 use crate::cli::output::{print, print_error};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::post::subsurface::states::points;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::fields::{Fields, PatchCells, PatchFields, PointFields};
+use crate::contact::solution::words::answer::{
+    Fields, PatchCells, PatchFields, PointFields, Solution,
+};
 use crate::contact::{check, solve_with};
 
 /// Exit code for a faulty case.

@@ -17,7 +17,7 @@
 //! # Order of values
 //!
 //! - Cells of a mesh: patch by patch, strip by strip from smaller to larger y, segment by segment and in each from the trailing end
-//!   (smaller x) to the leading end ([`strips`](crate::contact::mesh::strips)).
+//!   (smaller x) to the leading end ([`strips`](crate::contact::mesh)).
 //! - Vectors of the slip equations: all x components, then all y components
 //!   ([`slip_equations`](crate::contact::rolling::slip_equations)).
 //! - Grids: the value at `(x[i], y[j])` is `rows[j][i]`, stored at `j * nx + i`.
@@ -30,7 +30,7 @@
 //! | case | the question in the words of a client; checked, it is a [`CheckedCase`](crate::contact::problem::checked_case::CheckedCase) |
 //! | problem, run, label | what a case asks, how it is to be solved, what it is called |
 //! | contact | what the bodies are: ellipse, radii, gap, pressure grid, profiles |
-//! | normal task | what is known of patches and pressures before they are found ([`NormalTask`](crate::contact::normal::normal_task::NormalTask)) |
+//! | normal task | what is known of patches and pressures before they are found ([`NormalTask`](crate::contact::normal::footprint::NormalTask)) |
 //! | footprint | patches and pressures, known ([`Footprint`](crate::contact::normal::footprint::Footprint)) |
 //! | patch | a connected part of the contact |
 //! | approach | how far distant points of the bodies come together |

@@ -7,15 +7,14 @@ use std::collections::BTreeMap;
 use serde_json::to_value;
 use thiserror::Error;
 
-use crate::contact::case::limits::Limits;
+use crate::contact::case::solver::Limits;
 use crate::contact::case::words::contact::{
-    Contact, CrossSection, FormatName, InfluenceName, Load, SideName, Smoothing, SurfaceName,
+    Contact, CrossSection, Elastic, FormatName, InfluenceName, Load, Material, SideName, Smoothing,
+    SurfaceName,
 };
 use crate::contact::case::words::friction::Friction;
-use crate::contact::case::words::material::{Elastic, Material};
 use crate::contact::case::words::motion::{AskedMotion, Motions, Wheelset};
-use crate::contact::case::words::question::Case;
-use crate::contact::case::words::solver::{MethodName, Output, Solver};
+use crate::contact::case::words::solver::{Case, MethodName, Output, Solver};
 use crate::contact::error::{CaseError, Fault, SolveError};
 use crate::contact::monitor::Unmonitored;
 use crate::contact::problem::checked_case::CheckedCase;

@@ -51,20 +51,20 @@
 #[path = "mod.rs"]
 pub mod contact;
 
-pub use contact::case::limits::Limits;
+pub use contact::case::solver::Limits;
 pub use contact::case::words::contact::{
     Contact, CrossSection, FormatName as Format, InfluenceName as SurfaceInfluence, Load,
     SideName as Side, SurfaceName as ReferenceSurface,
 };
+pub use contact::case::words::contact::{Elastic, Material};
 pub use contact::case::words::friction::Friction;
-pub use contact::case::words::material::{Elastic, Material};
 pub use contact::case::words::motion::{AskedMotion as Motion, Motions, Wheelset};
-pub use contact::case::words::question::Case;
+pub use contact::case::words::solver::Case;
 pub use contact::case::words::solver::{MethodName as Method, Output, Solver};
 pub use contact::error::{CaseError, Fault, SolveError};
 pub use contact::facade::Error;
 pub use contact::monitor::{Monitor, Unmonitored};
 pub use contact::problem::checked_case::CheckedCase;
+pub use contact::solution::words::answer::Fields;
 pub use contact::solution::words::answer::Solution;
-pub use contact::solution::words::fields::Fields;
 pub use contact::{check, solve};

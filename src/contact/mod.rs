@@ -29,6 +29,25 @@
 //!    the outputs that were asked for ([`solution::maintain`]: stresses, damage, temperatures).
 //! 9. **Finish**: [`solution::finish`] distributes the time, adds remarks on implausible numbers, and refuses numbers that are not finite.
 
+use std::ops::Range;
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use crate::contact::case::read::draft;
+use crate::contact::case::solver::{KnownPair, Limits};
+use crate::contact::error::{CaseError, SolveError};
+use crate::contact::monitor::{Monitor, MonitorPart};
+use crate::contact::normal::footprint::NormalTask;
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::profile_assessment::trust;
+use crate::contact::rolling::operator_store::OperatorStore;
+use crate::contact::slices::slices;
+use crate::contact::solution::finish::finish;
+use crate::contact::solution::words::answer::{Fields, Solution};
+use crate::contact::time_limit::TimeLimit;
+use crate::contact::unlike_bodies::UnlikeGap;
+
 pub mod case;
 pub mod conventions;
 pub mod error;
@@ -57,32 +76,10 @@ pub(crate) mod surface_fallback;
 pub mod time_limit;
 pub(crate) mod traction_estimate;
 pub mod unlike_bodies;
-pub(crate) mod unlike_motions;
 pub(crate) mod vertical_equilibrium;
 pub(crate) mod wheel_force_control;
 pub mod wheel_on_rail;
 pub mod wheelset;
-
-use std::ops::Range;
-use std::sync::Arc;
-
-use serde_json::Value;
-
-use crate::contact::case::known_pair::KnownPair;
-use crate::contact::case::limits::Limits;
-use crate::contact::case::read::draft;
-use crate::contact::error::{CaseError, SolveError};
-use crate::contact::monitor::{Monitor, MonitorPart};
-use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::profile_assessment::trust;
-use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::slices::slices;
-use crate::contact::solution::finish::finish;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::fields::Fields;
-use crate::contact::time_limit::TimeLimit;
-use crate::contact::unlike_bodies::UnlikeGap;
 
 /// Reads and checks a case.
 ///
@@ -195,7 +192,7 @@ fn solve_motions(
             let explained = |error| monitor.explained(error, case);
             if case.problem.is_coupled(&case.run) {
                 let gap = UnlikeGap::of_case(case, monitor).map_err(explained)?;
-                unlike_motions::solve(operators, case, &gap, monitor)?
+                unlike_bodies::solve(operators, case, &gap, monitor)?
             } else {
                 let footprint = normal_stage::solve(case, monitor).map_err(explained)?;
                 rolling_stage::solve(operators, case, &footprint, monitor)?

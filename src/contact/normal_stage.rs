@@ -3,11 +3,9 @@
 use crate::contact::error::SolveError;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::gap::answer::{NormalError, NormalWork};
-use crate::contact::normal::gap::grid::GridFineness;
+use crate::contact::normal::footprint::{Footprint, NormalTask};
+use crate::contact::normal::gap::grid::{GridFineness, NormalError, NormalWork};
 use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::words::answer::NormalReport;

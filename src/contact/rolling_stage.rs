@@ -7,21 +7,17 @@ use crate::contact::error::SolveError;
 use crate::contact::method::Method;
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::rolling::answer::Skip;
-use crate::contact::rolling::force_control;
-use crate::contact::rolling::history;
-use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::rolling::answer::{MotionAnswer, Skip};
+use crate::contact::rolling::history::plan::HistoryTask;
 use crate::contact::rolling::methods::table::solve as table;
-use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::gradients::add_gradients;
-use crate::contact::rolling::refinement::state::RefinementState;
-use crate::contact::rolling::resolution::{RelativeTo, Resolution, TARGET_LEAST};
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::refinement::interpolate::RefinementState;
+use crate::contact::rolling::task::{RelativeTo, Resolution, RollingTask, TARGET_LEAST};
+use crate::contact::rolling::{force_control, history};
 use crate::contact::solution::assemble::Assembly;
 use crate::contact::solution::finish::share_seconds;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::fields::Fields;
+use crate::contact::solution::words::answer::{Fields, Solution};
 use crate::contact::time_limit::TimeLimit;
 
 /// Solves every motion of a problem on a footprint.

@@ -7,9 +7,8 @@ use std::ops::Range;
 
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::merged;
-use crate::contact::rolling::resolution::Resolution;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::fields::Fields;
+use crate::contact::rolling::task::Resolution;
+use crate::contact::solution::words::answer::{Fields, Solution};
 
 /// Most motions of a slice. Few motions keep the time short that other jobs wait; each slice finds region and pressure again. Chosen by judgement.
 const MOTIONS_MAX: usize = 100;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel::task::WheelTask;
+use crate::contact::normal::wheel::WheelTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_assessment::trust;
 use crate::contact::remark::entry::RemarkEntry;

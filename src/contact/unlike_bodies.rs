@@ -4,6 +4,8 @@
 //! slips of the present pressure, the gap is changed by what they open, region and pressure are found anew, and so on (Panagiotopoulos
 //! 1975). Each round leaves a hundredth to a fifth of the change before it. The first round begins with the contact of a motion nearby, or with the
 //! one without tractions.
+//!
+//! The motions of bodies that differ: each has a region and a pressure of its own, because its tractions change them.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -11,29 +13,28 @@ use std::sync::Arc;
 use crate::contact::error::SolveError;
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::half_space::unlike_bodies::opening;
-use crate::contact::mesh::strips::MeshSize;
+use crate::contact::mesh::MeshSize;
 use crate::contact::monitor::Monitor;
+use crate::contact::normal::footprint::NormalTask;
 use crate::contact::normal::gap::grid::GridFineness;
-use crate::contact::normal::gap::preview::PreviewCache;
 use crate::contact::normal::gap::surface::GapSurface;
-use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::gap::task::{GapTask, PreviewCache};
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
-use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal_stage;
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::force_control;
-use crate::contact::rolling::history;
+use crate::contact::rolling::answer::Resultants;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::state::RefinementState;
-use crate::contact::rolling::resolution::Resolution;
-use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::refinement::interpolate::RefinementState;
 use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::RollingTask;
-use crate::contact::solution::words::answer::NormalReport;
+use crate::contact::rolling::task::{Resolution, RollingTask};
+use crate::contact::rolling::{force_control, history};
+use crate::contact::solution::words::answer::{
+    Fields, MotionRegion, NormalReport, PatchSolution, Solution,
+};
 use crate::contact::time_limit::TimeLimit;
+use crate::contact::{normal_stage, rolling_stage};
 
 /// Allowed error of the resultants in the rounds, relative to μN: the opening follows from tractions, whose error counts K times. Chosen on the 12
 /// contacts of `tests/physics/unlike.rs`, not on others.
@@ -292,4 +293,88 @@ fn axis([low, high]: [f64; 2], [least, most]: [f64; 2]) -> Vec<f64> {
 
 fn distance([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
     (a - c).hypot(b - d)
+}
+
+/// Solves every motion of a case in a gap; region and pressure of each are sought from those of the motion before. The patches of the answer
+/// are those of the first motion; where a case has several, their points say what belongs to each.
+///
+/// # Errors
+/// Why a motion has no answer; or the monitor stopped the work.
+pub(crate) fn solve(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    gap: &UnlikeGap,
+    watch: &TimeLimit,
+) -> Result<(Solution, Fields), SolveError> {
+    let several = case.problem.part.all > 1;
+    let mut neighbour: Option<SolvedFootprint> = None;
+    let mut answer: Option<(Solution, Fields)> = None;
+    for index in 0..case.problem.motions.len() {
+        let part = case.slice(index..index + 1);
+        let solved = gap
+            .solve(operators, &part, neighbour.as_ref(), watch)
+            .map_err(|error| watch.explained(error, &part))?;
+        let solved = if several {
+            with_patches_of(gap, solved, &part)
+        } else {
+            solved
+        };
+        let (mut solution, fields) = rolling_stage::solve(operators, &part, &solved, watch)?;
+        if several {
+            solution.patches.iter_mut().for_each(tell_region);
+        }
+        match &mut answer {
+            None => answer = Some((solution, fields)),
+            Some((all, all_fields)) => {
+                all.append(solution);
+                all_fields.append(fields);
+            }
+        }
+        neighbour = Some(solved);
+    }
+    let Some(answer) = answer else {
+        unreachable!("a case has at least one motion")
+    };
+    Ok(answer)
+}
+
+/// The contact of a motion, with as many patches as that without tractions: an answer has one list of patches. Where tractions part or join
+/// them, the motion is answered on the patches without tractions, and a remark says so.
+fn with_patches_of(
+    gap: &UnlikeGap,
+    solved: SolvedFootprint,
+    part: &CheckedCase,
+) -> SolvedFootprint {
+    let count = |solved: &SolvedFootprint| solved.footprint.patches().len();
+    let number = part.problem.part.before;
+    let seconds = solved.report.map_or(0.0, |report| report.seconds);
+    let mut kept = solved;
+    if count(&kept) != count(&gap.without) {
+        kept = gap.without.clone();
+        kept.coupling_error = part.problem.first_order_error(part.run.method);
+        let remark = part.problem.first_order_remark(part.run.method);
+        kept.remarks.push(remark.into());
+    }
+    if let Some(report) = &mut kept.report {
+        report.seconds = seconds;
+    }
+    kept.remarks
+        .iter_mut()
+        .for_each(|remark| remark.point = Some(number));
+    kept
+}
+
+/// Writes region and pressure of the one motion of a patch into its point.
+pub(crate) fn tell_region(patch: &mut PatchSolution) {
+    let region = MotionRegion {
+        normal_force_n: patch.normal_force_n,
+        friction_limit_n: patch.friction_limit_n,
+        approach_mm: patch.approach_mm,
+        area_mm2: patch.area_mm2,
+        pressure_max_mpa: patch.pressure_max_mpa,
+        extent_mm: patch.extent_mm,
+    };
+    for point in &mut patch.points {
+        point.region = Some(Box::new(region));
+    }
 }

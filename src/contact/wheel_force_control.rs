@@ -12,22 +12,19 @@ use std::sync::Arc;
 
 use crate::contact::error::SolveError;
 use crate::contact::geometry::wheel_rail::Placement;
-use crate::contact::geometry::wheelset::WheelsetMotion;
+use crate::contact::geometry::wheelset_pose::WheelsetMotion;
 use crate::contact::monitor::{Monitor, MonitorPart};
-use crate::contact::normal::wheel::task::WheelTask;
-use crate::contact::numerics::bracketed_root::{FRACTION_MAX, RootExit, find_root};
-use crate::contact::numerics::pair_root::{PairRoot, find_pair};
+use crate::contact::normal::wheel::WheelTask;
+use crate::contact::numerics::roots::{FRACTION_MAX, PairRoot, RootExit, find_pair, find_root};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::run::Run;
+use crate::contact::problem::physics::Run;
 use crate::contact::profile_assessment::trust;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::force_places::CubicLaw;
 use crate::contact::rolling::linear_theory;
-use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::resolution::RelativeTo;
-use crate::contact::solution::words::answer::{PatchSolution, Solution};
-use crate::contact::solution::words::fields::Fields;
+use crate::contact::rolling::task::{Motion, PrescribedForces, RelativeTo};
+use crate::contact::solution::words::answer::{Fields, PatchSolution, Solution};
 use crate::contact::vertical_equilibrium::BALANCE;
 use crate::contact::wheel_on_rail::SolvedWheel;
 

@@ -7,10 +7,6 @@
 //! Planes of contact replace parts of the curve. Each has tractions of its own, under the slip of a plane, which any method solves. There pressures depend on
 //! tractions under a vertical load alone; under other loads several motions share the pressures.
 
-mod answer;
-mod rounds;
-mod tractions;
-
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
@@ -19,21 +15,25 @@ use crate::contact::geometry::reference_curve::{CurvePlace, ReferenceCurve, Whee
 use crate::contact::half_space::bent_surface::{Influence, TURN_MAX};
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::gap::grid::GridFineness;
+use crate::contact::normal::hertz::Patch;
 use crate::contact::normal::on_curve::{CurveContact, CurveTask, Friction, Workspace};
-use crate::contact::normal::patch::Patch;
-use crate::contact::normal::wheel::task::{ReferenceSurface, WheelLoad, WheelTask};
-use crate::contact::normal::wheel::wheel_contact::{WheelContact, WheelPatch};
+use crate::contact::normal::wheel::{
+    ReferenceSurface, WheelContact, WheelLoad, WheelPatch, WheelTask,
+};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::coupled::negligible;
+use crate::contact::problem::physics::negligible;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::kind::short;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::fields::Fields;
+use crate::contact::solution::words::answer::{Fields, Solution};
 use crate::contact::time_limit::TimeLimit;
-use crate::contact::unlike_motions::tell_region;
+use crate::contact::unlike_bodies::tell_region;
 use crate::contact::wheel_on_rail::answer::turn;
+
+mod answer;
+mod rounds;
+mod tractions;
 
 /// Length over width at most, of patches with more than this share of the load. Hertz's patch of a gauge corner of 13 mm is 11 times as long as wide, a
 /// contact at the root of a flange 20 times, and a single point that is off makes a ridge a hundred times as long.

@@ -18,7 +18,7 @@ use object_store::path::Path;
 use object_store::{GetOptions, ObjectStore, ObjectStoreExt, PutPayload};
 use uuid::Uuid;
 
-use crate::contact::solution::words::fields::PatchFields;
+use crate::contact::solution::words::answer::PatchFields;
 use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::error::JobsError;

@@ -7,15 +7,13 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::contact;
-use crate::contact::case::known_pair::KnownPair;
-use crate::contact::case::limits::Limits;
+use crate::contact::case::solver::{KnownPair, Limits};
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::slices::slices;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::fields::Fields;
+use crate::contact::solution::words::answer::{Fields, Solution};
 use crate::contact::solve_slice;
 
 /// Checks a case against limits.

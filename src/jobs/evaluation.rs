@@ -7,10 +7,8 @@ use tokio::runtime::Handle;
 
 use crate::contact::error::CaseError;
 use crate::contact::evaluate::answer::RowsAnswer;
-use crate::contact::evaluate::many::solve::{NotAtOnce, evaluate_at_once};
-use crate::contact::evaluate::many::task::ManyTask;
-use crate::contact::evaluate::request_faults::column_pointer;
-use crate::contact::evaluate::varied::{Values, VariedColumn};
+use crate::contact::evaluate::many::{ManyTask, NotAtOnce, evaluate_at_once};
+use crate::contact::evaluate::varied::{Values, VariedColumn, column_pointer};
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::error::JobsError;

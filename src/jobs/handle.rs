@@ -7,7 +7,7 @@ use serde_json::Value;
 use tokio::time::timeout;
 use uuid::Uuid;
 
-use crate::contact::case::known_pair::KnownPair;
+use crate::contact::case::solver::KnownPair;
 use crate::contact::error::CaseError;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::attempts::attempt_control::StopReason;

@@ -4,12 +4,13 @@ use std::fmt;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::contact::case::limits::Limits;
+use crate::contact::case::solver::Limits;
 use crate::jobs::clock::Clock;
 use crate::jobs::result_place::url::ResultsPlace;
 use crate::jobs::staged_bytes::StagingBounds;
-pub use crate::jobs::store::cluster::NotifyMode;
 use crate::jobs::trace::Tracer;
+
+pub use crate::jobs::store::cluster::NotifyMode;
 
 /// A database that several processes share.
 #[derive(Clone, PartialEq, Eq)]

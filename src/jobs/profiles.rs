@@ -8,7 +8,7 @@ use bytes::Bytes;
 use serde_json::Value;
 use tokio::runtime::Handle;
 
-use crate::contact::case::section_check::{SectionReport, check_section};
+use crate::contact::case::check::{SectionReport, check_section};
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::varied::{named_and_given, named_sections, put_section};
 use crate::jobs::error::JobsError;

@@ -6,8 +6,7 @@ use futures_util::stream::{self, BoxStream};
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::fields::PatchFields;
+use crate::contact::solution::words::answer::{PatchFields, Solution};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::job::Job;

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::CaseError;
-use crate::contact::evaluate::request_faults::in_template;
+use crate::contact::evaluate::varied::in_template;
 use crate::contact::evolution::task::Evolution;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::error::JobsError;

@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::solution::words::answer::Solution;

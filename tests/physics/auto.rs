@@ -5,16 +5,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use railhead::contact::case::known_pair::KnownPair;
-use railhead::contact::case::limits::Limits;
+use railhead::contact;
+use railhead::contact::case::solver::{KnownPair, Limits};
 use railhead::contact::case::words::solver::MethodName;
-use railhead::contact::evaluate::many::solve::evaluate_at_once;
-use railhead::contact::evaluate::many::task::ManyTask;
+use railhead::contact::evaluate::many::{ManyTask, evaluate_at_once};
 use railhead::contact::monitor::{Monitor, Unmonitored};
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::solution::words::answer::{PointSolution, Solution};
-use railhead::contact::{self};
 use serde_json::{Value, json};
 
 use crate::many_rows::{column, numbers, solved};

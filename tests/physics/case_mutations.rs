@@ -1,7 +1,7 @@
 //! Whatever is done to a case, it is answered with a problem or with faults that point into it.
 
 use proptest::prelude::*;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use serde_json::{Value, json};
 

@@ -1,6 +1,6 @@
 //! Valid cases to start from, and ways to change them.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use railhead::contact::error::Fault;
 use railhead::contact::problem::checked_case::CheckedCase;

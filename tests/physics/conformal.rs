@@ -1,7 +1,7 @@
 //! Is the contact of a wheel on the curve of its rail right? Against CONTACT with curved surfaces of contact, against boundary elements, and where the
 //! rail does not bend against planes.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::answer::Solution;

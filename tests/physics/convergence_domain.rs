@@ -1,9 +1,10 @@
 //! Where `liu_hsu` converges, counted over the same motions on every region.
 
-use railhead::contact::mesh::strips::Grading;
+use railhead::contact::mesh::Grading;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::methods::liu_hsu::active_set::InitialGuess;
-use railhead::contact::rolling::methods::liu_hsu::active_set::{ZonesRun, ZonesTermination};
+use railhead::contact::rolling::methods::liu_hsu::active_set::{
+    InitialGuess, ZonesRun, ZonesTermination,
+};
 use railhead::contact::rolling::methods::liu_hsu::solve::{
     coarse_pole, solve_by_upwind, solve_with,
 };

@@ -2,7 +2,7 @@
 //! `tests/data/README.md`).
 
 use railhead::contact::half_space::kernels::{Rectangle, rectangle};
-use railhead::contact::mesh::strips::Grading;
+use railhead::contact::mesh::Grading;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::liu_hsu::active_set::InitialGuess;
 use railhead::contact::rolling::methods::liu_hsu::solve::solve_with;

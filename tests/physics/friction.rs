@@ -1,18 +1,17 @@
 //! Coulomb's law in every cell: the bound, complementarity, and slip along the traction.
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
-use railhead::contact::mesh::strips::MeshSize;
+use railhead::contact::case::solver::Limits;
+use railhead::contact::mesh::MeshSize;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal_stage;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use railhead::contact::rolling::motion::Motion;
 use railhead::contact::rolling::slip_equations::SlipEquations;
 use railhead::contact::rolling::slip_rules::Rule;
 use railhead::contact::rolling::strip_mesh::StripMesh;
-use railhead::contact::rolling::task::TOLERANCE_LEAST;
+use railhead::contact::rolling::task::{Motion, TOLERANCE_LEAST};
 
 use crate::laws::{MOTIONS, shapes};
 use crate::reference::{Ellipse, assert_none, solve};
@@ -115,7 +114,7 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
     for (i, zone) in zones.iter().enumerate() {
         // The last cell of a strip may stick on the whole and slip at its trailing end.
         let last = i % n as usize == 0;
-        if last && *zone == contact::solution::words::fields::Zone::Stick {
+        if last && *zone == contact::solution::words::answer::Zone::Stick {
             slip.iter_mut().for_each(|slip| slip[i] = 0.0);
         }
     }
@@ -131,7 +130,7 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
             .as_ref()
             .expect("was asked for")
             .iter()
-            .map(|z| *z == contact::solution::words::fields::Zone::Slip)
+            .map(|z| *z == contact::solution::words::answer::Zone::Slip)
             .collect(),
         largest: [
             vx.hypot(vy) + phi.abs() * contact.a_mm.max(contact.b_mm),

@@ -1,7 +1,7 @@
 //! Friction that lies on the track while a history rolls over it.
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::solution::words::answer::{PointSolution, Solution};
 use serde_json::{Value, json};
 

@@ -1,7 +1,7 @@
 //! A gap without a contact to show is refused, or fails with its reason.
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;

@@ -10,15 +10,14 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use railhead::contact::error::SolveError;
 use railhead::contact::half_space::kernels::{Rectangle, rectangle};
 use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::normal::gap::surface::GapSurface;
 use railhead::contact::remark::kind::Figure;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::solution::words::fields::Fields;
+use railhead::contact::solution::words::answer::{Fields, Solution};
 use serde_json::{Value, json};
 
 use crate::gap_samples::{Across, grid, profile, spread, steel};

@@ -2,7 +2,7 @@
 //! `benches/calibrate` and all its wheels on rails, against meshes much finer.
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use serde_json::{Value, json};
 

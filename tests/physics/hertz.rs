@@ -1,6 +1,6 @@
 //! Hertz's contact: worked cases of the literature and the laws of scaling.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
 use serde_json::json;

@@ -5,12 +5,12 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
-use railhead::contact::mesh::strips::MeshSize;
+use railhead::contact::case::solver::Limits;
+use railhead::contact::mesh::MeshSize;
 use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead::contact::normal_stage;
 use railhead::contact::rolling::history::level_run::LevelRun;
-use railhead::contact::rolling::history::record::PointRecord;
+use railhead::contact::rolling::history::plan::PointRecord;
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead::contact::rolling::strip_mesh::StripMesh;
 use railhead::contact::solution::words::answer::{HistoryPoint, PointSolution, Solution};

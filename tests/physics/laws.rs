@@ -1,8 +1,7 @@
 //! What holds exactly in theory and on every symmetric mesh: symmetry, scaling, friction, power.
 
-use railhead::contact::post::outlines::outline::outlines;
-use railhead::contact::solution::words::fields::Zone;
-use railhead::contact::solution::words::fields::{Fields, PatchCells};
+use railhead::contact::post::outlines::outlines;
+use railhead::contact::solution::words::answer::{Fields, PatchCells, Zone};
 
 use crate::reference::{Ellipse, assert_none, solve};
 

@@ -1,11 +1,10 @@
 //! The algebra inside `liu_hsu`: the elimination of the stick tractions, and the Newton–Raphson step.
 
-use railhead::contact::mesh::strips::Grading;
+use railhead::contact::mesh::Grading;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::methods::liu_hsu::newton_raphson::newton_step;
-use railhead::contact::rolling::methods::liu_hsu::stick_block::DenseTask;
 use railhead::contact::rolling::methods::liu_hsu::stick_block::{
-    DenseProblem, SlipSystem, both_components,
+    DenseProblem, DenseTask, SlipSystem, both_components,
 };
 use railhead::contact::rolling::slip_equations::SlipScratch;
 use railhead::contact::rolling::slip_rules::Rule;

@@ -4,15 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use railhead::contact::case::known_pair::KnownPair;
-use railhead::contact::case::limits::Limits;
-use railhead::contact::evaluate::many::solve::solve_many;
-use railhead::contact::evaluate::many::task::{ManyTask, RowSolver};
+use railhead::contact;
+use railhead::contact::case::solver::{KnownPair, Limits};
+use railhead::contact::evaluate::many::{ManyTask, RowSolver, solve_many};
 use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;
-use railhead::contact::{self};
 use serde_json::{Value, json};
 
 use crate::gap_samples::steel;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::operator_store::OperatorStore;

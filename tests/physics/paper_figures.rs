@@ -1,9 +1,7 @@
 //! The examples that redraw the figures of Liu and Hsu's paper show what the paper says, on a patch without symmetry.
 
-use railhead::contact::post::outlines::outline::outlines;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::solution::words::fields::Fields;
-use railhead::contact::solution::words::fields::Zone;
+use railhead::contact::post::outlines::outlines;
+use railhead::contact::solution::words::answer::{Fields, Solution, Zone};
 use serde_json::{Value, json};
 
 use crate::reference::solve;

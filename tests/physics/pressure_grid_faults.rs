@@ -1,6 +1,6 @@
 //! A pressure grid that cannot be read is refused with the place of the fault.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use serde_json::{Value, json};
 

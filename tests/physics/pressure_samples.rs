@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use railhead::contact::mesh::strips::Chord;
+use railhead::contact::mesh::Chord;
 use railhead::contact::normal::pressure_field::field::PressureField;
 use railhead::contact::remark::entry::RemarkEntry;
 use serde_json::{Value, json};

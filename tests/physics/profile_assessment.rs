@@ -1,6 +1,6 @@
 //! Profiles are judged before they are trusted: what exports and instruments do to points is named in the answer, or there is none.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::answer::Solution;

@@ -1,6 +1,6 @@
 //! Faulty wheels and rails are refused by the reader, or fail with a reason; doubtful ones are remarked on.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};

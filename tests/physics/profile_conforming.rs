@@ -1,10 +1,10 @@
 //! A wheel worn to the shape of its rail, made here: tread and gauge corner touch side by side, inclined to each other by about half a
 //! radian, where two overlaps may or may not share a gap.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use railhead::contact::geometry::wheel_rail::WheelRail;
-use railhead::contact::normal::normal_task::NormalTask;
+use railhead::contact::normal::footprint::NormalTask;
 use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::answer::Solution;

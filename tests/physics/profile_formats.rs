@@ -1,9 +1,8 @@
 //! Do profile files say what their formats mean?
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
-use railhead::contact::geometry::formats::format::{Format, read};
-use railhead::contact::geometry::formats::profile_file::ProfileFile;
+use railhead::contact::geometry::formats::{Format, ProfileFile, read};
 use serde_json::json;
 
 use crate::profile_cases::generated;

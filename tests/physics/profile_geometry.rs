@@ -1,8 +1,8 @@
 //! Do wheel and rail touch where they should?
 
 use railhead::contact::geometry::contact_locus::ContactLocus;
-use railhead::contact::geometry::formats::format as formats;
-use railhead::contact::geometry::formats::format::Format;
+use railhead::contact::geometry::formats;
+use railhead::contact::geometry::formats::Format;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::geometry::reference_curve::{ContactPlane, Nearest, ReferenceCurve};
 use railhead::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};

@@ -1,6 +1,6 @@
 //! A wheel comes to rest wherever it stands on its rail, or the reason is told.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};

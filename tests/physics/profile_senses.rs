@@ -1,7 +1,7 @@
 //! Are sections read the right way round? One section has one answer, in whatever senses, order, spacing and format its points are given; where its
 //! shape does not show the senses, the case is refused and names what to state.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::remark::entry::RemarkEntry;

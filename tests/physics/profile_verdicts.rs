@@ -1,7 +1,7 @@
 //! The judgement of a profile names the defect that it has: one kind of defect at a time, of many sizes and at many places, on profiles that
 //! are sound otherwise.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};

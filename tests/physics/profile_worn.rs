@@ -1,7 +1,7 @@
 //! A measured worn wheel on a worn rail, where tread, gauge corner and flange touch close to each other. Needs the reference files beside
 //! the checkout; `profile_conforming.rs` makes a pair of its own and tests the same.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::answer::Solution;
 use railhead::contact::{check, solve};

@@ -1,6 +1,6 @@
 //! The answer shown in the README is the one that the example has.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};

@@ -3,10 +3,9 @@
 use std::path::Path;
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::{PointSolution, Solution};
-use railhead::contact::solution::words::fields::Fields;
+use railhead::contact::solution::words::answer::{Fields, PointSolution, Solution};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};

@@ -1,7 +1,7 @@
 //! The solver ends with an answer, whatever the motion and the shape.
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use serde_json::json;
 

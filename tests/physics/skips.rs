@@ -1,7 +1,7 @@
 //! Work that a case does not need is left out, and the answer does not move.
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::half_space::strip_operator::kind::Precision;
 use railhead::contact::half_space::strip_operator::operator::StripOperator;
 use railhead::contact::monitor::Unmonitored;
@@ -40,7 +40,7 @@ fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
 fn on_level<T>(contact: &Ellipse, work: impl FnOnce(&RollingTask, LevelTask) -> T) -> T {
     let case = contact.case(STRIPS, CELLS);
     let checked = contact::check(&case, &Limits::default()).expect("a valid case");
-    let size = contact::mesh::strips::MeshSize {
+    let size = contact::mesh::MeshSize {
         strips: STRIPS,
         cells: CELLS,
     };

@@ -1,21 +1,21 @@
 //! A small part of the stability stress test: random cases end in an answer that obeys the laws, or in a reason.
 
-#[path = "../../benches/stress/contacts.rs"]
-mod contacts;
-#[path = "../../benches/stress/laws.rs"]
-mod laws;
-use crate::random;
-#[path = "../../benches/stress/trial.rs"]
-mod trial;
-
 use contacts::samples;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::{check, solve};
 use serde_json::{Value, json};
 use trial::{End, trial};
 
+use crate::random;
 use crate::reference::assert_none;
+
+#[path = "../../benches/stress/contacts.rs"]
+mod contacts;
+#[path = "../../benches/stress/laws.rs"]
+mod laws;
+#[path = "../../benches/stress/trial.rs"]
+mod trial;
 
 #[test]
 fn random_cases_obey_the_laws_or_say_why_not() {

@@ -3,15 +3,13 @@
 use std::sync::Arc;
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
-use railhead::contact::check;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::slices::slices;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::solution::words::fields::Fields;
-use railhead::contact::solve_slice;
+use railhead::contact::solution::words::answer::{Fields, Solution};
+use railhead::contact::{check, solve_slice};
 use serde_json::{Value, json};
 
 use crate::reference::{force_of_cells, solve};

@@ -1,10 +1,10 @@
 //! Rows of numbers: they are answered as jobs are, and say what they cannot be answered with.
 
+use railhead::contact;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::error::Fault;
 use railhead::contact::evaluate::answer::{RowStatus, RowsAnswer};
-use railhead::contact::evaluate::rows::Column;
-use railhead::contact::evaluate::rows::Rows;
-use railhead::contact::{self, case::limits::Limits};
+use railhead::contact::evaluate::rows::{Column, Rows};
 use serde_json::{Value, json};
 
 use crate::gap_samples::steel;

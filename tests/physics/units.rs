@@ -1,6 +1,6 @@
 //! Numbers in another unit are asked about, and nothing else is.
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use serde_json::{Value, json};
 

@@ -3,13 +3,12 @@
 use std::sync::Arc;
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead::contact::rolling::operator_store::OperatorStore;
 use railhead::contact::slices::slices;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::solution::words::fields::Fields;
+use railhead::contact::solution::words::answer::{Fields, Solution};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

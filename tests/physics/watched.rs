@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::{Monitor, Stop};
 use railhead::contact::{check, solve};

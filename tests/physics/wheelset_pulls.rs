@@ -1,7 +1,7 @@
 //! Forces prescribed under one wheel of a moving wheelset: its lateral and its angular velocity are found, with the wheel at rest under its load.
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::solution::words::answer::Solution;

@@ -2,21 +2,20 @@
 
 use std::sync::Arc;
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
-use railhead::contact::mesh::strips::MeshSize;
+use railhead::contact::mesh::MeshSize;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal_stage;
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use railhead::contact::rolling::motion::Motion;
 use railhead::contact::rolling::operator_store::{CaseOperators, LevelOperator, OperatorStore};
 use railhead::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 use railhead::contact::rolling::slip_rules::Rule;
 use railhead::contact::rolling::strip_mesh::StripMesh;
-use railhead::contact::{check, solve, solve_with};
+use railhead::contact::rolling::task::Motion;
+use railhead::contact::{check, normal_stage, solve, solve_with};
 use serde_json::{Value, json};
 
 use crate::allocations::during;

@@ -6,12 +6,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use railhead::contact;
-use railhead::contact::case::known_pair::KnownPair;
-use railhead::contact::case::limits::Limits;
-use railhead::contact::evaluate::many::solve::{evaluate_at_once, solve_many};
-use railhead::contact::evaluate::many::task::ManyTask;
-use railhead::contact::evaluate::rows::Column;
-use railhead::contact::evaluate::rows::Rows;
+use railhead::contact::case::solver::{KnownPair, Limits};
+use railhead::contact::evaluate::many::{ManyTask, evaluate_at_once, solve_many};
+use railhead::contact::evaluate::rows::{Column, Rows};
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::{Monitor, Unmonitored};
 use railhead::contact::problem::checked_case::CheckedCase;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use reqwest::Method;
 use serde_json::{Value, json};
 use tempfile::TempDir;

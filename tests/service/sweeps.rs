@@ -5,10 +5,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use railhead::contact;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::{Monitor, Unmonitored};
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::solution::words::fields::PatchFields;
+use railhead::contact::solution::words::answer::{PatchFields, Solution};
 use railhead::jobs::engine::Engine;
 use railhead::jobs::{FailureKind, Jobs, Options, State};
 use reqwest::Method;

@@ -268,7 +268,7 @@ fn every_example_is_a_case_that_can_be_asked_or_the_faulty_one() {
         let text = fs::read_to_string(&path).expect("an example");
         let value = serde_json::from_str(&text).expect("an example is JSON");
         if name.ends_with(".case.json") {
-            let limits = railhead_contact::contact::case::limits::Limits::default();
+            let limits = railhead_contact::contact::case::solver::Limits::default();
             let checked = railhead_contact::contact::check(&value, &limits);
             assert_eq!(checked.is_err(), name.contains("faulty"), "{name}");
         }

@@ -32,7 +32,6 @@ const ORDER: &[&str] = &[
     "contact::rolling_stage",
     "contact::traction_estimate",
     "contact::unlike_bodies",
-    "contact::unlike_motions",
     "contact::vertical_equilibrium",
     "contact::wheel_on_rail",
     "contact::profile_assessment",

@@ -1,18 +1,16 @@
 //! What a case asks for beyond its contact: stresses below the surface, damage, temperatures.
 
-use crate::contact::case::limits::Limits;
 use crate::contact::case::motions::ExpandedMotions;
+use crate::contact::case::solver::Limits;
 use crate::contact::case::subsurface;
-use crate::contact::case::words::damage::{DamageModel, DamageWords};
-use crate::contact::case::words::material::{ThermalBodyWords, ThermalWords};
+use crate::contact::case::words::contact::{ThermalBodyWords, ThermalWords};
 use crate::contact::case::words::motion::Motions;
-use crate::contact::case::words::question::Case;
-use crate::contact::case::words::solver::Output;
-use crate::contact::case::words::subsurface::SubsurfaceWords;
+use crate::contact::case::words::solver::{Case, Output};
+use crate::contact::case::words::subsurface::{DamageModel, DamageWords, SubsurfaceWords};
 use crate::contact::error::Fault;
-use crate::contact::post::damage::figures::DamageTask;
+use crate::contact::post::damage::DamageTask;
 use crate::contact::post::heat::{ThermalBody, ThermalTask};
-use crate::contact::problem::run::AfterTasks;
+use crate::contact::problem::physics::AfterTasks;
 
 impl Case {
     /// The words of what it asks for.

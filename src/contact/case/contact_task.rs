@@ -1,16 +1,21 @@
 //! What a case asks of the normal problem: from the words of contact and load to a checked task. Wheel on rail: see `wheel_task.rs`.
+//!
+//! The position of a flange's back in the cross-section of a wheel: stated, or found from the points.
+//!
+//! Lengths of track and wheelset that would be usual in another unit than mm.
 
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::error::Fault;
-use crate::contact::normal::gap::preview::PreviewCache;
+use crate::contact::geometry::length_unit::LengthUnit;
+use crate::contact::geometry::profile::Profile;
+use crate::contact::normal::footprint::NormalTask;
 use crate::contact::normal::gap::surface::GapSurface;
-use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::hertz::{Ellipse, NormalLoad};
-use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::patch::Patch;
+use crate::contact::normal::gap::task::{GapTask, PreviewCache};
+use crate::contact::normal::hertz::{Ellipse, NormalLoad, Patch};
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::kind::short;
+use crate::contact::remark::list::Remark;
 
 /// Largest pressure of a patch in MPa; a larger one is a mistake rather than a contact.
 const PRESSURE_MAX: f64 = 1e12;
@@ -175,4 +180,156 @@ fn loading(load: &Load) -> NormalLoad {
 
 fn fault(pointer: &str, detail: String) -> Fault {
     Fault::new(pointer, detail)
+}
+
+/// y of the back in mm where the origin is the running circle, as in EN 13715.
+const USUAL: f64 = -70.0;
+/// Difference in mm up to which the points agree with the usual position.
+const AGREES: f64 = 0.5;
+/// Difference in mm up to which the points agree with a stated position: backs are measured at different heights.
+const AGREES_WITH_STATED: f64 = 5.0;
+/// Largest distance in mm from the last point of a flange to a back that was not measured. Flanges are up to 35 mm thick; made-up wheels are thicker.
+const THICKNESS_MAX: f64 = 60.0;
+const MEMBER: &str = "/contact/flange_back_position_mm";
+
+/// y of the back of the flange in mm, with a remark at the pointer of the wheel.
+///
+/// # Errors
+/// A stated position outside the points of a flange, or none although the points do not show it.
+pub(crate) fn position(
+    wheel: &Profile,
+    pointer: &str,
+    stated: Option<f64>,
+    flange_back_distance: f64,
+) -> Result<(f64, Option<RemarkEntry>), Fault> {
+    let found = match stated {
+        // A wheel without a distance of backs is placed by its origin.
+        Some(given) if flange_back_distance == 0.0 => Ok((given, None)),
+        Some(given) => check_stated(wheel, given).map(|remark| (given, remark)),
+        None => find(wheel),
+    };
+    match found {
+        Ok((back, remark)) => Ok((back, remark.map(|remark| remark.at_pointer(pointer)))),
+        Err(detail) => Err(Fault::new(MEMBER, detail)),
+    }
+}
+
+fn check_stated(wheel: &Profile, given: f64) -> Result<Option<Remark>, String> {
+    let Some(flange) = wheel.flange() else {
+        return Ok(None);
+    };
+    let [first, last] = wheel.width();
+    let least = match flange.back {
+        Some(back) => back.min(first) - AGREES_WITH_STATED,
+        None => flange.end - THICKNESS_MAX,
+    };
+    if !(least..=last).contains(&given) {
+        let back = flange.back.map_or_else(String::new, |back| {
+            format!(", and the back of their flange lies at y = {back:.2} mm")
+        });
+        return Err(format!(
+            "{given} given, which is outside the points of the wheel: they reach from y = {first:.2} to {last:.2} mm{back}; \
+             {least:.1} to {last:.1} mm are allowed"
+        ));
+    }
+    Ok(flange
+        .back
+        .filter(|back| (back - given).abs() > AGREES_WITH_STATED)
+        .map(|found_mm| Remark::FlangeBackContradicted {
+            profile: "wheel",
+            given_mm: given,
+            found_mm,
+        }))
+}
+
+fn find(wheel: &Profile) -> Result<(f64, Option<Remark>), String> {
+    match wheel.flange().and_then(|flange| flange.back) {
+        Some(back) if (back - USUAL).abs() <= AGREES => Ok((USUAL, None)),
+        Some(back) => {
+            // Four decimals, as coordinates are answered.
+            let back = (1e4 * back).round() / 1e4;
+            let remark = Remark::FlangeBackFound {
+                profile: "wheel",
+                position_mm: back,
+            };
+            Ok((back, Some(remark)))
+        }
+        // The usual position belongs to points whose y is 0 at the running circle.
+        None => {
+            let [first, last] = wheel.width();
+            let fits = first < 0.0 && last > 0.0 && first >= USUAL - AGREES;
+            fits.then_some((USUAL, None)).ok_or_else(|| {
+                format!(
+                    "no value given, and the points of the wheel, from y = {first:.2} to {last:.2} mm, do not show the back of its flange; \
+                     the usual {USUAL} mm holds only where y = 0 is the running circle: state the position"
+                )
+            })
+        }
+    }
+}
+
+/// Usual gauge in mm: standard gauge.
+const GAUGE: f64 = 1435.0;
+/// Usual distance of the middle of a rail from that of the track in mm, on standard gauge.
+const RAIL_ORIGIN: f64 = 752.5;
+/// Usual distance of the backs of the flanges in mm, on standard gauge.
+const FLANGE_BACKS: f64 = 1360.0;
+/// Usual rolling radius in mm (UIC wheels of 920 mm diameter).
+const RADIUS: f64 = 460.0;
+
+/// Remarks on the lengths of a wheel or a wheelset on rails, each with the pointer to its member.
+pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
+    let (Contact::Profiles {
+        gauge_mm,
+        rail_origin_mm,
+        flange_back_distance_mm,
+        rolling_radius_mm,
+        ..
+    }
+    | Contact::Wheelset {
+        gauge_mm,
+        rail_origin_mm,
+        flange_back_distance_mm,
+        rolling_radius_mm,
+        ..
+    }) = contact
+    else {
+        return Vec::new();
+    };
+    let lengths = [
+        ("/contact/gauge_mm", *gauge_mm, GAUGE),
+        ("/contact/rail_origin_mm", *rail_origin_mm, RAIL_ORIGIN),
+        (
+            "/contact/flange_back_distance_mm",
+            Some(*flange_back_distance_mm),
+            FLANGE_BACKS,
+        ),
+        (
+            "/contact/rolling_radius_mm",
+            Some(*rolling_radius_mm),
+            RADIUS,
+        ),
+    ];
+    let remark = |(pointer, length_mm, usual): (&str, Option<f64>, f64)| {
+        let length_mm = length_mm?;
+        let unit = LengthUnit::likely(length_mm, usual).filter(|unit| *unit != LengthUnit::Mm)?;
+        let unit = unit.symbol();
+        Some(Remark::LengthUnusual { length_mm, unit }.at_pointer(pointer))
+    };
+    lengths.into_iter().filter_map(remark).collect()
+}
+
+/// Faults of the placement, with the lengths that may be the reason.
+pub(crate) fn explained(faults: Vec<Fault>, unusual: &[RemarkEntry]) -> Vec<Fault> {
+    let explain = |mut fault: Fault| {
+        let about_place = ["/contact", "/contact/rolling_radius_mm"];
+        if about_place.contains(&fault.pointer.as_str()) {
+            for remark in unusual {
+                let pointer = remark.pointer.as_deref().unwrap_or_default();
+                fault.detail = format!("{}; {pointer}: {}", fault.detail, remark.detail);
+            }
+        }
+        fault
+    };
+    faults.into_iter().map(explain).collect()
 }

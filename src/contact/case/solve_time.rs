@@ -8,17 +8,15 @@
 
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::method::Method;
+use crate::contact::normal::footprint::NormalTask;
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
-use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel::task::WheelTask;
-use crate::contact::normal::wheel::wheelset_task::WheelsetMove;
+use crate::contact::normal::wheel::{WheelTask, WheelsetMove};
 use crate::contact::post::subsurface::states::StressPlaces;
+use crate::contact::problem::checked_case;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::profile_points;
 use crate::contact::rolling::history::solve::usual_work;
-use crate::contact::rolling::resolution::{RelativeTo, Resolution};
-use crate::contact::rolling::task::precision_of;
+use crate::contact::rolling::task::{RelativeTo, Resolution, precision_of};
 
 /// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`].
 const MOTION_SECONDS: f64 = 3.5e-4;
@@ -141,7 +139,7 @@ fn half_under(task: &WheelTask) -> [f64; 2] {
 
 /// Time in s to bring a wheel to rest on its rail, with all the readings of its profiles.
 fn at_rest(task: &WheelTask) -> f64 {
-    WHEEL_SECONDS * f64::from(1 + profile_points::readings_expected(task))
+    WHEEL_SECONDS * f64::from(1 + checked_case::readings_expected(task))
 }
 
 impl CheckedCase {

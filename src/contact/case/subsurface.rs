@@ -1,7 +1,7 @@
 //! From words to task: where stresses below the surface are computed, and in which body.
 
-use crate::contact::case::limits::Limits;
-use crate::contact::case::words::material::Material;
+use crate::contact::case::solver::Limits;
+use crate::contact::case::words::contact::Material;
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::subsurface::{
     BodyName, DepthLineAt, FoundPlace, GridAxis, StressGrid, SubsurfaceWords,

@@ -2,14 +2,13 @@
 
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::patch::Patch;
-use crate::contact::normal::wheel::task::{WheelLoad, WheelTask};
+use crate::contact::normal::footprint::{Footprint, NormalTask};
+use crate::contact::normal::hertz::Patch;
+use crate::contact::normal::wheel::{WheelLoad, WheelTask};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
-use crate::contact::solution::words::understanding::{
+use crate::contact::solution::words::answer::{
     FirstTouch, KnownPatch, PlacedProfiles, Understanding,
 };
 

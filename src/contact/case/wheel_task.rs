@@ -2,28 +2,29 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::flange_back;
-use crate::contact::case::known_pair::KnownPair;
+use crate::contact::case::contact_task;
+use crate::contact::case::solver::KnownPair;
 use crate::contact::case::words::contact::{
     Contact, CrossSection, FormatName, Load, Smoothing, SmoothingWord,
 };
 use crate::contact::case::words::motion::{Motions, Wheelset};
 use crate::contact::error::Fault;
 use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::formats::format as formats;
-use crate::contact::geometry::formats::profile_file::ProfileFile;
+use crate::contact::geometry::formats;
+use crate::contact::geometry::formats::ProfileFile;
 use crate::contact::geometry::length_unit::LengthUnit;
 use crate::contact::geometry::orientation::{FormatSenses, Senses, StatedSenses};
 use crate::contact::geometry::profile::{Body, Profile, Reading};
 use crate::contact::geometry::wheel_rail::{NotPlaced, Placement, RailPlace, WheelRail};
-use crate::contact::geometry::wheelset::WheelsetMotion;
-use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel::task::{ProfileTrust, ReferenceSurface, WheelLoad, WheelTask};
-use crate::contact::normal::wheel::wheelset_task::WheelsetMove;
-use crate::contact::problem::profile_points;
+use crate::contact::geometry::wheelset_pose::WheelsetMotion;
+use crate::contact::normal::footprint::NormalTask;
+use crate::contact::normal::wheel::{
+    ProfileTrust, ReferenceSurface, WheelLoad, WheelTask, WheelsetMove,
+};
+use crate::contact::problem::checked_case;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::motion::PrescribedForces;
+use crate::contact::rolling::task::PrescribedForces;
 
 /// The task of a wheel on a rail, whose profiles may be known, with its remarks; `None` without faults where the load or the contact
 /// modulus in MPa is not known.
@@ -45,8 +46,8 @@ pub(crate) fn task(
     let mut remarks = geometry.remarks();
     remarks.extend(flange_back);
     let [rail, wheel] = geometry.profiles();
-    remarks.extend(profile_points::load_mismatch(rail, Body::Rail));
-    remarks.extend(profile_points::load_mismatch(wheel, Body::Wheel));
+    remarks.extend(checked_case::load_mismatch(rail, Body::Rail));
+    remarks.extend(checked_case::load_mismatch(wheel, Body::Wheel));
     let loading = load.and_then(loading);
     let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
         return Ok(None);
@@ -211,7 +212,7 @@ fn wheel_rail(
     let stated = *flange_back_position_mm;
     let back_of = |wheel: &Profile| {
         let distance = *flange_back_distance_mm;
-        flange_back::position(wheel, "/contact/wheel", stated, distance)
+        contact_task::position(wheel, "/contact/wheel", stated, distance)
             .map_err(|fault| vec![fault])
     };
     let checked = |profiles: [&Profile; 2]| {
@@ -242,7 +243,7 @@ pub(crate) fn both(
     pointers: [&str; 2],
 ) -> Result<[Profile; 2], Vec<Fault>> {
     let load_mismatch = |profile: &Profile, body: Body, pointer: &str| {
-        let remark = profile_points::load_mismatch(profile, body)?;
+        let remark = checked_case::load_mismatch(profile, body)?;
         Some(fault(pointer.to_owned(), remark.detail))
     };
     let faults = match read {
@@ -274,8 +275,8 @@ pub(crate) fn exchanged(
     [rail, wheel]: [&Profile; 2],
     pointers: [&str; 2],
 ) -> Result<(), Vec<Fault>> {
-    let both = profile_points::load_mismatch(rail, Body::Rail)
-        .zip(profile_points::load_mismatch(wheel, Body::Wheel));
+    let both = checked_case::load_mismatch(rail, Body::Rail)
+        .zip(checked_case::load_mismatch(wheel, Body::Wheel));
     let Some((rail, wheel)) = both else {
         return Ok(());
     };

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::flange_back;
-use crate::contact::case::limits::Limits;
+use crate::contact::case::contact_task;
 use crate::contact::case::motions::swept_values;
+use crate::contact::case::solver::Limits;
 use crate::contact::case::wheel_task::{
     both, exchanged, moves, profile_at, reasons, unplaced, with_reasons,
 };
@@ -14,10 +14,12 @@ use crate::contact::error::Fault;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
-use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::wheel::task::{ProfileTrust, ReferenceSurface, WheelLoad, WheelTask};
-use crate::contact::normal::wheel::wheelset_task::{KinematicsTask, WheelsetMove, WheelsetTask};
-use crate::contact::problem::profile_points;
+use crate::contact::normal::footprint::NormalTask;
+use crate::contact::normal::wheel::{
+    KinematicsTask, ProfileTrust, ReferenceSurface, WheelLoad, WheelTask, WheelsetMove,
+    WheelsetTask,
+};
+use crate::contact::problem::checked_case;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 
 /// The part of the load on the left wheel when nothing is said.
@@ -222,7 +224,7 @@ fn in_place(
     if !accept_rough_profiles {
         exchanged([&rail, &wheel], pointers).map_err(explained)?;
     }
-    let (flange_back_position, remark) = flange_back::position(
+    let (flange_back_position, remark) = contact_task::position(
         &wheel,
         pointers[1],
         *flange_back_position_mm,
@@ -262,7 +264,7 @@ fn remarks_of(geometry: &WheelRail, pointers: [&str; 2]) -> Vec<RemarkEntry> {
         .flat_map(|((profile, body), pointer)| {
             let own = profile.remarks.iter().cloned();
             let own = own.map(|remark| remark.at_pointer(pointer));
-            let load_mismatch = profile_points::load_mismatch(profile, body);
+            let load_mismatch = checked_case::load_mismatch(profile, body);
             let load_mismatch = load_mismatch.map(|remark| RemarkEntry {
                 pointer: Some(pointer.to_owned()),
                 ..remark

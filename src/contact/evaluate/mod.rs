@@ -5,7 +5,6 @@ pub mod answer;
 pub mod many;
 pub mod many_answer;
 pub mod placing;
-pub mod request_faults;
 pub mod rows;
 pub mod variable;
 pub mod varied;

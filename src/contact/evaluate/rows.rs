@@ -11,15 +11,15 @@ use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::error::{CaseError, Fault, FaultCode, SolveError};
 use crate::contact::evaluate::answer::{RowAnswer, RowStatus, RowsAnswer};
 use crate::contact::evaluate::variable::{Row, Variable};
+use crate::contact::normal::footprint::NormalTask;
 use crate::contact::normal::hertz::{Ellipse, HertzShape};
-use crate::contact::normal::normal_task::NormalTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::methods::fastsim::{self, EllipseMesh};
 use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
 use crate::contact::rolling::methods::table::file::table;
 use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
 use crate::contact::rolling::refinement::gradients::{STEP, slope};
-use crate::contact::rolling::resolution::{RelativeTo, Resolution};
+use crate::contact::rolling::task::{RelativeTo, Resolution};
 
 /// Rows that can be evaluated.
 #[derive(Debug)]

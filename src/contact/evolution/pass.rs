@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use crate::contact;
-use crate::contact::case::words::damage::DamageModel;
+use crate::contact::case::words::subsurface::DamageModel;
 use crate::contact::error::SolveError;
 use crate::contact::evolution::section::{add, along, lengths, smoothed};
 use crate::contact::evolution::task::{Evolution, Sections, SolveContext};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::normal_task::NormalTask;
+use crate::contact::normal::footprint::NormalTask;
 use crate::contact::post::heat::NANOMETRES;
 use crate::contact::solution::words::answer::PatchSolution;
 use crate::contact::solution::words::evolution::{StateContact, StatePatch};

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::contact::case::limits::Limits;
+use crate::contact::case::solver::Limits;
 use crate::contact::evolution::pass::pass;
 use crate::contact::evolution::section::{area_between, distance};
 use crate::contact::evolution::task::{Evolution, Sections, SolveContext};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::contact::normal::load_across::LoadAcross;
+use crate::contact::normal::footprint::LoadAcross;
 
 /// Coefficients in the order of their places, at least one.
 #[derive(Debug, Clone, PartialEq)]

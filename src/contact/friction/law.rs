@@ -4,16 +4,17 @@
 //! value and what a patch carries with it. Levels take their bounds strip by strip from [`FrictionLaw::share`]; what is relative to μN
 //! takes it from [`FrictionLaw::limit`]. Where the bound of a cell falls with its slip, these are the bounds at rest, and the method
 //! follows [`FrictionLaw::bound_fall`] from there.
+//!
+//! Friction of a rail in the axes of its patches.
 
 use std::borrow::Borrow;
 
-use crate::contact::friction::coefficient_table::AcrossLaw;
-use crate::contact::friction::coefficient_table::AlongLaw;
+use crate::contact::friction::coefficient_table::{AcrossLaw, AcrossPlace, AlongLaw};
 use crate::contact::friction::path_dependent::HeatedLaw;
 use crate::contact::friction::velocity_weakening::{FallingLaw, Softening};
-use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::load_across::LoadAcross;
-use crate::contact::normal::patch::Patch;
+use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::contact::normal::footprint::{Footprint, LoadAcross};
+use crate::contact::normal::hertz::Patch;
 
 /// How the coefficient of friction varies over the contact.
 #[derive(Debug, Clone, PartialEq)]
@@ -178,4 +179,44 @@ impl FrictionLaw {
             | FrictionLaw::Along(_) => (0..patches.len()).map(|k| self.limit(footprint, k)).sum(),
         }
     }
+}
+
+/// Samples of a coefficient that varies over the rail, across all patches.
+const SAMPLES: usize = 129;
+
+/// Friction in the axes of the surface of a rail whose patches have these extents `[x_min, x_max, s_min, s_max]` in mm along its cross-section: a
+/// coefficient by the y of the rail's profile, or by the inclination of its surface, becomes one by the arc length from an origin `[x, s]`, and one by
+/// the place along the track becomes one by x. `rail` gives the parameter of the rail's curve by the arc length.
+pub(crate) fn on_rail(
+    friction: &FrictionLaw,
+    geometry: &WheelRail,
+    extents: impl Iterator<Item = [f64; 4]>,
+    [x, s]: [f64; 2],
+    rail: impl Fn(f64) -> f64,
+) -> FrictionLaw {
+    if let Some(law) = friction.along() {
+        return FrictionLaw::Along(law.about(x));
+    }
+    let Some(law) = friction.across() else {
+        return friction.clone();
+    };
+    let nothing = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = extents.fold(nothing, |(low, high), e| {
+        (low.min(e[2] - s), high.max(e[3] - s))
+    });
+    let step = (high - low) / (SAMPLES - 1) as f64;
+    let found = (0..SAMPLES).map(|k| {
+        let y = low + k as f64 * step;
+        let rail = rail(s + y);
+        let at = match law.place {
+            AcrossPlace::Y => geometry.on_rail(rail)[0],
+            AcrossPlace::Angle => {
+                let [across, up] = geometry.rail_at(rail).slope;
+                (up * across.signum()).atan2(across.abs())
+            }
+        };
+        (y, law.at(at))
+    });
+    let (y, coefficient): (Vec<f64>, Vec<f64>) = found.unzip();
+    FrictionLaw::Across(AcrossLaw::new(AcrossPlace::Y, &y, &coefficient))
 }

@@ -2,6 +2,5 @@
 
 pub mod coefficient_table;
 pub mod law;
-pub(crate) mod on_rail;
 pub mod path_dependent;
 pub mod velocity_weakening;

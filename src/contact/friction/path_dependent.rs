@@ -6,8 +6,8 @@
 use std::sync::Arc;
 
 use crate::contact::friction::velocity_weakening::SLIP_OF_CELL;
-use crate::contact::mesh::strips::Mesh;
-use crate::contact::numerics::monotone_root::{self, CloseEnough, Course};
+use crate::contact::mesh::Mesh;
+use crate::contact::numerics::roots::{self, CloseEnough, Course};
 
 /// Largest temperature in K by which the temperature of a cell may be missed; bounds change by some 10⁻⁴ per K. Keeps the numbers safe; not tuned.
 const KELVIN: f64 = 1e-6;
@@ -209,7 +209,7 @@ impl CellHeat<'_> {
             place: KELVIN,
         };
         let temperature = match own > 0.0 {
-            true => monotone_root::find([fixed, hottest], hottest, Course::Rising, close, |t| {
+            true => roots::find([fixed, hottest], hottest, Course::Rising, close, |t| {
                 let (mu, slope) = self.law.at(t);
                 [t - fixed - own * mu, 1.0 - own * slope]
             }),
@@ -254,8 +254,8 @@ impl Default for Interface {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::strips::Chord;
-    use crate::contact::mesh::strips::Grading;
+    use crate::contact::mesh::Chord;
+    use crate::contact::mesh::Grading;
 
     fn strip(cells: usize) -> Mesh {
         let chord = Chord {

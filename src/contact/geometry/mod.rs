@@ -16,5 +16,4 @@ pub mod profile_quality;
 pub mod reference_curve;
 pub mod rigid_touch;
 pub mod wheel_rail;
-pub mod wheelset;
 pub mod wheelset_pose;

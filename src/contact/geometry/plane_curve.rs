@@ -1,6 +1,6 @@
 //! A plane curve whose coordinates are cubics between common knots, prepared for many evaluations.
 
-use crate::contact::numerics::spline::Spline;
+use crate::contact::numerics::interpolation::Spline;
 
 /// A curve `[y, z]` in mm over a parameter in mm, twice continuously differentiable except at sharp corners, straight beyond its ends.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,15 +5,13 @@
 
 use std::sync::Arc;
 
-use crate::contact::geometry::crossing;
 use crate::contact::geometry::length_unit::LengthUnit;
 use crate::contact::geometry::orientation::{
     self, Flange, FormatSenses, FoundSenses, StatedSenses, SureBody,
 };
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
-use crate::contact::geometry::profile_quality::noise;
-use crate::contact::geometry::profile_quality::readings::{KnownStretches, PointsRead};
-use crate::contact::geometry::profile_quality::samples::Points;
+use crate::contact::geometry::profile_quality::{KnownStretches, Points, PointsRead};
+use crate::contact::geometry::{crossing, profile_quality};
 use crate::contact::lazy_field::LazyField;
 use crate::contact::remark::list::Remark;
 
@@ -118,7 +116,10 @@ impl Profile {
         format: FormatSenses,
     ) -> Result<Profile, String> {
         let mut remarks = Vec::new();
-        let (rounding, digits) = (noise::rounding(points), noise::digits(points));
+        let (rounding, digits) = (
+            profile_quality::rounding(points),
+            profile_quality::digits(points),
+        );
         let mut points = checked(points)?;
         let length = arc_length(&points);
         let [shortest, longest] = ARC_LENGTH;
@@ -256,7 +257,7 @@ impl Profile {
     #[must_use]
     pub fn usual_chord(&self) -> f64 {
         let mut chords: Vec<f64> = self.chords().collect();
-        noise::median(&mut chords)
+        profile_quality::median(&mut chords)
     }
 
     /// Largest distance of neighbouring points in mm.
@@ -345,7 +346,8 @@ fn orient(
         mirror_y: reading.mirror_y,
         mirror_z: reading.mirror_z,
     };
-    let [first, last] = noise::stray_ends(points).map(|stray| stray.map_or(0, |(count, _)| count));
+    let [first, last] =
+        profile_quality::stray_ends(points).map(|stray| stray.map_or(0, |(count, _)| count));
     // A section in another unit than stated shows its senses all the same.
     let scale = likely_unit(body, points).map_or(1.0, |(_, unit)| unit.mm());
     let shown: Vec<[f64; 2]> = points[first..points.len() - last]
@@ -435,7 +437,7 @@ fn straighten(
 
 /// Drops one or two points at an end that a long chord separates from all others, as they occur in measurements.
 fn cut_stray_ends(body: Body, points: &mut Vec<[f64; 2]>, remarks: &mut Vec<Remark>) {
-    let [first, last] = noise::stray_ends(points);
+    let [first, last] = profile_quality::stray_ends(points);
     let profile = body.name();
     if let Some((count, distance_mm)) = last {
         points.truncate(points.len() - count);

@@ -11,11 +11,12 @@ use std::borrow::Cow;
 use std::cell::Cell;
 use std::ops::Range;
 
-pub use crate::contact::geometry::curve_place::CurvePlace;
 use crate::contact::geometry::plane_curve::CurvePoint;
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::geometry::wheelset::WheelsetMotion;
+use crate::contact::geometry::wheelset_pose::WheelsetMotion;
 use crate::contact::numerics::quadrature::{GaussPoints, integral};
+
+pub use crate::contact::geometry::curve_place::CurvePlace;
 
 /// Largest spacing in mm of the places of the rail where overlaps are looked for.
 pub const SPACING: f64 = 0.25;

@@ -20,10 +20,9 @@ use std::cmp::Ordering;
 use pulp::NullaryFnOnce;
 use rustfft::num_complex::Complex;
 
-use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::grid_operator::{coefficients, lines};
 use crate::contact::half_space::transforms::{FftPlanners, FftPlans};
-use crate::contact::half_space::unlike_bodies::displacement_by_cell;
+use crate::contact::half_space::unlike_bodies::{Elasticity, displacement_by_cell};
 use crate::contact::lazy_field::LazyField;
 use crate::contact::numerics::simd;
 

@@ -7,7 +7,7 @@ use rustfft::num_complex::Complex;
 use crate::contact::half_space::line_sums::{LineSums, Spectra};
 use crate::contact::half_space::transforms::{FftFloat, FftPlanners, FftPlans};
 use crate::contact::numerics::simd;
-use crate::contact::numerics::simd_ln::Float;
+use crate::contact::numerics::simd::Float;
 
 /// Normal displacement at the centres of `nx` by `ny` equal rectangles caused by uniform pressures on them, both bodies
 /// together.

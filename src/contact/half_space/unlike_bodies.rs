@@ -3,10 +3,12 @@
 //! With K of the pair, p = x − x′ and q = y − y′ the distances to the corners of a cell and [[·]] their sum with alternating signs, a pressure
 //! P moves the surfaces apart by `u_x = K P/(πG) [[p atan(q/p) + q ln r]]` and `u_y` with p and q exchanged, and tractions open the gap
 //! by minus the same sums (Kalker 1990, section 1.6; Johnson 1985, section 3.6).
+//!
+//! Elastic constants of the pair of bodies.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::mesh::{Mesh, Segment};
 
 /// `p atan(q/p) + q ln r` and the same with p and q exchanged.
 fn corner(p: f64, q: f64) -> [f64; 2] {
@@ -104,11 +106,38 @@ pub fn opening(mesh: &Mesh, difference: f64, traction: &[Vec<f64>; 2], at: [f64;
     -difference / PI * sum
 }
 
+/// Elastic constants of the pair of bodies, combined as in quasi-identical contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Elasticity {
+    /// Combined shear modulus G in MPa.
+    pub shear_modulus: f64,
+    /// Combined Poisson's ratio, 0 to 0.5.
+    pub poisson_ratio: f64,
+    /// Difference parameter K (Kalker 1990, eq. 1.44); 0 for like bodies.
+    pub difference: f64,
+    /// Part of the normal displacement of both bodies that is the lower one's; ½ for like bodies.
+    pub lower_share: f64,
+}
+
+impl Elasticity {
+    /// Have the bodies different elastic constants?
+    #[must_use]
+    pub fn differs(&self) -> bool {
+        self.difference != 0.0 || self.lower_share != 0.5
+    }
+
+    /// Contact modulus `E* = G/(1−ν)` in MPa, that is `1/E* = (1−ν₁²)/E₁ + (1−ν₂²)/E₂`.
+    #[must_use]
+    pub fn contact_modulus(&self) -> f64 {
+        self.shear_modulus / (1.0 - self.poisson_ratio)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::strips::Chord;
-    use crate::contact::mesh::strips::Grading;
+    use crate::contact::mesh::Chord;
+    use crate::contact::mesh::Grading;
 
     /// Corner sums of the rectangle |x| ≤ 0.5, |y| ≤ 0.3, computed with 40 digits and written with 12.
     #[test]

@@ -1,15 +1,21 @@
 //! The solved normal problem of one frame: its patches and their pressures.
+//!
+//! How the load of a patch is spread across rolling: its line load by y, a chain of parabolas.
+//!
+//! Slip of a contact surface beyond that of a motion of the plane.
+//!
+//! What is asked of the normal problem: where patches and pressures come from.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::contact::lazy_field::LazyField;
-use crate::contact::mesh::strips::Chord;
-use crate::contact::normal::hertz::Ellipse;
-use crate::contact::normal::load_across::LoadAcross;
-use crate::contact::normal::patch::Patch;
+use crate::contact::mesh::Chord;
+use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::hertz::{Ellipse, Patch};
 use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::normal::surface_slip::SurfaceSlip;
+use crate::contact::normal::wheel::{WheelTask, WheelsetTask};
+use crate::contact::numerics::interpolation;
 
 /// The patches of one frame with their pressures; never empty. It answers where the patches are, how long their chords are,
 /// and what pressure acts on them, and nothing else.
@@ -292,5 +298,278 @@ impl Footprint {
                 field.pressures(chord, cosines.map(|cosine| chord.along(cosine)))
             }
         }
+    }
+}
+
+/// Parabolas of a pressure that is known by samples, narrower towards both ends, where its line load changes fastest. Chosen by judgement: twice as many
+/// change the limit of Hertz's patch, given as a grid, under a table with a jump by less than 1e-5.
+const PARABOLAS: usize = 24;
+
+/// Line load of a patch in N/mm, up to a factor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadAcross {
+    /// Place in mm and line load of both ends and the middle of every parabola; neighbours share their ends.
+    points: Vec<(f64, f64)>,
+}
+
+impl LoadAcross {
+    /// That of an elliptic patch between two y: one parabola.
+    #[must_use]
+    pub fn of_ellipse([low, high]: [f64; 2]) -> LoadAcross {
+        let points = vec![(low, 0.0), (0.5 * (low + high), 1.0), (high, 0.0)];
+        LoadAcross { points }
+    }
+
+    /// That of a patch of a pressure known by samples.
+    #[must_use]
+    pub fn of_samples(field: &PressureField, patch: usize) -> LoadAcross {
+        let [.., low, high] = field.patches()[patch].extent;
+        let count = 2 * PARABOLAS;
+        let place = |k: usize| {
+            let part = 0.5 - 0.5 * (PI * k as f64 / count as f64).cos();
+            low + (high - low) * part
+        };
+        let line_load = |y: f64| -> f64 {
+            let chords = field.chords(patch, &[(y, 1.0)]);
+            let load = |x: [f64; 2], mean: f64| (x[1] - x[0]) * mean;
+            let each = chords.iter().map(|chord| {
+                let [left, right] = [chord.left, chord.right];
+                load([left, right], field.mean_pressure(chord, left, right))
+            });
+            each.sum()
+        };
+        let inner = (1..count).map(|k| (place(k), line_load(place(k))));
+        let ends = [(low, 0.0), (high, 0.0)];
+        LoadAcross {
+            points: std::iter::once(ends[0])
+                .chain(inner)
+                .chain([ends[1]])
+                .collect(),
+        }
+    }
+
+    /// Mean over the load of what is linear from one point `(y, value)` to the next, points in order of y and at least one, and constant
+    /// before the first and behind the last. Two points at one place are a jump.
+    ///
+    /// Exact for a load of parabolas: its products with straight lines are cubic, which Simpson's rule integrates.
+    #[must_use]
+    pub fn mean(&self, table: &[(f64, f64)]) -> f64 {
+        let (first, last) = (table[0], table[table.len() - 1]);
+        let (low, high) = (self.points[0].0, self.points[self.points.len() - 1].0);
+        let before = [(low.min(first.0), first.1), first];
+        let behind = [last, (high.max(last.0), last.1)];
+        let inner = table.windows(2).map(|pair| [pair[0], pair[1]]);
+        let pieces = inner.chain([before, behind]);
+        let sum: f64 = pieces.map(|piece| self.integral(piece)).sum();
+        let load = self.integral([(low, 1.0), (high, 1.0)]);
+        sum / load
+    }
+
+    /// Integral of the line load times a straight line between two points.
+    fn integral(&self, [(y0, v0), (y1, v1)]: [(f64, f64); 2]) -> f64 {
+        let parabolas = self.points.windows(3).step_by(2);
+        let over = |parabola: &[(f64, f64)]| {
+            let (begin, end) = (y0.max(parabola[0].0), y1.min(parabola[2].0));
+            if begin >= end {
+                return 0.0;
+            }
+            let value = |y: f64| {
+                (v0 + (y - y0) / (y1 - y0) * (v1 - v0))
+                    * interpolation::polynomial_value(parabola, y)
+            };
+            let middle = value(0.5 * (begin + end));
+            (end - begin) / 6.0 * (value(begin) + 4.0 * middle + value(end))
+        };
+        parabolas.map(over).sum()
+    }
+}
+
+/// Slip at the points of a surface beyond that of the motion, divided by the rolling speed, interpolated between samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceSlip {
+    /// Samples along x: the first one and their distance in mm, and how many, at least 1.
+    pub x: (f64, f64, usize),
+    /// Samples along y in mm, ascending, at least 1.
+    pub y: Vec<f64>,
+    /// Slip of the upper body relative to the lower one along x and y; sample (i, j) at `j * x.2 + i`.
+    pub slip: [Vec<f64>; 2],
+}
+
+impl SurfaceSlip {
+    /// Slip at a place `[x, y]` in mm; beyond the samples that of the nearest place among them.
+    #[must_use]
+    pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (first, step, samples) = self.x;
+        let last = (samples - 1) as f64;
+        let at = ((x - first) / step).clamp(0.0, last);
+        let from = at.floor().min((last - 1.0).max(0.0));
+        let x = (from as usize, at - from, usize::from(last > 0.0));
+        let last = self.y.len() - 1;
+        let from = self
+            .y
+            .partition_point(|sample| *sample <= y)
+            .clamp(1, last.max(1))
+            - 1;
+        let to = (from + 1).min(last);
+        let length = self.y[to] - self.y[from];
+        let part = if length > 0.0 {
+            ((y - self.y[from]) / length).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let y = (from, part, to - from);
+        let value = |values: &[f64], i: usize, j: usize| values[j * self.x.2 + i];
+        [0, 1].map(|k| {
+            let row = |j: usize| {
+                let [low, high] = [x.0, x.0 + x.2].map(|i| value(&self.slip[k], i, j));
+                low + x.1 * (high - low)
+            };
+            let [low, high] = [row(y.0), row(y.0 + y.2)];
+            low + y.1 * (high - low)
+        })
+    }
+
+    /// Mean slip between two places along x, by Simpson's rule.
+    #[must_use]
+    pub fn mean(&self, [from, to]: [f64; 2], y: f64) -> [f64; 2] {
+        let [low, middle, high] = [from, 0.5 * (from + to), to].map(|x| self.at([x, y]));
+        [0, 1].map(|k| (low[k] + 4.0 * middle[k] + high[k]) / 6.0)
+    }
+}
+
+/// What is known of a contact before it is solved. Solved, it is a [`Footprint`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum NormalTask {
+    /// Hertz's ellipse, in closed form.
+    Hertz(Ellipse),
+    /// A pressure on a grid, as it was given.
+    Given(PressureField),
+    /// A gap: patches and pressures have to be found.
+    Gap(Box<GapTask>),
+    /// A wheel on a rail: the places of its patches have to be found first, each in a frame of its own.
+    Wheel(Arc<WheelTask>),
+    /// A wheelset on both rails, in one or several positions.
+    Wheelset(Arc<WheelsetTask>),
+}
+
+impl NormalTask {
+    /// Number of positions of the bodies: several of a wheelset only.
+    #[must_use]
+    pub fn positions(&self) -> usize {
+        match self {
+            NormalTask::Wheelset(task) => task.poses.len(),
+            NormalTask::Hertz(_)
+            | NormalTask::Given(_)
+            | NormalTask::Gap(_)
+            | NormalTask::Wheel(_) => 1,
+        }
+    }
+
+    /// The contact where it is known; nothing where it has to be found.
+    #[must_use]
+    pub fn known_footprint(&self) -> Option<Footprint> {
+        match self {
+            NormalTask::Hertz(ellipse) => Some(Footprint::hertz(*ellipse)),
+            NormalTask::Given(field) => Some(Footprint::given(field.clone())),
+            NormalTask::Gap(_) | NormalTask::Wheel(_) | NormalTask::Wheelset(_) => None,
+        }
+    }
+
+    /// The patches, in order of their smallest y and at least one; nothing where they have to be found.
+    #[must_use]
+    pub fn known_patches(&self) -> Option<Vec<Patch>> {
+        match self {
+            NormalTask::Hertz(ellipse) => Some(vec![ellipse.patch()]),
+            NormalTask::Given(field) => Some(field.patches()),
+            NormalTask::Gap(_) | NormalTask::Wheel(_) | NormalTask::Wheelset(_) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod load_across_tests {
+    use super::*;
+
+    const TABLE: [(f64, f64); 4] = [(-1.0, 0.1), (1.0, 0.3), (1.0, 0.5), (2.0, 0.2)];
+
+    /// The field of a pressure on a grid of equal spacings, 61 along and 81 across.
+    fn field(pressure: impl Fn(f64, f64) -> f64) -> PressureField {
+        let axis = |half: f64, count: u32| -> Vec<f64> {
+            let step = 2.0 * half / f64::from(count - 1);
+            (0..count).map(|k| f64::from(k) * step - half).collect()
+        };
+        let (x, y) = (axis(4.0, 61), axis(6.0, 81));
+        let rows: Vec<Vec<f64>> = y
+            .iter()
+            .map(|y| x.iter().map(|x| pressure(*x, *y)).collect())
+            .collect();
+        PressureField::new(&x, &y, &rows).unwrap().0
+    }
+
+    #[test]
+    fn samples_of_an_ellipse_carry_as_the_ellipse() {
+        let [a, b, y] = [3.0, 2.2, 0.7];
+        let lens = |x: f64, at: f64| 1.0 - (x / a).powi(2) - ((at - y) / b).powi(2);
+        let field = field(|x, y| 1000.0 * lens(x, y).max(0.0).sqrt());
+        let sampled = LoadAcross::of_samples(&field, 0).mean(&TABLE);
+        let exact = LoadAcross::of_ellipse([y - b, y + b]).mean(&TABLE);
+        assert!((sampled / exact - 1.0).abs() < 1e-4, "{sampled} {exact}");
+    }
+
+    /// A pressure that is even along and straight across, from 0 at one side to its largest at the other.
+    #[test]
+    fn a_wedge_carries_most_under_its_thick_side() {
+        let field = field(|x, y| {
+            let inside = x.abs() < 3.0 && (-2.05..=4.0).contains(&y);
+            if inside { 100.0 * (y + 2.1) } else { 0.0 }
+        });
+        let load = LoadAcross::of_samples(&field, 0);
+        let step = load.mean(&[(1.0, 0.0), (1.0, 1.0)]);
+        let [.., low, high] = field.patches()[0].extent;
+        let part = 1.0 - ((1.0 + 2.1) / (high + 2.1)).powi(2);
+        assert!((step - part).abs() < 0.02, "{step} {part} {low} {high}");
+        // The parabola between the same ends has the value of its middle.
+        let parabola = LoadAcross::of_ellipse([low, high]);
+        assert!(step - parabola.mean(&[(1.0, 0.0), (1.0, 1.0)]) > 0.1);
+    }
+
+    #[test]
+    fn patches_beside_each_other_have_loads_of_their_own() {
+        let lens = |x: f64, y: f64| (1.0 - (x / 2.0).powi(2) - (y / 1.6).powi(2)).max(0.0);
+        let field = field(|x, y| 900.0 * (lens(x, y - 3.0) + 0.5 * lens(x, y + 3.0)).sqrt());
+        let by_side = [(0.0, 0.1), (0.0, 0.4)];
+        let means = [0, 1].map(|k| LoadAcross::of_samples(&field, k).mean(&by_side));
+        assert!((means[0] - 0.1).abs() < 1e-12 && (means[1] - 0.4).abs() < 1e-12);
+    }
+}
+
+#[cfg(test)]
+mod surface_slip_tests {
+    use super::*;
+
+    #[test]
+    fn a_linear_slip_is_reproduced_and_constant_beyond() {
+        let of = |x: f64, y: f64| [0.1 * x - 0.3 * y, 0.2 + 0.05 * x];
+        let mut slip = [Vec::new(), Vec::new()];
+        for j in 0..4 {
+            for i in 0..3 {
+                let [along, across] = of(1.0 + 0.5 * f64::from(i), -2.0 + 0.25 * f64::from(j));
+                slip[0].push(along);
+                slip[1].push(across);
+            }
+        }
+        let surface = SurfaceSlip {
+            x: (1.0, 0.5, 3),
+            y: vec![-2.0, -1.75, -1.5, -1.25],
+            slip,
+        };
+        for (x, y) in [(1.0, -2.0), (1.3, -1.6), (2.0, -1.25)] {
+            let (found, expected) = (surface.at([x, y]), of(x, y));
+            assert!((found[0] - expected[0]).abs() < 1e-15);
+            assert!((found[1] - expected[1]).abs() < 1e-15);
+        }
+        let mean = surface.mean([1.2, 1.8], -1.5);
+        assert!((mean[0] - of(1.5, -1.5)[0]).abs() < 1e-15);
+        assert_eq!(surface.at([9.0, 3.0]), surface.at([2.0, -1.25]));
     }
 }

@@ -8,21 +8,19 @@ use crate::contact::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCu
 use crate::contact::half_space::bent_surface::{
     BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
 };
-use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::half_space::unlike_bodies::Elasticity;
 use crate::contact::lazy_field::LazyField;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::curve_grid::{CurveGrid, FREE, WheelOverGrid, extent_of};
-use crate::contact::normal::gap::answer::{NormalError, NormalWork, no_touch};
 use crate::contact::normal::gap::cell_sums::{CellWeights, LANES};
 use crate::contact::normal::gap::conjugate_gradients::{
     PressureInfluence, PressureTask, solve_pressure,
 };
-use crate::contact::normal::gap::edges::squares;
-use crate::contact::normal::gap::grid::GridFineness;
+use crate::contact::normal::gap::grid::{GridFineness, NormalError, NormalWork, no_touch, squares};
 use crate::contact::normal::hertz::NormalLoad;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal::wheel::task::WheelLoad;
+use crate::contact::normal::wheel::WheelLoad;
 use crate::contact::numerics::flood_fill::groups;
 
 /// Cells across the largest overlap on the grid that finds the contact.

@@ -3,8 +3,8 @@
 //! Tangents at the nodes are those of the parabola through the node and its two neighbours, so the curve has a
 //! continuous derivative and reproduces parabolas exactly (Catmull and Rom 1974, for unequal spacing).
 
-use crate::contact::numerics::monotone_root;
-use crate::contact::numerics::monotone_root::{CloseEnough, Course};
+use crate::contact::numerics::roots;
+use crate::contact::numerics::roots::{CloseEnough, Course};
 
 /// A cubic `c0 + c1 s + c2 s² + c3 s³` on an interval, with s from 0 at its start to 1 at its end.
 #[derive(Debug, Clone, Copy)]
@@ -138,7 +138,7 @@ impl Cubic {
             place: CLOSE,
         };
         let secant = low + (high - low) * at_low / (at_low - at_high);
-        monotone_root::find([low, high], secant, course, close, |at| {
+        roots::find([low, high], secant, course, close, |at| {
             let slope = c1 + at * (2.0 * c2 + 3.0 * at * c3);
             [self.value(at), slope]
         })

@@ -22,23 +22,14 @@
 //!   is upright, it keeps the start instead of failing.
 //! - [`coordinates`](crate::contact::rolling::methods::table::coordinates) of the creep table always takes six steps, without a test in
 //!   between, because it is evaluated for millions of rows.
-//! - The [search](crate::contact::rolling::history::search) of a history looks for two creepages at once as [`pair_root`] does, and keeps its
+//! - The [search](crate::contact::rolling::history::plan) of a history looks for two creepages at once as [`pair_root`] does, and keeps its
 //!   compliance from step to step.
 
-pub mod bracketed_root;
 pub mod cubic;
-pub mod dense_lu;
 pub mod flood_fill;
 pub mod gmres;
-pub mod hermite;
-pub mod lagrange;
-pub mod least_squares;
-pub mod length;
-pub mod monotone_root;
-pub mod pair_root;
+pub mod interpolation;
+pub mod lu;
 pub mod quadrature;
-pub(crate) mod sampling;
+pub mod roots;
 pub mod simd;
-pub mod simd_ln;
-pub mod small_lu;
-pub mod spline;

@@ -126,7 +126,7 @@ pub(crate) const NANOMETRES: f64 = 1e6;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::strips::Grading;
+    use crate::contact::mesh::Grading;
 
     /// Golden values of constant heat per cell: the slopes are 0 where neighbours do not change.
     #[test]

@@ -10,14 +10,14 @@ use std::ops::Range;
 
 use crate::contact::half_space::strip_operator::assembly::{CellEdges, SegmentRows};
 use crate::contact::half_space::strip_operator::kind::Precision;
-use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::mesh::{Mesh, Segment};
 use crate::contact::method::Method;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd;
-use crate::contact::numerics::simd_ln::Float;
+use crate::contact::numerics::simd::Float;
 use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome};
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::task::Motion;
 
 /// What the power of the cells is taken from.
 #[derive(Debug, Clone, Copy)]
@@ -300,8 +300,8 @@ fn carry(power: &mut [f64], slips: &[bool], cells: Range<usize>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::strips::Chord;
-    use crate::contact::mesh::strips::{Grading, strips_about};
+    use crate::contact::mesh::Chord;
+    use crate::contact::mesh::{Grading, strips_about};
     use crate::contact::monitor::Unmonitored;
 
     /// Whatever the tractions: the cells give the power of the forces, on strips of one width and of many.

@@ -1,8 +1,7 @@
 //! Interpolates cell values onto a regular grid, for pictures and for programs that read arrays.
 
 use crate::contact::post::strip_segments::{StoredSegment, Strips};
-use crate::contact::solution::words::fields::PatchCells;
-use crate::contact::solution::words::fields::Zone;
+use crate::contact::solution::words::answer::{PatchCells, Zone};
 
 /// Values on a regular grid; `None` outside the patch.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +21,7 @@ pub struct Gridded<T = f64> {
 /// linear between the centres of cells, and constant beyond the first and last centre up to the end of the chord. Between
 /// the mid-lines of two strips, the ends of the chord are linear in y, and so is the value between those at
 /// the same relative position in both chords. Beyond the first and last mid-line the chord is extrapolated to the
-/// strip's border as in [`patch_outline`](crate::contact::post::outlines::outline::patch_outline). Where segments branch, every
+/// strip's border as in [`patch_outline`](crate::contact::post::outlines::patch_outline). Where segments branch, every
 /// segment is continued unchanged to its strip's borders. Constants are reproduced everywhere, linear fields between the
 /// outermost centres of a chord and between the outermost mid-lines.
 ///

@@ -1,7 +1,7 @@
 //! Recovers strips and their segments from stored cells, and finds the neighbours that continue a segment.
 
-use crate::contact::numerics::lagrange;
-use crate::contact::solution::words::fields::PatchCells;
+use crate::contact::numerics::interpolation;
+use crate::contact::solution::words::answer::PatchCells;
 
 /// Distance between cells, as a fraction of a cell's width, below which they count as adjacent.
 pub(crate) const JOIN: f64 = 1e-9;
@@ -134,14 +134,17 @@ impl Strips {
             .take(2)
             .map(|s| (s.y, 0.5 * (s.left + s.right)))
             .collect();
-        let half = lagrange::value(&squared, y).clamp(0.0, squared[0].1).sqrt();
+        let half = interpolation::polynomial_value(&squared, y)
+            .clamp(0.0, squared[0].1)
+            .sqrt();
         // Rounding of the parabola gives half-lengths of this size where the true one is 0.
         let half = if half < 1e-6 * squared[0].1.sqrt() {
             0.0
         } else {
             half
         };
-        let centre = lagrange::value(&centres, y).clamp(first.left + half, first.right - half);
+        let centre = interpolation::polynomial_value(&centres, y)
+            .clamp(first.left + half, first.right - half);
         (centre - half, centre + half)
     }
 
@@ -182,7 +185,7 @@ pub(crate) fn join_tolerance(coordinate: f64, width: f64) -> f64 {
 pub(crate) mod samples {
     use std::f64::consts::PI;
 
-    use crate::contact::solution::words::fields::PatchCells;
+    use crate::contact::solution::words::answer::PatchCells;
 
     /// Adds a segment with the given cell edges to a patch.
     pub(crate) fn push_segment(

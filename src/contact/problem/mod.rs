@@ -1,9 +1,6 @@
 //! The checked question: physics, run and label, as numbers. Every stage after the check takes its task from here.
 
 pub mod checked_case;
-pub mod coupled;
 pub mod memory;
 pub mod physics;
 pub mod plausibility;
-pub mod profile_points;
-pub mod run;

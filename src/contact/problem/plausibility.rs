@@ -1,10 +1,10 @@
 //! Remarks on contacts outside the range for which the theory is intended, for all types of contact; nothing is refused here.
 
 use crate::contact::case::words::contact::Contact;
-use crate::contact::normal::patch::Patch;
+use crate::contact::normal::hertz::Patch;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::motion::Motion;
+use crate::contact::rolling::task::Motion;
 
 /// Beyond this pressure, in MPa, wheel and rail steels yield whatever their hardness (about 3 times a yield stress of 1.6 GPa).
 const PRESSURE_USUAL_MAX: f64 = 5000.0;

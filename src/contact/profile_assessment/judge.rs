@@ -1,15 +1,13 @@
 //! Examines the points of both profiles under the patches found, and reports their defects.
 
 use crate::contact::geometry::profile::{Body, Profile};
-use crate::contact::geometry::profile_quality::noise::Oddity;
-use crate::contact::geometry::profile_quality::points::{
-    Grain, UnderContact, advised_smoothing, under_contact,
+use crate::contact::geometry::profile_quality::{
+    Grain, Oddity, UnderContact, advised_smoothing, noise_pressure, under_contact,
 };
-use crate::contact::geometry::profile_quality::readings::noise_pressure;
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::wheel::wheel_contact::WheelPatch;
+use crate::contact::normal::wheel::WheelPatch;
 use crate::contact::profile_assessment::finding::{AMBIGUOUS, Cause, Finding, LIGHT};
-use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileQuality};
+use crate::contact::solution::words::damage::{PatchQuality, ProfileQuality};
 
 /// Share of the roughness of both bodies from which that of one body is reported.
 const BLAMED: f64 = 0.6;

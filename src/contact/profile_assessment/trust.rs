@@ -6,22 +6,19 @@ use crate::contact::error::SolveError;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::holes::{Hole, holes};
 use crate::contact::geometry::profile::{Body, Profile};
-use crate::contact::geometry::profile_quality::points::{Grain, advised_smoothing, under_contact};
+use crate::contact::geometry::profile_quality::{Grain, advised_smoothing, under_contact};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel::task::{ReferenceSurface, WheelTask};
-use crate::contact::normal::wheel::wheel_contact::{WheelContact, WheelPatch};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::profile_points;
-use crate::contact::problem::profile_points::PRESSURE_USUAL;
+use crate::contact::normal::wheel::{ReferenceSurface, WheelContact, WheelPatch, WheelTask};
+use crate::contact::problem::checked_case;
+use crate::contact::problem::checked_case::{CheckedCase, PRESSURE_USUAL};
 use crate::contact::profile_assessment::finding::{Cause, Finding};
 use crate::contact::profile_assessment::judge::{FoundPatch, judge};
 use crate::contact::profile_assessment::uncertainty;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::fields::Fields;
-use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileQuality};
+use crate::contact::solution::words::answer::{Fields, Solution};
+use crate::contact::solution::words::damage::{PatchQuality, ProfileQuality};
 use crate::contact::wheel_on_rail;
 use crate::contact::wheel_on_rail::SolvedWheel;
 
@@ -349,7 +346,7 @@ pub(crate) fn remarks(contact: &WheelTask) -> Vec<RemarkEntry> {
     let chosen = profiles.zip(contact.trust.auto).filter(|(_, auto)| *auto);
     chosen
         .map(|((profile, body), _)| {
-            let remark = if profile_points::tells_noise(profile) {
+            let remark = if checked_case::tells_noise(profile) {
                 Remark::SmoothingChosen {
                     profile: body.name(),
                     smoothing_mm: profile.smoothing(),
@@ -370,7 +367,7 @@ pub(crate) fn undecided(contact: &WheelTask) -> bool {
     let profiles = contact.geometry.profiles().into_iter();
     profiles
         .zip(contact.trust.auto)
-        .any(|(profile, auto)| auto && !profile_points::tells_noise(profile))
+        .any(|(profile, auto)| auto && !checked_case::tells_noise(profile))
 }
 
 /// The contact with every automatic smoothing replaced by a length: first the one for a pressure of 1200 MPa, then the one for the largest
@@ -389,7 +386,7 @@ pub(crate) fn settled(
         return Ok(None);
     }
     let modulus = contact.contact_modulus;
-    let mut grains = contact.geometry.profiles().map(profile_points::grain);
+    let mut grains = contact.geometry.profiles().map(checked_case::grain);
     let advised = advised_smoothing(grains, modulus, PRESSURE_USUAL);
     if let Ok(search) = ContactLocus::new(&contact.geometry) {
         let touch = search.first_touch();

@@ -10,17 +10,16 @@ use std::time::Duration;
 
 use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Profile;
-use crate::contact::geometry::profile_quality::points::SMOOTHING_ADVISED;
-use crate::contact::geometry::profile_quality::readings::noise_pressure;
+use crate::contact::geometry::profile_quality::{SMOOTHING_ADVISED, noise_pressure};
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::wheel::task::WheelTask;
+use crate::contact::normal::wheel::WheelTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::resolution::Resolution;
+use crate::contact::rolling::task::Resolution;
 use crate::contact::solution::words::answer::{PatchSolution, Solution};
-use crate::contact::solution::words::profile_quality::{ProfileQuality, ProfileUncertainty};
+use crate::contact::solution::words::damage::{ProfileQuality, ProfileUncertainty};
 use crate::contact::wheel_on_rail;
 
 /// The companion solves use the smoothing multiplied by these factors.

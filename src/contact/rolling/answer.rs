@@ -1,8 +1,15 @@
 //! The tangential answer on one level: tractions, slips and zones, how they came about, and the work done for them.
+//!
+//! The tangential answer for one motion: resultants, and the fields they come from where the method has any.
+//!
+//! Forces and moment of tractions over a patch.
 
+use crate::contact::method::Method;
 use crate::contact::monitor::Stop;
-use crate::contact::numerics::length::length;
+use crate::contact::numerics::simd::length;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::task::Motion;
 
 /// The tangential answer on one level for one motion, dimensionless, one value per cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -170,5 +177,195 @@ impl Skip {
                 "mirror symmetry of the patch: half of the influence matrix was computed"
             }
         }
+    }
+}
+
+/// Relative errors of every patch, then of the sum over them; nothing where there is nothing to compare with.
+pub type RelativeErrors = Vec<Option<f64>>;
+
+/// The answer for one motion.
+#[derive(Debug, Clone)]
+pub struct MotionAnswer {
+    /// The motion it was solved for.
+    pub motion: Motion,
+    /// A prescribed force could not be reached.
+    pub saturated: bool,
+    /// Resultants of every patch about the origin of the case: the best known.
+    pub resultants: Vec<Resultants>,
+    /// Their estimated errors relative to μN: one per patch, then that of the sum.
+    pub errors: RelativeErrors,
+    /// Tractions, slips and zones; none from a method that knows resultants only ([`Method::has_fields`]).
+    pub fields: Option<SolvedFields>,
+    /// Share of every patch that sticks, from methods without fields that know it.
+    pub stick: Option<Vec<f64>>,
+    /// Derivatives of the resultants of every patch, where they were asked for or come with the method.
+    pub gradients: Option<Vec<PatchGradients>>,
+    /// What a history adds to a motion; nothing of steady rolling.
+    pub history: Option<HistoryAnswer>,
+    /// Work that was not needed.
+    pub skips: Vec<Skip>,
+    /// Remarks for the client.
+    pub remarks: Vec<Remark>,
+    /// Work over all levels.
+    pub work: Work,
+    /// The method that gave the resultants.
+    pub method: Method,
+    /// Wall time in s.
+    pub seconds: f64,
+}
+
+/// What is known of a point of a history beside its forces.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HistoryAnswer {
+    /// Distance rolled since the start in mm.
+    pub distance: f64,
+    /// Displacement of the upper body against the lower one from the point before in mm and rad, where the bodies did not roll.
+    pub shift: Option<Motion>,
+    /// Power of friction over the rolling speed of every patch, in N; 0 of a shift.
+    pub power: Vec<f64>,
+    /// What friction has dissipated since the start in every patch, in N·mm.
+    pub dissipated: Vec<f64>,
+    /// Estimated errors of the creepages that were found.
+    pub creepage_errors: [Option<f64>; 2],
+    /// The same of shifts, in mm.
+    pub shift_errors: [Option<f64>; 2],
+}
+
+/// Derivatives of F_x, F_y and M_z about the origin of the case by ν_x, ν_y and φ (per mm): `[resultant][creepage]` in N and mm.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PatchGradients {
+    /// The derivatives.
+    pub values: [[f64; 3]; 3],
+    /// Their estimated absolute errors, where they are known.
+    pub errors: Option<[[f64; 3]; 3]>,
+}
+
+/// The fields of a motion on the finest level it needed.
+#[derive(Debug, Clone)]
+pub struct SolvedFields {
+    /// The number of that level in the levels.
+    pub level: usize,
+    /// Tractions, slips and zones on it.
+    pub tangential: LevelAnswer,
+}
+
+impl MotionAnswer {
+    /// Replaces the resultants, and what belongs to them, by those of another method; the values per cell stay.
+    pub(crate) fn take_resultants(&mut self, of: &MotionAnswer) {
+        self.resultants.clone_from(&of.resultants);
+        self.errors.clone_from(&of.errors);
+        self.stick.clone_from(&of.stick);
+        self.gradients.clone_from(&of.gradients);
+        self.method = of.method;
+    }
+
+    /// Tangential force of all patches over their friction limit in N; 0 without friction.
+    #[must_use]
+    pub fn force_share(&self, limit: f64) -> f64 {
+        let sum = Resultants::default();
+        let sum = self.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
+        let force = sum.force_x.hypot(sum.force_y);
+        if limit > 0.0 { force / limit } else { 0.0 }
+    }
+
+    /// Estimated error of the sum over the patches.
+    #[must_use]
+    pub fn error(&self) -> Option<f64> {
+        self.errors.last().copied().flatten()
+    }
+}
+
+/// Forces in N and moment about z in N·mm, on the lower body.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Resultants {
+    /// Longitudinal force.
+    pub force_x: f64,
+    /// Lateral force.
+    pub force_y: f64,
+    /// Moment about the point it was asked for.
+    pub moment_z: f64,
+}
+
+impl Resultants {
+    /// `F_x = Σ T_x A`, `F_y = Σ T_y A`, `M_z = Σ (x T_y − y T_x) A` over the cells of one patch. `traction` is dimensionless as on the
+    /// level; the moment is about the origin of the case.
+    ///
+    /// x is taken in the middle of the cell, where the moment of its constant traction is exact; at the node the error of M_z is about
+    /// twice as large. y is taken halfway between the mid-line and the centre of the load: at the mid-line the moment of a vortex comes
+    /// out too large, at the centre too small, because the mean of `y²` over a strip exceeds the square of the mean.
+    #[must_use]
+    pub fn of_patch(level: &StripMesh, traction: &[Vec<f64>; 2], patch: usize) -> Resultants {
+        let mut sum = Resultants::default();
+        let mesh = &level.mesh;
+        let segments = mesh.segments.iter().zip(&mesh.load_y);
+        for (segment, load_y) in segments.filter(|(s, _)| s.chord.patch == patch) {
+            let arm = 0.5 * (segment.chord.y + load_y);
+            for i in segment.cells.clone() {
+                let weight = level.area[i] * level.scale.traction;
+                let (x, y) = (weight * traction[0][i], weight * traction[1][i]);
+                sum.force_x += x;
+                sum.force_y += y;
+                let centre = 0.5 * (mesh.left[i] + mesh.right[i]);
+                sum.moment_z += centre * y - arm * x;
+            }
+        }
+        sum
+    }
+
+    /// Sum of two resultants about the same point.
+    #[must_use]
+    pub fn plus(self, other: Resultants) -> Resultants {
+        Resultants {
+            force_x: self.force_x + other.force_x,
+            force_y: self.force_y + other.force_y,
+            moment_z: self.moment_z + other.moment_z,
+        }
+    }
+
+    /// These resultants times a factor.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Resultants {
+        Resultants {
+            force_x: factor * self.force_x,
+            force_y: factor * self.force_y,
+            moment_z: factor * self.moment_z,
+        }
+    }
+
+    /// Richardson's extrapolation of errors that fall as 1/N: these resultants plus `share` of their change from a coarser
+    /// mesh, with a force no larger than `bound`.
+    #[must_use]
+    pub fn beyond(self, coarser: Resultants, share: f64, bound: f64) -> Resultants {
+        let past = |here: f64, before: f64| here + share * (here - before);
+        let [x, y] = [
+            past(self.force_x, coarser.force_x),
+            past(self.force_y, coarser.force_y),
+        ];
+        let force = x.hypot(y);
+        let factor = if force > bound { bound / force } else { 1.0 };
+        Resultants {
+            force_x: factor * x,
+            force_y: factor * y,
+            moment_z: past(self.moment_z, coarser.moment_z),
+        }
+    }
+
+    /// The same resultants with the moment about `point` instead of the origin.
+    #[must_use]
+    pub fn about(self, point: [f64; 2]) -> Resultants {
+        Resultants {
+            moment_z: self.moment_z - point[0] * self.force_y + point[1] * self.force_x,
+            ..self
+        }
+    }
+
+    /// Largest component of the difference to `other`: forces relative to `force`, moments to `force × length`; the
+    /// moments should be about a point in the patch.
+    #[must_use]
+    pub fn distance(&self, other: &Resultants, force: f64, length: f64) -> f64 {
+        let x = (self.force_x - other.force_x).abs();
+        let y = (self.force_y - other.force_y).abs();
+        let z = (self.moment_z - other.moment_z).abs() / length;
+        x.max(y).max(z) / force
     }
 }

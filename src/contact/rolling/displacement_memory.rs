@@ -5,7 +5,7 @@
 
 use crate::contact::half_space::kernels::{Rectangle, rectangle};
 use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::mesh::strips::Mesh;
+use crate::contact::mesh::Mesh;
 
 /// Displacement at the leading edge of every strip per unit traction on every cell, for the unknowns of a parity.
 #[derive(Debug, Clone)]

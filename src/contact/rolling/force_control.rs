@@ -10,20 +10,15 @@
 use crate::contact::error::SolveError;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
-use crate::contact::numerics::bracketed_root::{RootExit, find_root};
-use crate::contact::numerics::pair_root::find_pair;
+use crate::contact::numerics::roots::{RootExit, find_pair, find_root};
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::answer::Work;
+use crate::contact::rolling::answer::{MotionAnswer, Work};
 use crate::contact::rolling::force_places::{ForcePlaces, total};
-use crate::contact::rolling::motion::{Motion, PrescribedForces};
-use crate::contact::rolling::motion_answer::MotionAnswer;
 use crate::contact::rolling::refinement::adapt;
+use crate::contact::rolling::refinement::interpolate::RefinementState;
 use crate::contact::rolling::refinement::mesh_family::MeshFamily;
 use crate::contact::rolling::refinement::on_mesh::MotionTask;
-use crate::contact::rolling::refinement::state::RefinementState;
-use crate::contact::rolling::resolution::MeshPlan;
-use crate::contact::rolling::resolution::Resolution;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::task::{MeshPlan, Motion, PrescribedForces, Resolution, RollingTask};
 
 /// A prescribed force may be missed by this part of the target error. Chosen by judgement; how much it matters was not measured.
 const SHARE_OF_TARGET: f64 = 0.02;

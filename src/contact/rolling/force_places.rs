@@ -3,14 +3,13 @@
 //! By Vermeulen and Johnson's cubic law with Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3) the creepage at
 //! place r gives the force r μN, so that the force found is close to r. A search starts where the table of creep forces has the forces.
 
-use crate::contact::numerics::bracketed_root::FRACTION_MAX;
+use crate::contact::numerics::roots::FRACTION_MAX;
+use crate::contact::rolling::answer::Resultants;
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::table::solve as table;
-use crate::contact::rolling::motion::{Motion, PrescribedForces};
-use crate::contact::rolling::refinement::state::RefinementState;
-use crate::contact::rolling::resultants::Resultants;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::refinement::interpolate::RefinementState;
+use crate::contact::rolling::task::{Motion, PrescribedForces, RollingTask};
 
 /// Steps by which a start is moved to where the table has the forces; they fall short where the force hardly grows with its place.
 /// Chosen by judgement; how much it matters was not measured.

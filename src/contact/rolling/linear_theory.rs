@@ -7,7 +7,7 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::numerics::lagrange;
+use crate::contact::numerics::interpolation;
 
 /// Rows of the table: a/b from 1/32 to 32, two to an octave.
 pub const RATIOS: usize = 21;
@@ -62,11 +62,11 @@ pub fn spin_coefficient(a_over_b: f64, poisson_ratio: f64) -> f64 {
 fn places(inside: f64, poisson_ratio: f64) -> (usize, [f64; 4], [f64; 5]) {
     let place = 2.0 * inside.log2() + 0.5 * (RATIOS - 1) as f64;
     let first = (place.floor() as usize).clamp(1, RATIOS - 3) - 1;
-    let along = lagrange::weights(&[0.0, 1.0, 2.0, 3.0], place - first as f64);
+    let along = interpolation::polynomial_weights(&[0.0, 1.0, 2.0, 3.0], place - first as f64);
     (
         first,
         along,
-        lagrange::weights(&POISSON_RATIOS, poisson_ratio),
+        interpolation::polynomial_weights(&POISSON_RATIOS, poisson_ratio),
     )
 }
 

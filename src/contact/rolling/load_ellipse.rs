@@ -4,7 +4,7 @@
 //! pressure, which is exact for Hertz's pressure. On 17 patches of arcs and quartics the resultants of this ellipse are off by 0.004 μN in
 //! the median and 0.015 at most; those of the ellipse of the same area and second moments of area by 0.009 and 0.051.
 
-use crate::contact::mesh::strips::Chord;
+use crate::contact::mesh::Chord;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad};
 use crate::contact::normal::pressure_field::field::PressureField;

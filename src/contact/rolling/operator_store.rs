@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::half_space::strip_operator::operator;
 use crate::contact::half_space::strip_operator::operator::StripOperator;
-use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::mesh::{Mesh, Segment};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::own_blocks;
 use crate::contact::rolling::own_blocks::SharedBlocks;

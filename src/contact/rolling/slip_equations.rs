@@ -9,11 +9,11 @@ use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::half_space::strip_operator::operator::{
     OperatorScratch, StripOperator, rows_of,
 };
-use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::mesh::{Mesh, Segment};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::displacement_memory::DisplacementMemory;
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_rules::{Rule, Stencils};
+use crate::contact::rolling::task::Motion;
 
 /// A rule on a mesh with its operator: the linear map from tractions to slips.
 #[derive(Debug)]
@@ -423,7 +423,7 @@ mod tests {
     use super::*;
     use crate::contact::half_space::strip_operator::kind::Precision;
     use crate::contact::mesh::samples::mesh_between;
-    use crate::contact::mesh::strips::{Chord, Grading};
+    use crate::contact::mesh::{Chord, Grading};
     use crate::contact::monitor::Unmonitored;
 
     fn parabolic_mesh() -> Mesh {

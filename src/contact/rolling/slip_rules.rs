@@ -6,8 +6,7 @@
 
 use std::ops::Range;
 
-use crate::contact::mesh::strips::observe;
-use crate::contact::mesh::strips::{Mesh, Segment};
+use crate::contact::mesh::{Mesh, Segment, observe};
 
 /// The rules offered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -160,9 +159,9 @@ fn three_point(points: &[f64], i: usize, n: usize) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::strips::Chord;
-    use crate::contact::mesh::strips::Grading;
-    use crate::contact::mesh::strips::observation_points;
+    use crate::contact::mesh::Chord;
+    use crate::contact::mesh::Grading;
+    use crate::contact::mesh::observation_points;
 
     fn mesh(n: usize) -> Mesh {
         let chord = Chord {

@@ -1,6 +1,6 @@
 //! Chords that stand for their whole strip, not only for its mid-line.
 
-use crate::contact::mesh::strips::Chord;
+use crate::contact::mesh::Chord;
 use crate::contact::normal::footprint::{Footprint, LineAngles};
 use crate::contact::numerics::quadrature::FOUR_POINTS;
 
@@ -163,7 +163,7 @@ impl StripLoad {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::strips::equal_strips;
+    use crate::contact::mesh::equal_strips;
     use crate::contact::normal::hertz::{Ellipse, NormalLoad};
     use crate::contact::normal::pressure_field::field::PressureField;
 

@@ -5,23 +5,18 @@ use std::sync::Arc;
 
 use crate::contact::error::SolveError;
 use crate::contact::friction::path_dependent::{PathDependentFriction, PathDependentLaws};
-use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
-use crate::contact::half_space::unlike_bodies::pressure_slips;
-use crate::contact::mesh::strips::Chord;
-use crate::contact::mesh::strips::{Grading, Mesh, equal_strips, strips_about};
+use crate::contact::half_space::unlike_bodies::{Elasticity, pressure_slips};
+use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::footprint::{Footprint, SurfaceSlip};
 use crate::contact::normal::hertz::Ellipse;
-use crate::contact::normal::surface_slip::SurfaceSlip;
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::{
     CaseOperators, LevelOperator, OperatorKind, OperatorStore,
 };
-use crate::contact::rolling::resolution::MeshPlan;
 use crate::contact::rolling::strip_chords;
 use crate::contact::rolling::strip_chords::StripChord;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::task::{MeshPlan, Motion, RollingTask};
 
 /// With an operator in single precision, dimensionless coordinates are rounded to multiples of this, so that patches of one shape get
 /// the same mesh to the last digit whatever their size. 2⁻³⁴ is a thousandth of the last digit of single precision.

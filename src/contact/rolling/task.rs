@@ -1,15 +1,17 @@
 //! What the tangential problem of one footprint asks: physics, method and accuracy.
+//!
+//! How fine a solution is to be, and the size and grading of a mesh.
+//!
+//! The relative motion of two rolling bodies.
 
 use crate::contact::friction::law::FrictionLaw;
-use crate::contact::friction::path_dependent::Interface;
-use crate::contact::friction::path_dependent::PathDependentLaws;
+use crate::contact::friction::path_dependent::{Interface, PathDependentLaws};
 use crate::contact::friction::velocity_weakening::Softening;
-use crate::contact::half_space::elasticity::Elasticity;
 use crate::contact::half_space::strip_operator::kind::Precision;
+use crate::contact::half_space::unlike_bodies::Elasticity;
+use crate::contact::mesh::MeshSize;
 use crate::contact::method::{Method, TractionBound};
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::rolling::motion::{Motion, PrescribedForces};
-use crate::contact::rolling::resolution::Resolution;
 
 /// Targets from here on are met with an operator in single precision. Chosen by judgement; how much it matters was not measured.
 const SINGLE_PRECISION_FROM: f64 = 5e-4;
@@ -137,3 +139,90 @@ pub fn precision_of(resolution: Resolution) -> Precision {
         _ => Precision::Double,
     }
 }
+
+/// The target that stands for an explicit mesh where a search needs one. Chosen by judgement; how much it matters was not measured.
+const TARGET_OF_MESH: f64 = 0.005;
+/// Part of a target that another error may take up while the rest of it is still sought.
+const ERROR_MAX: f64 = 0.95;
+
+/// Least target of an error relative to μN: no mesh resolves less.
+pub const TARGET_LEAST: f64 = 1e-4;
+
+/// What the target of an error is a share of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum RelativeTo {
+    /// The friction limit μN.
+    #[default]
+    FrictionLimit,
+    /// The tangential force.
+    Force,
+}
+
+/// Mesh chosen by the solver for a target, or given by the client.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Resolution {
+    /// Allowed error of the resultants relative to μN.
+    Target(f64),
+    /// An explicit mesh.
+    Mesh(MeshSize),
+}
+
+impl Resolution {
+    /// The target, if there is one.
+    #[must_use]
+    pub fn target(self) -> Option<f64> {
+        match self {
+            Resolution::Target(target) => Some(target),
+            Resolution::Mesh(_) => None,
+        }
+    }
+
+    /// The target, or what stands for it with an explicit mesh.
+    #[must_use]
+    pub fn target_or_usual(self) -> f64 {
+        self.target().unwrap_or(TARGET_OF_MESH)
+    }
+
+    /// The target reduced so that its root sum of squares with another error equals the original; unchanged if that error is 0, or takes up
+    /// the target so that the finest meshes would hardly meet the rest.
+    #[must_use]
+    pub fn beside(self, error: f64) -> Resolution {
+        match self {
+            Resolution::Target(target) if 0.0 < error && error < ERROR_MAX * target => {
+                Resolution::Target((target * target - error * error).sqrt())
+            }
+            unchanged => unchanged,
+        }
+    }
+}
+
+/// The size of a mesh and where it is graded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshPlan {
+    /// Strips and cells.
+    pub size: MeshSize,
+    /// The point about which strips and cells gather, along the chords and across the patch, each from −1 to 1. Without one, strips are equal
+    /// and cells are cosine-graded.
+    pub pole: Option<[f64; 2]>,
+}
+
+impl From<MeshSize> for MeshPlan {
+    fn from(size: MeshSize) -> Self {
+        MeshPlan { size, pole: None }
+    }
+}
+
+/// Velocity of the upper body relative to the lower one, divided by the rolling speed; the rigid slip at `(x, y)` is
+/// `(ξ − φ y, η + φ x)` (Kalker 1990, eq. 1.70).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Motion {
+    /// Longitudinal creepage ξ, dimensionless.
+    pub creepage_x: f64,
+    /// Lateral creepage η, dimensionless.
+    pub creepage_y: f64,
+    /// Spin φ in 1/mm, or dimensionless where lengths are.
+    pub spin_per_mm: f64,
+}
+
+/// The forces prescribed along x and across instead of creepages, in N, where they are.
+pub type PrescribedForces = [Option<f64>; 2];

@@ -2,31 +2,28 @@
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::friction::law::FrictionLaw;
-use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::half_space::unlike_bodies::Elasticity;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::normal_task::NormalTask;
-use crate::contact::normal::patch::Patch;
+use crate::contact::normal::footprint::NormalTask;
+use crate::contact::normal::hertz::Patch;
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::answer::Skip;
-use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::motion_answer::{
-    HistoryAnswer, MotionAnswer, PatchGradients, SolvedFields,
+use crate::contact::rolling::answer::{
+    HistoryAnswer, MotionAnswer, PatchGradients, Resultants, Skip, SolvedFields,
 };
-use crate::contact::rolling::refinement::levels::Levels;
-use crate::contact::rolling::resolution::RelativeTo;
-use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::refinement::interpolate::Levels;
 use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::solution::cell_values::{patch_cells, point_fields, traction_max};
+use crate::contact::rolling::task::{Motion, RelativeTo};
+use crate::contact::solution::finish::{patch_cells, point_fields, traction_max};
 use crate::contact::solution::maintain;
 use crate::contact::solution::maintain::SolvedMotion;
 use crate::contact::solution::words::answer::{
-    CombinedMaterial, ErrorEstimate, GradientErrors, Gradients, HistoryPoint, MeshReport,
-    NormalisedMotion, Origin, PatchSolution, PointSolution, Solution, SolverReport, Total,
+    CombinedMaterial, ErrorEstimate, Fields, GradientErrors, Gradients, HistoryPoint, MeshReport,
+    NormalisedMotion, Origin, PatchFields, PatchSolution, PointFields, PointSolution, Solution,
+    SolverReport, Total,
 };
-use crate::contact::solution::words::fields::{Fields, PatchFields, PointFields};
 
 /// Remarks collected before repetitions are merged.
 const REMARKS_AT_ONCE: usize = 1000;

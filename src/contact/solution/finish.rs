@@ -1,17 +1,24 @@
 //! The final step for every answer: distributes wall time, sets rounding residues to 0, adds remarks on implausible numbers, and
 //! checks that all numbers are finite.
+//!
+//! Values per cell as the client reads them: with units, and only those requested.
 
 use std::f64::consts::PI;
 use std::time::Duration;
 
+use crate::contact::case::words::solver::Output;
 use crate::contact::error::SolveError;
+use crate::contact::numerics::simd::length;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::plausibility;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::answer::{LevelAnswer, SolvedFields};
+use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::finite;
-use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
-use crate::contact::solution::words::fields::Fields;
+use crate::contact::solution::words::answer::{
+    Fields, PatchCells, PatchSolution, PointFields, PointSolution, Solution, Zone,
+};
 
 /// Values below this fraction of their scale are rounding residues and reported as 0.
 const DUST: f64 = 1e-14;
@@ -141,4 +148,65 @@ fn implausible(solution: &Solution, before: usize) -> Vec<RemarkEntry> {
     let load = force.sum::<f64>() / positions as f64;
     said.extend(plausibility::load(load).map(RemarkEntry::from));
     said
+}
+
+/// The cells of a patch.
+pub(crate) fn patch_cells(case: &CheckedCase, level: &StripMesh, patch: usize) -> PatchCells {
+    let cells = level.patch_cells(patch);
+    let mesh = &level.mesh;
+    let mut fields = PatchCells::default();
+    for segment in mesh.segments.iter().filter(|s| s.chord.patch == patch) {
+        for i in segment.cells.clone() {
+            fields.x_mm.push(0.5 * (mesh.left[i] + mesh.right[i]));
+            fields.y_mm.push(segment.chord.y);
+            fields.dx_mm.push(mesh.right[i] - mesh.left[i]);
+            fields.dy_mm.push(segment.chord.dy);
+            fields
+                .strip
+                .push(u32::try_from(segment.chord.strip).unwrap_or(u32::MAX));
+        }
+    }
+    fields.pressure_mpa = case
+        .run
+        .wants(Output::Pressure)
+        .then(|| level.pressure[cells].to_vec());
+    fields
+}
+
+/// The values of a patch for one motion that its tractions alone give.
+pub(crate) fn point_fields(
+    case: &CheckedCase,
+    level: &StripMesh,
+    cells: std::ops::Range<usize>,
+    answer: &LevelAnswer,
+) -> PointFields {
+    let scaled = |values: &[f64], factor: f64| {
+        values[cells.clone()]
+            .iter()
+            .map(|v| v * factor)
+            .collect::<Vec<_>>()
+    };
+    let traction = |k: usize| {
+        case.run
+            .wants(Output::Tractions)
+            .then(|| scaled(&answer.traction[k], level.scale.traction))
+    };
+    let zone = |slips: &bool| if *slips { Zone::Slip } else { Zone::Stick };
+    PointFields {
+        mesh: 0,
+        zone: case
+            .run
+            .wants(Output::Zones)
+            .then(|| answer.slips[cells.clone()].iter().map(zone).collect()),
+        traction_x_mpa: traction(0),
+        traction_y_mpa: traction(1),
+        ..PointFields::default()
+    }
+}
+
+/// Largest tangential traction in the cells of a patch, in MPa.
+pub(crate) fn traction_max(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64 {
+    let [x, y] = &fields.tangential.traction;
+    let lengths = level.patch_cells(patch).map(|i| length(x[i], y[i]));
+    lengths.fold(0.0, f64::max) * level.scale.traction
 }

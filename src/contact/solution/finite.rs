@@ -8,8 +8,9 @@ use serde::ser::{
 };
 
 use crate::contact::error::SolveError;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::fields::{Fields, PatchCells, PatchFields, PointFields};
+use crate::contact::solution::words::answer::{
+    Fields, PatchCells, PatchFields, PointFields, Solution,
+};
 
 /// Refuses an answer that holds a number that is not finite.
 ///

@@ -7,28 +7,25 @@ use crate::contact::case::words::subsurface::BodyName;
 use crate::contact::method::Method;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::patch::Patch;
-use crate::contact::post::damage::evaluate::{CellWear, across};
-use crate::contact::post::damage::evaluate::{DamagedPatch, damage};
-use crate::contact::post::damage::figures::DamageTask;
+use crate::contact::normal::hertz::Patch;
+use crate::contact::post::damage::{CellWear, DamageTask, DamagedPatch, across, damage};
 use crate::contact::post::heat::{ThermalTask, heating};
 use crate::contact::post::local_power::{CellPower, PowerTask, cell_power};
-use crate::contact::post::subsurface::enclosing_ball::GAP;
-use crate::contact::post::subsurface::seen_parts::LoadResolution;
-use crate::contact::post::subsurface::states::{LoadedBody, StressPlaces, SubsurfaceTask};
-use crate::contact::post::subsurface::states::{STORED, in_patch_axes, point, stored};
+use crate::contact::post::subsurface::load_parts::LoadResolution;
+use crate::contact::post::subsurface::states::{
+    LoadedBody, STORED, StressPlaces, SubsurfaceTask, in_patch_axes, point, stored,
+};
 use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
-use crate::contact::post::subsurface::worst::worst_place;
+use crate::contact::post::subsurface::worst::{GAP, worst_place};
 use crate::contact::post::subsurface::worst_passage::{PassagesOf, passage};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::LevelAnswer;
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::solution::words::answer::PointSolution;
+use crate::contact::rolling::task::Motion;
+use crate::contact::solution::words::answer::{PointFields, PointSolution};
 use crate::contact::solution::words::damage::WearAcross;
-use crate::contact::solution::words::fields::PointFields;
-use crate::contact::solution::words::maintenance::{SubsurfaceSummary, TemperatureSummary};
+use crate::contact::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
 
 /// Stresses are answered from this part of the half-width of the smaller patch on: nearer to the surface the steps of the traction from cell
 /// to cell would show, whose stresses grow without bound. There the largest error in the reference contacts is 0.3 % of the largest pressure

@@ -1,7 +1,6 @@
 //! The answer, in the words that clients read.
 
 pub mod assemble;
-pub mod cell_values;
 pub mod finish;
 pub mod finite;
 pub mod maintain;

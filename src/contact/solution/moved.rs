@@ -2,10 +2,9 @@
 
 use crate::contact::post::subsurface::states::STORED;
 use crate::contact::solution::words::answer::{
-    GradientErrors, Gradients, PatchSolution, PointSolution,
+    GradientErrors, Gradients, PatchFields, PatchSolution, PointSolution,
 };
-use crate::contact::solution::words::fields::PatchFields;
-use crate::contact::solution::words::maintenance::SubsurfaceSummary;
+use crate::contact::solution::words::evolution::SubsurfaceSummary;
 
 /// Moves the origin of a patch by `[x, y]` in mm: its extent, its moments and derivatives, and all places in its answer and its fields.
 pub(crate) fn move_origin(

@@ -4,15 +4,16 @@ use crate::contact::case::words::solver::Output;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::reference_curve::{ReferenceCurve, RigidMotion};
 use crate::contact::normal::on_curve::CurveContact;
-use crate::contact::normal::wheel::wheel_contact::WheelContact;
-use crate::contact::post::damage::evaluate::{DamagedPatch, damage};
-use crate::contact::problem::run::Run;
+use crate::contact::normal::wheel::WheelContact;
+use crate::contact::post::damage::{DamagedPatch, damage};
+use crate::contact::problem::physics::Run;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::solution::assemble::normalised;
 use crate::contact::solution::moved::move_origin;
-use crate::contact::solution::words::answer::{ErrorEstimate, Origin, Position, Solution, Total};
+use crate::contact::solution::words::answer::{
+    ErrorEstimate, Fields, Origin, PatchFields, Position, Solution, Total,
+};
 use crate::contact::solution::words::damage::Damage;
-use crate::contact::solution::words::fields::{Fields, PatchFields};
 use crate::contact::wheel_on_rail::rounds::Found;
 use crate::contact::wheel_on_rail::tractions::{Part, PatchForces, creepages, each_cell};
 use crate::contact::wheel_on_rail::{WheelSolve, minus};

@@ -3,11 +3,11 @@
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::reference_curve::RigidMotion;
-use crate::contact::normal::gap::answer::NormalError;
+use crate::contact::normal::gap::grid::NormalError;
 use crate::contact::normal::on_curve::{CurveContact, Friction, Workspace};
-use crate::contact::normal::wheel::wheel_contact::{WheelContact, WheelPatch};
+use crate::contact::normal::wheel::{WheelContact, WheelPatch};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::run::Run;
+use crate::contact::problem::physics::Run;
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::answer::Total;
 use crate::contact::traction_estimate::{can_estimate, patch_forces};

@@ -1,22 +1,19 @@
 //! Tractions of the patches of a wheel on a rail, and their forces.
 
 use crate::contact::error::SolveError;
-use crate::contact::friction::law::FrictionLaw;
-use crate::contact::friction::on_rail::on_rail;
+use crate::contact::friction::law::{FrictionLaw, on_rail};
 use crate::contact::geometry::reference_curve::{CurvePlace, RigidMotion, WheelOver};
-use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::footprint::{Footprint, SurfaceSlip};
+use crate::contact::normal::hertz::Patch;
 use crate::contact::normal::on_curve::{CurveContact, Workspace};
-use crate::contact::normal::patch::Patch;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal::surface_slip::SurfaceSlip;
 use crate::contact::normal_stage::SolvedFootprint;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::run::Run;
-use crate::contact::rolling::motion::Motion;
+use crate::contact::problem::physics::Run;
+use crate::contact::rolling::task::Motion;
 use crate::contact::rolling_stage;
-use crate::contact::solution::words::answer::{NormalReport, PatchSolution, Solution};
-use crate::contact::solution::words::fields::Fields;
+use crate::contact::solution::words::answer::{Fields, NormalReport, PatchSolution, Solution};
 use crate::contact::time_limit::TimeLimit;
 use crate::contact::vertical_equilibrium::tolerance;
 use crate::contact::wheel_on_rail::{WheelSolve, minus};

@@ -7,12 +7,10 @@
 use std::sync::Arc;
 
 use crate::contact::error::SolveError;
-use crate::contact::geometry::wheelset::WheelsetMotion;
-use crate::contact::geometry::wheelset_pose::RigidPose;
+use crate::contact::geometry::wheelset_pose::{RigidPose, WheelsetMotion};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel::task::WheelTask;
-use crate::contact::normal::wheel::wheelset_task::WheelsetTask;
-use crate::contact::numerics::bracketed_root::find_root;
+use crate::contact::normal::wheel::{WheelTask, WheelsetTask};
+use crate::contact::numerics::roots::find_root;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_assessment::trust;
 use crate::contact::rolling::operator_store::OperatorStore;

@@ -1,16 +1,13 @@
 //! Gathers the answers for both wheels in all positions into one, with the sums in track axes.
 
-use crate::contact::normal::wheel::wheelset_task::WheelsetTask;
+use crate::contact::normal::wheel::WheelsetTask;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::solution::words::answer::{
-    ErrorEstimate, Origin, PatchSolution, Solution, Total,
+    ErrorEstimate, Fields, Kinematics, Origin, PatchSolution, Solution, Total, WheelOnRail,
+    WheelsetAnswer, WheelsetPosition,
 };
-use crate::contact::solution::words::fields::Fields;
-use crate::contact::solution::words::profile_quality::ProfileUncertainty;
-use crate::contact::solution::words::wheelset::{
-    Kinematics, WheelOnRail, WheelsetAnswer, WheelsetPosition,
-};
+use crate::contact::solution::words::damage::ProfileUncertainty;
 use crate::contact::wheelset::balance::AtRest;
 
 /// The answers so far.

@@ -9,15 +9,14 @@ use std::ops::ControlFlow;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::conicity::{Conicity, NoConicity, RadiusDifference};
 use crate::contact::geometry::profile::Profile;
-use crate::contact::geometry::profile_quality::points::{SMOOTHING_ADVISED, advised_smoothing};
+use crate::contact::geometry::profile_quality::{SMOOTHING_ADVISED, advised_smoothing};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset_pose::{PairOfRails, RigidPose};
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel::task::WheelTask;
-use crate::contact::normal::wheel::wheelset_task::KinematicsTask;
-use crate::contact::problem::profile_points;
-use crate::contact::problem::profile_points::PRESSURE_USUAL;
-use crate::contact::solution::words::wheelset::{EquivalentConicity, Kinematics, TouchLine};
+use crate::contact::normal::wheel::{KinematicsTask, WheelTask};
+use crate::contact::problem::checked_case;
+use crate::contact::problem::checked_case::PRESSURE_USUAL;
+use crate::contact::solution::words::answer::{EquivalentConicity, Kinematics, TouchLine};
 
 /// The other reading of a cross-section has its smoothing times this, or one of so many chords.
 const OTHER_TIMES: f64 = 2.0;
@@ -209,7 +208,7 @@ fn halve(
 /// A wheel over its rail with the other reading of both cross-sections: smoother, as their noise and spacing advise at least.
 fn other_reading(side: &WheelTask) -> WheelRail {
     let profiles = side.geometry.profiles();
-    let grains = profiles.map(profile_points::grain);
+    let grains = profiles.map(checked_case::grain);
     let advised = advised_smoothing(grains, side.contact_modulus, PRESSURE_USUAL);
     let other = |k: usize, profile: &Profile| {
         let chords = OTHER_CHORDS * profile.usual_chord();

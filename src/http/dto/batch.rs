@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::question::Case;
+use crate::contact::case::words::solver::Case;
 use crate::http::dto::job::rfc3339;
 use crate::http::problem::body::Fault;
 use crate::jobs::model::batch::Batch;

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::post::outlines::outline::{outlines, patch_outline};
-use crate::contact::solution::words::fields::{PatchCells, PointFields, Zone};
+use crate::contact::post::outlines::{outlines, patch_outline};
+use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run
 /// counter-clockwise, holes clockwise.

@@ -7,7 +7,7 @@ use crate::contact::case::words::motion::MotionWords;
 use crate::contact::solution::words::answer::{
     ErrorEstimate, HistoryPoint, Origin, Solution, Total,
 };
-use crate::contact::solution::words::profile_quality::ProfileUncertainty;
+use crate::contact::solution::words::damage::ProfileUncertainty;
 
 /// Forces and moments.
 #[derive(Debug, Serialize, ToSchema)]

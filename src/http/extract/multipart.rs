@@ -9,9 +9,8 @@ use tokio::time::timeout;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::words::question::Case;
-use crate::http::extract::body_reader::BodyReader;
-use crate::http::extract::body_reader::unreadable;
+use crate::contact::case::words::solver::Case;
+use crate::http::extract::body_reader::{BodyReader, unreadable};
 use crate::http::extract::json::{essence, read_json, weigh_case};
 use crate::http::extract::titles::faulty;
 use crate::http::limits::memory::Memory;

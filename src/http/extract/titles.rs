@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
 
-use crate::contact::evaluate::request_faults::column_pointer;
+use crate::contact::evaluate::varied::column_pointer;
 use crate::http::problem::body::Fault;
 use crate::http::problem::error::ApiError;
 use crate::http::problem::kinds::ProblemKind;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use axum::body::{Body, Bytes};
 use futures_util::stream;
 
-use crate::contact::solution::words::fields::Zone;
+use crate::contact::solution::words::answer::Zone;
 use crate::http::render::csv;
 use crate::http::render::table::{ArrayData, Precision, Rows, Table};
 
@@ -165,7 +165,7 @@ mod tests {
 
     use super::*;
     use crate::contact::case::words::solver::Output;
-    use crate::contact::solution::words::fields::{PatchCells, PointFields};
+    use crate::contact::solution::words::answer::{PatchCells, PointFields};
     use crate::http::render::table::TableColumn;
 
     async fn text(body: Body) -> String {

@@ -1,6 +1,6 @@
 //! Stresses below the surface as CSV: one line per point.
 
-use crate::contact::solution::words::maintenance::StressPoint;
+use crate::contact::solution::words::evolution::StressPoint;
 use crate::http::render::csv::{finish, number};
 
 const COLUMNS: [&str; 16] = [

@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::post::resample::{Gridded, resample, resample_zone};
-use crate::contact::solution::words::fields::{PatchCells, PointFields, Zone};
+use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// A file, byte for byte.
 #[derive(Debug, ToSchema)]

@@ -6,13 +6,11 @@ use railhead_macros::none_is_absent;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::question::Case;
-use crate::contact::case::words::solver::{MethodName, Output};
+use crate::contact::case::words::solver::{Case, MethodName, Output};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::solution::words::profile_quality::PairQuality;
-use crate::contact::solution::words::understanding::FoundBy;
-use crate::contact::solution::words::understanding::Understanding;
+use crate::contact::solution::words::answer::{FoundBy, Understanding};
+use crate::contact::solution::words::damage::PairQuality;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
 use crate::http::limits::memory::{Memory, MemoryPermit};

@@ -17,10 +17,10 @@ use uuid::Uuid;
 
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::answer::RowsAnswer;
-use crate::contact::evaluate::many::solve::{NotAtOnce, SOLVED_ROWS_MAX};
-use crate::contact::evaluate::many::task::several_answers;
-use crate::contact::evaluate::request_faults::{column_pointer, of_first_row, of_values};
-use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use crate::contact::evaluate::many::{NotAtOnce, SOLVED_ROWS_MAX, several_answers};
+use crate::contact::evaluate::varied::{
+    Values, VariedColumn, case_of_row, column_pointer, of_first_row, of_values,
+};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::http::dto::run::CellValue;
 use crate::http::extract::accept::{choose, one_of};

@@ -8,7 +8,7 @@ use uuid::Uuid;
 
 use crate::contact::case::words::evolution::{EvolutionWords, WearLosses};
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::request_faults::column_pointer;
+use crate::contact::evaluate::varied::column_pointer;
 use crate::contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord, WornBody};
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::Caller;

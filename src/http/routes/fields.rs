@@ -7,7 +7,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::fields::{PatchCells, PointFields};
+use crate::contact::solution::words::answer::{PatchCells, PointFields};
 use crate::http::dto::cells::{Cells, GriddedField, Outlines};
 use crate::http::dto::result::name_of;
 use crate::http::extract::accept::{choose, one_of};

@@ -4,7 +4,7 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
-use crate::contact::case::words::question::Case;
+use crate::contact::case::words::solver::Case;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::ids::JobId;
 use crate::http::extract::json::JsonBody;

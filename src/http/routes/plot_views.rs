@@ -4,8 +4,7 @@ use serde_json::Value;
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::answer::{PointSolution, Solution, Total};
-use crate::contact::solution::words::fields::PatchCells;
+use crate::contact::solution::words::answer::{PatchCells, PointSolution, Solution, Total};
 use crate::http::extract::query::require_index;
 use crate::http::problem::error::ApiError;
 use crate::http::render::picture::curve::{self, Curve, CurveLine};

@@ -11,7 +11,7 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::contact::CrossSection;
 use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::profile_quality::SectionQuality;
+use crate::contact::solution::words::damage::SectionQuality;
 use crate::http::dto::job::rfc3339;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;

@@ -3,7 +3,7 @@
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::fields::{PatchCells, PointFields};
+use crate::contact::solution::words::answer::{PatchCells, PointFields};
 use crate::http::dto::result::name_of;
 use crate::http::problem::catalogue::problems;
 use crate::http::problem::error::ApiError;

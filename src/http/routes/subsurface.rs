@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::BodyName;
 use crate::contact::post::subsurface::states::{STORED, points};
-use crate::contact::solution::words::maintenance::{PassageSummary, StressPoint};
+use crate::contact::solution::words::evolution::{PassageSummary, StressPoint};
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::query::{Parameters, index, query, require_index};
 use crate::http::limits::holding_body::hold_while_sent;

@@ -181,7 +181,7 @@ pub(crate) mod tests {
 
     use super::*;
     use crate::contact;
-    use crate::contact::case::limits::Limits;
+    use crate::contact::case::solver::Limits;
 
     /// Seven motions with all fields.
     pub(crate) fn checked_case() -> CheckedCase {

@@ -7,7 +7,7 @@ use serde_json::Value;
 use tokio::runtime::Handle;
 use uuid::Uuid;
 
-use crate::contact::case::known_pair::KnownPair;
+use crate::contact::case::solver::KnownPair;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::varied::named_sections;
 use crate::contact::problem::checked_case::CheckedCase;

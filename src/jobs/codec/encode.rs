@@ -4,8 +4,7 @@ use std::io::{Error, Result};
 
 use zstd::bulk::Compressor;
 
-use crate::contact::solution::words::fields::Fields;
-use crate::contact::solution::words::fields::Zone;
+use crate::contact::solution::words::answer::{Fields, Zone};
 use crate::jobs::codec::fields::{Block, Header, Kind, MAGIC, PREFIX_BYTES};
 
 const ZSTD_LEVEL: i32 = 3;

@@ -17,8 +17,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::solution::words::fields::Zone;
-use crate::contact::solution::words::fields::{PatchCells, PatchFields, PointFields};
+use crate::contact::solution::words::answer::{PatchCells, PatchFields, PointFields, Zone};
 
 pub(crate) const MAGIC: &[u8; 8] = b"RHFIELD2";
 
@@ -264,7 +263,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::contact::solution::words::fields::Fields;
+    use crate::contact::solution::words::answer::Fields;
 
     /// Any bit pattern: NaN payloads, infinities and negative zero have to survive too.
     fn values(count: usize) -> impl Strategy<Value = Vec<f64>> {

@@ -3,7 +3,7 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use crate::contact::solution::words::fields::PatchFields;
+use crate::contact::solution::words::answer::PatchFields;
 use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
 use crate::jobs::codec::parquet;
 use crate::jobs::error::JobsError;

@@ -8,11 +8,11 @@ use tokio::runtime::Handle;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::many::solve::expected_seconds;
-use crate::contact::evaluate::many::task::{ManyTask, several_answers};
+use crate::contact::evaluate::many::{ManyTask, expected_seconds, several_answers};
 use crate::contact::evaluate::many_answer::NumberColumns;
-use crate::contact::evaluate::request_faults::{column_pointer, of_first_row, of_values};
-use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use crate::contact::evaluate::varied::{
+    Values, VariedColumn, case_of_row, column_pointer, of_first_row, of_values,
+};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::codec::table::COLUMNS_MAX;

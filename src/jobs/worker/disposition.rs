@@ -105,7 +105,7 @@ mod tests {
             "load": { "normal_force_n": 100_000 },
             "motion": [{ "creepage_x": 0.001 }, { "creepage_x": 0.002 }]
         });
-        crate::contact::check(&case, &crate::contact::case::limits::Limits::default()).unwrap()
+        crate::contact::check(&case, &crate::contact::case::solver::Limits::default()).unwrap()
     }
 
     /// What becomes of a job, as a word.

@@ -5,8 +5,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use serde_json::json;
 
-use crate::contact::evaluate::many::solve::solve_many;
-use crate::contact::evaluate::many::task::ManyTask;
+use crate::contact::evaluate::many::{ManyTask, solve_many};
 use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;

@@ -8,8 +8,7 @@ use bytes::Bytes;
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::fields::{Fields, PatchFields};
+use crate::contact::solution::words::answer::{Fields, PatchFields, Solution};
 use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::attempts::outcome::{Ended, Outcome, Work};
 use crate::jobs::attempts::slices::{SlicedCase, SlicedWork};

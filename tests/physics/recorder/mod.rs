@@ -6,17 +6,12 @@
 //! iterations and meshes. Other levels sum in another order: there the numbers that a client reads are compared, within [`ELSEWHERE`] or
 //! [`FOUND_ELSEWHERE`].
 
-mod cases;
-mod comparison;
-mod machine;
-mod record;
-
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use railhead::contact;
 use railhead::contact::case::digest::SOLVER_REVISION;
-use railhead::contact::case::limits::Limits;
+use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::numerics::simd::SimdLevel;
 use railhead::contact::rolling::operator_store::OperatorStore;
@@ -25,6 +20,11 @@ use serde_json::Value;
 use crate::recorder::comparison::{Precision, compare};
 use crate::recorder::machine::arithmetic;
 use crate::recorder::record::{Record, Recording};
+
+mod cases;
+mod comparison;
+mod machine;
+mod record;
 
 /// Largest change of a given contact with another arithmetic, relative to the scale of the quantity: less than half of the usual target.
 /// Kernels without SIMD move creepages that are found for a force by 9e-4, peaks of the traction by 1.2e-4 and all other numbers by 7e-7.

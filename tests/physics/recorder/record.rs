@@ -2,8 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use railhead::contact::solution::words::answer::{PointSolution, Solution};
-use railhead::contact::solution::words::fields::{Fields, PatchFields};
+use railhead::contact::solution::words::answer::{Fields, PatchFields, PointSolution, Solution};
 
 /// How a change of a quantity is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,13 +1,14 @@
 //! Reads `contact` and `load`: where the bodies touch and how hard they are pressed together.
+//!
+//! Reads `material`: one set of elastic constants, or one for each body.
 
 use serde_json::Value;
 
 use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, names, shown};
 use crate::contact::case::read::samples::{SampleQuantity, axis, line, samples};
-use crate::contact::case::read::wheel_rail;
-use crate::contact::case::read::wheelset;
-use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::read::{wheel_rail, wheelset};
+use crate::contact::case::words::contact::{Contact, Elastic, Load, Material};
 
 const RADIUS: AllowedRange = AllowedRange::positive(1e9, "mm");
 const SEMI_AXIS: AllowedRange = AllowedRange::positive(1e6, "mm");
@@ -187,4 +188,52 @@ fn grid(block: &mut Object, quantity: SampleQuantity) -> GridMembers {
 /// Number of elements of an array, sound or not.
 fn given(block: &Object, name: &str) -> Option<usize> {
     block.value(name).and_then(Value::as_array).map(Vec::len)
+}
+
+const MODULUS: AllowedRange = AllowedRange::positive(1e12, "MPa");
+const POISSON_RATIO: AllowedRange = AllowedRange::closed(0.0, 0.5, "");
+
+/// Reads the required member `material` of a case.
+pub(crate) fn read_material(case: &mut Object) -> Option<Material> {
+    let mut block = case.child("material")?;
+    if !block.has("lower") && !block.has("upper") {
+        return elastic(&mut block).map(Material::Same);
+    }
+    block.only(&["lower", "upper"]);
+    let lower = block.child("lower").and_then(|mut body| elastic(&mut body));
+    let upper = block.child("upper").and_then(|mut body| elastic(&mut body));
+    Some(Material::Pair {
+        lower: lower?,
+        upper: upper?,
+    })
+}
+
+fn elastic(block: &mut Object) -> Option<Elastic> {
+    block.only(&["shear_modulus_mpa", "young_modulus_mpa", "poisson_ratio"]);
+    let shear_modulus_mpa = block.number("shear_modulus_mpa", MODULUS);
+    let young_modulus_mpa = block.number("young_modulus_mpa", MODULUS);
+    let poisson_ratio = block.required_number("poisson_ratio", POISSON_RATIO);
+    match (
+        block.has("shear_modulus_mpa"),
+        block.has("young_modulus_mpa"),
+    ) {
+        (false, false) => {
+            block.fault(
+                "shear_modulus_mpa",
+                format!("missing; {MODULUS} is needed, or young_modulus_mpa instead"),
+            );
+            return None;
+        }
+        (true, true) => {
+            block.exclude("shear_modulus_mpa", "young_modulus_mpa");
+            return None;
+        }
+        _ => {}
+    }
+    shear_modulus_mpa.or(young_modulus_mpa)?;
+    Some(Elastic {
+        shear_modulus_mpa,
+        young_modulus_mpa,
+        poisson_ratio: poisson_ratio?,
+    })
 }

@@ -4,11 +4,11 @@ use serde_json::Value;
 
 use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, names, number, word};
-use crate::contact::case::words::damage::{
+use crate::contact::case::words::solver::Output;
+use crate::contact::case::words::subsurface::{
     ArchardFigures, DamageModel, DamageParameterWords, DamageSetName, DamageWords,
     OwnDamageFigures, UsfdFigures, WlrmFigures,
 };
-use crate::contact::case::words::solver::Output;
 
 /// Evaluated where none is named: those whose figures are confirmed.
 const DEFAULT_MODELS: [DamageModel; 2] = [DamageModel::TGamma, DamageModel::UsfdWear];

@@ -9,22 +9,15 @@ use serde_json::Value;
 
 use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::checks::{PartialCase, faults_of};
-use crate::contact::case::known_pair::KnownPair;
-use crate::contact::case::limits::Limits;
 use crate::contact::case::read::faults::Faults;
 use crate::contact::case::read::object::{Object, has_controls, join, shown};
-use crate::contact::case::read::{
-    contact, damage, friction, material, motion, solver, subsurface, thermal,
-};
-use crate::contact::case::words::contact::{Contact, Load};
-use crate::contact::case::words::damage::DamageWords;
+use crate::contact::case::read::{contact, damage, friction, motion, solver, subsurface, thermal};
+use crate::contact::case::solver::{KnownPair, Limits};
+use crate::contact::case::words::contact::{Contact, Load, Material, ThermalWords};
 use crate::contact::case::words::friction::Friction;
-use crate::contact::case::words::material::Material;
-use crate::contact::case::words::material::ThermalWords;
 use crate::contact::case::words::motion::Motions;
-use crate::contact::case::words::question::Case;
-use crate::contact::case::words::solver::{Output, Solver};
-use crate::contact::case::words::subsurface::SubsurfaceWords;
+use crate::contact::case::words::solver::{Case, Output, Solver};
+use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::method::Method;
 
@@ -140,7 +133,7 @@ fn read(case: &mut Object) -> CaseDraft {
     ]);
     let name = case.line("name", NAME_LENGTH_MAX);
     let labels = labels(case);
-    let material = material::read(case);
+    let material = contact::read_material(case);
     let friction = friction::read(case);
     let contact = contact::read(case);
     let load = contact::read_load(case);

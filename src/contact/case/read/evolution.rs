@@ -5,13 +5,13 @@ use serde_json::Value;
 use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::object::{Object, join, number, shown};
 use crate::contact::case::read::wheel_rail::section_of;
-use crate::contact::case::words::damage::DamageModel;
 use crate::contact::case::words::evolution::{
     EvolutionAccuracy, EvolutionEvent, EvolutionExtent, EvolutionWords, Traffic, TrafficColumn,
     TrafficDistribution, WearLosses, WearingBodies,
 };
+use crate::contact::case::words::subsurface::DamageModel;
 use crate::contact::error::CaseError;
-use crate::contact::numerics::sampling::PRIMES;
+use crate::contact::numerics::quadrature::PRIMES;
 
 const BODIES: [(&str, WearingBodies); 3] = [
     ("rail", WearingBodies::Rail),

@@ -4,9 +4,9 @@ use serde_json::Value;
 
 use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join};
-use crate::contact::case::words::history::Range;
-use crate::contact::case::words::history::{History, HistoryCourse, HistoryStartName};
-use crate::contact::case::words::motion::Motions;
+use crate::contact::case::words::motion::{
+    History, HistoryCourse, HistoryStartName, Motions, Range,
+};
 
 const DISTANCE: AllowedRange = AllowedRange::closed(0.0, 1e9, "mm");
 const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");

@@ -7,7 +7,6 @@ pub mod evolution;
 pub mod faults;
 pub mod friction;
 pub mod history;
-pub mod material;
 pub mod motion;
 pub mod object;
 pub mod samples;

@@ -5,9 +5,8 @@ use serde_json::Value;
 use crate::contact::case::read::faults::{AllowedRange, Faults};
 use crate::contact::case::read::history;
 use crate::contact::case::read::object::{Object, join, shown};
-use crate::contact::case::words::history::Range;
 use crate::contact::case::words::motion::{
-    AskedMotion, Combine, Motions, Sweep, Swept, ValueList, Wheelset,
+    AskedMotion, Combine, Motions, Range, Sweep, Swept, ValueList, Wheelset,
 };
 
 const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");

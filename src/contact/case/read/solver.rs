@@ -2,11 +2,11 @@
 
 use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::{Object, join, names, shown, word};
-use crate::contact::case::resolution::TARGET_ERROR_DEFAULT;
+use crate::contact::case::solver::TARGET_ERROR_DEFAULT;
 use crate::contact::case::words::solver::{
     MeshSizeWords, MethodName, Output, RelativeToName, Solver, TractionBoundName,
 };
-use crate::contact::rolling::resolution::TARGET_LEAST;
+use crate::contact::rolling::task::TARGET_LEAST;
 
 const TARGET_ERROR: AllowedRange = AllowedRange::closed(TARGET_LEAST, 0.5, "");
 const TIME_LIMIT: AllowedRange = AllowedRange::positive(86_400.0, "s");

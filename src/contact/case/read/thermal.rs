@@ -2,8 +2,8 @@
 
 use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::object::Object;
+use crate::contact::case::words::contact::{ThermalBodyWords, ThermalWords};
 use crate::contact::case::words::friction::Friction;
-use crate::contact::case::words::material::{ThermalBodyWords, ThermalWords};
 use crate::contact::case::words::solver::Output;
 
 const CONDUCTIVITY: AllowedRange = AllowedRange::positive(1e6, "W/(m K)");

@@ -6,7 +6,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::contact::CrossSection;
-use crate::contact::case::words::damage::DamageModel;
+use crate::contact::case::words::subsurface::DamageModel;
 
 /// Profiles that wear under a traffic.
 #[derive(Debug, Clone, PartialEq, ToSchema)]

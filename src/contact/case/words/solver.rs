@@ -1,8 +1,25 @@
 //! How to solve, how exactly, and what to compute.
+//!
+//! The question as the client writes it: one contact case.
+//!
+//! A [`Case`] is only ever made by [`Case::read`](crate::contact::case::words::solver::Case::read), which collects every fault of the
+//! JSON text at once. Lengths in mm, forces in N, stresses in MPa, creepages dimensionless, spin in 1/mm.
+//!
+//! A case in the form of which its digest is taken.
+
+use std::collections::BTreeMap;
 
 use railhead_macros::{Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+
+use crate::contact::case::words::contact::{Contact, Load, Material, ThermalWords};
+use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::motion::{
+    History, HistoryStartName, MotionWords, Motions, Wheelset,
+};
+use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
+use crate::contact::rolling::task::PrescribedForces;
 
 /// How to solve, and how exactly.
 #[none_is_absent]
@@ -118,5 +135,99 @@ impl Output {
             self,
             Output::Resultants | Output::Gradients | Output::Damage
         )
+    }
+}
+
+/// One contact case: two bodies, how they are pressed together and how they roll.
+#[none_is_absent]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Case {
+    /// Free text for people, at most 200 characters, none of them a control character.
+    pub name: Option<String>,
+    /// Free key–value pairs to find the case again, at most 32 of them, without control characters; no key has a colon.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    #[schema(required = false)]
+    pub labels: BTreeMap<String, String>,
+    /// Elastic constants of the two bodies.
+    pub material: Material,
+    /// Friction between them.
+    pub friction: Friction,
+    /// Where and how the bodies touch.
+    pub contact: Contact,
+    /// How hard they are pressed together; needed unless the contact carries its own pressure.
+    pub load: Option<Load>,
+    /// One motion, a list of motions, or a sweep.
+    pub motion: Motions,
+    /// Method and accuracy; `{"method": "auto", "target_error": 0.005}` when left out.
+    #[schema(required = false)]
+    pub solver: Solver,
+    /// What to compute; `["resultants", "zones"]` when left out.
+    #[schema(required = false)]
+    pub outputs: Vec<Output>,
+    /// Where stresses below the surface are computed; for the output `subsurface`, which finds the worst point without it.
+    pub subsurface: Option<SubsurfaceWords>,
+    /// Damage models for the output `damage`. When left out, the models with confirmed parameters are evaluated.
+    pub damage: Option<DamageWords>,
+    /// What the bodies do with heat; for the output `temperature`.
+    pub thermal: Option<ThermalWords>,
+}
+
+/// Everything that determines the answer, in a fixed order; name and labels do not.
+#[derive(Serialize)]
+pub(crate) struct Canonical<'a> {
+    pub(crate) solver_version: &'static str,
+    pub(crate) solver_revision: u32,
+    pub(crate) elasticity: [f64; 3],
+    /// Revision of the method for bodies that differ, and the lower body's share of the displacement. Absent for equal bodies, whose digests do not depend
+    /// on that method.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) coupling: Option<(u32, f64)>,
+    pub(crate) friction: FrictionForm<'a>,
+    pub(crate) contact: &'a Contact,
+    pub(crate) load: Option<&'a Load>,
+    pub(crate) motions: Vec<MotionWords>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) forces: Option<&'a [PrescribedForces]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) wheelset: Option<&'a Wheelset>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) wheelsets: Option<&'a [Wheelset]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) history: Option<(&'a History, HistoryStartName)>,
+    pub(crate) method: MethodName,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) traction_bound: Option<TractionBoundName>,
+    pub(crate) target_error: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) relative_to: Option<RelativeToName>,
+    pub(crate) mesh: Option<MeshSizeWords>,
+    pub(crate) time_limit_s: Option<f64>,
+    pub(crate) outputs: &'a [Output],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) subsurface: Option<&'a SubsurfaceWords>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) bodies: Option<&'a Material>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) damage: Option<&'a DamageWords>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) thermal: Option<&'a ThermalWords>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) speeds: Option<&'a [Option<f64>]>,
+}
+
+/// A constant coefficient alone is its number, however it is written.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub(crate) enum FrictionForm<'a> {
+    Constant(f64),
+    Other(&'a Friction),
+}
+
+impl<'a> From<&'a Friction> for FrictionForm<'a> {
+    fn from(friction: &'a Friction) -> FrictionForm<'a> {
+        match friction.constant() {
+            Some(coefficient) => FrictionForm::Constant(coefficient),
+            None => FrictionForm::Other(friction),
+        }
     }
 }

@@ -4,11 +4,10 @@ use std::ops::{ControlFlow, Range};
 
 use pulp::NullaryFnOnce;
 
-use crate::contact::mesh::strips::Mesh;
-use crate::contact::mesh::strips::observe;
+use crate::contact::mesh::{Mesh, observe};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd;
-use crate::contact::numerics::simd_ln::Float;
+use crate::contact::numerics::simd::Float;
 
 /// Cells of a strip that are folded at once.
 const RUN: usize = 4;

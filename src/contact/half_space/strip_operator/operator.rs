@@ -12,7 +12,7 @@ use pulp::WithSimd;
 use crate::contact::half_space::strip_operator::assembly::OperatorAssembly;
 use crate::contact::half_space::strip_operator::kind::{LANES, Parity, Precision};
 use crate::contact::half_space::strip_operator::product::{Product, RowLayout};
-use crate::contact::mesh::strips::Mesh;
+use crate::contact::mesh::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd;
 

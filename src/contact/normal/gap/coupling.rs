@@ -3,12 +3,23 @@
 //! Two boxes of cells that are as far from each other as half their longest side act on each other through Chebyshev points in
 //! either box, between which the kernel `1/(πE* r)` is interpolated (Börm, Grasedyck and Hackbusch 2003). Boxes nearer than
 //! this are halved until they are far enough or hold few cells; between these the coefficients of rectangles are summed.
+//!
+//! Displacements of some places by unit pressures on the cells of a regular grid nearby, by the closed form.
+//!
+//! The influence of several grids on each other, as one operator over all their cells.
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
+use std::ops::Range;
 
+use pulp::NullaryFnOnce;
+
+use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
+use crate::contact::normal::gap::cell_sums::{CellWeights, LANES};
+use crate::contact::normal::gap::conjugate_gradients::PressureInfluence;
 use crate::contact::normal::gap::grid::PressureGrid;
-use crate::contact::normal::gap::near_cells::NearCells;
+use crate::contact::numerics::simd;
+use crate::contact::numerics::simd::Float;
 
 /// Chebyshev points per axis. Displacements differ from the exact sum by less than 5e-5 of the largest one that the other grid
 /// causes (the test below; with 6 points by 1e-4). That is the error of interpolation alone: 11 points leave 2e-7.
@@ -366,6 +377,163 @@ fn distance(one: [[f64; 2]; 2], other: [[f64; 2]; 2]) -> f64 {
     apart(0).hypot(apart(1))
 }
 
+/// Places where displacements are wanted, and a block of cells that press.
+pub(crate) struct NearCells<'a> {
+    /// x and y of the places in mm.
+    pub(crate) places: [&'a [f64]; 2],
+    /// Edges of the cells along x and y in mm, in rising order.
+    pub(crate) edges: [&'a [f64]; 2],
+    /// Contact modulus `E*` in MPa.
+    pub(crate) contact_modulus: f64,
+}
+
+impl NearCells<'_> {
+    /// Displacements in mm/MPa: for every cell, x fastest, those of all places.
+    ///
+    /// The coefficient [`rectangle`](crate::contact::half_space::kernels::rectangle) calls `zz`, as differences of values at the corners, which
+    /// neighbouring cells share. They lose digits with the square of the distance over the side of a cell: at a distance of 1000 sides ten are left.
+    pub(crate) fn coefficients(self) -> Vec<f32> {
+        simd::dispatch(self)
+    }
+}
+
+impl NullaryFnOnce for NearCells<'_> {
+    type Output = Vec<f32>;
+
+    #[inline(always)]
+    fn call(self) -> Vec<f32> {
+        let [x, y] = self.places;
+        let [along, across] = self.edges;
+        let factor = 1.0 / (PI * self.contact_modulus);
+        let count = x.len();
+        let (mut lower, mut upper) = (
+            vec![0.0; along.len() * count],
+            vec![0.0; along.len() * count],
+        );
+        let cells = (along.len() - 1) * (across.len() - 1);
+        let mut out = Vec::with_capacity(cells * count);
+        for (j, v) in across.iter().enumerate() {
+            std::mem::swap(&mut lower, &mut upper);
+            for (column, u) in upper.chunks_exact_mut(count).zip(along) {
+                for ((value, x), y) in column.iter_mut().zip(x).zip(y) {
+                    *value = corner(x - u, y - v);
+                }
+            }
+            if j == 0 {
+                continue;
+            }
+            let between =
+                |row: &[f64], i: usize, k: usize| row[i * count + k] - row[(i + 1) * count + k];
+            for i in 0..along.len() - 1 {
+                out.extend(
+                    (0..count)
+                        .map(|k| (factor * (between(&lower, i, k) - between(&upper, i, k))) as f32),
+                );
+            }
+        }
+        out
+    }
+}
+
+/// `p asinh(q/|p|) + q asinh(p/|q|)`, 0 on either axis.
+#[inline(always)]
+fn corner(p: f64, q: f64) -> f64 {
+    let (a, b) = (p.abs().max(f64::TINY), q.abs().max(f64::TINY));
+    let r = (a * a + b * b).sqrt();
+    let value = a * Float::ln((b + r) / a) + b * Float::ln((a + r) / b);
+    if p * q < 0.0 { -value } else { value }
+}
+
+/// The influence of all grids on all.
+pub(crate) struct TilesInfluence {
+    /// Cells of every grid.
+    pub(crate) ranges: Vec<Range<usize>>,
+    own: Vec<GridOperator<f32>>,
+    /// Grid acted on, grid that acts.
+    couplings: Vec<(usize, usize, Coupling)>,
+    /// Cell by cell, relative to the first cell.
+    area: Vec<f64>,
+    yielding: Vec<f64>,
+}
+
+impl TilesInfluence {
+    pub(crate) fn new(
+        grids: &[PressureGrid],
+        contact_modulus: f64,
+        workspace: &mut GridWorkspace<f32>,
+    ) -> TilesInfluence {
+        let own: Vec<GridOperator<f32>> = grids
+            .iter()
+            .map(|grid| grid.influence(contact_modulus, workspace))
+            .collect();
+        let (mut ranges, mut area, mut yielding) = (Vec::new(), Vec::new(), Vec::new());
+        let first = grids[0].step[0] * grids[0].step[1];
+        for (grid, operator) in grids.iter().zip(&own) {
+            let count = grid.cells[0] * grid.cells[1];
+            ranges.push(area.len()..area.len() + count);
+            area.resize(area.len() + count, grid.step[0] * grid.step[1] / first);
+            yielding.resize(yielding.len() + count, own[0].own() / operator.own());
+        }
+        let pairs = (0..grids.len()).flat_map(|to| (0..grids.len()).map(move |from| (to, from)));
+        let couplings = pairs
+            .filter(|(to, from)| to != from)
+            .map(|(to, from)| {
+                let coupling = Coupling::new(&grids[to], &grids[from], contact_modulus);
+                (to, from, coupling)
+            })
+            .collect();
+        TilesInfluence {
+            ranges,
+            own,
+            couplings,
+            area,
+            yielding,
+        }
+    }
+}
+
+impl PressureInfluence for TilesInfluence {
+    // A change acts on every other grid: a whole product costs less than adding one by one.
+    const CHANGES_MAX: usize = 0;
+    type Workspace = GridWorkspace<f32>;
+
+    fn apply(
+        &self,
+        pressure: &[f64],
+        displacement: &mut [f64],
+        workspace: &mut GridWorkspace<f32>,
+    ) {
+        for (range, own) in self.ranges.iter().zip(&self.own) {
+            let displacement = &mut displacement[range.clone()];
+            own.apply(&pressure[range.clone()], displacement, workspace);
+        }
+        for (to, from, coupling) in &self.couplings {
+            let [to, from] = [to, from].map(|k| self.ranges[*k].clone());
+            coupling.add(&pressure[from], &mut displacement[to]);
+        }
+    }
+
+    fn add(&self, changes: &[(usize, f64)], _displacement: &mut [f64]) {
+        debug_assert!(changes.is_empty());
+    }
+
+    fn own(&self) -> f64 {
+        self.own[0].own()
+    }
+
+    fn weights(&self, cells: usize) -> CellWeights {
+        let padded = |values: &[f64]| {
+            let mut values = values.to_vec();
+            values.resize(cells.next_multiple_of(LANES), 1.0);
+            values
+        };
+        CellWeights {
+            area: padded(&self.area),
+            yielding: padded(&self.yielding),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -427,5 +595,43 @@ mod tests {
         let small = PressureGrid::new([[-0.4, 0.5], [14.0, 14.8]], [24, 24], [false; 2]);
         let coupling = Coupling::new(&large, &small, MODULUS);
         assert_eq!([coupling.near.len(), coupling.far.len()], [0, 1]);
+    }
+}
+
+#[cfg(test)]
+mod near_cells_tests {
+    use super::*;
+    use crate::contact::half_space::kernels::{Rectangle, rectangle};
+
+    #[test]
+    fn coefficients_are_those_of_the_rectangles() {
+        // Inside, on edges and corners, and far away.
+        let places = [
+            [0.1, 0.3, 0.7, -2.0, 300.0, 0.3],
+            [0.05, 0.2, 0.4, 0.2, -90.0, 1.0],
+        ];
+        let edges = [[0.0, 0.3, 0.6, 0.9], [0.2, 0.4, 0.6, 0.8]];
+        let found = NearCells {
+            places: [&places[0], &places[1]],
+            edges: [&edges[0], &edges[1]],
+            contact_modulus: 2.0,
+        };
+        let found = found.coefficients();
+        assert_eq!(found.len(), 54);
+        for (k, found) in found.into_iter().enumerate() {
+            let (cell, place) = (k / 6, k % 6);
+            let (i, j) = (cell % 3, cell / 3);
+            let pressed = Rectangle {
+                x0: edges[0][i],
+                x1: edges[0][i + 1],
+                y0: edges[1][j],
+                y1: edges[1][j + 1],
+            };
+            let exact = 0.5 * rectangle(places[0][place], places[1][place], pressed, 0.0).zz;
+            assert!(
+                (f64::from(found) / exact - 1.0).abs() < 1e-6,
+                "{cell} {place}"
+            );
+        }
     }
 }

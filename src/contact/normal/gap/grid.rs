@@ -1,13 +1,27 @@
 //! Grids of equal rectangles over a box of the contact plane: where they are in contact, and which grid should follow.
+//!
+//! Tuned numbers of the gap solver: how fine its grids are, and when they are fine enough.
+//!
+//! Errors at these numbers are those of `tests/physics/gap_hertz.rs` and `gap_reference.rs`; `cargo bench --bench gaps` prints times and
+//! errors of the reference gaps. Where no sensitivity is given it was not measured.
+//!
+//! The contact of a gap, or the reason why there is none.
+//!
+//! A grid of the normal problem with its pressure.
+//!
+//! Pressures near the edge of the contact, corrected for the steps of the grid.
 
 use std::f64::consts::PI;
 
 use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
+use crate::contact::monitor::Stop;
+use crate::contact::normal::gap::conjugate_gradients;
 use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
-use crate::contact::normal::gap::edges;
-use crate::contact::normal::gap::search_box::SearchBox;
 use crate::contact::normal::gap::surface::{GapSurface, Window};
+use crate::contact::normal::gap::task::SearchBox;
+use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::numerics::flood_fill::groups;
+use crate::contact::remark::entry::RemarkEntry;
 
 /// Most cells along either axis.
 const CELLS_MAX: usize = 200;
@@ -179,7 +193,7 @@ impl PressureGrid {
 
     /// The same, 0 everywhere if the other grid presses nothing here.
     pub(crate) fn interpolated(&self, other: &PressureGrid, pressure: &[f64]) -> Vec<f64> {
-        let squares = edges::continued(other.cells[0], edges::squares(other.cells[0], pressure));
+        let squares = continued(other.cells[0], squares(other.cells[0], pressure));
         let places = [0, 1].map(|axis| -> Vec<(isize, f64)> {
             let first = other.range(axis)[0] + 0.5 * other.step[axis];
             self.centres(axis)
@@ -371,4 +385,301 @@ pub(crate) fn within(window: Window, limits: Window) -> Window {
             window[k][1].min(limits[k][1]),
         ]
     })
+}
+
+/// Fewest cells across the contact, and across every patch with the given share of the load, on the last grid: with 44 cells the error of
+/// the resultants is below 0.0007 in nine of ten gaps (see `REGION` of the rolling constants).
+pub(crate) const RESOLUTION: GridFineness = GridFineness {
+    first: 32,
+    contact: 44.0,
+    patch: 24.0,
+    share_min: 0.02,
+    settles: true,
+    tolerance: 2e-4,
+};
+
+/// Below this target of the resultants' error (relative to μN) grids are finer: the error of a normal problem falls with the
+/// power 3/2 of its cells' size.
+pub(crate) const TARGET_USUAL: f64 = 0.002;
+
+/// Power of the target over [`TARGET_USUAL`] by which the cells grow: the inverse of that 3/2.
+pub(crate) const TARGET_POWER: f64 = -2.0 / 3.0;
+
+/// Between these targets patches have fewer cells, the looser the target: that of a case that gives none still has all.
+pub(crate) const TARGETS_LOOSE: [f64; 2] = [0.005, 0.02];
+
+/// Power of the target by which they fall: 25 cells at 0.02. At that target gaps take two thirds of the time that they
+/// take with all cells; .97 and .95 of them are covered, .985 and .99 with all cells
+/// (`cargo bench --bench calibrate gap profiles`).
+pub(crate) const LOOSE_POWER: f64 = -0.4;
+
+/// A grid is fine enough if the cells that are wanted are no smaller than this times its own.
+pub(crate) const COARSER_MAX: f64 = 0.8;
+
+/// A gap is solved on finer grids until the approach changes by no more than this, relative to the depth of overlap and times the ratio
+/// of the cells' sizes.
+pub(crate) const APPROACH_CHANGE: f64 = 0.002;
+
+/// The same for the largest pressure.
+pub(crate) const PRESSURE_CHANGE: f64 = 0.015;
+
+/// Ratio of the cells along an axis from one such grid to the next.
+pub(crate) const REFINEMENT: f64 = 1.6;
+
+/// Violation of the contact conditions relative to the deepest overlap that ends the iteration on the first grid, which only finds the
+/// box.
+pub(crate) const TOLERANCE_FIRST: f64 = 2e-3;
+
+/// Most grids that are tried; each is larger, shifted or finer than the one before. Numeric safety.
+pub(crate) const GRIDS_MAX: usize = 12;
+
+/// Where the approach found is beyond the level that a box was made for, the next box is made for the approach and this part of the depth of
+/// overlap more. Chosen by judgement; the box grows again where it is not enough.
+pub(crate) const LEVEL_BEYOND: f64 = 0.2;
+
+/// Cells outside the contact that nearly touch, relative to the deepest overlap, belong to the next grid.
+pub(crate) const NEAR: f64 = 0.03;
+
+/// The contact of a gap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NormalAnswer {
+    /// Region and pressure.
+    pub field: PressureField,
+    /// How it was found.
+    pub report: NormalWork,
+    /// Remarks for the answer.
+    pub remarks: Vec<RemarkEntry>,
+}
+
+/// How a normal problem was solved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NormalWork {
+    /// Cells of the last grid along x and y, of the one that carries most if there are several.
+    pub cells: [usize; 2],
+    /// Grids: 1, or one per patch where patches differ much in size.
+    pub grids: usize,
+    /// Iterations over all grids.
+    pub iterations: u32,
+    /// Largest violation of the contact conditions on the last grid, relative to the deepest overlap of the undeformed
+    /// surfaces: distance in the contact, overlap outside.
+    pub residual: f64,
+    /// Largest pressure on the last grid but one, relative to that on the last, less 1; 0 if there was only one grid.
+    pub pressure_change: f64,
+}
+
+/// Why a normal problem has no answer.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NormalError {
+    /// A reason, as a sentence.
+    NoAnswer(String),
+    /// The caller stopped the work.
+    Stopped(Stop),
+}
+
+impl From<conjugate_gradients::PressureFailure> for NormalError {
+    fn from(failure: conjugate_gradients::PressureFailure) -> NormalError {
+        match failure {
+            conjugate_gradients::PressureFailure::Stopped(stop) => NormalError::Stopped(stop),
+            conjugate_gradients::PressureFailure::NotConverged(residual) => {
+                NormalError::NoAnswer(format!(
+                    "the pressure did not converge: the contact conditions are violated by {residual:.1e} of the overlap"
+                ))
+            }
+        }
+    }
+}
+
+pub(crate) fn no_touch(approach: f64, least: f64) -> String {
+    format!(
+        "the bodies do not touch: the approach of {approach} mm is not more than the least gap of {least} mm"
+    )
+}
+
+pub(crate) fn edge_reached(side: GridSide, limits: Window) -> NormalError {
+    NormalError::NoAnswer(format!(
+        "the contact reaches the edge {} of the given gap, so that the true contact is cut off; give the gap farther out",
+        side.place(limits)
+    ))
+}
+
+/// A grid with its part of the solution: distances and pressures are its own, the rest is common to all grids.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PatchGrid {
+    pub(crate) grid: PressureGrid,
+    pub(crate) pressed: PressureAnswer,
+}
+
+impl PatchGrid {
+    /// Load over the area of a cell of 1 mm².
+    pub(crate) fn load(&self) -> f64 {
+        self.pressed.pressure.iter().sum::<f64>() * self.grid.step[0] * self.grid.step[1]
+    }
+
+    pub(crate) fn largest(&self) -> f64 {
+        self.pressed.largest()
+    }
+}
+
+/// How the refinement of the grids of a gap ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum GridsExit {
+    /// Finer grids no longer change the result.
+    Settled,
+    /// The result still changes on the finest grid allowed.
+    Rough,
+    /// The patches need more grids, or more cells, than are allowed.
+    CellsUsedUp,
+    /// The number of grids that may be tried was used up.
+    GridsUsedUp,
+}
+
+impl GridsExit {
+    /// Is the result that of the gap, rather than of the grid?
+    pub(crate) fn settled(self) -> bool {
+        self == GridsExit::Settled
+    }
+}
+
+/// Pressures on the last grids.
+pub(crate) struct GapOutcome {
+    /// The grids with their pressures: one, or one per patch.
+    pub(crate) patch_grids: Vec<PatchGrid>,
+    /// Iterations over all grids.
+    pub(crate) iterations: u32,
+    /// How the refinement of the grids ended.
+    pub(crate) exit: GridsExit,
+    /// See [`NormalWork`](crate::contact::normal::gap::grid::NormalWork).
+    pub(crate) pressure_change: f64,
+    /// The least gap in mm.
+    pub(crate) least: f64,
+}
+
+/// How far outward a piecewise constant pressure places the edge of the contact: `(distance, displacement)`, where the distance is that
+/// from the edge as pressure and gradient give it. Both are in cells along the normal.
+///
+/// Near an edge the square of the pressure falls linearly, so that a pressure and its gradient tell the distance of the
+/// edge. Measured on Hertz's contact (a/b 0.25 to 1.4, 20 to 42 cells across, all positions and directions of the edge);
+/// the scatter is 0.02 up to a distance of 1.2, then 0.005 and less.
+const DISPLACEMENT: [(f64, f64); 18] = [
+    (0.00, 0.090),
+    (0.05, 0.020),
+    (0.10, -0.030),
+    (0.15, -0.060),
+    (0.25, -0.070),
+    (0.35, -0.065),
+    (0.45, -0.050),
+    (0.55, -0.035),
+    (0.65, -0.014),
+    (0.75, 0.012),
+    (0.85, 0.027),
+    (0.95, 0.036),
+    (1.15, 0.034),
+    (1.35, 0.029),
+    (1.55, 0.020),
+    (1.75, 0.016),
+    (2.25, 0.010),
+    (4.00, 0.007),
+];
+
+/// The squared pressures as they would be without the grid: moved back by [`DISPLACEMENT`], so that they vanish at the edge. Cells
+/// without pressure keep 0; others become negative where the edge excludes their centre.
+///
+/// `pressure` belongs to a grid with `nx` cells along x.
+pub(crate) fn squares(nx: usize, pressure: &[f64]) -> Vec<f64> {
+    let square: Vec<f64> = pressure.iter().map(|p| p * p).collect();
+    let mut moved = square.clone();
+    let ny = pressure.len() / nx;
+    for j in 0..ny {
+        let row = j * nx;
+        for i in 0..nx {
+            let own = square[row + i];
+            if own <= 0.0 {
+                continue;
+            }
+            let along = slope(i, nx, |i| square[row + i]);
+            let across = slope(j, ny, |j| square[i + j * nx]);
+            let slope = (along * along + across * across).sqrt();
+            if slope > 0.0 {
+                moved[row + i] = own - slope * displacement(own / slope);
+            }
+        }
+    }
+    moved
+}
+
+/// Change per cell at cell `i` of a line of `n`, from cells in contact only; a cell at the edge takes that between its
+/// two inner neighbours, as its own value is not sound.
+#[inline]
+fn slope(i: usize, n: usize, square: impl Fn(usize) -> f64) -> f64 {
+    let before = if i > 0 { square(i - 1) } else { 0.0 };
+    let after = if i + 1 < n { square(i + 1) } else { 0.0 };
+    if before > 0.0 && after > 0.0 {
+        return 0.5 * (after - before);
+    }
+    let before2 = if i > 1 { square(i - 2) } else { 0.0 };
+    let after2 = if i + 2 < n { square(i + 2) } else { 0.0 };
+    match (before > 0.0, after > 0.0) {
+        (true, false) if before2 > 0.0 => before - before2,
+        (false, true) if after2 > 0.0 => after2 - after,
+        _ => 0.0,
+    }
+}
+
+fn displacement(distance: f64) -> f64 {
+    let (last, far) = DISPLACEMENT[DISPLACEMENT.len() - 1];
+    if distance >= last {
+        return far;
+    }
+    let next = DISPLACEMENT.partition_point(|(at, _)| *at <= distance);
+    let ((x0, y0), (x1, y1)) = (DISPLACEMENT[next - 1], DISPLACEMENT[next]);
+    y0 + (y1 - y0) * (distance - x0) / (x1 - x0)
+}
+
+/// The squares, continued below 0 in the cells next to the contact: the mean over all eight directions of the extrapolation from two
+/// cells inside in a row, or of the negative of one cell where there is only one.
+pub(crate) fn continued(nx: usize, squares: Vec<f64>) -> Vec<f64> {
+    let ny = squares.len() / nx;
+    let value = |i: isize, j: isize| {
+        let inside = (0..nx as isize).contains(&i) && (0..ny as isize).contains(&j);
+        let value = if inside {
+            squares[j as usize * nx + i as usize]
+        } else {
+            0.0
+        };
+        (value > 0.0).then_some(value)
+    };
+    let beyond = |i: isize, j: isize| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (di, dj) in (-1..=1).flat_map(|dj| (-1..=1).map(move |di| (di, dj))) {
+            if let Some(near) = value(i + di, j + dj) {
+                let far = value(i + 2 * di, j + 2 * dj);
+                sum += far.map_or(-near, |far| 2.0 * near - far).min(0.0);
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { sum / count } else { 0.0 }
+    };
+    let mut out = squares.clone();
+    let row_of = |j: usize| squares[j * nx..(j + 1) * nx].iter();
+    // Cells of a row of the contact, the first and the last one, and those of the rows around it.
+    let ends: Vec<Option<[usize; 2]>> = (0..ny)
+        .map(|j| {
+            let first = row_of(j).position(|square| *square > 0.0)?;
+            Some([first, row_of(j).rposition(|square| *square > 0.0)?])
+        })
+        .collect();
+    for j in 0..ny {
+        let near = &ends[j.saturating_sub(1)..(j + 2).min(ny)];
+        let first = near.iter().flatten().map(|ends| ends[0]).min();
+        let last = near.iter().flatten().map(|ends| ends[1]).max();
+        let (Some(first), Some(last)) = (first, last) else {
+            continue;
+        };
+        for i in first.saturating_sub(1)..(last + 2).min(nx) {
+            if squares[j * nx + i] == 0.0 {
+                out[j * nx + i] = beyond(i as isize, j as isize);
+            }
+        }
+    }
+    out
 }

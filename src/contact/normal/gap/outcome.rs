@@ -1,8 +1,8 @@
 //! The answer of a gap: pressures of the last grids as a field, and remarks on them.
 
-use crate::contact::normal::gap::answer::{NormalAnswer, NormalError, NormalWork};
-use crate::contact::normal::gap::edges::squares;
-use crate::contact::normal::gap::patch_grid::{GapOutcome, PatchGrid};
+use crate::contact::normal::gap::grid::{
+    GapOutcome, NormalAnswer, NormalError, NormalWork, PatchGrid, squares,
+};
 use crate::contact::normal::gap::task::GapTask;
 use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::normal::pressure_field::grid_pressure::GridPressure;

@@ -9,16 +9,14 @@ use std::ops::Range;
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::gap::answer::{NormalError, edge_reached};
 use crate::contact::normal::gap::conjugate_gradients::{
     PressureAnswer, PressureTask, solve_pressure,
 };
-use crate::contact::normal::gap::constants::{
-    APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, NEAR, PRESSURE_CHANGE, REFINEMENT,
+use crate::contact::normal::gap::coupling::TilesInfluence;
+use crate::contact::normal::gap::grid::{
+    APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, GapOutcome, GridFineness, GridsExit, NEAR,
+    NormalError, PRESSURE_CHANGE, PatchGrid, PressureGrid, REFINEMENT, edge_reached, within,
 };
-use crate::contact::normal::gap::grid::{GridFineness, PressureGrid, within};
-use crate::contact::normal::gap::patch_grid::{GapOutcome, GridsExit, PatchGrid};
-use crate::contact::normal::gap::patch_grid_influence::TilesInfluence;
 use crate::contact::normal::gap::task::GapTask;
 
 /// More grids than this are not coupled: such a gap is rough, not a few patches of different size.

@@ -6,18 +6,16 @@
 
 use crate::contact::half_space::grid_operator::GridWorkspace;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::gap::answer::{NormalAnswer, NormalError, edge_reached, no_touch};
 use crate::contact::normal::gap::conjugate_gradients::{
     PressureAnswer, PressureTask, solve_pressure,
 };
-use crate::contact::normal::gap::constants::{
-    APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, LEVEL_BEYOND, LOOSE_POWER, NEAR, PRESSURE_CHANGE,
-    REFINEMENT, RESOLUTION, TARGET_POWER, TARGET_USUAL, TARGETS_LOOSE, TOLERANCE_FIRST,
+use crate::contact::normal::gap::grid::{
+    APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, GapOutcome, GridFineness, GridSide, GridsExit,
+    LEVEL_BEYOND, LOOSE_POWER, NEAR, NormalAnswer, NormalError, PRESSURE_CHANGE, PatchGrid,
+    PressureGrid, REFINEMENT, RESOLUTION, TARGET_POWER, TARGET_USUAL, TARGETS_LOOSE,
+    TOLERANCE_FIRST, edge_reached, no_touch,
 };
-use crate::contact::normal::gap::grid::{GridFineness, GridSide, PressureGrid};
-use crate::contact::normal::gap::patch_grid::{GapOutcome, GridsExit, PatchGrid};
-use crate::contact::normal::gap::search_box::{SearchBox, reach_of_level};
-use crate::contact::normal::gap::task::GapTask;
+use crate::contact::normal::gap::task::{GapTask, SearchBox, reach_of_level};
 use crate::contact::normal::hertz::NormalLoad;
 
 impl GapTask {

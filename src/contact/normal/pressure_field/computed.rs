@@ -1,8 +1,8 @@
 //! Fields from pressures computed on equal cells, and their mirror symmetry about y = 0.
 
-use crate::contact::normal::pressure_field::components::NOWHERE;
-use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal::pressure_field::sample_grid::{PADDING, SampleGrid, padded};
+use crate::contact::normal::pressure_field::grid_pressure::{
+    GridPressure, NOWHERE, PADDING, SampleGrid, padded,
+};
 
 impl GridPressure {
     /// The field of a pressure computed on equal cells with the centres `(x[i], y[j])` in mm, stored at

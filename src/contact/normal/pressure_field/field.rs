@@ -1,10 +1,8 @@
 //! The pressure of a whole contact: on one grid, or on a grid per patch where patches differ much in size.
 
-use crate::contact::mesh::strips::Chord;
-use crate::contact::normal::patch::Patch;
-use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal::pressure_field::jump::Jump;
-use crate::contact::normal::pressure_field::sample_grid::PATCHES_MAX;
+use crate::contact::mesh::Chord;
+use crate::contact::normal::hertz::Patch;
+use crate::contact::normal::pressure_field::grid_pressure::{GridPressure, Jump, PATCHES_MAX};
 use crate::contact::remark::entry::RemarkEntry;
 
 /// Pressures on one grid or several, and the patches they form.

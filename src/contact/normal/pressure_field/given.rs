@@ -7,17 +7,14 @@
 
 use std::ops::RangeInclusive;
 
-use crate::contact::mesh::strips::Chord;
-use crate::contact::normal::patch::Patch;
-use crate::contact::normal::pressure_field::components::NOWHERE;
-use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
+use crate::contact::mesh::Chord;
+use crate::contact::normal::hertz::Patch;
+use crate::contact::normal::pressure_field::grid_pressure::{
+    GridPressure, NOWHERE, PADDING, PATCHES_MAX, PatchShape, SampleGrid, padded,
+};
 use crate::contact::normal::pressure_field::level_set::State;
 use crate::contact::normal::pressure_field::line::GridLine;
-use crate::contact::normal::pressure_field::patch_cells::PatchShape;
-use crate::contact::normal::pressure_field::sample_grid::{
-    PADDING, PATCHES_MAX, SampleGrid, padded,
-};
-use crate::contact::normal::pressure_field::{components, level_set, line};
+use crate::contact::normal::pressure_field::{grid_pressure, level_set, line};
 use crate::contact::numerics::cubic::{interval, weights};
 use crate::contact::numerics::quadrature::{GaussPoints, integral};
 use crate::contact::remark::entry::RemarkEntry;
@@ -98,10 +95,10 @@ impl GridPressure {
         q: Vec<f64>,
         pressure_max: f64,
     ) -> Result<(GridPressure, Vec<u8>), String> {
-        let (samples, count) = components::label_samples(&grid, &q).map_err(|count| {
+        let (samples, count) = grid_pressure::label_samples(&grid, &q).map_err(|count| {
             format!("{count} separate patches found; at most {PATCHES_MAX} are allowed")
         })?;
-        let cells = components::label_cells(&grid, &samples);
+        let cells = grid_pressure::label_cells(&grid, &samples);
         let mut field = GridPressure {
             grid,
             q,

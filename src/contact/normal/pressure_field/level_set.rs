@@ -4,8 +4,8 @@
 //! distance. Samples outside the contact, where only `p = 0` is known, therefore get negative values extrapolated from
 //! inside. For Hertz's pressure q is a quadratic function and the continuation is exact.
 
-use crate::contact::normal::pressure_field::sample_grid::SampleGrid;
-use crate::contact::numerics::lagrange;
+use crate::contact::normal::pressure_field::grid_pressure::SampleGrid;
+use crate::contact::numerics::interpolation;
 
 /// Number of samples outside that get an extrapolated value, counted from the nearest one inside along either axis.
 const RINGS: usize = 3;
@@ -101,7 +101,7 @@ fn parabola_weights(axis: &[f64]) -> Vec<ParabolaWeights> {
     let of = |at: usize, nodes: [Option<usize>; 3]| {
         let nodes = nodes.map(|node| axis.get(node?).copied());
         match nodes {
-            [Some(a), Some(b), Some(c)] => lagrange::weights(&[a, b, c], axis[at]),
+            [Some(a), Some(b), Some(c)] => interpolation::polynomial_weights(&[a, b, c], axis[at]),
             _ => [0.0; 3],
         }
     };
@@ -161,7 +161,7 @@ fn continued(
                 let [wa, wb, wc] = parabola;
                 wa * a + wb * b + wc * c
             }
-            _ => lagrange::value(&known[..order], axis[at]),
+            _ => interpolation::polynomial_value(&known[..order], axis[at]),
         };
         let known = &known[..order];
         let nearest = states[k.wrapping_add_signed(sign * stride)];
@@ -200,7 +200,7 @@ fn edge_value(at: f64, inside: &[(f64, f64)], value: f64) -> (f64, State) {
             },
         );
     }
-    let value = value.min(lagrange::value(&inside[..2], at));
+    let value = value.min(interpolation::polynomial_value(&inside[..2], at));
     if value <= EDGE_AT_SAMPLE * last {
         return (value.min(0.0), State::Rough);
     }
@@ -247,8 +247,9 @@ mod tests {
 
     #[test]
     fn the_edge_stays_between_inside_and_outside() {
-        let edge_value =
-            |at: f64, inside: &[(f64, f64)]| edge_value(at, inside, lagrange::value(inside, at));
+        let edge_value = |at: f64, inside: &[(f64, f64)]| {
+            edge_value(at, inside, interpolation::polynomial_value(inside, at))
+        };
         let last = 0.5;
         for next in [0.0, 0.2, 0.5, 0.6, 1.0, 5.0] {
             let (value, _) = edge_value(2.0, &[(1.0, last), (0.0, next)]);

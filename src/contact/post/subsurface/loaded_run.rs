@@ -3,12 +3,11 @@
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
-use crate::contact::half_space::point_loads::{LANES, LoadPack};
-use crate::contact::mesh::strips::{Chord, Segment};
+use crate::contact::half_space::kernels::{LANES, LoadPack};
+use crate::contact::mesh::{Chord, Segment};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::numerics::quadrature::RULES;
-use crate::contact::post::subsurface::load_parts::LoadPart;
-use crate::contact::post::subsurface::seen_parts::{ORDERS, PartBox};
+use crate::contact::post::subsurface::load_parts::{LoadPart, ORDERS, PartBox};
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::strip_mesh::StripMesh;
 

@@ -1,10 +1,8 @@
 //! Stresses below the surface: tensors at chosen points, the worst point of a patch, and what a passage of the contact does.
 
-pub mod enclosing_ball;
 pub mod load_parts;
 pub(crate) mod loaded_run;
 pub mod passage;
-pub mod seen_parts;
 pub mod states;
 pub mod surface_load;
 pub mod worst;

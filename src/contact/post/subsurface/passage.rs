@@ -11,9 +11,9 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
-use crate::contact::half_space::point_loads::Stress;
-use crate::contact::post::subsurface::enclosing_ball::{Deviator, enclosing_ball};
+use crate::contact::half_space::kernels::Stress;
 use crate::contact::post::subsurface::states::principal;
+use crate::contact::post::subsurface::worst::{Deviator, enclosing_ball};
 
 /// Weights of points that hold the ball, from which on the places beside them are looked at. Chosen by judgement.
 const HOLDING: f64 = 0.02;
@@ -34,7 +34,7 @@ pub struct PassageValue {
     pub stress: f64,
     /// States that decide it.
     pub deciding: Vec<usize>,
-    /// What is left of the search for the smallest ball: see [`EnclosingBall`](crate::contact::post::subsurface::enclosing_ball::EnclosingBall).
+    /// What is left of the search for the smallest ball: see [`EnclosingBall`](crate::contact::post::subsurface::worst::EnclosingBall).
     pub gap: f64,
 }
 

@@ -1,7 +1,7 @@
 //! From a stress tensor to what is read off it.
 
-use crate::contact::half_space::point_loads::Stress;
-use crate::contact::solution::words::maintenance::{StressPoint, StressTensor};
+use crate::contact::half_space::kernels::Stress;
+use crate::contact::solution::words::evolution::{StressPoint, StressTensor};
 
 /// Numbers that a stored point has: `x, y, depth`, then the stress in axes of the patch.
 pub const STORED: usize = 9;

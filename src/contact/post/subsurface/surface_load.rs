@@ -9,15 +9,14 @@
 
 use std::ops::Range;
 
-use crate::contact::half_space::point_loads::{LANES, Lanes, LoadPack, Stress, stresses};
-use crate::contact::mesh::strips::{Chord, Segment};
+use crate::contact::half_space::kernels::{LANES, Lanes, LoadPack, Stress, stresses};
+use crate::contact::mesh::{Chord, Segment};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::numerics::quadrature::RULES;
-use crate::contact::post::subsurface::load_parts::{LoadPart, LoadParts};
-use crate::contact::post::subsurface::loaded_run::{KnownLines, LoadedRun};
-use crate::contact::post::subsurface::seen_parts::{
-    LoadResolution, ORDERS, PartBox, PartCodes, look, orders,
+use crate::contact::post::subsurface::load_parts::{
+    LoadPart, LoadParts, LoadResolution, ORDERS, PartBox, PartCodes, look, orders,
 };
+use crate::contact::post::subsurface::loaded_run::{KnownLines, LoadedRun};
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::strip_mesh::StripMesh;
 

@@ -1,9 +1,16 @@
 //! The worst point of a patch: where von Mises' stress is largest.
 //!
 //! A scan of columns at several depths, then from the three best that lie apart a search by steps in `(x/a, y/b, ln depth)`.
+//!
+//! The smallest ball about stress deviators, as the fatigue criterion of Dang Van and the theorem of Melan ask for it.
+//!
+//! A deviator is a point of five coordinates, whose distances are those of the tensors. The centre may be free in the first of
+//! them only and is 0 in the others. The dual problem, the largest mean square distance to their own mean that weights of the points
+//! give, is solved by steps towards the farthest and away from the nearest point (Yildirim 2008, Two algorithms for the minimum
+//! enclosing ball problem); primal and dual bound the radius from both sides.
 
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::post::subsurface::seen_parts::LoadResolution;
+use crate::contact::post::subsurface::load_parts::LoadResolution;
 use crate::contact::post::subsurface::states::von_mises;
 use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 
@@ -146,6 +153,95 @@ fn search_from(
     best
 }
 
+/// A deviator in coordinates of which the sum of squares is that of the tensor's components.
+pub type Deviator = [f64; 5];
+
+/// Relative distance of primal and dual, in squares of the radius, and most steps. Chosen by judgement.
+pub(crate) const GAP: f64 = 1e-6;
+const STEPS_MAX: usize = 2000;
+
+/// A ball about points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnclosingBall {
+    /// Its centre.
+    pub centre: Deviator,
+    /// Its radius: no point is farther.
+    pub radius: f64,
+    /// Relative distance of primal and dual in squares of the radius: no ball is smaller by more than half of it. Above [`GAP`] the steps were
+    /// used up.
+    pub gap: f64,
+    /// Weights of the points; those on the sphere that hold the ball have one.
+    pub weights: Vec<f64>,
+}
+
+/// The smallest ball whose centre has only the first `free` coordinates. Without points it is a point.
+#[must_use]
+pub fn enclosing_ball(points: &[Deviator], free: usize) -> EnclosingBall {
+    ball_within(points, free, STEPS_MAX)
+}
+
+/// The same with so many steps at most.
+fn ball_within(points: &[Deviator], free: usize, steps_max: usize) -> EnclosingBall {
+    let mut ball = EnclosingBall {
+        centre: [0.0; 5],
+        radius: 0.0,
+        gap: 0.0,
+        weights: vec![0.0; points.len()],
+    };
+    if points.is_empty() {
+        return ball;
+    }
+    ball.weights[0] = 1.0;
+    ball.centre[..free].copy_from_slice(&points[0][..free]);
+    for step in 0..=steps_max {
+        let apart = |k: usize| squared(&points[k], &ball.centre, 5);
+        let distances: Vec<f64> = (0..points.len()).map(apart).collect();
+        let held = |k: &usize| ball.weights[*k] > 0.0;
+        let by = |a: &usize, b: &usize| distances[*a].total_cmp(&distances[*b]);
+        let far = (0..points.len()).max_by(by).unwrap_or(0);
+        let near = (0..points.len()).filter(held).min_by(by).unwrap_or(far);
+        let mean: f64 = (distances.iter().zip(&ball.weights))
+            .map(|(distance, weight)| distance * weight)
+            .sum();
+        ball.radius = distances[far].sqrt();
+        ball.gap = if distances[far] > 0.0 {
+            (distances[far] - mean) / distances[far]
+        } else {
+            0.0
+        };
+        if ball.gap <= GAP || step == steps_max {
+            break;
+        }
+        let forward = distances[far] - mean >= mean - distances[near];
+        let k = if forward { far } else { near };
+        let gain = (distances[k] - mean).abs();
+        let best = 0.5 * gain / squared(&points[k], &ball.centre, free);
+        let share = if forward {
+            best.min(1.0)
+        } else {
+            -best.min(ball.weights[k] / (1.0 - ball.weights[k]))
+        };
+        let removed = !forward && -share < best;
+        for weight in &mut ball.weights {
+            *weight *= 1.0 - share;
+        }
+        ball.weights[k] = if removed {
+            0.0
+        } else {
+            ball.weights[k] + share
+        };
+        for (centre, point) in ball.centre[..free].iter_mut().zip(points[k]) {
+            *centre += share * (point - *centre);
+        }
+    }
+    ball
+}
+
+/// Squared distance in the first coordinates.
+fn squared(point: &Deviator, centre: &Deviator, first: usize) -> f64 {
+    (0..first).map(|c| (point[c] - centre[c]).powi(2)).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -160,5 +256,72 @@ mod tests {
         let heights = |all: &[[f64; 3]]| all.iter().map(|at| height(*at)).collect();
         let (found, at) = search_from([0.2, 0.0, -0.7], heights);
         assert!(found > 5.0 - 1e-3, "{found} at {at:?}");
+    }
+}
+
+#[cfg(test)]
+mod enclosing_ball_tests {
+    use super::*;
+
+    #[test]
+    fn a_simplex_has_its_circumscribed_ball_and_a_fixed_coordinate_stays() {
+        let corners: Vec<Deviator> = (0..5)
+            .map(|k| std::array::from_fn(|c| if c == k { 2.0 } else { 0.0 }))
+            .collect();
+        let ball = enclosing_ball(&corners, 5);
+        // Centre 2/5 in each coordinate: (8/5)² + 4 (2/5)² = 16/5.
+        assert!((ball.radius - 3.2_f64.sqrt()).abs() < 2e-6, "{ball:?}");
+        // The centre is free in the first coordinate: 0 and 4 along it, 3 beside it at 2.
+        let points = [
+            [0.0; 5],
+            [4.0, 0.0, 0.0, 0.0, 0.0],
+            [2.0, 3.0, 0.0, 0.0, 0.0],
+        ];
+        let ball = enclosing_ball(&points, 1);
+        assert!((ball.radius - 3.0).abs() < 1e-5 && (ball.centre[0] - 2.0).abs() < 1e-2);
+        assert_eq!(ball.centre[1..], [0.0; 4]);
+    }
+
+    #[test]
+    fn a_ball_whose_steps_are_used_up_says_by_how_much_it_may_be_too_large() {
+        let points: Vec<Deviator> = (0..40)
+            .map(|k| std::array::from_fn(|c| (1.3 * f64::from(k) + c as f64).sin()))
+            .collect();
+        let exact = enclosing_ball(&points, 5);
+        assert!(exact.gap <= GAP, "{exact:?}");
+        for steps in [0, 1, 3, 10] {
+            let ball = ball_within(&points, 5, steps);
+            let too_large = ball.radius / exact.radius - 1.0;
+            assert!(ball.gap > GAP, "{steps}: {ball:?}");
+            assert!(too_large >= -GAP, "{steps}: {too_large}");
+            // Squares: the dual is below that of the best.
+            let least = ball.radius * (1.0 - ball.gap).max(0.0).sqrt();
+            assert!(least <= exact.radius * (1.0 + GAP), "{steps}: {ball:?}");
+        }
+    }
+
+    #[test]
+    fn no_centre_is_better_than_the_one_found() {
+        let mut seed = 7_u64;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        for free in 1..=5 {
+            let points: Vec<Deviator> = (0..60).map(|_| std::array::from_fn(|_| draw())).collect();
+            let ball = enclosing_ball(&points, free);
+            let reach = |centre: &Deviator| {
+                let all = points.iter().map(|p| squared(p, centre, 5));
+                all.fold(0.0, f64::max).sqrt()
+            };
+            assert!((reach(&ball.centre) - ball.radius).abs() < 1e-12);
+            for _ in 0..200 {
+                let mut centre = ball.centre;
+                for value in &mut centre[..free] {
+                    *value += 0.02 * draw();
+                }
+                assert!(reach(&centre) > ball.radius * (1.0 - 1e-6), "{free}");
+            }
+        }
     }
 }

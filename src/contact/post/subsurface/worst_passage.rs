@@ -4,15 +4,14 @@
 
 use std::ops::ControlFlow;
 
-use crate::contact::half_space::point_loads::Stress;
+use crate::contact::half_space::kernels::Stress;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
+use crate::contact::post::subsurface::load_parts::LoadResolution;
 use crate::contact::post::subsurface::passage::{PassageMeasure, judge};
-use crate::contact::post::subsurface::seen_parts::LoadResolution;
-use crate::contact::post::subsurface::states::PassageTask;
-use crate::contact::post::subsurface::states::von_mises;
+use crate::contact::post::subsurface::states::{PassageTask, von_mises};
 use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
-use crate::contact::solution::words::maintenance::{PassagePlace, PassageSummary};
+use crate::contact::solution::words::evolution::{PassagePlace, PassageSummary};
 
 // The numbers below are chosen by judgement; `cargo test --test physics -- shakes_down` holds what they give against closed forms.
 
@@ -49,7 +48,7 @@ pub struct PassagesOf<'a> {
 pub struct JudgedPassage {
     /// The worst of the passages.
     pub summary: PassageSummary,
-    /// The largest gap of the balls on the worst lines, see [`enclosing_ball`](crate::contact::post::subsurface::enclosing_ball).
+    /// The largest gap of the balls on the worst lines, see [`enclosing_ball`](crate::contact::post::subsurface::worst).
     pub gap: f64,
 }
 

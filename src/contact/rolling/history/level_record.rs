@@ -1,14 +1,11 @@
 //! What a step has done: friction work, elastic energy, and the record of a point.
 
 use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::rolling::answer::project_on_bound;
+use crate::contact::rolling::answer::{Resultants, project_on_bound};
 use crate::contact::rolling::history::level_run::LevelRun;
-use crate::contact::rolling::history::plan::{StepKind, weights};
-use crate::contact::rolling::history::record::PointRecord;
-use crate::contact::rolling::history::step_equations::StepEquations;
-use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::resultants::Resultants;
+use crate::contact::rolling::history::plan::{PointRecord, StepEquations, StepKind, weights};
 use crate::contact::rolling::slip_equations::SlipSource;
+use crate::contact::rolling::task::Motion;
 
 impl LevelRun<'_> {
     /// Adds what friction has dissipated in a step that began with the tractions `from`: what the motion has given less what is stored.

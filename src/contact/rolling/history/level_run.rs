@@ -6,27 +6,25 @@ use std::sync::Arc;
 use crate::contact::friction::coefficient_table::AlongLaw;
 use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::mesh::strips::Mesh;
+use crate::contact::mesh::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::answer::{LevelFailure, Work};
 use crate::contact::rolling::displacement_memory::LeadingEdges;
-use crate::contact::rolling::history::plan::{HistoryStep, StepKind, steps, weights};
-use crate::contact::rolling::history::record::PointRecord;
-use crate::contact::rolling::history::search::StepSearch;
-use crate::contact::rolling::history::step_equations::{StepEquations, memory, steady};
-use crate::contact::rolling::history::task::HistoryTask;
+use crate::contact::rolling::history::plan::{
+    HistoryStep, HistoryTask, PointRecord, StepEquations, StepKind, StepSearch, memory, steady,
+    steps, weights,
+};
 use crate::contact::rolling::methods::boundary_element::fixed_point::slide_along;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, NewtonTask, STEPS_MAX,
 };
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::motion::{Motion, PrescribedForces};
 use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::task::{Motion, PrescribedForces, RollingTask};
 
 /// Tangential stiffness of a circular patch over shear modulus and radius, for the first trial of a force: 4/(2 − ν) of both bodies together
 /// (Mindlin 1949). Later trials take what was found.

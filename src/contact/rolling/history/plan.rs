@@ -2,8 +2,25 @@
 //!
 //! Each step is a backward difference of second order in the displacements (BDF2) with the weights for unequal steps (Hairer, Nørsett &
 //! Wanner 1993, §III.5), or of first order where no step was before it.
+//!
+//! The slip equations of the steps of one kind.
+//!
+//! What a history asks beside its motions and forces.
+//!
+//! What is kept of a point of a history.
+//!
+//! Which displacements in a step give the forces that were asked for? Newton's iteration with Broyden's update of the stiffness, which is
+//! kept from step to step.
 
-use crate::contact::rolling::history::task::{HistoryStart, HistoryTask};
+use crate::contact::half_space::strip_operator::kind::Parity;
+use crate::contact::rolling::answer::{Resultants, Work};
+use crate::contact::rolling::displacement_memory::{DisplacementMemory, LeadingEdges};
+use crate::contact::rolling::methods::boundary_element::newton::Newton;
+use crate::contact::rolling::operator_store::LevelOperator;
+use crate::contact::rolling::slip_equations::SlipEquations;
+use crate::contact::rolling::slip_rules::Rule;
+use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::task::Motion;
 
 /// A step may be longer than the one before by this factor at most; BDF2 is stable up to 1 + √2.
 const GROWTH_MAX: f64 = 2.0;
@@ -167,10 +184,220 @@ pub fn steps(history: &HistoryTask, longest: f64, forced: bool) -> Vec<HistorySt
     steps
 }
 
+/// Equations of steps of one kind.
+pub(super) struct StepEquations<'e> {
+    pub(super) kind: StepKind,
+    pub(super) equations: &'e SlipEquations<'e>,
+    pub(super) newton: &'e Newton<'e>,
+}
+
+/// How the displacements enter the slip of a step of this kind, for a unit of length in mm.
+pub(super) fn memory(kind: StepKind, edges: &LeadingEdges, unit: f64) -> DisplacementMemory<'_> {
+    let (factor, rolls) = match kind {
+        StepKind::Steady => (0.0, true),
+        StepKind::Shift => (1.0, false),
+        StepKind::Press => (PRESS_WEIGHTS[0], false),
+        StepKind::Roll { distance, growth } => (weights(growth)[0] * unit / distance, true),
+    };
+    DisplacementMemory {
+        edges,
+        factor,
+        rolls,
+    }
+}
+
+/// Equations of steady rolling by a rule.
+pub(super) fn steady<'e>(
+    rule: Rule,
+    (level, operator, parity): (&StripMesh, &'e LevelOperator, Option<Parity>),
+) -> SlipEquations<'e> {
+    SlipEquations::new(rule, &level.normalised, &operator.influence, parity)
+        .with_layer(&level.normalised, level.layer)
+}
+
+/// The state at the distance 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum HistoryStart {
+    /// No tangential tractions: the bodies were just pressed together.
+    #[default]
+    Rest,
+    /// Steady rolling with the first motion.
+    Steady,
+    /// Pressed together under friction, without rolling.
+    Pressed,
+}
+
+/// A sequence of motions in the distance rolled; creepages, spin and forces change linearly between them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct HistoryTask {
+    /// Where it begins.
+    pub start: HistoryStart,
+    /// Distance rolled since the start in mm, motion by motion, never less than the one before. Where it is the same as before, or 0 at
+    /// first, the bodies do not roll: they are shifted.
+    pub distances: Vec<f64>,
+    /// Displacements of the upper body against the lower one at these points, in mm and rad; a component is found where its force is
+    /// prescribed.
+    pub shifts: Vec<Motion>,
+}
+
+impl HistoryTask {
+    /// Is pressing all that is asked for?
+    #[must_use]
+    pub fn only_presses(&self) -> bool {
+        self.start == HistoryStart::Pressed
+            && self.distances == [0.0]
+            && self.shifts == [Motion::default()]
+    }
+
+    /// Distance rolled from the point before to point `index`; 0 of a shift.
+    #[must_use]
+    pub fn rolled(&self, index: usize) -> f64 {
+        let before = index.checked_sub(1).map_or(0.0, |k| self.distances[k]);
+        self.distances[index] - before
+    }
+}
+
+/// A solved point of a history on one level.
+#[derive(Debug, Clone, Default)]
+pub struct PointRecord {
+    /// Creepages and spin, in the units of the case; found where forces are prescribed.
+    pub motion: Motion,
+    /// The shift that led here without rolling, in mm and rad.
+    pub shift: Motion,
+    /// Resultants of every patch about the origin of the case.
+    pub resultants: Vec<Resultants>,
+    /// Power of friction of every patch over the rolling speed, in N; 0 of a shift.
+    pub power: Vec<f64>,
+    /// What friction has dissipated since the start, of every patch, in N·mm.
+    pub dissipated: Vec<f64>,
+    /// Sum of the lengths of all tractions over the friction limit.
+    pub carried: f64,
+    /// Elastic energy of all tangential displacements in N·mm.
+    pub elastic: f64,
+    /// Tractions, slips, and which cells slip, dimensionless on the level.
+    pub traction: [Vec<f64>; 2],
+    /// See [`PointRecord::traction`].
+    pub slip: [Vec<f64>; 2],
+    /// See [`PointRecord::traction`].
+    pub slips: Vec<bool>,
+    /// A prescribed force could not be reached.
+    pub saturated: bool,
+    /// Work since the point before.
+    pub work: Work,
+}
+
+/// Trials in one step. A few are usual.
+const TRIALS_MAX: u32 = 40;
+/// Longest step of a component, in units of what its stiffness asks for at the friction limit.
+const STRIDE_MAX: f64 = 1.5;
+
+/// How a search ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FoundStep {
+    /// The components.
+    pub(crate) place: [f64; 2],
+    /// How far the forces are from those asked for, relative to the friction limit.
+    pub(crate) off: f64,
+}
+
+/// The search for the components that are prescribed by forces.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StepSearch {
+    /// Which components are searched.
+    pub(crate) searched: [bool; 2],
+    /// Change of the components per change of the forces over the friction limit.
+    pub(crate) compliance: [[f64; 2]; 2],
+    /// Largest change of a component in one trial.
+    stride: [f64; 2],
+}
+
+impl StepSearch {
+    /// A search with a compliance to begin with.
+    pub(crate) fn new(searched: [bool; 2], compliance: [f64; 2]) -> StepSearch {
+        StepSearch {
+            searched,
+            compliance: [[compliance[0], 0.0], [0.0, compliance[1]]],
+            stride: compliance.map(|c| STRIDE_MAX * c.abs()),
+        }
+    }
+
+    /// Finds where `off` is below `tolerance`; `off` gives the forces less those asked for.
+    pub(crate) fn find<E>(
+        &mut self,
+        start: [f64; 2],
+        tolerance: f64,
+        mut off: impl FnMut([f64; 2]) -> Result<[f64; 2], E>,
+    ) -> Result<FoundStep, E> {
+        let searched = self.searched;
+        let masked = |values: [f64; 2]| [0, 1].map(|k| if searched[k] { values[k] } else { 0.0 });
+        let mut place = start;
+        let mut residual = masked(off(place)?);
+        let mut best = (length(residual), place);
+        let initial = self.compliance;
+        for trial in 0..TRIALS_MAX {
+            if best.0 <= tolerance {
+                break;
+            }
+            let mut step = masked([0, 1].map(|i| {
+                let row = self.compliance[i];
+                let wanted = -(row[0] * residual[0] + row[1] * residual[1]);
+                wanted.clamp(-self.stride[i], self.stride[i])
+            }));
+            if trial > 12 {
+                // Smaller steps from the best place.
+                place = best.1;
+                residual = masked(off(place)?);
+                step = step.map(|s| s * 0.5_f64.powi(trial as i32 / 6 - 1));
+            }
+            let next = [0, 1].map(|k| place[k] + step[k]);
+            let found = masked(off(next)?);
+            let change = [found[0] - residual[0], found[1] - residual[1]];
+            self.update(step, change, initial);
+            (place, residual) = (next, found);
+            if length(residual) < best.0 {
+                best = (length(residual), place);
+            }
+        }
+        if length(residual) > best.0 {
+            residual = masked(off(best.1)?);
+        }
+        Ok(FoundStep {
+            place: best.1,
+            off: length(residual),
+        })
+    }
+
+    /// Broyden's update of the compliance; one that loses its sign or its size is taken back.
+    fn update(&mut self, step: [f64; 2], change: [f64; 2], initial: [[f64; 2]; 2]) {
+        let moved = self.compliance.map(|[a, b]| a * change[0] + b * change[1]);
+        let denominator = step[0] * moved[0] + step[1] * moved[1];
+        let size = step[0] * step[0] + step[1] * step[1];
+        if denominator.abs() <= 1e-3 * size {
+            return;
+        }
+        let row = [0, 1].map(|j| step[0] * self.compliance[0][j] + step[1] * self.compliance[1][j]);
+        for i in 0..2 {
+            for (entry, row) in self.compliance[i].iter_mut().zip(row) {
+                *entry += (step[i] - moved[i]) * row / denominator;
+            }
+        }
+        for k in 0..2 {
+            if self.searched[k] && self.compliance[k][k] <= 1e-3 * initial[k][k] {
+                self.compliance = initial;
+                return;
+            }
+        }
+    }
+}
+
+fn length([x, y]: [f64; 2]) -> f64 {
+    x.hypot(y)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::rolling::motion::Motion;
+    use crate::contact::rolling::task::Motion;
 
     fn history(distances: &[f64]) -> HistoryTask {
         HistoryTask {

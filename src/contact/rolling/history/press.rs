@@ -3,17 +3,20 @@
 //! A step lets the patch grow by the factor ρ. Slip over it is minus the change of the displacements U at a fixed place, of which the
 //! backward difference of second order in the logarithm of the size is `3/2 U(x) − 2 ρ⁻² U(ρx) + 1/2 ρ⁻⁴ U(ρ²x)`. Steps are taken until the tractions are the scaled
 //! copy of those before; what the first of them began with is then forgotten.
+//!
+//! How the steps of a run take part in friction that falls with slip.
 
 use std::ops::ControlFlow;
 
+use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::half_space::unlike_bodies::displacement;
 use crate::contact::rolling::answer::LevelFailure;
 use crate::contact::rolling::history::level_run::LevelRun;
-use crate::contact::rolling::history::plan::PRESS_WEIGHTS;
+use crate::contact::rolling::history::plan::{PRESS_WEIGHTS, StepEquations, StepKind};
 use crate::contact::rolling::history::self_similar::{PressedPair, PressedState, SelfSimilarState};
-use crate::contact::rolling::history::step_equations::StepEquations;
-use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::slip_equations::SlipScratch;
+use crate::contact::rolling::methods::boundary_element::newton::Newton;
+use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
+use crate::contact::rolling::task::Motion;
 
 // The numbers below were chosen on the three contacts of `tests/physics/pressing.rs`; what others give was not measured.
 
@@ -159,5 +162,44 @@ fn add(sum: &mut [Vec<f64>; 2], values: &[Vec<f64>; 2], weight: f64) {
         sum.iter_mut()
             .zip(values)
             .for_each(|(sum, value)| *sum += weight * value);
+    }
+}
+
+impl LevelRun<'_> {
+    /// The fall that a step follows at once.
+    pub(super) fn fall(&self, kind: StepKind) -> Option<Softening> {
+        self.slip_friction.as_ref()?.at_once(kind)
+    }
+
+    /// A solver of such a step.
+    pub(super) fn newton<'e>(
+        &self,
+        kind: StepKind,
+        equations: &'e SlipEquations<'e>,
+    ) -> Newton<'e> {
+        let newton = Newton::new(equations);
+        match self.fall(kind) {
+            Some(fall) => newton.falling(&self.bound, &fall),
+            None => newton,
+        }
+    }
+
+    /// Lets bounds that fall with slip follow the slips of a step.
+    pub(super) fn follow_slips(&mut self, of: &StepEquations) {
+        let Some(friction) = &mut self.slip_friction else {
+            return;
+        };
+        let slip = self.workspace.slip();
+        let half = slip.len() / 2;
+        let slides = |i: usize| of.newton.slips(&self.bound, &self.state.tractions, slip, i);
+        let size = |i: usize| match slides(i) {
+            true => slip[i].hypot(slip[half + i]),
+            false => 0.0,
+        };
+        let sizes: Vec<f64> = (0..self.cells).map(size).collect();
+        friction.follow(of.kind, &sizes);
+        if of.kind == StepKind::Steady {
+            self.bound.copy_from_slice(friction.settled());
+        }
     }
 }

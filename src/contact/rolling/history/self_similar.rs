@@ -6,8 +6,8 @@
 
 use crate::contact::half_space::kernels::{Rectangle, rectangle};
 use crate::contact::half_space::unlike_bodies::displacement;
-use crate::contact::mesh::strips::Mesh;
-use crate::contact::numerics::lagrange;
+use crate::contact::mesh::Mesh;
+use crate::contact::numerics::interpolation;
 
 /// What the displacements of a state depend on, over all cells of a dimensionless mesh.
 #[derive(Debug, Clone, Default)]
@@ -144,7 +144,7 @@ fn around(mesh: &Mesh, [x, y]: [f64; 2]) -> Option<Vec<(usize, f64)>> {
         // Near the edge strips are followed at the same part of their half-length, which is that at the place.
         let half = |j: usize| 0.5 * (mesh.segments[j].chord.right - mesh.segments[j].chord.left);
         let squares = strips.map(|j| half(j) * half(j));
-        let weights = lagrange::weights(&nodes, y);
+        let weights = interpolation::polynomial_weights(&nodes, y);
         let square: f64 = weights.iter().zip(squares).map(|(w, s)| w * s).sum();
         let middle: f64 = weights
             .iter()
@@ -160,7 +160,7 @@ fn around(mesh: &Mesh, [x, y]: [f64; 2]) -> Option<Vec<(usize, f64)>> {
         }
         places = [place; 4];
     }
-    let across = lagrange::weights(&nodes, y);
+    let across = interpolation::polynomial_weights(&nodes, y);
     let mut weights = Vec::with_capacity(16);
     for (k, j) in strips.into_iter().enumerate() {
         for (i, weight) in along(mesh, j, places[k])? {
@@ -187,7 +187,7 @@ fn along(mesh: &Mesh, j: usize, place: f64) -> Option<[(usize, f64); 4]> {
     let above = mesh.node[cells.clone()].partition_point(|x| angle(*x) < at);
     let from = cells.start + above.saturating_sub(2).min(cells.len() - 4);
     let nodes: [f64; 4] = std::array::from_fn(|k| angle(mesh.node[from + k]));
-    let weights = lagrange::weights(&nodes, at);
+    let weights = interpolation::polynomial_weights(&nodes, at);
     Some(std::array::from_fn(|k| (from + k, weights[k])))
 }
 

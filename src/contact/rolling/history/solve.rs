@@ -1,22 +1,19 @@
 //! A history on finer and finer levels until two in a row agree.
 
 use crate::contact::error::SolveError;
-use crate::contact::mesh::strips::MeshSize;
+use crate::contact::mesh::MeshSize;
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::remark::kind::short;
-use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome, Work};
+use crate::contact::rolling::answer::{
+    HistoryAnswer, LevelAnswer, LevelOutcome, MotionAnswer, Resultants, SolvedFields, Work,
+};
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan;
-use crate::contact::rolling::history::record::PointRecord;
+use crate::contact::rolling::history::plan::{HistoryStart, HistoryTask, PointRecord};
 use crate::contact::rolling::history::self_similar::SelfSimilarState;
-use crate::contact::rolling::history::task::{HistoryStart, HistoryTask};
-use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::motion_answer::{HistoryAnswer, MotionAnswer, SolvedFields};
+use crate::contact::rolling::refinement::interpolate::RefinementState;
 use crate::contact::rolling::refinement::on_mesh::named;
-use crate::contact::rolling::refinement::state::RefinementState;
-use crate::contact::rolling::resolution::Resolution;
-use crate::contact::rolling::resultants::Resultants;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::task::{Motion, Resolution, RollingTask};
 
 // The numbers below are from the four histories of CONTACT in `tests/data/transient.json`, on meshes from 6 × 12 to 24 × 48 with steps of
 // a/5 to a/32, a half the length (`cargo test --test physics -- histories_agree --nocapture` prints what comes of them).

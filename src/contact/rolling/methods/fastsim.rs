@@ -10,20 +10,17 @@ use std::f64::consts::PI;
 use crate::contact::error::SolveError;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::friction::path_dependent::Interface;
-use crate::contact::half_space::elasticity::Elasticity;
-use crate::contact::mesh::strips::MeshSize;
+use crate::contact::half_space::unlike_bodies::Elasticity;
+use crate::contact::mesh::MeshSize;
 use crate::contact::method::{Method, TractionBound};
 use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::hertz::{Ellipse, NormalLoad};
-use crate::contact::normal::patch::Patch;
-use crate::contact::numerics::length::length;
+use crate::contact::normal::hertz::{Ellipse, NormalLoad, Patch};
+use crate::contact::numerics::simd::length;
 use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome, Work};
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::methods::full_slip;
-use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::resolution::Resolution;
 use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::task::{Motion, Resolution, RollingTask};
 
 /// The mesh if none is given: finer ones change the resultants by a small fraction of the error of the theory.
 pub const MESH: MeshSize = MeshSize {

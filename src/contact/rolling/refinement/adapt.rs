@@ -3,17 +3,15 @@
 use crate::contact::error::SolveError;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
-use crate::contact::rolling::answer::Work;
+use crate::contact::rolling::answer::{MotionAnswer, SolvedFields, Work};
 use crate::contact::rolling::methods::table::solve as table;
-use crate::contact::rolling::motion_answer::{MotionAnswer, SolvedFields};
 use crate::contact::rolling::refinement::error_estimate::{Estimate, coarser};
+use crate::contact::rolling::refinement::interpolate::RefinementState;
 use crate::contact::rolling::refinement::mesh_family::{MeshFamily, fixed_meshes};
 use crate::contact::rolling::refinement::on_mesh::{
     DiscreteSolution, MotionTask, add_smooth_slips, solve_on_mesh,
 };
-use crate::contact::rolling::refinement::state::RefinementState;
-use crate::contact::rolling::resolution::MeshPlan;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::task::{MeshPlan, RollingTask};
 
 /// Next mesh over the last one.
 const DOUBLING: f64 = 2.0;

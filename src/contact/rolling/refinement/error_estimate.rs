@@ -3,12 +3,10 @@
 use std::f64::consts::PI;
 
 use crate::contact::method::Method;
-use crate::contact::normal::patch::Patch;
-use crate::contact::rolling::answer::LevelOutcome;
+use crate::contact::normal::hertz::Patch;
+use crate::contact::rolling::answer::{LevelOutcome, RelativeErrors, Resultants};
 use crate::contact::rolling::methods::fastsim;
-use crate::contact::rolling::motion_answer::RelativeErrors;
 use crate::contact::rolling::refinement::on_mesh::DiscreteSolution;
-use crate::contact::rolling::resultants::Resultants;
 use crate::contact::rolling::task::RollingTask;
 
 /// Factor on the root of the squares of both changes. Chosen on 230 of the 920 ellipses, smooth grids and gaps of `benches/calibrate`: 0.9 covers .89

@@ -5,13 +5,11 @@
 
 use crate::contact::error::SolveError;
 use crate::contact::monitor::Monitor;
-use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::motion_answer::{MotionAnswer, PatchGradients};
+use crate::contact::rolling::answer::{MotionAnswer, PatchGradients, Resultants};
 use crate::contact::rolling::refinement::adapt::{solve_forces, solve_on_meshes};
+use crate::contact::rolling::refinement::interpolate::RefinementState;
 use crate::contact::rolling::refinement::on_mesh::MotionTask;
-use crate::contact::rolling::refinement::state::RefinementState;
-use crate::contact::rolling::resultants::Resultants;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::task::{Motion, RollingTask};
 
 /// The smaller step as a part of μN/(G c²), with c² = A/π. A creepage of that unit makes nearly everything slip, so that the force changes by about
 /// 0.02 μN, and the noise of a solve, 1e-5 μN, is far below the errors of the mesh.

@@ -1,7 +1,20 @@
 //! Prolongation: the tractions on a coarse mesh as the first iterate on a finer one.
+//!
+//! The meshes of a footprint that exist: made once, shared by all motions, the least recently used dropped.
+//!
+//! Meshes, tractions for predictions, and buffers, kept from one motion of a footprint to the next.
 
-use crate::contact::mesh::strips::{Mesh, Segment};
+use std::cell::OnceCell;
+use std::sync::Arc;
+
+use crate::contact::error::SolveError;
+use crate::contact::mesh::{Mesh, Segment};
+use crate::contact::rolling::load_ellipse::LoadEllipse;
+use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use crate::contact::rolling::operator_store::{CaseOperators, OperatorStore};
+use crate::contact::rolling::refinement::predictor::Predictor;
 use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::task::{MeshPlan, RollingTask};
 
 /// Tractions on one mesh interpolated to another. Interpolated are their ratios to the friction bound, which vary less.
 pub(crate) fn prolonged(
@@ -88,6 +101,119 @@ fn along(mesh: &Mesh, segment: &Segment, values: &[f64], place: f64) -> f64 {
     }
     let weight = (x - nodes[next - 1]) / (nodes[next] - nodes[next - 1]);
     (1.0 - weight) * values[next - 1] + weight * values[next]
+}
+
+/// Levels that are kept from one motion to the next: a few paths of about four levels. Sweeps return to the levels of the last few
+/// motions only; in a creep map of 900 motions at fixed spin, half as many make no difference (`cargo bench --bench stress -- --only
+/// creep-map`).
+pub const LEVELS_KEPT: usize = 32;
+
+/// The levels of a case that exist; the least recently used are dropped between motions.
+#[derive(Debug)]
+pub struct Levels<'a> {
+    task: &'a RollingTask<'a>,
+    operators: Arc<CaseOperators>,
+    /// With their numbers, which are never given twice, in the order of their last use.
+    kept: Vec<(usize, Arc<StripMesh>)>,
+    made: usize,
+}
+
+impl<'a> Levels<'a> {
+    /// No levels yet; their operators come from a store.
+    #[must_use]
+    pub fn new(task: &'a RollingTask<'a>, store: &Arc<OperatorStore>) -> Levels<'a> {
+        Levels {
+            task,
+            operators: CaseOperators::new(store),
+            kept: Vec::new(),
+            made: 0,
+        }
+    }
+
+    /// The number of the level of this plan; it is made if it is not there.
+    ///
+    /// # Errors
+    /// If no strip meets a patch.
+    pub fn level(&mut self, plan: MeshPlan) -> Result<usize, SolveError> {
+        if let Some(place) = self.kept.iter().position(|(_, level)| level.plan == plan) {
+            // The most recently used stand last.
+            self.kept[place..].rotate_left(1);
+            return Ok(self.kept[self.kept.len() - 1].0);
+        }
+        let operators = Arc::clone(&self.operators);
+        let level = StripMesh::with_operators(self.task, plan, operators)?;
+        self.kept.push((self.made, Arc::new(level)));
+        self.made += 1;
+        Ok(self.made - 1)
+    }
+
+    /// A level by its number; it must have been used since the last [`Levels::trim`].
+    #[must_use]
+    pub fn get(&self, level: usize) -> Arc<StripMesh> {
+        let found = self.kept.iter().rev().find(|(number, _)| *number == level);
+        let Some((_, level)) = found else {
+            unreachable!("level {level} was dropped while it was in use")
+        };
+        Arc::clone(level)
+    }
+
+    /// Drops the least recently used levels beyond [`LEVELS_KEPT`] and gives their numbers. Called between motions: no answer may refer to
+    /// a level by its number after that.
+    pub fn trim(&mut self) -> Vec<usize> {
+        let surplus = self.kept.len().saturating_sub(LEVELS_KEPT);
+        let dropped = self.kept.drain(..surplus);
+        dropped.map(|(number, _)| number).collect()
+    }
+}
+
+/// The state of the refinement of one footprint. It saves time and never changes a mesh or an estimate.
+#[derive(Debug)]
+pub struct RefinementState<'a> {
+    task: &'a RollingTask<'a>,
+    /// The meshes that exist.
+    pub levels: Levels<'a>,
+    /// Tractions of the last motions.
+    pub predictor: Predictor,
+    /// Buffers of the iterations on all meshes.
+    pub workspace: NewtonWorkspace,
+    /// Equivalent ellipses of the patches.
+    ellipses: OnceCell<Vec<LoadEllipse>>,
+}
+
+impl<'a> RefinementState<'a> {
+    /// The state before the first motion; operators come from a store.
+    #[must_use]
+    pub fn new(task: &'a RollingTask<'a>, store: &Arc<OperatorStore>) -> RefinementState<'a> {
+        RefinementState {
+            task,
+            levels: Levels::new(task, store),
+            predictor: Predictor::default(),
+            workspace: NewtonWorkspace::of_thread(),
+            ellipses: OnceCell::new(),
+        }
+    }
+
+    /// The equivalent ellipses of the patches, computed on first use.
+    pub fn ellipses(&self) -> &[LoadEllipse] {
+        let footprint = self.task.footprint;
+        let all = 0..footprint.patches().len();
+        self.ellipses
+            .get_or_init(|| all.map(|patch| LoadEllipse::of(footprint, patch)).collect())
+    }
+
+    /// Drops the least recently used meshes and the tractions on them. Called between motions: no answer may refer to a mesh by its number
+    /// after that.
+    pub fn trim(&mut self) {
+        for number in self.levels.trim() {
+            self.predictor.forget(number);
+        }
+    }
+}
+
+impl Drop for RefinementState<'_> {
+    fn drop(&mut self) {
+        std::mem::take(&mut self.workspace).give_back();
+    }
 }
 
 #[cfg(test)]

@@ -2,13 +2,10 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::mesh::strips::MeshSize;
+use crate::contact::mesh::MeshSize;
 use crate::contact::method::Method;
 use crate::contact::rolling::methods::fastsim;
-use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::resolution::MeshPlan;
-use crate::contact::rolling::resolution::Resolution;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::task::{MeshPlan, Motion, Resolution, RollingTask};
 
 /// Cells per patch of the coarsest mesh. 16 and 23 halve the work at a target of 0.02, but cover 90 to 93 % of ellipses: meshes of 4 × 4 cells
 /// agree by accident.

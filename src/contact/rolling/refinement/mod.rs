@@ -14,8 +14,6 @@ pub mod adapt;
 pub mod error_estimate;
 pub mod gradients;
 pub mod interpolate;
-pub mod levels;
 pub mod mesh_family;
 pub mod on_mesh;
 pub mod predictor;
-pub mod state;

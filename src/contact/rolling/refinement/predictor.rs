@@ -1,7 +1,7 @@
 //! Starts of a motion from the tractions of the last motions on the same mesh. They change the time of a solve, never its mesh or estimate.
 
-use crate::contact::numerics::length::length;
-use crate::contact::rolling::motion::Motion;
+use crate::contact::numerics::simd::length;
+use crate::contact::rolling::task::Motion;
 
 /// Distance from the line through the last two motions, relative to the step, up to which a motion lies on it. Numeric safety, not tuned.
 const STRAIGHT: f64 = 1e-6;

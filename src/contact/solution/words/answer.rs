@@ -1,7 +1,15 @@
-//! The answer as the client reads it: everything small. The values per cell are in [`fields`](crate::contact::solution::words::fields).
+//! The answer as the client reads it: everything small. The values per cell are in [`fields`](crate::contact::solution::words::answer).
 //!
 //! Forces and tractions act on the lower body (body 2, the rail). Frame: x along rolling (the leading edge is at the
 //! larger x), y to the left, z up; moments and spin refer to [`Solution::origin`].
+//!
+//! The values per cell: tractions, slips, zones and pressures on the meshes that motions were solved on.
+//!
+//! Frame and signs are those of [`answer`](crate::contact::solution::words::answer).
+//!
+//! The answer for a wheelset as the client reads it: its positions, and what it does as a rigid body over a range of shifts.
+//!
+//! What a case was understood as before anything is solved: what is known of its patches, and where wheel and rail lie.
 
 use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
@@ -11,10 +19,10 @@ use crate::contact::case::words::contact::Load;
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::damage::{Damage, DamageFiguresUsed};
-use crate::contact::solution::words::maintenance::{SubsurfaceSummary, TemperatureSummary};
-use crate::contact::solution::words::profile_quality::{PatchQuality, ProfileUncertainty};
-use crate::contact::solution::words::wheelset::WheelsetAnswer;
+use crate::contact::solution::words::damage::{
+    Damage, DamageFiguresUsed, PatchQuality, ProfileUncertainty,
+};
+use crate::contact::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
 
 /// The answer to one case, without fields.
 #[none_is_absent]
@@ -413,4 +421,295 @@ pub struct Total {
     /// What the measurement of the profiles leaves open; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub profile_uncertainty: Option<ProfileUncertainty>,
+}
+
+/// The values per cell of all patches: what was asked for, nothing else.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Fields {
+    /// One entry per patch, in the order of [`Solution::patches`](crate::contact::solution::words::answer::Solution::patches).
+    pub patches: Vec<PatchFields>,
+}
+
+/// The values per cell of one patch, motion by motion, each on the mesh that served it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PatchFields {
+    /// The meshes that the motions were solved on; several motions may share one.
+    pub meshes: Vec<PatchCells>,
+    /// One entry per motion.
+    pub points: Vec<PointFields>,
+}
+
+impl PatchFields {
+    /// The cells that the values of a motion belong to.
+    #[must_use]
+    pub fn cells(&self, point: usize) -> &PatchCells {
+        &self.meshes[self.points[point].mesh]
+    }
+}
+
+/// Cells of one patch, strip by strip from smaller to larger y, in each strip from smaller to larger x.
+/// All vectors have one value per cell.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PatchCells {
+    /// Centre of the cell along x in mm.
+    pub x_mm: Vec<f64>,
+    /// Centre of the cell across in mm.
+    pub y_mm: Vec<f64>,
+    /// Width of the cell along x in mm.
+    pub dx_mm: Vec<f64>,
+    /// Width of the cell across in mm.
+    pub dy_mm: Vec<f64>,
+    /// Number of the strip, counted from 0; segments of one strip share it.
+    pub strip: Vec<u32>,
+    /// Pressure in MPa, if asked for.
+    pub pressure_mpa: Option<Vec<f64>>,
+}
+
+/// Values per cell for one motion; absent where not asked for.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PointFields {
+    /// Which of the patch's meshes they belong to.
+    pub mesh: usize,
+    /// Stick or slip.
+    pub zone: Option<Vec<Zone>>,
+    /// Traction on the lower body along x in MPa.
+    pub traction_x_mpa: Option<Vec<f64>>,
+    /// Traction on the lower body across in MPa.
+    pub traction_y_mpa: Option<Vec<f64>>,
+    /// Mean slip of the cell, upper body relative to the lower, along x, divided by rolling speed: along the traction, and such that the
+    /// power of the cells adds up to that of the patch (see [`local_power`](crate::contact::post::local_power)).
+    pub slip_x: Option<Vec<f64>>,
+    /// Slip across, divided by rolling speed.
+    pub slip_y: Option<Vec<f64>>,
+    /// Temperature of both surfaces at the middle of the cell in °C.
+    pub temperature_c: Option<Vec<f64>>,
+    /// Stresses at the requested points, as [`stored`](crate::contact::post::subsurface::states::stored).
+    pub subsurface: Option<Vec<f64>>,
+}
+
+/// What a cell of the contact patch does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Zone {
+    /// No relative slip.
+    Stick,
+    /// The friction bound is reached and the surfaces slip.
+    Slip,
+}
+
+impl Zone {
+    /// The word for this zone in every text.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Zone::Stick => "stick",
+            Zone::Slip => "slip",
+        }
+    }
+}
+
+/// What is answered of a wheelset beside its patches.
+#[none_is_absent]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct WheelsetAnswer {
+    /// One entry per position, in the order of the case.
+    pub positions: Vec<WheelsetPosition>,
+    /// The rigid wheelset over a range of shifts; only if `kinematics` was asked for.
+    pub kinematics: Option<Box<Kinematics>>,
+}
+
+/// A wheelset at rest on both rails under its load.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct WheelsetPosition {
+    /// Shift to the left in mm, as given.
+    pub lateral_shift_mm: f64,
+    /// Yaw in rad, as given.
+    pub yaw_rad: f64,
+    /// Roll in rad, positive from y to z (the left wheel higher), at which both wheels carry their loads.
+    pub roll_rad: f64,
+    /// Height of the wheelset's centre over the top of the rails in mm; its change from one position to another is the lift.
+    pub centre_height_mm: f64,
+    /// Angular velocity about the axle in rad/s, given or found.
+    pub angular_velocity_rad_per_s: f64,
+    /// Torque about the axle in N mm that balances the forces of the rails: what a drive exerts, negative for a brake.
+    pub drive_torque_n_mm: f64,
+    /// Rolling radius of the left wheel less that of the right one in mm.
+    pub radius_difference_mm: f64,
+    /// The left wheel on its rail.
+    pub left: WheelOnRail,
+    /// The right wheel on its rail.
+    pub right: WheelOnRail,
+}
+
+/// One wheel of a wheelset; forces act on the rail, in track axes, normal forces included.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct WheelOnRail {
+    /// Indices of its patches in `patches`.
+    pub patches: Vec<usize>,
+    /// Rolling radius in mm at the patch that carries most.
+    pub rolling_radius_mm: f64,
+    /// Contact angle in rad of the patch that carries most.
+    pub contact_angle_rad: f64,
+    /// How far the wheel is below first touch, vertically, in mm.
+    pub wheel_lowering_mm: f64,
+    /// Along the track, in N.
+    pub force_x_n: f64,
+    /// To the left, in N.
+    pub force_y_n: f64,
+    /// Upward, in N; negative under a load.
+    pub force_z_n: f64,
+    /// About the vertical line through the middle of the track, in N mm.
+    pub moment_z_n_mm: f64,
+}
+
+/// A rigid wheelset without yaw over a range of shifts; lists have one entry per shift.
+#[none_is_absent]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Kinematics {
+    /// Shifts to the left in mm. They end where a wheel leaves its rail or touches at the end of a cross-section.
+    pub lateral_shift_mm: Vec<f64>,
+    /// Roll in rad at which both wheels touch; null where there is none.
+    pub roll_rad: Vec<Option<f64>>,
+    /// Height of the wheelset's centre over the top of the rails in mm, with the roll; null where there is no roll.
+    pub centre_height_mm: Vec<Option<f64>>,
+    /// Δr of EN 15302, in mm: rolling radius of the left wheel less that of the right one, with the axle held level.
+    pub radius_difference_mm: Vec<f64>,
+    /// Δr in mm with the roll; null where there is no roll.
+    #[serde(default)]
+    pub radius_difference_with_roll_mm: Vec<Option<f64>>,
+    /// Deprecated name of `radius_difference_mm`.
+    pub radius_difference_without_roll_mm: Vec<f64>,
+    /// How much Δr changes with another reading of the cross-sections, in mm.
+    pub profile_uncertainty_mm: Vec<f64>,
+    /// Where the left wheel touches, with the axle held level.
+    pub left: TouchLine,
+    /// Where the right wheel touches, with the axle held level.
+    pub right: TouchLine,
+    /// The shift in mm nearest to 0 at which Δr rises through 0: where a free wheelset runs on straight track. The middle of the shifts at which
+    /// Δr is 0, if there are several. Absent if there is none.
+    pub equilibrium_shift_mm: Option<f64>,
+    /// How much this shift changes with another reading of the cross-sections, in mm.
+    pub equilibrium_uncertainty_mm: Option<f64>,
+    /// Distance across of the two places of contact in mm, at the shift nearest to the equilibrium, else to 0.
+    pub contact_distance_mm: f64,
+    /// Equivalent conicity, one entry per amplitude of the case.
+    pub conicity: Vec<EquivalentConicity>,
+    /// Why the shifts or values of the lists end early, or why there is no equilibrium.
+    pub reason: Option<String>,
+}
+
+/// Where a rigid wheel touches its rail, shift by shift.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+pub struct TouchLine {
+    /// Radius of the wheel there in mm.
+    pub rolling_radius_mm: Vec<f64>,
+    /// Contact angle in rad, signed as that of a patch.
+    pub contact_angle_rad: Vec<f64>,
+    /// y on the rail's cross-section in mm, positive to the field side.
+    pub rail_y_mm: Vec<f64>,
+    /// y on the wheel's cross-section in mm, positive to the field side.
+    pub wheel_y_mm: Vec<f64>,
+}
+
+/// The equivalent conicity tan γ at one amplitude. `reason` explains every absent member.
+#[none_is_absent]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct EquivalentConicity {
+    /// Half the distance of the turning points in mm.
+    pub amplitude_mm: f64,
+    /// tan γ of EN 15302, by integration of the wheelset's equation of motion with Δr of the level axle. 0 where Δr is 0 over the whole
+    /// amplitude.
+    pub conicity: Option<f64>,
+    /// tan γ from Δr with the roll. Of a cone the roll adds some percent to the cone's own tangent.
+    pub conicity_with_roll: Option<f64>,
+    /// Deprecated name of `conicity`.
+    pub conicity_without_roll: Option<f64>,
+    /// tan γ by harmonic linearisation of Δr between the same turning points.
+    pub conicity_harmonic: Option<f64>,
+    /// Error of `conicity` from the distance of the shifts.
+    pub error_estimate: Option<f64>,
+    /// How much `conicity` changes with another reading of the cross-sections.
+    pub profile_uncertainty: Option<f64>,
+    /// Wavelength of the motion in mm.
+    pub wavelength_mm: Option<f64>,
+    /// Shifts in mm at which the motion turns.
+    pub turns_mm: Option<[f64; 2]>,
+    /// Why members are absent.
+    pub reason: Option<String>,
+}
+
+/// What a case was understood as, without solving it.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Understanding {
+    /// The patches, where they are known beforehand: of `radii` and `ellipse` by Hertz's formulas, of `pressure_grid` from the grid.
+    /// Empty where they have to be found.
+    pub patches: Vec<KnownPatch>,
+    /// Friction coefficient times normal force in N, which no tangential force can exceed; absent where the normal force has to be
+    /// found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction_limit_n: Option<f64>,
+    /// Where wheel and rail lie; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub placement: Option<PlacedProfiles>,
+}
+
+/// A patch that is known before anything is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct KnownPatch {
+    /// Normal force in N.
+    pub normal_force_n: f64,
+    /// Approach of distant points in mm; absent where the pressure was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub approach_mm: Option<f64>,
+    /// Contact area in mm².
+    pub area_mm2: f64,
+    /// Largest pressure in MPa.
+    pub pressure_max_mpa: f64,
+    /// Semi-axes along and across rolling in mm; only for elliptic patches.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub semi_axes_mm: Option<[f64; 2]>,
+    /// Extent of the patch `[x_min, x_max, y_min, y_max]` in mm.
+    pub extent_mm: [f64; 4],
+}
+
+/// Cross-sections of rail and wheel in track axes, `[y, z]` in mm: y to the left from the middle of the track, z up from the top of
+/// the rail. Both are read, turned, shifted and smoothed as for the solution; coordinates are rounded to 0.0001 mm.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct PlacedProfiles {
+    /// The rail.
+    pub rail_mm: Vec<[f64; 2]>,
+    /// The wheel at the height of first touch, as it meets a rail that is straight along x: of the circle on which a point of the profile
+    /// runs, the place where the surface has no slope along x, else the place below the axle. Without yaw this is the cut through the axle.
+    pub wheel_mm: Vec<[f64; 2]>,
+    /// Where the wheel touches first when it is lowered onto the rail.
+    pub first_touch: FirstTouch,
+    /// About how far the wheel comes to rest below first touch, in mm; the result has the computed `wheel_lowering_mm`.
+    pub lowering_estimate_mm: f64,
+}
+
+/// The point of first touch of a wheel on a rail.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct FirstTouch {
+    /// In track axes, `[x, y, z]` in mm; x differs from 0 where the wheelset is yawed.
+    pub track_mm: [f64; 3],
+    /// On the rail's cross-section, `[y, z]` in mm, y to the field side and z down.
+    pub rail_mm: [f64; 2],
+    /// On the wheel's cross-section, likewise.
+    pub wheel_mm: [f64; 2],
+    /// Inclination of the surfaces there in rad, as `contact_angle_rad` of a patch.
+    pub contact_angle_rad: f64,
+}
+
+/// How a time was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FoundBy {
+    /// The case was solved.
+    Solve,
+    /// The case was solved up to an error, with which a job would end as well.
+    FailedSolve,
+    /// The solve had begun when the time ran out.
+    PartOfSolve,
+    /// Nothing was solved.
+    Formulas,
 }

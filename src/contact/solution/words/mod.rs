@@ -3,8 +3,3 @@
 pub mod answer;
 pub mod damage;
 pub mod evolution;
-pub mod fields;
-pub mod maintenance;
-pub mod profile_quality;
-pub mod understanding;
-pub mod wheelset;

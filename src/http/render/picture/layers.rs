@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::post::resample::resample;
-use crate::contact::solution::words::fields::PatchCells;
+use crate::contact::solution::words::answer::PatchCells;
 use crate::http::render::picture::chart::{border, grid_lines, label};
 use crate::http::render::picture::colour::{SLIP, STICK};
 use crate::http::render::picture::frame::{Frame, ticks};

@@ -2,10 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::contact::post::outlines::outline::{outlines, patch_outline};
-use crate::contact::post::smooth::sheet::{AtBorder, Sheet};
-use crate::contact::solution::words::fields::PatchCells;
-use crate::contact::solution::words::fields::Zone;
+use crate::contact::post::outlines::{outlines, patch_outline};
+use crate::contact::post::smooth::{AtBorder, Sheet};
+use crate::contact::solution::words::answer::{PatchCells, Zone};
 use crate::http::render::picture::colour::{SLIP, STICK, at};
 use crate::http::render::picture::frame::Frame;
 use crate::http::render::picture::scene::{Heat, Scene, extent, zones_present};

@@ -1,8 +1,6 @@
 //! Draws a wheel on a rail as they lie in the track, seen along the rolling direction, with the pressure of every patch on the rail.
 
-use crate::contact::solution::words::answer::Position;
-use crate::contact::solution::words::fields::PatchCells;
-use crate::contact::solution::words::understanding::PlacedProfiles;
+use crate::contact::solution::words::answer::{PatchCells, PlacedProfiles, Position};
 use crate::http::render::picture::chart::{Chart, open};
 use crate::http::render::picture::frame::WIDTH;
 use crate::http::render::picture::svg::{Anchor, Svg, polyline, px};

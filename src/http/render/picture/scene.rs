@@ -1,9 +1,8 @@
 //! What a picture shows, and what follows from it: the coloured values, the box around the cells, the zones.
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::post::smooth::sheet::AtBorder;
-use crate::contact::solution::words::fields::Zone;
-use crate::contact::solution::words::fields::{PatchCells, PointFields};
+use crate::contact::post::smooth::AtBorder;
+use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// What a picture shows.
 #[derive(Debug, Clone)]

@@ -1,7 +1,6 @@
 //! Draws the sections of a patch through its largest traction: how large the traction is, and how much friction would carry.
 
-use crate::contact::solution::words::fields::Zone;
-use crate::contact::solution::words::fields::{PatchCells, PointFields};
+use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
 use crate::http::render::picture::chart::{Chart, open};
 use crate::http::render::picture::frame::WIDTH;
 use crate::http::render::picture::svg::{Anchor, Svg, polyline, px};

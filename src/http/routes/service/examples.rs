@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::question::Case;
+use crate::contact::case::words::solver::Case;
 use crate::http::examples::EXAMPLES;
 use crate::http::problem::catalogue::PlainProblems;
 use crate::http::problem::error::ApiError;

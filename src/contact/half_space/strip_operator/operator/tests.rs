@@ -3,12 +3,9 @@
 use std::ops::ControlFlow;
 
 use super::*;
-
 use crate::contact::half_space::kernels::{Rectangle, rectangle};
 use crate::contact::mesh::samples::mesh_between;
-use crate::contact::mesh::strips::Chord;
-use crate::contact::mesh::strips::Grading;
-use crate::contact::mesh::strips::observation_points;
+use crate::contact::mesh::{Chord, Grading, observation_points};
 use crate::contact::monitor::Unmonitored;
 
 fn ellipse(a: f64, b: f64, strips: usize, cells: usize) -> Mesh {

@@ -2,7 +2,7 @@
 
 use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::length::length;
+use crate::contact::numerics::simd::length;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, NewtonTask, NewtonTermination,

@@ -12,9 +12,10 @@ use std::sync::Arc;
 use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::gmres::LinearSystem;
-use crate::contact::numerics::length::length;
-use crate::contact::rolling::methods::boundary_element::linearisation::FallingRow;
-use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
+use crate::contact::numerics::simd::length;
+use crate::contact::rolling::methods::boundary_element::linearisation::{
+    FallingRow, Linearisation,
+};
 use crate::contact::rolling::methods::boundary_element::preconditioner::StripFactors;
 use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, NewtonTask, NewtonTermination, STEPS_MAX,

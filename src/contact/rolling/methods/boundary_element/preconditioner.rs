@@ -6,10 +6,11 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor;
 use faer::{MatMut, Par};
 
-use crate::contact::numerics::small_lu;
-use crate::contact::numerics::small_lu::SMALL;
-use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
-use crate::contact::rolling::methods::boundary_element::linearisation::{FallingRow, turn_rows};
+use crate::contact::numerics::lu;
+use crate::contact::numerics::lu::SMALL;
+use crate::contact::rolling::methods::boundary_element::linearisation::{
+    FallingRow, Linearisation, turn_rows,
+};
 use crate::contact::rolling::methods::boundary_element::strip_blocks::StripBlocks;
 use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::SlipEquations;
@@ -62,7 +63,7 @@ impl FactorScratch {
     fn factor(&mut self, matrix: &mut [f64], size: usize) {
         self.pivots.resize(size, 0);
         if size <= SMALL {
-            small_lu::factor(matrix, &mut self.pivots);
+            lu::factor_small(matrix, &mut self.pivots);
             return;
         }
         self.pivots_inverse.resize(size, 0);

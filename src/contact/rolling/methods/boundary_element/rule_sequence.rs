@@ -6,7 +6,7 @@ use crate::contact::friction::path_dependent::PathDependentFriction;
 use crate::contact::friction::velocity_weakening::{CONTINUATION, Softening};
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::length::length;
+use crate::contact::numerics::simd::length;
 use crate::contact::rolling::answer::{LevelFailure, Work};
 use crate::contact::rolling::methods::boundary_element::fixed_point::{
     SAME_SOLUTION, fixed_point, force_change, slide_along,
@@ -16,12 +16,12 @@ use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, LevelTask, NewtonTask, STEPS_MAX,
 };
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::{SlipEquations, SlipSource};
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::task::Motion;
 
 /// From this stability number on (see [`Newton::stability`]) a second solution is looked for. None was seen below 1.5 in 360 random
 /// motions of the prototype.

@@ -5,8 +5,8 @@ use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::numerics::gmres::GmresTermination;
 use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome};
 use crate::contact::rolling::methods::full_slip;
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::task::Motion;
 
 /// One motion on one level.
 #[derive(Debug, Clone, Copy)]

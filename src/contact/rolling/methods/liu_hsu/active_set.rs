@@ -8,8 +8,8 @@ use crate::contact::rolling::methods::liu_hsu::newton_raphson::{
 use crate::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
 };
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_rules::Rule;
+use crate::contact::rolling::task::Motion;
 
 /// Divisions into stick and slip after which the run ends without convergence.
 const DIVISIONS_MAX: u32 = 60;

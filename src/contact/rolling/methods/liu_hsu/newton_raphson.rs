@@ -3,7 +3,7 @@
 use faer::{Mat, MatMut};
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::dense_lu::{DenseLu, check};
+use crate::contact::numerics::lu::{DenseLu, check};
 use crate::contact::rolling::methods::liu_hsu::stick_block::SlipSystem;
 
 /// Steps after which the iteration ends without convergence.

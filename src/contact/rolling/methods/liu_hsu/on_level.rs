@@ -9,11 +9,11 @@ use crate::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::methods::liu_hsu::solve::{ZonesOutcome, solve_by_upwind};
 use crate::contact::rolling::methods::liu_hsu::stick_block::DenseTask;
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::rolling::task::Motion;
 
 /// Solves one motion (about the origin of the case) with the trapezoid rule. The spin pole comes from the level `coarse`;
 /// without it, guess 2 is skipped.

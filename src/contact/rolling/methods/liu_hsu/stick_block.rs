@@ -4,11 +4,11 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::dense_lu::{DenseLu, check, subtract_product};
+use crate::contact::numerics::lu::{DenseLu, check, subtract_product};
 use crate::contact::rolling::methods::boundary_element::task::NewtonTask;
-use crate::contact::rolling::motion::Motion;
 use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
+use crate::contact::rolling::task::Motion;
 
 /// The discrete problem as dense arrays over the cells without padding, x components before y components.
 #[derive(Debug)]

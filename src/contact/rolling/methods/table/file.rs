@@ -8,12 +8,10 @@ use std::sync::LazyLock;
 
 use serde_json::{Value, json};
 
-use crate::contact::rolling::methods::table::evaluate::CreepTable;
-use crate::contact::rolling::methods::table::grid::{
-    CELLS, DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZES,
+use crate::contact::rolling::methods::table::evaluate::{CreepTable, SIZE_ROW};
+use crate::contact::rolling::methods::table::spline::{
+    CELLS, DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, ROW, SIZES, VALUES,
 };
-use crate::contact::rolling::methods::table::near_nodes::SIZE_ROW;
-use crate::contact::rolling::methods::table::spline::{OUTPUTS, ROW, VALUES};
 
 /// Format of the file.
 pub const FORMAT: u64 = 2;

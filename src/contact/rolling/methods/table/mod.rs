@@ -1,11 +1,8 @@
 //! Creep forces of an elliptic patch from a table that the boundary-element solver made.
 
-pub mod axis;
 pub mod coordinates;
 pub mod evaluate;
 pub mod file;
-pub mod grid;
-pub mod near_nodes;
 pub mod shape_coefficients;
 pub mod solve;
 pub mod spline;

@@ -1,9 +1,8 @@
 //! Kalker's coefficients as splines in ln(a/b), for many ellipses in little time.
 
-use crate::contact::numerics::lagrange;
+use crate::contact::numerics::interpolation;
 use crate::contact::rolling::linear_theory::{POISSON_RATIOS, coefficients, spin_coefficient};
-use crate::contact::rolling::methods::table::axis::{Axis, free_coefficients};
-use crate::contact::rolling::methods::table::grid::ln_ratio_max;
+use crate::contact::rolling::methods::table::spline::{Axis, free_coefficients, ln_ratio_max};
 
 /// Nodes in ln(a/b): closer than those of the tables in `linear_theory`, so that its interpolation is met to 1e-5.
 const NODES: u8 = 57;
@@ -81,5 +80,5 @@ impl Default for ShapeCoefficients {
 /// Weights of the values at [`POISSON_RATIOS`]: a polynomial of fourth degree, as in `linear_theory`.
 #[must_use]
 pub fn poisson_weights(poisson_ratio: f64) -> [f64; 5] {
-    lagrange::weights(&POISSON_RATIOS, poisson_ratio)
+    interpolation::polynomial_weights(&POISSON_RATIOS, poisson_ratio)
 }

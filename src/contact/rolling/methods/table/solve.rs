@@ -5,19 +5,16 @@ use std::ops::ControlFlow;
 use crate::contact::error::SolveError;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::friction::path_dependent::Interface;
-use crate::contact::half_space::elasticity::Elasticity;
+use crate::contact::half_space::unlike_bodies::Elasticity;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::remark::kind::Rounded;
-use crate::contact::rolling::answer::Work;
+use crate::contact::rolling::answer::{MotionAnswer, PatchGradients, Resultants, Work};
 use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::table::evaluate::Creep;
 use crate::contact::rolling::methods::table::file::table;
-use crate::contact::rolling::motion::Motion;
-use crate::contact::rolling::motion_answer::{MotionAnswer, PatchGradients};
-use crate::contact::rolling::resultants::Resultants;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::task::{Motion, RollingTask};
 
 /// a/b that the table covers.
 pub const RATIO_MIN: f64 = 0.1;

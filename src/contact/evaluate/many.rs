@@ -1,0 +1,454 @@
+//! Solves many rows: one case with columns of values in place of some of its members.
+//!
+//! The answer to a row depends on its own case alone, to the last bit: not on other rows, their order or number, or the load of the machine.
+//! Rows share the operators of patches of one shape and the profiles that were read, so that rows of one shape follow each other.
+//!
+//! What many rows are, and what one of them asks.
+
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::contact;
+use crate::contact::case::solve_time::TABLE_SECONDS;
+use crate::contact::case::solver::{KnownPair, Limits};
+use crate::contact::case::words::solver::{MethodName, Output};
+use crate::contact::error::{CaseError, Fault, SolveError};
+use crate::contact::evaluate::answer::{RowStatus, RowsAnswer};
+use crate::contact::evaluate::many_answer::{
+    ManyAnswer, ManyStatus, NumberColumns, RowFailure, RowNumbers, SolvedRow,
+};
+use crate::contact::evaluate::rows::{Column, Rows};
+use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
+use crate::contact::solution::words::answer::Solution;
+
+/// Solves rows: numbers of Hertz contacts by `table` and `fastsim`, or by `auto` where the table's bound meets the target, are evaluated
+/// without meshes; every other row is checked and solved as a case of its own.
+///
+/// # Errors
+/// [`SolveError::Cancelled`]: the monitor stopped the work. What hinders one row is its status.
+pub fn solve_many(
+    task: &ManyTask,
+    solve: &RowSolver,
+    monitor: &dyn Monitor,
+) -> Result<ManyAnswer, SolveError> {
+    let checked = contact::check_with(task.known, task.case, task.limits).ok();
+    let columns = checked.as_ref().map(NumberColumns::of).unwrap_or_default();
+    let mut answer = ManyAnswer::new(task.rows(), columns);
+    let mut open: Vec<usize> = (0..task.rows()).collect();
+    if let Some((evaluable, method)) = checked.and_then(|checked| evaluable(task, &checked)) {
+        let (evaluated, patches) = evaluable.evaluate_with_patches();
+        open.retain(|row| !take(&mut answer, *row, method, &evaluated, patches[*row]));
+    }
+    open.sort_by(|a, b| near(task.columns, *a, *b));
+    RowsInWork::new(task, solve, monitor, &mut answer).solve(&open, None)?;
+    Ok(answer)
+}
+
+/// Solves every row as a case of its own. `checked` is the checked case of the task, and `first` that of its first row, if it is known.
+fn solve_rows<E>(
+    task: &ManyTask,
+    checked: &CheckedCase,
+    first: Option<&CheckedCase>,
+    solve: &RowSolver,
+    monitor: &dyn Monitor,
+) -> Result<RowsAnswer, NotAtOnce<E>> {
+    let mut answer = ManyAnswer::new(task.rows(), NumberColumns::of(checked));
+    let mut rows: Vec<usize> = (0..task.rows()).collect();
+    rows.sort_by(|a, b| near(task.columns, *a, *b));
+    let solved = RowsInWork::new(task, solve, monitor, &mut answer).solve(&rows, first);
+    solved.map_err(|_| NotAtOnce::Stopped)?;
+    Ok(RowsAnswer::of_solver(answer))
+}
+
+/// Most rows of one evaluation that the solver answers; the table and FASTSIM answer any number.
+pub const SOLVED_ROWS_MAX: usize = 200;
+
+/// Why rows are not answered at once.
+#[derive(Debug)]
+pub enum NotAtOnce<E> {
+    /// That many rows need the solver, more than [`SOLVED_ROWS_MAX`].
+    TooManyRows(usize),
+    /// The monitor stopped the solver.
+    Stopped,
+    /// The error of a step.
+    Step(E),
+}
+
+/// Answers rows at once, by the table or FASTSIM where they apply, and else by the solver. The case of the task is that of its first row, and
+/// `checked` is its checked form; `step` is called after each row of the former and may end the evaluation.
+///
+/// With `auto`, rows that the table leaves to the solver are solved too, if there are at most [`SOLVED_ROWS_MAX`]; otherwise their status is
+/// [`RowStatus::NeedsSolver`].
+///
+/// # Errors
+/// The rows exceed what one evaluation may take, or it was ended.
+pub fn evaluate_at_once<E>(
+    task: &ManyTask,
+    checked: &CheckedCase,
+    solve: &RowSolver,
+    monitor: &dyn Monitor,
+    step: impl FnMut() -> Result<(), E>,
+) -> Result<RowsAnswer, NotAtOnce<E>> {
+    let first = Some(checked).filter(|checked| several_answers(checked).is_none());
+    let Some((rows, method)) = evaluable(task, checked) else {
+        let rows = task.rows();
+        if rows > SOLVED_ROWS_MAX {
+            return Err(NotAtOnce::TooManyRows(rows));
+        }
+        return solve_rows(task, checked, first, solve, monitor);
+    };
+    let mut answer = rows.evaluate_stepwise(step).map_err(NotAtOnce::Step)?;
+    let open: Vec<usize> = (0..answer.status.len())
+        .filter(|row| match answer.status[*row] {
+            RowStatus::NeedsSolver => true,
+            RowStatus::NotCovered => method == MethodName::Auto,
+            _ => false,
+        })
+        .collect();
+    if !open.is_empty() && open.len() <= SOLVED_ROWS_MAX {
+        let columns = task.columns.iter();
+        let columns: Vec<VariedColumn> = columns
+            .map(|column| VariedColumn {
+                pointer: column.pointer.clone(),
+                values: column.values.pick(&open),
+            })
+            .collect();
+        let task = ManyTask {
+            columns: &columns,
+            ..*task
+        };
+        let first = first.filter(|_| open[0] == 0);
+        let solved = solve_rows(&task, checked, first, solve, monitor)?;
+        answer.replace(&open, &solved);
+    }
+    Ok(answer)
+}
+
+/// How long the rows of a task take, in s on one core of the machine the figures were taken on; rough, and the same for the same rows.
+#[must_use]
+pub fn expected_seconds(task: &ManyTask) -> f64 {
+    let rows = task.rows();
+    let Ok(checked) = contact::check_with(task.known, task.case, task.limits) else {
+        return rows as f64 * REFUSED_SECONDS;
+    };
+    let Some((evaluable, method)) = evaluable(task, &checked) else {
+        let step = rows.div_ceil(SAMPLED).max(1);
+        let sampled: Vec<f64> = (0..rows)
+            .step_by(step)
+            .map(|row| match task.checked(row) {
+                Ok(checked) => checked.cost().seconds,
+                Err(_) => REFUSED_SECONDS,
+            })
+            .collect();
+        return rows as f64 * sampled.iter().sum::<f64>() / sampled.len().max(1) as f64;
+    };
+    let evaluated = evaluable.evaluate();
+    let left = evaluated.status.iter();
+    let left = left.filter(|status| to_solve(**status, method)).count();
+    let each = match checked.run.method_asked {
+        MethodName::Fastsim => FASTSIM_SECONDS,
+        _ => TABLE_SECONDS,
+    };
+    rows as f64 * each + left as f64 * checked.cost().seconds
+}
+
+/// Rows that [`expected_seconds`] looks at.
+const SAMPLED: usize = 16;
+/// Time of a row by the simplified theory, in s: 0.017 LU of the report (`cargo bench --bench report`) and what is written of it.
+const FASTSIM_SECONDS: f64 = 3e-5;
+/// Time of a row that is refused, in s; not measured, it only keeps chunks of faulty rows from being endless.
+const REFUSED_SECONDS: f64 = 1e-4;
+
+/// The rows as [`Rows`], if they are of that kind, and whether the method was left to the service.
+fn evaluable(task: &ManyTask, checked: &CheckedCase) -> Option<(Rows, MethodName)> {
+    let numbers = task.columns.iter().map(|column| match &column.values {
+        Values::Numbers(values) => Some(Column {
+            pointer: column.pointer.clone(),
+            values: values.clone(),
+        }),
+        Values::Texts(_) => None,
+    });
+    let columns = numbers.collect::<Option<Vec<Column>>>()?;
+    let rows = Rows::new(task.case, checked, columns).ok();
+    let rows = rows.filter(Rows::has_method)?;
+    Some((rows, checked.run.method_asked))
+}
+
+/// Is a row that was evaluated so left to the solver? The solver gives the reason of a row without finite numbers.
+fn to_solve(status: RowStatus, method: MethodName) -> bool {
+    match status {
+        RowStatus::Ok | RowStatus::TargetMissed => false,
+        RowStatus::NotCovered => method == MethodName::Auto,
+        RowStatus::NeedsSolver
+        | RowStatus::Refused
+        | RowStatus::NotFinite
+        | RowStatus::Failed(_) => true,
+    }
+}
+
+/// Takes over an evaluated row; `false` if it is to be solved.
+fn take(
+    answer: &mut ManyAnswer,
+    row: usize,
+    method: MethodName,
+    evaluated: &RowsAnswer,
+    [normal_force, c]: [f64; 2],
+) -> bool {
+    let status = evaluated.status[row];
+    if to_solve(status, method) {
+        return false;
+    }
+    if !status.has_answer() {
+        let reason = format!(
+            "a/b of the ellipse is beyond {RATIO_MIN} to {RATIO_MAX}; \"method\": \"table\" covers no other, use boundary_element or fastsim"
+        );
+        answer.set(
+            row,
+            Err(RowFailure {
+                status: ManyStatus::NotCovered,
+                reason,
+            }),
+        );
+        return true;
+    }
+    let area = std::f64::consts::PI * c * c;
+    let error = evaluated.error_estimate[row];
+    let numbers: RowNumbers = [
+        normal_force,
+        evaluated.force_x_n[row],
+        evaluated.force_y_n[row],
+        evaluated.moment_z_n_mm[row],
+        error,
+        error * c,
+        evaluated.friction_power_n[row],
+        evaluated.stick_share[row],
+        area,
+        1.5 * normal_force / area,
+        1.0,
+        f64::NAN,
+    ];
+    let slopes = evaluated.gradients.iter().flatten();
+    let slopes = slopes.map(|column| column[row]);
+    let solved = SolvedRow {
+        target_met: status == RowStatus::Ok,
+        method: Some(match method {
+            MethodName::Auto => MethodName::Table,
+            asked => asked,
+        }),
+        numbers: numbers.into_iter().chain(slopes).collect(),
+    };
+    answer.set(row, Ok(solved));
+    true
+}
+
+/// Orders rows so that equal shapes, and then near motions, follow each other.
+fn near(columns: &[VariedColumn], a: usize, b: usize) -> Ordering {
+    let of_motion = |column: &VariedColumn| column.pointer.starts_with("/motion");
+    let shapes = columns.iter().filter(|column| !of_motion(column));
+    let motions = columns.iter().filter(|column| of_motion(column));
+    shapes
+        .chain(motions)
+        .map(|column| column.values.compare(a, b))
+        .find(|order| order.is_ne())
+        .unwrap_or_else(|| a.cmp(&b))
+}
+
+/// Rows that are being solved.
+pub(crate) struct RowsInWork<'a> {
+    task: &'a ManyTask<'a>,
+    solve: &'a RowSolver<'a>,
+    monitor: &'a dyn Monitor,
+    /// Where their answers go.
+    answer: &'a mut ManyAnswer,
+    /// Rows that are over, and all.
+    done: usize,
+    all: usize,
+}
+
+/// Why a case has no solution.
+enum RowEnd {
+    Stopped,
+    Failed(RowFailure),
+}
+
+impl<'a> RowsInWork<'a> {
+    /// Rows of a task, before the first.
+    pub(crate) fn new(
+        task: &'a ManyTask<'a>,
+        solve: &'a RowSolver<'a>,
+        monitor: &'a dyn Monitor,
+        answer: &'a mut ManyAnswer,
+    ) -> RowsInWork<'a> {
+        RowsInWork {
+            task,
+            solve,
+            monitor,
+            answer,
+            done: 0,
+            all: 0,
+        }
+    }
+
+    /// Solves rows. The first row of the task is not checked again if its checked case is given.
+    ///
+    /// # Errors
+    /// [`SolveError::Cancelled`]: the monitor stopped the work.
+    pub(crate) fn solve(
+        mut self,
+        rows: &[usize],
+        first: Option<&CheckedCase>,
+    ) -> Result<(), SolveError> {
+        self.all = rows.len();
+        for row in rows {
+            if self.watch().tick(0.0).is_break() {
+                return Err(SolveError::Cancelled);
+            }
+            let known = first.filter(|_| *row == 0);
+            let checked = match known {
+                Some(checked) => Ok(self.task.as_row(checked.clone())),
+                None => self.task.checked(*row),
+            };
+            match checked {
+                Ok(checked) => self.alone(*row, &checked)?,
+                Err(error) => self.end(*row, RowFailure::refused(&error)),
+            }
+        }
+        Ok(())
+    }
+
+    fn alone(&mut self, row: usize, checked: &CheckedCase) -> Result<(), SolveError> {
+        match self.solved(checked) {
+            Ok(solution) => {
+                self.answer.set_solution(row, &solution);
+                self.done += 1;
+            }
+            Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
+            Err(RowEnd::Failed(failure)) => self.end(row, failure),
+        }
+        Ok(())
+    }
+
+    fn end(&mut self, row: usize, failure: RowFailure) {
+        self.answer.set(row, Err(failure));
+        self.done += 1;
+    }
+
+    fn solved(&self, checked: &CheckedCase) -> Result<Solution, RowEnd> {
+        let watch = self.watch();
+        let solved = catch_unwind(AssertUnwindSafe(|| (self.solve)(checked, &watch)));
+        match solved {
+            Ok(Ok(solution)) => Ok(solution),
+            Ok(Err(error)) => Err(RowFailure::of(&error).map_or(RowEnd::Stopped, RowEnd::Failed)),
+            Err(_) => Err(RowEnd::Failed(RowFailure {
+                status: ManyStatus::SolverFailed,
+                reason: "the solver stopped on a defect of its own".to_owned(),
+            })),
+        }
+    }
+
+    /// The monitor of the next row.
+    fn watch(&self) -> RowMonitor<'a> {
+        RowMonitor {
+            inner: self.monitor,
+            begun: self.monitor.elapsed(),
+            before: self.done as f64 / self.all as f64,
+            own: 1.0 / self.all as f64,
+        }
+    }
+}
+
+/// The monitor of one row.
+struct RowMonitor<'a> {
+    inner: &'a dyn Monitor,
+    begun: Duration,
+    before: f64,
+    own: f64,
+}
+
+impl Monitor for RowMonitor<'_> {
+    fn tick(&self, progress: f64) -> ControlFlow<Stop> {
+        self.inner
+            .tick((self.before + self.own * progress).min(1.0))
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.inner.elapsed().saturating_sub(self.begun)
+    }
+}
+
+/// Solves a checked case.
+pub type RowSolver<'a> = dyn Fn(&CheckedCase, &dyn Monitor) -> Result<Solution, SolveError> + 'a;
+
+/// Rows to solve.
+#[derive(Debug, Clone, Copy)]
+pub struct ManyTask<'a> {
+    /// A good case of one motion, such as that of the first of all rows.
+    pub case: &'a Value,
+    /// What differs from it, at least one column; all of the same length.
+    pub columns: &'a [VariedColumn],
+    /// Cross-sections that rows name, by their names.
+    pub profiles: &'a BTreeMap<String, Value>,
+    /// Pairs of cross-sections that were read before.
+    pub known: &'a KnownPair,
+    /// What a row may use.
+    pub limits: &'a Limits,
+    /// Longest time for one row; a shorter one of the case counts.
+    pub time_limit: Duration,
+}
+
+impl ManyTask<'_> {
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.columns.first().map_or(1, |column| column.values.len())
+    }
+
+    /// The checked case of a row.
+    ///
+    /// # Errors
+    /// Its faults.
+    pub(crate) fn checked(&self, row: usize) -> Result<CheckedCase, CaseError> {
+        let case = case_of_row(self.case, self.columns, self.profiles, row)
+            .map_err(|(pointer, reason)| CaseError(vec![Fault::new(pointer, reason)]))?;
+        let checked = contact::check_with(self.known, &case, self.limits)?;
+        match several_answers(&checked) {
+            Some(fault) => Err(CaseError(vec![fault])),
+            None => Ok(self.as_row(checked)),
+        }
+    }
+
+    /// A checked case with the outputs and the time limit of a row.
+    pub(crate) fn as_row(&self, mut checked: CheckedCase) -> CheckedCase {
+        // Rows are answered with numbers alone.
+        let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
+        let outputs = &mut checked.run.outputs;
+        outputs.retain(|output| numbers.contains(output));
+        let own = checked.run.time_limit;
+        checked.run.time_limit = Some(own.map_or(self.time_limit, |own| own.min(self.time_limit)));
+        checked
+    }
+}
+
+/// The fault of a case that has several answers, so that no row stands for it.
+#[must_use]
+pub fn several_answers(checked: &CheckedCase) -> Option<Fault> {
+    let problem = &checked.problem;
+    let (motions, positions) = (problem.motions.len(), problem.task.positions());
+    if motions > 1 {
+        let detail = format!("{motions} motions given; a row has one motion, and columns vary it");
+        return Some(Fault::new("/motion", detail));
+    }
+    (positions > 1).then(|| {
+        let detail = format!(
+            "{positions} positions of the wheelset with their motions given; a row has one position with one motion, and columns vary them"
+        );
+        Fault::new("/contact", detail)
+    })
+}

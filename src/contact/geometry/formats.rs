@@ -1,0 +1,1001 @@
+//! The formats of profile files, and how the format of a text is recognised.
+//!
+//! Simpack's rail and wheel profiles, `.prr` and `.prw`.
+//!
+//! A header with the type, a spline block with settings `name = value`, and points between `point.begin` and
+//! `point.end`, in any order and in any case. The settings are applied in the order of their numbers in the file:
+//! shift, rotation, mirroring; lengths are divided by `units.len.f` per metre.
+//!
+//! MiniProf's rail and wheel profiles, `.ban` and `.whl`.
+//!
+//! A header of lines `Name=value`, or of free words in files of older versions, then one point per line. `ColumnDef` names the columns:
+//! its `X` is y here and its `Y` is z; without it they are the first two. Instruments differ in the sense of both: `X` usually
+//! points to the track centre, the sense of z is found from the shape.
+//!
+//! The contents of a profile file.
+//!
+//! The lines of a text file: numbers, remarks and words, as instruments, programs and people write them.
+//!
+//! Columns of numbers: y and z, one point per line.
+//!
+//! A header and rows of numbers.
+
+use std::borrow::Cow;
+use std::f64::consts::TAU;
+
+use crate::contact::geometry::length_unit::LengthUnit;
+
+/// A file format that a client can name; each is read in the file of that name in this folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Two columns y and z, separated by blanks, commas, semicolons or tabs.
+    Columns,
+    /// Simpack's `.prr` (rail) and `.prw` (wheel).
+    Simpack,
+    /// MiniProf's `.ban` (rail) and `.whl` (wheel).
+    Miniprof,
+}
+
+/// Length below which a text may be a path.
+const PATH_LENGTH_MAX: usize = 1000;
+/// Starts of a text that was decoded in another encoding than its own.
+const BYTE_ORDER_MARKS: [&str; 4] = ["\u{feff}", "\u{fffd}", "ï»¿", "ÿþ"];
+
+/// Reads a profile from the text of a file.
+///
+/// # Errors
+/// A sentence that names the line that cannot be read, or what is missing.
+pub fn read(format: Format, text: &str) -> Result<ProfileFile, String> {
+    if is_path(text) {
+        return Err(format!(
+            "{:?} given, which looks like a path; text is what the file holds, not its path",
+            text.trim()
+        ));
+    }
+    // Bytes of UTF-16 that were taken for single characters.
+    let without_nulls = text.contains('\0').then(|| text.replace('\0', ""));
+    let mut text = without_nulls.as_deref().unwrap_or(text);
+    for mark in BYTE_ORDER_MARKS {
+        text = text.trim_start_matches(mark);
+    }
+    if let Some(refused) = other_kind(text) {
+        return Err(refused);
+    }
+    let looks_like = looks_like(text);
+    let other = looks_like.filter(|other| *other != format);
+    let contents = match format {
+        // Columns would be read from files of the other formats too, without their settings.
+        Format::Columns if other.is_some() => Err("no plain columns".to_owned()),
+        Format::Columns => read_columns(text),
+        Format::Simpack => read_simpack(text),
+        Format::Miniprof if other.is_some() => Err("no file of MiniProf".to_owned()),
+        Format::Miniprof => read_miniprof(text),
+    };
+    contents.map_err(|reason| match other {
+        Some(other) => {
+            format!(
+                "{reason}; this looks like a file of the format {}",
+                other.word()
+            )
+        }
+        None => reason,
+    })
+}
+
+/// Why a text holds something else than one cross-section: a list of cross-sections along the track or around the wheel, or both sides of a
+/// track.
+fn other_kind(text: &str) -> Option<String> {
+    let word = text.split_whitespace().next().unwrap_or_default();
+    if ["wheelprofile", "railprofile"].contains(&word.to_ascii_lowercase().as_str()) {
+        return Some(
+            "this is a file of Vampire, with the left and the right side in each row: send the columns y and z of one side, with the format \
+             columns"
+                .to_owned(),
+        );
+    }
+    // A slice is a position and the quoted name of a file.
+    let slices: Vec<&str> = text
+        .lines()
+        .filter_map(|line| {
+            let mut words = line.split_whitespace();
+            let _position: f64 = words.next()?.trim_end_matches(',').parse().ok()?;
+            let name = words.next().filter(|name| name.starts_with(['\'', '"']))?;
+            let name = name.trim_matches(|c| "'\",;".contains(c));
+            has_extension(name).then_some(name)
+        })
+        .collect();
+    let counts = |mark: &str| text.contains(mark) || text.contains(&mark.to_ascii_lowercase());
+    if slices.len() < 2 && !(counts("NSLC") && (counts("S_OFFSET") || counts("TH_OFFSET"))) {
+        return None;
+    }
+    let along = match (counts("TH_OFFSET"), counts("S_OFFSET")) {
+        (true, _) => "around the wheel (.slcw)",
+        (false, true) => "along the track (.slcs)",
+        (false, false) => "along the track (.slcs) or around the wheel (.slcw)",
+    };
+    let first = slices
+        .first()
+        .map(|name| format!(", the first in {}", shown(name)));
+    Some(format!(
+        "this is a list of {} cross-sections that vary {along}{}; a case has one cross-section: send the text of the slice at the place of contact",
+        slices.len(),
+        first.unwrap_or_default()
+    ))
+}
+
+fn has_extension(name: &str) -> bool {
+    let name = name.rsplit(['/', '\\']).next().unwrap_or_default();
+    let extension = name.rsplit_once('.').map(|(_, extension)| extension);
+    extension.is_some_and(|letters| {
+        (2..=5).contains(&letters.len()) && letters.chars().all(char::is_alphabetic)
+    })
+}
+
+/// Whether a text is a single line that ends like a file name.
+fn is_path(text: &str) -> bool {
+    let line = text.trim();
+    line.len() < PATH_LENGTH_MAX && !line.contains(['\n', '\r']) && has_extension(line)
+}
+
+/// The format whose keywords begin lines of a text.
+fn looks_like(text: &str) -> Option<Format> {
+    let first = text.trim_start().get(..14).unwrap_or_default();
+    if ["#miniwheelprof", "#minirailprof\n"]
+        .iter()
+        .any(|mark| first.eq_ignore_ascii_case(mark))
+    {
+        return Some(Format::Miniprof);
+    }
+    each_line(text).find_map(|line| {
+        let name = line
+            .bare
+            .split(|c: char| c == '=' || c == ':' || c.is_whitespace())
+            .next();
+        match name.unwrap_or_default().to_ascii_lowercase().as_str() {
+            "point.begin" | "spline.begin" => Some(Format::Simpack),
+            "columndef" | "xypoints" | "miniprof" => Some(Format::Miniprof),
+            _ => None,
+        }
+    })
+}
+
+impl Format {
+    fn word(self) -> &'static str {
+        match self {
+            Format::Columns => "columns",
+            Format::Simpack => "simpack",
+            Format::Miniprof => "miniprof",
+        }
+    }
+}
+
+#[derive(Debug, Clone, Default)]
+struct SimpackSettings {
+    wheel: Option<bool>,
+    in_spline: bool,
+    shift: [f64; 2],
+    rotate: f64,
+    /// Allowed range of y and of z; not applied if the lower bound is not below the upper one.
+    bounds: [[f64; 2]; 2],
+    mirror: [bool; 2],
+    per_metre: Option<f64>,
+    unit: Option<LengthUnit>,
+    per_radian: Option<f64>,
+    /// Name of another file that holds the points.
+    file: Option<String>,
+}
+
+/// Reads the points; their weights are ignored.
+pub(crate) fn read_simpack(text: &str) -> Result<ProfileFile, String> {
+    let mut settings = SimpackSettings::default();
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    let lines = lines(text)?;
+    let comma = comma_of(&lines);
+    let mut in_points = false;
+    let mut blocks = 0;
+    for line in &lines {
+        let word = line.bare.split_whitespace().next().unwrap_or_default();
+        match word.to_ascii_lowercase().as_str() {
+            "" => {}
+            "point.begin" if blocks > 0 => {
+                return Err(format!(
+                    "line {}: a second block of points begins; one cross-section is needed",
+                    line.place
+                ));
+            }
+            "point.begin" => in_points = true,
+            "point.end" => (in_points, blocks) = (false, blocks + 1),
+            "spline.begin" => settings.in_spline = true,
+            "spline.end" => settings.in_spline = false,
+            _ if in_points => {
+                let mixed = comma == Comma::Separator && has_decimal_commas(&line.bare);
+                match held(&line.bare, comma) {
+                    Held::Row(numbers) if !mixed => points.push([numbers[0], numbers[1]]),
+                    _ => {
+                        let needed = "a point y, z with an optional weight";
+                        return Err(unreadable(line, needed, comma));
+                    }
+                }
+            }
+            _ => {
+                if let Some((name, value)) = keyword(line) {
+                    settings
+                        .take(&name, &value)
+                        .ok_or_else(|| unreadable(line, "a number", comma))?;
+                }
+            }
+        }
+    }
+    match settings.file.take() {
+        Some(file) if points.is_empty() => Err(format!(
+            "the points are in another file, {}: send its text, with the format columns if it holds columns of y and z",
+            file.chars().take(100).collect::<String>()
+        )),
+        _ if in_points => Err("point.end is missing: the text ends within its points".to_owned()),
+        _ if blocks == 0 => Err("no block from point.begin to point.end found".to_owned()),
+        _ => settings.apply(points),
+    }
+}
+
+impl SimpackSettings {
+    /// Stores one setting; `None` if a known setting has no valid number.
+    fn take(&mut self, name: &str, value: &str) -> Option<()> {
+        let number = || match held(&format!("0 {value}"), Comma::Separator) {
+            Held::Row(numbers) => Some(numbers[1]),
+            _ => None,
+        };
+        let flag = || number().map(|number| number != 0.0);
+        match name {
+            "type" if !self.in_spline => self.wheel = Some(flag()?),
+            "shift.y" => self.shift[0] = number()?,
+            "shift.z" => self.shift[1] = number()?,
+            "rotate" => self.rotate = number()?,
+            "bound.y.min" => self.bounds[0][0] = number()?,
+            "bound.y.max" => self.bounds[0][1] = number()?,
+            "bound.z.min" => self.bounds[1][0] = number()?,
+            "bound.z.max" => self.bounds[1][1] = number()?,
+            "mirror.y" => self.mirror[0] = flag()?,
+            "mirror.z" => self.mirror[1] = flag()?,
+            "units.len" => self.unit = LengthUnit::named(value),
+            "units.len.f" => self.per_metre = Some(number().filter(|f| *f > 0.0)?),
+            "units.ang.f" => self.per_radian = Some(number().filter(|f| *f > 0.0)?),
+            "file" if value != "-" && !value.is_empty() => self.file = Some(value.to_owned()),
+            _ => {}
+        }
+        Some(())
+    }
+
+    fn apply(&self, mut points: Vec<[f64; 2]>) -> Result<ProfileFile, String> {
+        let angle = self.rotate / self.per_radian.unwrap_or(1.0);
+        if angle.abs() > TAU {
+            return Err(format!(
+                "a rotation of {angle} rad is more than a whole turn"
+            ));
+        }
+        let (sin, cos) = angle.sin_cos();
+        for point in &mut points {
+            let [y, z] = [point[0] + self.shift[0], point[1] + self.shift[1]];
+            *point = [cos * y - sin * z, sin * y + cos * z];
+        }
+        points.retain(|point| {
+            let within = |k: usize| {
+                let [low, high] = self.bounds[k];
+                low >= high || (low..=high).contains(&point[k])
+            };
+            within(0) && within(1)
+        });
+        let unit_mm = self.per_metre.map(|per_metre| 1000.0 / per_metre);
+        let unit_mm = unit_mm.or(self.unit.map(LengthUnit::mm));
+        let mm = unit_mm.unwrap_or(1.0);
+        let scale = self.mirror.map(|mirror| if mirror { -mm } else { mm });
+        for point in &mut points {
+            *point = [point[0] * scale[0], point[1] * scale[1]];
+        }
+        Ok(ProfileFile {
+            points,
+            unit_mm,
+            // After the file's own mirroring, y is positive to the field side and z down.
+            mirror_y: Some(false),
+            mirror_z: Some(false),
+            wheel: self.wheel,
+            ..ProfileFile::default()
+        })
+    }
+}
+
+/// Reads the points.
+pub(crate) fn read_miniprof(text: &str) -> Result<ProfileFile, String> {
+    let table = read_table(text)?;
+    let mut columns = [0, 1];
+    let mut stated = None;
+    for line in &table.header {
+        match keyword(line) {
+            Some((name, value)) if name == "columndef" => {
+                columns = places(&value).ok_or_else(|| {
+                    table.refuse(line, "a list with X and Y, such as ColumnDef=X,Y,A,C,")
+                })?;
+            }
+            Some((name, value)) if name == "xypoints" => stated = value.parse::<usize>().ok(),
+            _ => {}
+        }
+    }
+    let points = table.points(columns)?;
+    let counts = [points.len(), points.len() + table.remarked];
+    let mm = table.stated_unit().map(LengthUnit::mm);
+    let scale = mm.unwrap_or(1.0);
+    Ok(ProfileFile {
+        points: points
+            .into_iter()
+            .map(|point| point.map(|part| part * scale))
+            .collect(),
+        unit_mm: mm,
+        mirror_y: Some(true),
+        wrong_count: stated.filter(|count| !counts.contains(count)),
+        header_rows: table.header_rows,
+        ..ProfileFile::default()
+    })
+}
+
+fn places(value: &str) -> Option<[usize; 2]> {
+    let names: Vec<&str> = value
+        .split(|c: char| c.is_whitespace() || c == ',' || c == ';')
+        .filter(|name| !name.is_empty())
+        .collect();
+    let place = |name: &str| names.iter().position(|own| own.eq_ignore_ascii_case(name));
+    Some([place("X")?, place("Y")?])
+}
+
+/// The contents of a file.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ProfileFile {
+    /// Points `[y, z]` in mm, with the file's own shifts, rotation and mirroring applied.
+    pub points: Vec<[f64; 2]>,
+    /// Length of the file's unit in mm, if the file names its unit. Without a name the points are read as mm.
+    pub unit_mm: Option<f64>,
+    /// Whether y of the points is positive to the track centre, if the format specifies it.
+    pub mirror_y: Option<bool>,
+    /// Whether z of the points is positive up, if the format specifies it.
+    pub mirror_z: Option<bool>,
+    /// Whether the file describes a wheel, if it states the body.
+    pub wheel: Option<bool>,
+    /// The count of points that the header states, if it differs from the rows of the file, commented-out rows included.
+    pub wrong_count: Option<usize>,
+    /// Rows of numbers that were read as a part of the header: their count and the line of the first.
+    pub header_rows: Option<(usize, usize)>,
+}
+
+/// Signs that begin a remark anywhere in a line.
+const REMARK: [char; 5] = ['#', '%', '!', '$', '"'];
+/// Signs that begin a remark at the start of a line; elsewhere they separate or quote.
+const REMARK_AT_START: [char; 2] = [';', '\''];
+/// Lines of a text that are not empty: five for each point that a cross-section may have.
+const LINES_MAX: usize = 100_000;
+/// Signs of a line that a message shows.
+const SHOWN_MAX: usize = 300;
+
+/// One line of a text.
+#[derive(Debug, Clone)]
+pub(crate) struct Line<'a> {
+    /// Its number, from 1.
+    pub(crate) place: usize,
+    /// The line as it stands.
+    pub(crate) text: &'a str,
+    /// The line without its remark, without the quotes of quoted cells, and without blanks around it.
+    pub(crate) bare: Cow<'a, str>,
+    /// Whether an empty line is above it.
+    pub(crate) after_empty: bool,
+}
+
+/// Whether a comma separates numbers or stands before their decimals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Comma {
+    Separator,
+    Decimal,
+}
+
+/// What a line holds.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Held {
+    /// A remark alone.
+    Nothing,
+    /// Two numbers or more, possibly with words behind them.
+    Row(Vec<f64>),
+    /// Less than a row: a single number, or a word that begins like a number but is none.
+    Broken {
+        /// The word that is no number; `None` for a single number.
+        word: Option<String>,
+        /// Whether at least one word is a number.
+        has_number: bool,
+    },
+    /// Words.
+    Words,
+}
+
+/// The lines of a text that are not empty, whatever ends them.
+pub(crate) fn each_line(text: &str) -> impl Iterator<Item = Line<'_>> {
+    let mut after_empty = false;
+    text.split('\n')
+        .flat_map(|line| line.strip_suffix('\r').unwrap_or(line).split('\r'))
+        .enumerate()
+        .filter_map(move |(k, text)| {
+            let is_empty = text.trim().is_empty();
+            let after_empty = std::mem::replace(&mut after_empty, is_empty);
+            (!is_empty).then(|| Line {
+                place: k + 1,
+                text,
+                bare: bare(text),
+                after_empty,
+            })
+        })
+}
+
+/// The same, if they are not too many.
+///
+/// # Errors
+/// A sentence with the limit.
+pub(crate) fn lines(text: &str) -> Result<Vec<Line<'_>>, String> {
+    let lines: Vec<Line> = each_line(text).take(LINES_MAX + 1).collect();
+    if lines.len() > LINES_MAX {
+        return Err(format!(
+            "the text has more than {LINES_MAX} lines; a cross-section has fewer"
+        ));
+    }
+    Ok(lines)
+}
+
+/// A line without its remark.
+fn bare(text: &str) -> Cow<'_, str> {
+    let line = text.trim();
+    if let Some(cells) = quoted_cells(line) {
+        return Cow::Owned(cells);
+    }
+    if line.starts_with(REMARK_AT_START) {
+        return Cow::Borrowed("");
+    }
+    // `1.#QNAN` is a number that failed, not a remark.
+    let sign = |(at, _): &(usize, &str)| !line[..*at].ends_with('.');
+    let remark = line.match_indices(REMARK).find(sign).map(|(at, _)| at);
+    let end = remark.into_iter().chain(line.find("//")).min();
+    Cow::Borrowed(line[..end.unwrap_or(line.len())].trim_end())
+}
+
+/// The cells of a line that is quoted as in CSV, `"1.0","2.0"` or `"Name=value"`, separated by semicolons; `None` for any other
+/// line, in which a quote begins a remark.
+fn quoted_cells(line: &str) -> Option<String> {
+    let mut cells = Vec::new();
+    let mut rest = line;
+    while !rest.is_empty() {
+        let (cell, behind) = rest.strip_prefix('"')?.split_once('"')?;
+        cells.push(cell.trim());
+        let behind = behind.trim_start();
+        rest = behind
+            .strip_prefix([',', ';'])
+            .unwrap_or(behind)
+            .trim_start();
+    }
+    let is_cell = |cell: &&str| number(cell, Comma::Decimal).is_some() || !begins_like_number(cell);
+    let quoted = match cells.as_slice() {
+        [only] => only.contains('='),
+        all => !all.is_empty() && all.iter().all(is_cell),
+    };
+    quoted.then(|| cells.join(";"))
+}
+
+/// A finite number, also with the exponents of Fortran, the minus sign of typography, or a decimal comma.
+fn number(word: &str, comma: Comma) -> Option<f64> {
+    let parsed = word.parse::<f64>().or_else(|_| {
+        let plain = |c: char| match c {
+            'd' | 'D' => 'e',
+            '\u{2212}' => '-',
+            ',' if comma == Comma::Decimal => '.',
+            other => other,
+        };
+        word.chars().map(plain).collect::<String>().parse()
+    });
+    parsed.ok().filter(|number: &f64| number.is_finite())
+}
+
+/// Whether a word would be a number if it were written correctly.
+fn begins_like_number(word: &str) -> bool {
+    let unsigned = word.trim_start_matches(['+', '-', '\u{2212}', '.', ',']);
+    unsigned.starts_with(|c: char| c.is_ascii_digit()) || word.parse::<f64>().is_ok()
+}
+
+fn words(bare: &str, comma: Comma) -> impl Iterator<Item = &str> {
+    let separates =
+        move |c: char| c.is_whitespace() || c == ';' || c == ',' && comma == Comma::Separator;
+    bare.split(separates)
+        // `1,5, 2,5`: the comma behind a number separates.
+        .map(move |word| match comma {
+            Comma::Separator => word,
+            Comma::Decimal => word.trim_end_matches(','),
+        })
+        .filter(|word| !word.is_empty())
+}
+
+/// What a line holds.
+pub(crate) fn held(bare: &str, comma: Comma) -> Held {
+    if bare.is_empty() {
+        return Held::Nothing;
+    }
+    if comma == Comma::Separator
+        && let Some(word) = mixed_word(bare)
+    {
+        return broken(Some(word), true);
+    }
+    let mut numbers = Vec::new();
+    let mut malformed = None;
+    for word in words(bare, comma) {
+        match number(word, comma) {
+            Some(number) if malformed.is_none() => numbers.push(number),
+            Some(_) => return broken(malformed, true),
+            // Behind two numbers it is a word: `2nd measurement`, `12:30`.
+            None if begins_like_number(word) && numbers.len() < 2 => {
+                malformed = malformed.or(Some(word));
+            }
+            None => break,
+        }
+    }
+    match numbers.len() {
+        _ if malformed.is_some() => broken(malformed, !numbers.is_empty()),
+        0 => Held::Words,
+        1 => broken(None, true),
+        _ => Held::Row(numbers),
+    }
+}
+
+/// The second word of a line such as `1.5 2,5`, in which blanks separate and the comma is within a number.
+fn mixed_word(bare: &str) -> Option<&str> {
+    let mut words = bare.split_whitespace();
+    let _first = number(words.next()?, Comma::Separator)?;
+    let second = words.next().filter(|word| !word.starts_with(','))?;
+    let second = second.trim_end_matches([',', ';']);
+    let is_mixed = second.contains(',') && begins_like_number(second);
+    is_mixed.then_some(second)
+}
+
+fn broken(word: Option<&str>, has_number: bool) -> Held {
+    Held::Broken {
+        word: word.map(str::to_owned),
+        has_number,
+    }
+}
+
+/// Whether a line has two numbers or more, at least one of them with a decimal comma and none with a decimal point.
+pub(crate) fn has_decimal_commas(bare: &str) -> bool {
+    let mut with_comma = 0;
+    let is_number = |word: &&str| {
+        !word.contains('.')
+            && word.bytes().filter(|byte| *byte == b',').count() <= 1
+            && number(word, Comma::Decimal).is_some()
+    };
+    let count = words(bare, Comma::Decimal)
+        .take_while(is_number)
+        .inspect(|word| with_comma += usize::from(word.contains(',')))
+        .count();
+    count >= 2 && with_comma > 0
+}
+
+/// How the rows of a text use the comma: one use for all rows. It is decimal if some rows have decimal commas and no row has decimal points.
+pub(crate) fn comma_of(lines: &[Line]) -> Comma {
+    let has_points = |line: &Line| {
+        let is_number = |word: &&str| number(word, Comma::Separator).is_some();
+        matches!(held(&line.bare, Comma::Separator), Held::Row(_))
+            && words(&line.bare, Comma::Separator)
+                .take_while(is_number)
+                .any(|word| word.contains('.'))
+    };
+    let decimal = lines.iter().any(|line| has_decimal_commas(&line.bare));
+    if decimal && !lines.iter().any(has_points) {
+        Comma::Decimal
+    } else {
+        Comma::Separator
+    }
+}
+
+/// A line `name = value`, `name: value` or `name value`: the name in lower case, and the value without quotes.
+pub(crate) fn keyword(line: &Line) -> Option<(String, String)> {
+    let begins = line.bare.starts_with(|c: char| c.is_alphabetic());
+    let end = line
+        .bare
+        .find(|c: char| c == '=' || c == ':' || c.is_whitespace())
+        .filter(|_| begins)?;
+    let name = line.bare[..end].trim().to_ascii_lowercase();
+    // Signs of remarks may stand in a quoted value.
+    let quoted = line
+        .text
+        .split('\'')
+        .nth(1)
+        .filter(|_| line.bare.contains('\''));
+    let value =
+        line.bare[end..].trim_start_matches(|c: char| c == '=' || c == ':' || c.is_whitespace());
+    Some((name, quoted.unwrap_or(value).trim().to_owned()))
+}
+
+/// The words of a row that is no point but was one before its line became a remark.
+pub(crate) fn is_remarked_row(line: &Line, comma: Comma) -> bool {
+    let inner = line.text.trim_start_matches(|c: char| {
+        c.is_whitespace() || c == '/' || REMARK.contains(&c) || REMARK_AT_START.contains(&c)
+    });
+    line.bare.is_empty() && matches!(held(&bare(inner), comma), Held::Row(_))
+}
+
+/// A text in quotes as a message shows it, with its end left out if it is long.
+pub(crate) fn shown(text: &str) -> String {
+    let mut shown: String = text.chars().take(SHOWN_MAX).collect();
+    if shown.len() < text.len() {
+        shown.push('…');
+    }
+    format!("{shown:?}")
+}
+
+/// A refusal of a line: the line, the word in it that cannot be read, and what is allowed.
+pub(crate) fn unreadable(line: &Line, needed: &str, comma: Comma) -> String {
+    let place = |word: &str| {
+        let at = line.text.find(word)?;
+        let column = line.text[..at].chars().count() + 1;
+        Some(format!(
+            ", where {} at column {column} is no number",
+            shown(word)
+        ))
+    };
+    let word = match held(&line.bare, comma) {
+        Held::Broken {
+            word: Some(word), ..
+        } => place(&word),
+        Held::Broken { word: None, .. } => words(&line.bare, comma).nth(1).and_then(place),
+        Held::Words => words(&line.bare, comma).next().and_then(place),
+        Held::Nothing | Held::Row(_) => None,
+    };
+    let is_mixed = has_decimal_commas(&line.bare) || mixed_word(&line.bare).is_some();
+    let hint = if comma == Comma::Separator && is_mixed {
+        "; decimal commas and decimal points are mixed in this text"
+    } else {
+        ""
+    };
+    format!(
+        "line {}: {} given{}; {needed} is needed{hint}; remarks begin with #, %, !, \" or //",
+        line.place,
+        shown(line.text),
+        word.unwrap_or_default()
+    )
+}
+
+/// Rows from which on a column that counts them is recognised.
+const COUNTED_MIN: usize = 8;
+
+/// Reads the points. A line of titles before them says which columns are y and z and may name their unit; without it they are the
+/// first two. Further columns are ignored.
+pub(crate) fn read_columns(text: &str) -> Result<ProfileFile, String> {
+    let table = read_table(text)?;
+    let (columns, unit) = titles(&table);
+    if columns.is_none() && counts_rows(&table) {
+        return Err(format!(
+            "line {}: the first column counts the rows (0 or 1, 2, 3, …); remove it, or put a line of titles that contains y and z above the rows",
+            table.rows[0].line.place
+        ));
+    }
+    let columns = columns.unwrap_or([0, 1]);
+    let mm = unit.or(table.stated_unit()).map(LengthUnit::mm);
+    let scale = mm.unwrap_or(1.0);
+    let points = table.points(columns)?;
+    Ok(ProfileFile {
+        points: points
+            .into_iter()
+            .map(|point| point.map(|part| part * scale))
+            .collect(),
+        unit_mm: mm,
+        header_rows: table.header_rows,
+        ..ProfileFile::default()
+    })
+}
+
+/// Whether there are three columns or more and the first holds 0, 1, 2, … or 1, 2, 3, …
+fn counts_rows(table: &Table) -> bool {
+    let first = table.rows[0].numbers[0];
+    table.rows.len() >= COUNTED_MIN
+        && (first == 0.0 || first == 1.0)
+        && table.rows.iter().enumerate().all(|(k, row)| {
+            row.numbers.len() >= 3 && (row.numbers[0] - first - k as f64).abs() < 1e-9
+        })
+}
+
+/// The columns of y and z, or of x and y, or of x and z, and their unit, by the last lines of the header: titles, units, or both.
+fn titles(table: &Table) -> (Option<[usize; 2]>, Option<LengthUnit>) {
+    let mut lines = table
+        .header
+        .iter()
+        .rev()
+        .filter(|line| !line.bare.is_empty());
+    let Some(mut line) = lines.next() else {
+        return (None, None);
+    };
+    let units = cells(line).map(LengthUnit::named);
+    let mut unit = units
+        .collect::<Option<Vec<_>>>()
+        .and_then(|units| units.first().copied());
+    if unit.is_some() {
+        match lines.next() {
+            Some(before) => line = before,
+            None => return (None, unit),
+        }
+    }
+    let mut names: Vec<(char, Option<LengthUnit>)> = Vec::new();
+    for cell in cells(line) {
+        let alone = cell
+            .starts_with(['[', '('])
+            .then(|| LengthUnit::named(cell))
+            .flatten();
+        if let (Some(unit), Some(name)) = (alone, names.last_mut()) {
+            name.1 = Some(unit);
+            continue;
+        }
+        let mut letters = cell.chars();
+        let letter = letters.next().unwrap_or(' ').to_ascii_lowercase();
+        let is_axis = letters.next().is_none_or(|next| !next.is_alphanumeric());
+        let unit = cell.get(1..).and_then(LengthUnit::named);
+        names.push((if is_axis { letter } else { ' ' }, unit));
+    }
+    let width = table.rows[0].numbers.len();
+    let place = |name: char| names.iter().position(|(own, _)| *own == name);
+    let columns = [['y', 'z'], ['x', 'y'], ['x', 'z']]
+        .into_iter()
+        .find_map(|[y, z]| Some([place(y)?, place(z)?]))
+        .filter(|columns| columns.iter().all(|column| *column < width));
+    if let Some([y, z]) = columns {
+        unit = unit.or(names[y].1.filter(|_| names[y].1 == names[z].1));
+    }
+    (columns, unit)
+}
+
+fn cells<'a>(line: &'a Line<'_>) -> impl Iterator<Item = &'a str> {
+    let separated = line.bare.contains([',', ';', '\t']);
+    line.bare
+        .split(move |c: char| {
+            if separated {
+                ",;\t".contains(c)
+            } else {
+                c.is_whitespace()
+            }
+        })
+        .map(str::trim)
+        .filter(|cell| !cell.is_empty())
+}
+
+/// What a line of points has to be.
+const NEEDED: &str = "a row of finite numbers";
+/// Rows in one piece that may be a part of the header: fewer than the points of any profile.
+const HEADER_ROWS_MAX: usize = 7;
+/// A row of the header is this many usual chords or more from the first point, while neighbouring points are one or two apart.
+const CHORDS_APART: f64 = 10.0;
+
+/// A row of numbers.
+#[derive(Debug, Clone)]
+pub(crate) struct Row<'a> {
+    pub(crate) line: Line<'a>,
+    pub(crate) numbers: Vec<f64>,
+}
+
+/// A header and rows of numbers.
+#[derive(Debug, Clone)]
+pub(crate) struct Table<'a> {
+    /// The lines before the first row.
+    pub(crate) header: Vec<Line<'a>>,
+    pub(crate) rows: Vec<Row<'a>>,
+    /// Rows that were commented out.
+    pub(crate) remarked: usize,
+    /// Rows of numbers in the header: their count and the line of the first.
+    pub(crate) header_rows: Option<(usize, usize)>,
+    comma: Comma,
+}
+
+/// The lines of a text with what they hold.
+struct Scanned<'a> {
+    lines: Vec<Line<'a>>,
+    held: Vec<Held>,
+    comma: Comma,
+}
+
+impl Scanned<'_> {
+    fn rows(&self, from: usize, to: usize) -> impl Iterator<Item = usize> {
+        (from..to).filter(|k| matches!(self.held[*k], Held::Row(_)))
+    }
+
+    fn refuse(&self, k: usize) -> String {
+        unreadable(&self.lines[k], NEEDED, self.comma)
+    }
+
+    /// The stretch between lines of words that has the most rows.
+    ///
+    /// # Errors
+    /// Words between rows.
+    fn longest_stretch(&self) -> Result<[usize; 2], String> {
+        let words = |k: &usize| self.held[*k] == Held::Words;
+        let ends: Vec<usize> = (0..self.lines.len()).filter(words).collect();
+        let starts = [0].into_iter().chain(ends.iter().map(|end| end + 1));
+        let ends = ends.iter().copied().chain([self.lines.len()]);
+        let stretches: Vec<([usize; 2], usize)> = starts
+            .zip(ends)
+            .map(|(from, to)| ([from, to], self.rows(from, to).count()))
+            .collect();
+        let most = stretches.iter().map(|(_, rows)| *rows).max().unwrap_or(0);
+        let longest = stretches.iter().position(|(_, rows)| *rows == most);
+        let longest = longest.unwrap_or(0);
+        let (before, behind) = (&stretches[..longest], &stretches[longest..]);
+        if let Some(([_, end], _)) = before.iter().find(|(_, rows)| *rows > HEADER_ROWS_MAX) {
+            return Err(self.refuse(*end));
+        }
+        if behind[1..].iter().any(|(_, rows)| *rows > 0) {
+            return Err(self.refuse(behind[0].0[1]));
+        }
+        Ok(behind[0].0)
+    }
+
+    /// How many of the rows at the begin of a stretch belong to the header: those before its first empty line, or one of another length than
+    /// all others, if they lie apart from the next row.
+    fn header_rows(&self, [from, to]: [usize; 2], points: &[[f64; 2]]) -> usize {
+        let rows: Vec<usize> = self.rows(from, to).collect();
+        let blank = (from..to).find(|k| self.lines[*k].after_empty);
+        let is_attached = |k: &&usize| blank.is_some_and(|blank| **k < blank);
+        let attached = rows.iter().take_while(is_attached).count();
+        let length = |k: &usize| match &self.held[*k] {
+            Held::Row(numbers) => numbers.len(),
+            _ => 0,
+        };
+        let lone = rows.len() > 2
+            && length(&rows[0]) != length(&rows[1])
+            && rows[2..].iter().all(|k| length(k) == length(&rows[1]));
+        let chord = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+        let count = if (1..=HEADER_ROWS_MAX).contains(&attached) {
+            attached
+        } else {
+            usize::from(lone)
+        };
+        if count == 0 || 2 * count >= rows.len() {
+            return 0;
+        }
+        let chords = points[count..].windows(2).map(chord);
+        let mut chords: Vec<f64> = chords.collect();
+        let middle = chords.len() / 2;
+        let usual = *chords.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let apart = chord(&points[count - 1..=count]) > CHORDS_APART * usual;
+        if apart { count } else { 0 }
+    }
+
+    /// A broken row directly above the first row: it is no header.
+    fn broken_row(&self, from: usize, first: usize) -> Option<usize> {
+        let above = (from..first)
+            .rev()
+            .take_while(|k| !self.lines[*k + 1].after_empty);
+        let is_row = |k: &usize| {
+            matches!(
+                self.held[*k],
+                Held::Broken {
+                    word: Some(_),
+                    has_number: true
+                }
+            )
+        };
+        above.filter(is_row).last()
+    }
+
+    /// The first line that may not stand behind the rows or between them. Words may: they are the end of a file.
+    fn bad_line(&self, first: usize) -> Option<usize> {
+        let is_bad = |k: &usize| match self.held[*k] {
+            Held::Broken { .. } => true,
+            Held::Words => !self.lines[*k].bare.starts_with(is_end),
+            Held::Row(_) => {
+                self.comma == Comma::Separator && has_decimal_commas(&self.lines[*k].bare)
+            }
+            Held::Nothing => false,
+        };
+        (first..self.lines.len()).find(is_bad)
+    }
+
+    /// Rows that are remarks.
+    fn remarked(&self, first: usize) -> usize {
+        let lines = self.lines[first..].iter();
+        lines
+            .filter(|line| is_remarked_row(line, self.comma))
+            .count()
+    }
+
+    fn nothing_found(&self) -> String {
+        let is_broken = |k: &usize| matches!(self.held[*k], Held::Broken { .. });
+        if let Some(k) = (0..self.held.len()).find(is_broken) {
+            return self.refuse(k);
+        }
+        match self.remarked(0) {
+            0 => "no points found".to_owned(),
+            count => format!(
+                "no points found; {count} rows are remarks, since they begin with #, %, !, \", ' or ;"
+            ),
+        }
+    }
+}
+
+/// Reads the header and the rows of a text.
+///
+/// # Errors
+/// A sentence that names the line that cannot be read, or that there are no rows.
+pub(crate) fn read_table(text: &str) -> Result<Table<'_>, String> {
+    let lines = lines(text)?;
+    let comma = comma_of(&lines);
+    let held = lines.iter().map(|line| held(&line.bare, comma)).collect();
+    let scanned = Scanned { lines, held, comma };
+    let [from, to] = scanned.longest_stretch()?;
+    let places: Vec<usize> = scanned.rows(from, to).collect();
+    let points: Vec<[f64; 2]> = places
+        .iter()
+        .filter_map(|k| match &scanned.held[*k] {
+            Held::Row(numbers) => Some([numbers[0], numbers[1]]),
+            _ => None,
+        })
+        .collect();
+    let left_out = scanned.header_rows([from, to], &points);
+    let Some(first) = places.get(left_out).copied() else {
+        return Err(scanned.nothing_found());
+    };
+    let broken = scanned.broken_row(from, first).filter(|_| left_out == 0);
+    if let Some(k) = broken.or_else(|| scanned.bad_line(first)) {
+        return Err(scanned.refuse(k));
+    }
+    let in_header: Vec<usize> = scanned.rows(0, first).collect();
+    let first_of = |k: &usize| (in_header.len(), scanned.lines[*k].place);
+    let header_rows = in_header.first().map(first_of);
+    let remarked = scanned.remarked(first);
+    let mut header = scanned.lines;
+    let body = header.split_off(first);
+    let rows = body.into_iter().zip(scanned.held.into_iter().skip(first));
+    let rows = rows.filter_map(|(line, held)| match held {
+        Held::Row(numbers) => Some(Row { line, numbers }),
+        _ => None,
+    });
+    Ok(Table {
+        header,
+        rows: rows.collect(),
+        remarked,
+        header_rows,
+        comma,
+    })
+}
+
+/// Whether a line of words that begins with this may end a file: `END`, `[END]`, `}`, a DOS end of file.
+fn is_end(c: char) -> bool {
+    c.is_alphabetic() || "[]{}()<>=-_\u{1a}".contains(c)
+}
+
+impl Table<'_> {
+    /// A refusal of a line of the header.
+    pub(crate) fn refuse(&self, line: &Line, needed: &str) -> String {
+        unreadable(line, needed, self.comma)
+    }
+
+    /// The values in two columns of every row.
+    ///
+    /// # Errors
+    /// The first row that is too short.
+    pub(crate) fn points(&self, columns: [usize; 2]) -> Result<Vec<[f64; 2]>, String> {
+        let point = |row: &Row| {
+            let value = |column: usize| row.numbers.get(column).copied();
+            match columns.map(value) {
+                [Some(y), Some(z)] => Ok([y, z]),
+                _ => {
+                    let count = columns[0].max(columns[1]) + 1;
+                    let needed = format!("a row of at least {count} finite numbers");
+                    Err(self.refuse(&row.line, &needed))
+                }
+            }
+        };
+        self.rows.iter().map(point).collect()
+    }
+
+    /// The unit that a line of the header names, such as `Units=mm` or `LENGTH = 'm'`.
+    pub(crate) fn stated_unit(&self) -> Option<LengthUnit> {
+        self.header.iter().find_map(|line| {
+            let (name, value) = keyword(line)?;
+            let is_unit = name.contains("unit") || name == "length";
+            LengthUnit::named(&value).filter(|_| is_unit)
+        })
+    }
+}

@@ -1,0 +1,590 @@
+//! Curves through samples: a cubic in every interval, with slopes at the nodes that the functions here choose by different rules.
+//!
+//! Polynomials through given points, after Lagrange.
+//!
+//! Natural cubic splines through samples, smoothed on request.
+//!
+//! The spline f of the samples `(s_i, d_i)` minimises `Σ w_i (d_i − f(s_i))² + λ ∫ (f'')² ds`, with
+//! `w_i` half the distance between the neighbours of `s_i`, so that `λ = (L/2π)⁴` halves waves of length L whatever the
+//! spacing. Source: Reinsch, "Smoothing by spline functions", Numerische Mathematik 10 (1967).
+
+use crate::contact::numerics::cubic::interval;
+
+/// Value of the curve with these values and slopes at the nodes of an ascending axis, at least 2; beyond its ends that of the
+/// outermost cubics.
+pub(crate) fn value(axis: &[f64], values: &[f64], slopes: &[f64], at: f64) -> f64 {
+    Place::new(axis, at).value(values, slopes)
+}
+
+/// A place on an axis, found once for the curves of many rows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    /// The node at the start of its interval.
+    pub(crate) node: usize,
+    /// Weights of the values at both ends of the interval in the curve's value.
+    pub(crate) values: [f64; 2],
+    /// Weights of the slopes there.
+    pub(crate) slopes: [f64; 2],
+}
+
+impl Place {
+    /// A place on an ascending axis of at least 2 nodes; beyond the ends it is counted from the outermost intervals.
+    pub(crate) fn new(axis: &[f64], at: f64) -> Place {
+        let node = interval(axis, at);
+        let length = axis[node + 1] - axis[node];
+        let share = (at - axis[node]) / length;
+        let rest = 1.0 - share;
+        let end = share * share * (3.0 - 2.0 * share);
+        Place {
+            node,
+            values: [1.0 - end, end],
+            slopes: [length * share * rest * rest, -length * share * share * rest],
+        }
+    }
+
+    /// Value of the curve with these values and slopes at the nodes.
+    pub(crate) fn value(&self, values: &[f64], slopes: &[f64]) -> f64 {
+        let [start, end] = self.values;
+        let [leaving, arriving] = self.slopes;
+        let next = self.node + 1;
+        start * values[self.node]
+            + end * values[next]
+            + (leaving * slopes[self.node] + arriving * slopes[next])
+    }
+}
+
+/// Values at any places of the curve that has no extreme between its nodes (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat.
+/// Comput. 5, 1984); beyond the first and last node their values. Nodes ascend; none of two at the same place counts twice.
+pub(crate) fn monotone(axis: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
+    let last = axis.len() - 1;
+    if last == 0 {
+        return vec![values[0]; at.len()];
+    }
+    let slopes = monotone_slopes(axis, values);
+    let value_at = |place: &f64| {
+        let place = place.clamp(axis[0], axis[last]);
+        let i = interval(axis, place);
+        if axis[i + 1] > axis[i] {
+            value(axis, values, &slopes, place)
+        } else {
+            values[i]
+        }
+    };
+    at.iter().map(value_at).collect()
+}
+
+/// Slopes after Fritsch and Butland: weighted harmonic means inside, parabolas at both ends, kept from overshooting.
+fn monotone_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
+    let last = axis.len() - 1;
+    let widths: Vec<f64> = axis.windows(2).map(|k| k[1] - k[0]).collect();
+    let secants: Vec<f64> = (0..last)
+        .map(|k| {
+            let rise = values[k + 1] - values[k];
+            if widths[k] > 0.0 {
+                rise / widths[k]
+            } else {
+                0.0
+            }
+        })
+        .collect();
+    let end = |near: usize, next: usize| {
+        let (h, g) = (widths[near], widths[next]);
+        if h + g <= 0.0 {
+            return 0.0;
+        }
+        let slope = ((2.0 * h + g) * secants[near] - h * secants[next]) / (h + g);
+        if slope * secants[near] <= 0.0 {
+            0.0
+        } else if slope.abs() > 3.0 * secants[near].abs() {
+            3.0 * secants[near]
+        } else {
+            slope
+        }
+    };
+    let mut slopes = vec![secants[0]; last + 1];
+    if last > 1 {
+        slopes[0] = end(0, 1);
+        slopes[last] = end(last - 1, last - 2);
+    }
+    for k in 1..last {
+        let (before, after) = (secants[k - 1], secants[k]);
+        slopes[k] = if before * after > 0.0 {
+            let (w1, w2) = (
+                2.0 * widths[k] + widths[k - 1],
+                widths[k] + 2.0 * widths[k - 1],
+            );
+            (w1 + w2) / (w1 / before + w2 / after)
+        } else {
+            0.0
+        };
+    }
+    slopes
+}
+
+/// How many nodes away the last value lies that a slope of [`limited_slopes`] depends on.
+pub(crate) const SLOPE_REACH: usize = 2;
+
+/// Slopes at the nodes of a curve through at least 2 values, limited where the values jump or have a kink.
+///
+/// A slope is that of the parabola through the node and its two neighbours, unless this parabola is curved more than a fixed
+/// number of times as strongly as those of both neighbouring nodes. There the slope is blended with the harmonic mean of the
+/// adjoining chords' slopes, 0 where these differ in sign (the limiter of van Leer 1974), which keeps the curve from overshooting
+/// the values. At the ends the parabola of the adjacent node is used. A slope inside depends on [`SLOPE_REACH`] values on either side.
+pub(crate) fn limited_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
+    let mut slopes = LimitedSlopes::new(axis);
+    slopes.find(values);
+    slopes.slopes
+}
+
+/// [`limited_slopes`] of one curve after the other over the same axis.
+#[derive(Debug)]
+pub(crate) struct LimitedSlopes {
+    /// One over the distance from every node to the next.
+    per_width: Vec<f64>,
+    /// Of every node but the outermost, two over the distance from the one before it to the one after it.
+    bend: Vec<f64>,
+    /// The weights of the chords before and after such a node in the slope of its parabola.
+    weights: Vec<[f64; 2]>,
+    rises: Vec<f64>,
+    /// Second derivatives of the parabolas; the outermost two have those of their neighbours.
+    bends: Vec<f64>,
+    /// Those of the last curve.
+    pub(crate) slopes: Vec<f64>,
+}
+
+impl LimitedSlopes {
+    /// For curves over an ascending axis of at least 2 nodes.
+    pub(crate) fn new(axis: &[f64]) -> LimitedSlopes {
+        let around = || {
+            axis.windows(3)
+                .map(|at| ([at[2] - at[1], at[1] - at[0]], at[2] - at[0]))
+        };
+        LimitedSlopes {
+            per_width: axis.windows(2).map(|at| 1.0 / (at[1] - at[0])).collect(),
+            bend: around().map(|(_, both)| 2.0 / both).collect(),
+            weights: around()
+                .map(|(parts, both)| parts.map(|part| part / both))
+                .collect(),
+            rises: Vec::with_capacity(axis.len()),
+            bends: Vec::with_capacity(axis.len()),
+            slopes: Vec::with_capacity(axis.len()),
+        }
+    }
+
+    /// Finds the slopes of a curve.
+    pub(crate) fn find(&mut self, values: &[f64]) {
+        let n = values.len();
+        self.rises.clear();
+        let chords = values.windows(2).zip(&self.per_width);
+        self.rises
+            .extend(chords.map(|(ends, per_width)| (ends[1] - ends[0]) * per_width));
+        self.slopes.clear();
+        if n == 2 {
+            self.slopes.resize(n, self.rises[0]);
+            return;
+        }
+        let pairs = || self.rises.windows(2);
+        self.bends.clear();
+        self.bends.push(0.0);
+        let bends = pairs().zip(&self.bend);
+        self.bends
+            .extend(bends.map(|(rise, per)| (rise[1] - rise[0]) * per));
+        self.bends.push(self.bends[n - 2]);
+        self.bends[0] = self.bends[1];
+        self.slopes.push(0.0);
+        let parabolas = pairs().zip(&self.weights);
+        self.slopes
+            .extend(parabolas.map(|(rise, [before, after])| before * rise[0] + after * rise[1]));
+        for k in 1..n - 1 {
+            let trust = self.trust(k);
+            if trust < 1.0 {
+                let (before, after) = (self.rises[k - 1], self.rises[k]);
+                let steepness = before.abs() + after.abs();
+                let mean = (before * after.abs() + after * before.abs()) / steepness;
+                self.slopes[k] = trust * self.slopes[k] + (1.0 - trust) * mean;
+            }
+        }
+        let end = |node: usize, chord: usize| {
+            0.5 * self.trust(node) * self.bends[node] / self.per_width[chord]
+        };
+        let (first, last) = (end(1, 0), end(n - 2, n - 2));
+        self.slopes[0] = self.rises[0] - first;
+        self.slopes.push(self.rises[n - 2] + last);
+    }
+
+    /// Share of the parabola in the slope at a node that is not the first or last.
+    fn trust(&self, k: usize) -> f64 {
+        /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
+        const SLOPE_LIMIT: f64 = 8.0;
+        let bend = self.bends[k].abs();
+        let allowed = SLOPE_LIMIT * self.bends[k - 1].abs().min(self.bends[k + 1].abs());
+        if bend <= allowed { 1.0 } else { allowed / bend }
+    }
+}
+
+/// Slopes that favour the straighter side, so that the curve stays close to the chords where a spline overshoots (H. Akima, Journal of
+/// the ACM 17, 1970). At least 2 nodes, ascending.
+pub(crate) fn akima_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
+    let count = axis.len();
+    // Slopes of the chords, with two more beyond either end that go on in a straight line.
+    let mut chords = vec![0.0; count + 3];
+    for k in 0..count - 1 {
+        chords[k + 2] = (values[k + 1] - values[k]) / (axis[k + 1] - axis[k]);
+    }
+    for k in [1, 0] {
+        chords[k] = 2.0 * chords[k + 1] - chords[k + 2];
+    }
+    for k in [count + 1, count + 2] {
+        chords[k] = 2.0 * chords[k - 1] - chords[k - 2];
+    }
+    (0..count)
+        .map(|k| {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|j| chords[k + j]);
+            let (before, after) = ((b - a).abs(), (d - c).abs());
+            if before + after > 0.0 {
+                (after * b + before * c) / (before + after)
+            } else {
+                0.5 * (b + c)
+            }
+        })
+        .collect()
+}
+
+/// Weights of the values at the nodes in the value at `at` of the polynomial through them. No two nodes are equal.
+pub(crate) fn polynomial_weights<const N: usize>(nodes: &[f64; N], at: f64) -> [f64; N] {
+    std::array::from_fn(|i| {
+        let others = || (0..N).filter(|j| *j != i);
+        let above: f64 = others().map(|j| at - nodes[j]).product();
+        let below: f64 = others().map(|j| nodes[i] - nodes[j]).product();
+        above / below
+    })
+}
+
+/// Value at `at` of the polynomial of least degree through points `(place, value)`, of which there is at least one.
+pub(crate) fn polynomial_value(points: &[(f64, f64)], at: f64) -> f64 {
+    let mut sum = 0.0;
+    for (i, (node, value)) in points.iter().enumerate() {
+        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
+        let weight: f64 = others.map(|(_, (x, _))| (at - x) / (node - x)).product();
+        sum += weight * value;
+    }
+    sum
+}
+
+/// A natural cubic spline; linear beyond its ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spline {
+    knots: Vec<f64>,
+    values: Vec<f64>,
+    /// Second derivatives at the knots, 0 at both ends.
+    bends: Vec<f64>,
+}
+
+/// Value and the first two derivatives at one place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SplineValue {
+    /// Value.
+    pub value: f64,
+    /// First derivative.
+    pub slope: f64,
+    /// Second derivative.
+    pub bend: f64,
+}
+
+impl Spline {
+    /// The spline through `values` at strictly increasing `knots`, at least 2; waves shorter than about `cut_wavelength`
+    /// (same unit as the knots) are smoothed away, 0 for interpolation.
+    #[must_use]
+    pub fn new(knots: &[f64], values: &[f64], cut_wavelength: f64) -> Spline {
+        Spline::pinned(knots, values, cut_wavelength, [false; 2])
+    }
+
+    /// Like [`Spline::new`]. A smoothed spline passes exactly through the first and the last value where `ends` says so.
+    #[must_use]
+    pub fn pinned(knots: &[f64], values: &[f64], cut_wavelength: f64, ends: [bool; 2]) -> Spline {
+        let n = knots.len();
+        let lambda = (cut_wavelength / std::f64::consts::TAU).powi(4);
+        let mut spline = Spline {
+            knots: knots.to_vec(),
+            values: values.to_vec(),
+            bends: vec![0.0; n],
+        };
+        if n < 3 {
+            return spline;
+        }
+        let step: Vec<f64> = knots.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let stiffness = |i: usize| {
+            if i == 0 && ends[0] || i == n - 1 && ends[1] {
+                return 0.0;
+            }
+            let before = if i > 0 { step[i - 1] } else { 0.0 };
+            let after = if i < n - 1 { step[i] } else { 0.0 };
+            2.0 * lambda / (before + after)
+        };
+        // Column i of the second differences has three entries, at the knots i − 1, i and i + 1.
+        let column = |i: usize| {
+            let (a, b) = (1.0 / step[i - 1], 1.0 / step[i]);
+            [a, -a - b, b]
+        };
+        let mut bands = vec![[0.0; 3]; n - 2];
+        let mut right = vec![0.0; n - 2];
+        for (k, band) in bands.iter_mut().enumerate() {
+            let i = k + 1;
+            let own = column(i);
+            band[0] = (step[i - 1] + step[i]) / 3.0;
+            band[0] += (0..3)
+                .map(|j| own[j] * own[j] * stiffness(i - 1 + j))
+                .sum::<f64>();
+            if i + 1 < n - 1 {
+                let next = column(i + 1);
+                band[1] = step[i] / 6.0
+                    + own[1] * next[0] * stiffness(i)
+                    + own[2] * next[1] * stiffness(i + 1);
+            }
+            if i + 2 < n - 1 {
+                band[2] = own[2] * column(i + 2)[0] * stiffness(i + 1);
+            }
+            right[k] = (0..3).map(|j| own[j] * values[i - 1 + j]).sum();
+        }
+        solve(&mut bands, &mut right);
+        spline.bends[1..n - 1].copy_from_slice(&right);
+        if lambda > 0.0 {
+            for i in 1..n - 1 {
+                for (j, entry) in column(i).into_iter().enumerate() {
+                    spline.values[i - 1 + j] -= stiffness(i - 1 + j) * entry * spline.bends[i];
+                }
+            }
+        }
+        spline
+    }
+
+    /// First and last knot.
+    #[must_use]
+    pub fn range(&self) -> [f64; 2] {
+        [self.knots[0], self.knots[self.knots.len() - 1]]
+    }
+
+    /// The knots.
+    #[must_use]
+    pub fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    /// Value and derivatives; beyond the ends the tangent there.
+    #[must_use]
+    pub fn at(&self, s: f64) -> SplineValue {
+        self.at_in(self.interval(s), s)
+    }
+
+    /// Coefficients of the cubic between the knots i and i + 1, by powers of the distance from knot i.
+    #[must_use]
+    pub fn cubic(&self, i: usize) -> [f64; 4] {
+        let jet = self.at_in(i, self.knots[i]);
+        let step = self.knots[i + 1] - self.knots[i];
+        let bends = self.bends[i + 1] - self.bends[i];
+        [jet.value, jet.slope, 0.5 * jet.bend, bends / (6.0 * step)]
+    }
+
+    /// The interval of knots that a place lies in, or the nearest one.
+    #[must_use]
+    pub fn interval(&self, s: f64) -> usize {
+        let after = self.knots.partition_point(|knot| *knot <= s);
+        after.clamp(1, self.knots.len() - 1) - 1
+    }
+
+    /// [`Spline::at`] for a place whose [`Spline::interval`] is known.
+    #[must_use]
+    pub fn at_in(&self, i: usize, s: f64) -> SplineValue {
+        let [first, last] = self.range();
+        if s < first || s > last {
+            let end = if s < first { first } else { last };
+            let jet = self.at(end);
+            return SplineValue {
+                value: jet.value + jet.slope * (s - end),
+                slope: jet.slope,
+                bend: 0.0,
+            };
+        }
+        let step = self.knots[i + 1] - self.knots[i];
+        let (b, a) = ((s - self.knots[i]) / step, (self.knots[i + 1] - s) / step);
+        let (bend_a, bend_b) = (self.bends[i], self.bends[i + 1]);
+        SplineValue {
+            value: a * self.values[i]
+                + b * self.values[i + 1]
+                + ((a * a - 1.0) * a * bend_a + (b * b - 1.0) * b * bend_b) * step * step / 6.0,
+            slope: (self.values[i + 1] - self.values[i]) / step
+                + ((3.0 * b * b - 1.0) * bend_b - (3.0 * a * a - 1.0) * bend_a) * step / 6.0,
+            bend: a * bend_a + b * bend_b,
+        }
+    }
+}
+
+/// Solves a symmetric positive definite system with two side bands by LDLᵀ; `bands[i]` holds the entries `(i, i)`,
+/// `(i, i + 1)`, `(i, i + 2)`. The solution replaces the right-hand side.
+fn solve(bands: &mut [[f64; 3]], right: &mut [f64]) {
+    let n = right.len();
+    for i in 0..n {
+        let [pivot, near, far] = bands[i];
+        if i + 1 < n {
+            bands[i + 1][0] -= near * near / pivot;
+            bands[i + 1][1] -= near * far / pivot;
+            right[i + 1] -= near / pivot * right[i];
+        }
+        if i + 2 < n {
+            bands[i + 2][0] -= far * far / pivot;
+            right[i + 2] -= far / pivot * right[i];
+        }
+    }
+    for i in (0..n).rev() {
+        let [pivot, near, far] = bands[i];
+        let mut value = right[i];
+        if i + 1 < n {
+            value -= near * right[i + 1];
+        }
+        if i + 2 < n {
+            value -= far * right[i + 2];
+        }
+        right[i] = value / pivot;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_passed_without_overshoot_and_lines_are_kept() {
+        let at: Vec<f64> = (0..=50).map(|k| f64::from(k) * 0.1).collect();
+        let knots = [0.0, 1.0, 1.5, 3.0, 5.0];
+        let step = monotone(&knots, &[0.0, 0.0, 1.0, 1.0, 1.0], &at);
+        assert!(step.iter().all(|v| (0.0..=1.0).contains(v)), "{step:?}");
+        assert!(step.is_sorted_by(|a, b| a <= b));
+        let line = monotone(&knots, &knots.map(|k| 2.0 * k - 3.0), &at);
+        for (place, value) in at.iter().zip(line) {
+            assert!((value - (2.0 * place - 3.0)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn akima_leaves_a_line_straight_up_to_where_it_bends() {
+        let axis: Vec<f64> = (0..10).map(f64::from).collect();
+        let values = axis.clone().into_iter().map(|x| (x - 5.0).max(0.0));
+        let values: Vec<f64> = values.collect();
+        let slopes = akima_slopes(&axis, &values);
+        for (k, slope) in slopes.iter().enumerate() {
+            let expected = [0.0, 1.0][usize::from(k > 5)];
+            assert!(k == 5 || (slope - expected).abs() < 1e-12, "{slopes:?}");
+        }
+        for k in [0.3, 2.5, 3.9] {
+            assert!(value(&axis, &values, &slopes, k).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn limited_slopes_are_those_of_parabolas_unless_the_values_jump() {
+        let axis = [0.0, 1.0, 1.5, 3.0, 5.0, 6.0];
+        let parabola = limited_slopes(&axis, &axis.map(|x| 1.0 + x * (0.5 - x)));
+        for (x, slope) in axis.iter().zip(parabola) {
+            assert!((slope - (0.5 - 2.0 * x)).abs() < 1e-12);
+        }
+        let step = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+        let axis: Vec<f64> = (0..6).map(f64::from).collect();
+        let slopes = limited_slopes(&axis, &step);
+        for k in 0..50 {
+            let found = value(&axis, &step, &slopes, 0.1 * f64::from(k));
+            assert!((-0.1..1.1).contains(&found), "{found}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod lagrange_tests {
+    use super::*;
+
+    #[test]
+    fn a_polynomial_of_as_many_terms_as_points_is_met_everywhere() {
+        let cubic = |x: f64| 1.0 + x * (2.0 - x * (0.5 + 3.0 * x));
+        let nodes = [-1.0, 0.2, 0.7, 2.0];
+        let points = nodes.map(|x| (x, cubic(x)));
+        for at in [-2.0, -1.0, 0.0, 0.65, 3.0] {
+            let weighted = polynomial_weights(&nodes, at).into_iter().zip(points);
+            let by_weights: f64 = weighted.map(|(weight, (_, value))| weight * value).sum();
+            assert!((by_weights - cubic(at)).abs() < 1e-12 * cubic(at).abs().max(1.0));
+            assert!(
+                (polynomial_value(&points, at) - by_weights).abs()
+                    < 1e-12 * cubic(at).abs().max(1.0)
+            );
+        }
+        assert_eq!(polynomial_value(&points[..1], 7.0), points[0].1);
+    }
+}
+
+#[cfg(test)]
+mod spline_tests {
+    use super::*;
+
+    fn sampled(step: f64, f: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>) {
+        let knots: Vec<f64> = (0..=400).map(|k| f64::from(k) * step).collect();
+        let values = knots.iter().map(|s| f(*s)).collect();
+        (knots, values)
+    }
+
+    #[test]
+    fn interpolation_meets_its_samples_and_is_of_fourth_order_inside() {
+        let mut errors = Vec::new();
+        for step in [0.02, 0.01] {
+            let (knots, values) = sampled(step, f64::sin);
+            let spline = Spline::new(&knots, &values, 0.0);
+            for (s, value) in knots.iter().zip(&values) {
+                assert!((spline.at(*s).value - value).abs() < 1e-14);
+            }
+            let middle = 2.0 + 0.5 * step;
+            errors.push((spline.at(middle).value - middle.sin()).abs());
+            assert!((spline.at(middle).slope - middle.cos()).abs() < 1e-6);
+            assert!((spline.at(middle).bend + middle.sin()).abs() < 1e-3);
+        }
+        assert!(errors[0] / errors[1] > 12.0, "{errors:?}");
+    }
+
+    #[test]
+    fn a_wave_of_the_cut_length_is_halved_and_longer_ones_pass() {
+        for (step, shift) in [(0.05, 0.0), (0.025, 0.0), (0.05, 0.02)] {
+            for (length, kept) in [(2.0, 0.5), (4.0, 16.0 / 17.0), (1.0, 1.0 / 17.0)] {
+                let wave = |s: f64| (std::f64::consts::TAU * s / length).cos();
+                let (mut knots, _) = sampled(step, wave);
+                for knot in knots.iter_mut().skip(1).step_by(2) {
+                    *knot += shift;
+                }
+                let values: Vec<f64> = knots.iter().map(|s| wave(*s)).collect();
+                let spline = Spline::new(&knots, &values, 2.0);
+                let found = spline.at(4.0).value;
+                assert!(
+                    (found - kept).abs() < 0.02,
+                    "{step} {length}: {found} against {kept}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_pinned_end_stays_where_its_sample_is() {
+        let (knots, values) = sampled(0.1, |s| (3.0 * s).sin() + 0.1 * (40.0 * s).cos());
+        let last = knots.len() - 1;
+        let spline = Spline::pinned(&knots, &values, 3.0, [true, false]);
+        assert!((spline.at(0.0).value - values[0]).abs() < 1e-12);
+        assert!((spline.at(knots[last]).value - values[last]).abs() > 1e-3);
+        let free = Spline::new(&knots, &values, 3.0);
+        assert!((free.at(0.0).value - values[0]).abs() > 1e-3);
+        // Far from the ends both are the same.
+        assert!((free.at(20.0).value - spline.at(20.0).value).abs() < 1e-9);
+    }
+
+    #[test]
+    fn lines_are_kept_by_any_smoothing() {
+        let (knots, values) = sampled(0.1, |s| 3.0 - 0.5 * s);
+        let spline = Spline::new(&knots, &values, 50.0);
+        for s in [-1.0, 0.0, 3.33, 40.0, 45.0] {
+            assert!((spline.at(s).value - (3.0 - 0.5 * s)).abs() < 1e-9);
+        }
+    }
+}

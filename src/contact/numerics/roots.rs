@@ -1,0 +1,592 @@
+//! The root of an increasing function of one variable without a bracket to start from, the boundary of a condition, and the largest value in an
+//! interval.
+//!
+//! The root of a monotone function of two variables, without bounds to start from: Broyden's iteration (Broyden 1965), and where that does not
+//! settle a search in a search.
+//!
+//! The root of a monotone function in a bracket: Newton's method, with bisection where a step fails, so that it always converges.
+
+use std::convert::Infallible;
+
+/// Largest argument tried: a hundred times the creepage at which the cubic law predicts full slip. Chosen by judgement; how much it matters was not
+/// measured.
+pub(crate) const FRACTION_MAX: f64 = 65.0;
+/// Most arguments tried. Keeps the numbers safe; not tuned.
+const TRIALS_MAX: u32 = 40;
+/// Width of a bracket, relative to its ends, below which it is not divided further. Keeps the numbers safe; not tuned.
+const CLOSED: f64 = 1e-13;
+/// The same relative to the tolerance of the value: a function that is not steeper than the inverse of this and misses the tolerance
+/// at both ends has a jump between them. Forces over places are no steeper than 10.
+const CLOSED_OF_TOLERANCE: f64 = 1e-3;
+
+/// How a search ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RootExit {
+    /// The value is within its tolerance.
+    Found,
+    /// The function keeps its sign up to the largest argument allowed.
+    SignKept,
+    /// The sign changes within a bracket too narrow to divide, but the values at its ends exceed the tolerance.
+    BracketClosed,
+    /// The trials were used up.
+    TrialsUsedUp,
+}
+
+impl RootExit {
+    /// Whether the tolerance was met.
+    pub(crate) fn converged(self) -> bool {
+        self == RootExit::Found
+    }
+
+    /// The reason as a clause for messages.
+    pub(crate) fn reason(self) -> &'static str {
+        match self {
+            RootExit::Found => "the tolerance was met",
+            RootExit::SignKept => "no change of sign was found",
+            RootExit::BracketClosed => "the value jumps where its sign changes",
+            RootExit::TrialsUsedUp => "the trials were used up",
+        }
+    }
+}
+
+/// The result of a search for a root.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Root {
+    /// The root, or without convergence the evaluated argument with the smallest magnitude of the value.
+    pub(crate) place: f64,
+    /// How the search ended.
+    pub(crate) exit: RootExit,
+}
+
+/// Searches from `start` until the sign changes, then within the bracket by the Illinois rule (regula falsi that halves the value at
+/// a bound that is kept twice). `f` returns the value at an argument and the magnitude below which it counts as 0.
+pub(crate) fn find_root<E>(
+    start: f64,
+    mut f: impl FnMut(f64, &mut f64) -> Result<f64, E>,
+) -> Result<Root, E> {
+    let mut tolerance = 0.0;
+    let (mut low, mut high): (Option<[f64; 2]>, Option<[f64; 2]>) = (None, None);
+    let mut place = start.clamp(-FRACTION_MAX, FRACTION_MAX);
+    let (mut stride, mut last) = (0.0_f64, None::<[f64; 2]>);
+    let mut best = [place, f64::INFINITY];
+    let ended = |place, exit| Ok(Root { place, exit });
+    for _ in 0..TRIALS_MAX {
+        let value = f(place, &mut tolerance)?;
+        if value.abs() <= tolerance {
+            return ended(place, RootExit::Found);
+        }
+        if value.abs() <= best[1] {
+            best = [place, value.abs()];
+        }
+        let below = value < 0.0;
+        let (mine, other) = if below {
+            (&mut low, &mut high)
+        } else {
+            (&mut high, &mut low)
+        };
+        let stays = last.is_some_and(|[_, before]| (before < 0.0) == below);
+        *mine = Some([place, value]);
+        if let (Some([_, value]), true) = (other.as_mut(), stays) {
+            *value *= 0.5;
+        }
+        let slope = last.map(|[at, before]| (value - before) / (place - at));
+        last = Some([place, value]);
+        if let (Some([p, f]), Some([q, g])) = (low, high) {
+            let narrow = (CLOSED * q.abs().max(p.abs())).max(CLOSED_OF_TOLERANCE * tolerance);
+            if (q - p).abs() <= narrow {
+                return ended(best[0], RootExit::BracketClosed);
+            }
+            place = (p * g - q * f) / (g - f);
+            continue;
+        }
+        if place.abs() >= FRACTION_MAX && (place < 0.0) != below {
+            return ended(best[0], RootExit::SignKept);
+        }
+        // Only one bound is known: follow the line through the last two points, but limit how much the step grows.
+        let needed = match slope.filter(|slope| *slope > 0.0) {
+            Some(slope) => (value / slope).abs(),
+            None => value.abs(),
+        };
+        stride = if stride == 0.0 {
+            needed
+        } else {
+            needed.min(4.0 * stride)
+        };
+        let step = if below { stride } else { -stride };
+        place = (place + step).clamp(-FRACTION_MAX, FRACTION_MAX);
+    }
+    ended(best[0], RootExit::TrialsUsedUp)
+}
+
+/// Bisects the interval between `low` and `high` (in either order) and returns the bracket after the given number of halvings, `2^-halvings` times as
+/// long. `is_low` is true on the side of `low` and false on that of `high`.
+pub(crate) fn bisect(
+    [mut low, mut high]: [f64; 2],
+    halvings: u32,
+    is_low: impl Fn(f64) -> bool,
+) -> [f64; 2] {
+    for _ in 0..halvings {
+        let middle = 0.5 * (low + high);
+        if is_low(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    [low, high]
+}
+
+/// Maximum of a unimodal function in an interval, by parabolic interpolation and golden sections (Brent 1973). The argument is
+/// found to 1e-4 of the interval, so that the relative error of a smooth maximum is about the square of this. A function with several
+/// maxima gives one of them. At most forty evaluations.
+pub(crate) fn maximum([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
+    const STEPS: usize = 40;
+    const SHORT: f64 = 0.381_966_011_250_105_1;
+    let close = 1e-4 * (high - low);
+    let best = low + SHORT * (high - low);
+    // The best argument, the second best and the previous second best, each with its value.
+    let mut places = [(best, f(best)); 3];
+    let (mut step, mut before) = (0.0_f64, 0.0_f64);
+    for _ in 0..STEPS {
+        let [(x, fx), (w, fw), (v, fv)] = places;
+        let middle = 0.5 * (low + high);
+        if (x - middle).abs() <= 2.0 * close - 0.5 * (high - low) {
+            break;
+        }
+        let (r, q) = ((x - w) * (fx - fv), (x - v) * (fx - fw));
+        let parabola = ((x - w) * r - (x - v) * q) / (2.0 * (q - r));
+        let inside = parabola > low - x && parabola < high - x;
+        if inside && parabola.abs() < 0.5 * before.abs() {
+            (before, step) = (step, parabola);
+        } else {
+            before = if x < middle { high - x } else { low - x };
+            step = SHORT * before;
+        }
+        let at = x + step.abs().max(close).copysign(step);
+        let value = f(at);
+        if value >= fx {
+            *(if at >= x { &mut low } else { &mut high }) = x;
+            places = [(at, value), (x, fx), (w, fw)];
+            continue;
+        }
+        *(if at < x { &mut low } else { &mut high }) = at;
+        if value >= fw || w == x {
+            places = [(x, fx), (at, value), (w, fw)];
+        } else if value >= fv || v == x || v == w {
+            places[2] = (at, value);
+        }
+    }
+    places[0].1
+}
+
+/// Arguments tried by Broyden's iteration. Chosen by judgement; how much it matters was not measured.
+const TRIALS_AT_ONCE: u32 = 14;
+/// Longest step of Broyden's iteration. Chosen by judgement; how much it matters was not measured.
+const STEP_MAX: f64 = 0.4;
+/// Trials in a row without improvement after which Broyden's iteration is given up. Keeps the numbers safe; not tuned.
+const WORSE_MAX: u32 = 3;
+/// Tolerance of the inner one of two nested searches over that of the outer one, to which the error of the inner one is noise. Chosen by
+/// judgement; how much it matters was not measured.
+const INNER_TOLERANCE: f64 = 0.3;
+
+/// The result of a search for two arguments.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PairRoot {
+    /// The arguments with the smallest values found.
+    pub(crate) place: [f64; 2],
+    /// How the search ended; that a value kept its sign counts before other reasons.
+    pub(crate) exit: RootExit,
+}
+
+/// Searches from `start` for two arguments at which both values are 0. Each value must grow with its own argument; where their slopes are
+/// about 1, Broyden's iteration needs no others to begin with. `f` returns the values at two arguments and the length below which they
+/// count as 0.
+///
+/// # Errors
+/// Those of `f`.
+pub(crate) fn find_pair<E>(
+    start: [f64; 2],
+    mut f: impl FnMut([f64; 2], &mut f64) -> Result<[f64; 2], E>,
+) -> Result<PairRoot, E> {
+    if let Some(place) = at_once(start, &mut f)? {
+        let exit = RootExit::Found;
+        return Ok(PairRoot { place, exit });
+    }
+    one_in_the_other(start, &mut f)
+}
+
+/// Broyden's iteration; nothing if it does not settle.
+fn at_once<E>(
+    start: [f64; 2],
+    f: &mut impl FnMut([f64; 2], &mut f64) -> Result<[f64; 2], E>,
+) -> Result<Option<[f64; 2]>, E> {
+    let mut tolerance = 0.0;
+    let (mut place, mut off) = (start, f(start, &mut tolerance)?);
+    let mut inverse = [[1.0, 0.0], [0.0, 1.0]];
+    let mut worse = 0;
+    let mut trials = 0;
+    loop {
+        if length(off) <= tolerance {
+            return Ok(Some(place));
+        }
+        if trials == TRIALS_AT_ONCE || worse == WORSE_MAX {
+            return Ok(None);
+        }
+        trials += 1;
+        let mut step = times(&inverse, off).map(|s| -s);
+        let factor = (STEP_MAX / length(step)).min(1.0);
+        step = step.map(|s| factor * s);
+        let next = [place[0] + step[0], place[1] + step[1]];
+        let found = f(next, &mut tolerance)?;
+        let change = times(&inverse, [found[0] - off[0], found[1] - off[1]]);
+        let denominator = step[0] * change[0] + step[1] * change[1];
+        if denominator.abs() > 1e-12 * length(step).powi(2) {
+            let row = [0, 1].map(|j| step[0] * inverse[0][j] + step[1] * inverse[1][j]);
+            for i in 0..2 {
+                for j in 0..2 {
+                    inverse[i][j] += (step[i] - change[i]) * row[j] / denominator;
+                }
+            }
+        }
+        if length(found) < length(off) {
+            (place, off, worse) = (next, found, 0);
+        } else {
+            worse += 1;
+        }
+    }
+}
+
+/// For every trial of the second argument, finds the first that makes the first value 0. Both searches are bracketed: slow but sure.
+fn one_in_the_other<E>(
+    start: [f64; 2],
+    f: &mut impl FnMut([f64; 2], &mut f64) -> Result<[f64; 2], E>,
+) -> Result<PairRoot, E> {
+    let mut first = start[0];
+    // Second argument, the first one found for it, and how that search ended.
+    let mut pairs = Vec::new();
+    let Root { place, exit } = find_root(start[1], |second, tolerance| {
+        let (mut off, mut outer) = ([0.0; 2], 0.0);
+        let inner = find_root(first, |at, tolerance| {
+            off = f([at, second], &mut outer)?;
+            *tolerance = INNER_TOLERANCE * outer;
+            Ok::<f64, E>(off[0])
+        })?;
+        first = inner.place;
+        pairs.push((second, inner));
+        *tolerance = outer;
+        Ok::<f64, E>(off[1])
+    })?;
+    let inner = pairs.iter().rev().find(|(second, _)| *second == place);
+    let (first, exit_inner) = inner.map_or((first, RootExit::Found), |(_, inner)| {
+        (inner.place, inner.exit)
+    });
+    let exits = [exit, exit_inner];
+    let kept = exits.into_iter().find(|exit| *exit == RootExit::SignKept);
+    let last = if exit.converged() { exit_inner } else { exit };
+    Ok(PairRoot {
+        place: [first, place],
+        exit: kept.unwrap_or(last),
+    })
+}
+
+fn length([x, y]: [f64; 2]) -> f64 {
+    x.hypot(y)
+}
+
+fn times(matrix: &[[f64; 2]; 2], [x, y]: [f64; 2]) -> [f64; 2] {
+    matrix.map(|[a, b]| a * x + b * y)
+}
+
+/// Evaluations after which Newton steps are no longer tried and the bracket is halved every time.
+const NEWTON_STEPS: usize = 60;
+
+/// When a search ends: as soon as the value, the last step or the bracket is smaller than given here; 0 disables a criterion.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CloseEnough {
+    /// Magnitude of the value.
+    pub(crate) value: f64,
+    /// Length of the last step, or of the bracket.
+    pub(crate) place: f64,
+}
+
+/// Whether a function rises or falls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Course {
+    Rising,
+    Falling,
+}
+
+/// The root of a function that rises or falls from `low` to `high`. `f` returns value and slope. `start` is tried first, or the middle
+/// of the bracket if `start` lies outside. If Newton steps do not converge, as at a triple root, sixty halvings reduce the bracket to
+/// rounding error.
+pub(crate) fn find(
+    bracket: [f64; 2],
+    start: f64,
+    course: Course,
+    close: CloseEnough,
+    f: impl Fn(f64) -> [f64; 2],
+) -> f64 {
+    let Ok(root) = try_find(bracket, start, course, close, |at| {
+        Ok::<[f64; 2], Infallible>(f(at))
+    });
+    root
+}
+
+/// The same for a function that may have no value, which ends the search. Ends of the bracket may be infinite as long as Newton steps
+/// stay finite. Where the criterion for the value is met, the root returned is the argument evaluated last.
+///
+/// # Errors
+/// The one of `f`.
+pub(crate) fn try_find<E>(
+    [mut low, mut high]: [f64; 2],
+    start: f64,
+    course: Course,
+    close: CloseEnough,
+    mut f: impl FnMut(f64) -> Result<[f64; 2], E>,
+) -> Result<f64, E> {
+    let inside = |at: f64, low: f64, high: f64| at > low && at < high;
+    let mut at = if (low..=high).contains(&start) {
+        start
+    } else {
+        0.5 * (low + high)
+    };
+    for step in 1..=2 * NEWTON_STEPS {
+        let [value, slope] = f(at)?;
+        if value.abs() < close.value {
+            break;
+        }
+        if (value > 0.0) == (course == Course::Rising) {
+            high = at;
+        } else {
+            low = at;
+        }
+        let newton = at - value / slope;
+        let next = if inside(newton, low, high) && step < NEWTON_STEPS {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
+        let moved = (next - at).abs();
+        at = next;
+        if moved < close.place || high - low < close.place {
+            break;
+        }
+    }
+    Ok(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn search(tolerance: f64, f: impl Fn(f64) -> f64) -> Root {
+        let look = |at: f64, least: &mut f64| {
+            *least = tolerance;
+            Ok::<f64, ()>(f(at))
+        };
+        find_root(0.1, look).unwrap()
+    }
+
+    #[test]
+    fn a_root_is_found_to_its_tolerance() {
+        for goal in [-20.0, -0.3, 0.0, 0.1, 4.0, 60.0] {
+            let root = search(1e-9, |at| (at - goal) * (1.0 + at * at));
+            assert_eq!(root.exit, RootExit::Found, "{goal}");
+            assert!((root.place - goal).abs() < 1e-8, "{goal}: {root:?}");
+        }
+    }
+
+    #[test]
+    fn without_convergence_the_best_evaluated_argument_is_returned() {
+        // The value jumps from -1 to 0.2: only arguments beyond the jump are near 0.
+        let mut seen = Vec::new();
+        let root = find_root(0.1, |at, least| {
+            *least = 1e-9;
+            let value = if at < 2.0 { -1.0 } else { 0.2 + 0.01 * at };
+            seen.push([at, f64::abs(value)]);
+            Ok::<f64, ()>(value)
+        })
+        .unwrap();
+        assert!(!root.exit.converged(), "{root:?}");
+        let least = seen
+            .iter()
+            .map(|[_, value]| *value)
+            .fold(f64::INFINITY, f64::min);
+        assert!(seen.contains(&[root.place, least]), "{root:?}");
+    }
+
+    #[test]
+    fn a_search_without_a_root_says_why_it_ended() {
+        assert_eq!(search(1e-9, |at| at - 1e3).exit, RootExit::SignKept);
+        assert_eq!(search(1e-9, |at| at + 1e3).exit, RootExit::SignKept);
+        // A constant function has no slope that could end the search early.
+        assert_eq!(search(1e-9, |_| -1.0).exit, RootExit::TrialsUsedUp);
+        // At a jump the value is small nowhere.
+        let jump = |at: f64| if at < 2.0 { -1.0 } else { 1.0 };
+        let ended = search(1e-9, jump);
+        assert!(!ended.exit.converged(), "{ended:?}");
+        assert!((ended.place - 2.0).abs() < 1e-3, "{ended:?}");
+        // A tolerance of 0 is met only if the value is exactly 0.
+        let ended = search(0.0, |at| at.exp() - 1.3);
+        assert!(
+            !ended.exit.converged() || ended.place.exp() == 1.3,
+            "{ended:?}"
+        );
+    }
+
+    #[test]
+    fn the_place_of_a_step_is_bracketed_from_either_side() {
+        for bounds in [[0.0, 1.0], [1.0, 0.0]] {
+            let rising = bounds[1] > bounds[0];
+            let [low, high] = bisect(bounds, 30, |x| (x < 0.3) == rising);
+            assert!((high - low).abs() <= 1e-9, "{low} {high}");
+            assert!((low - 0.3).abs() <= 1e-9 && (high - 0.3).abs() <= 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_top_of_a_hump_is_found_in_few_evaluations() {
+        let humps: [(&dyn Fn(f64) -> f64, f64); 3] = [
+            (&|x: f64| 1.0 - (x - 0.3).powi(2), 1.0),
+            (&|x: f64| (x - 1.2).cos() * (1.0 + 1e-3 * x), 0.0),
+            (&|x: f64| -(x - 0.77).abs(), 0.0),
+        ];
+        for (k, (hump, top)) in humps.into_iter().enumerate() {
+            let evaluations = std::cell::Cell::new(0);
+            let counted = |x: f64| {
+                evaluations.set(evaluations.get() + 1);
+                hump(x)
+            };
+            let found = maximum([-0.5, 2.0], counted);
+            let exact = if k == 1 {
+                (0..=250_000)
+                    .map(|n| hump(-0.5 + 1e-5 * f64::from(n)))
+                    .fold(f64::MIN, f64::max)
+            } else {
+                top
+            };
+            // At a kink the error of the value is proportional to that of the argument.
+            let allowed = if k == 2 { 5e-4 } else { 1e-7 };
+            assert!((found - exact).abs() < allowed, "{k}: {found} {exact}");
+            assert!(
+                evaluations.get() <= 25,
+                "{k}: {} evaluations",
+                evaluations.get()
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod pair_root_tests {
+    use super::*;
+
+    /// Two forces that a length below 1 shares, as friction does.
+    fn shared([x, y]: [f64; 2]) -> [f64; 2] {
+        let length = 1.0 + x.hypot(y);
+        [x / length, y / length]
+    }
+
+    fn search(goal: [f64; 2]) -> (PairRoot, u32) {
+        let mut trials = 0;
+        let look = |place: [f64; 2], least: &mut f64| {
+            trials += 1;
+            *least = 1e-9;
+            let found = shared(place);
+            Ok::<[f64; 2], ()>([found[0] - goal[0], found[1] - goal[1]])
+        };
+        let root = find_pair([0.1, 0.1], look).unwrap();
+        (root, trials)
+    }
+
+    #[test]
+    fn near_arguments_are_found_in_few_trials_and_far_ones_all_the_same() {
+        for (place, most) in [([0.3, 0.2], 12), ([-0.4, 0.9], 15), ([8.0, -11.0], 400)] {
+            let (root, trials) = search(shared(place));
+            assert_eq!(root.exit, RootExit::Found, "{place:?}");
+            assert!(trials <= most, "{place:?}: {trials}");
+            for (found, wanted) in root.place.iter().zip(place) {
+                assert!((found - wanted).abs() < 1e-5, "{root:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn values_beyond_what_the_function_reaches_keep_their_sign() {
+        let (root, _) = search([0.9, 0.9]);
+        assert_eq!(root.exit, RootExit::SignKept, "{root:?}");
+    }
+}
+
+#[cfg(test)]
+mod monotone_root_tests {
+    use super::*;
+
+    #[test]
+    fn steep_flat_and_kinked_functions_have_their_root_found_to_the_last_digits() {
+        let close = CloseEnough {
+            value: 0.0,
+            place: 4.0 * f64::EPSILON,
+        };
+        let functions: [fn(f64) -> [f64; 2]; 4] = [
+            |x| [(x - 0.3).powi(3), 3.0 * (x - 0.3).powi(2)],
+            |x| {
+                [
+                    (50.0 * (x - 0.3)).atan(),
+                    50.0 / (1.0 + (50.0 * (x - 0.3)).powi(2)),
+                ]
+            },
+            |x| {
+                [
+                    if x < 0.3 {
+                        1e-3 * (x - 0.3)
+                    } else {
+                        1e3 * (x - 0.3)
+                    },
+                    1.0,
+                ]
+            },
+            // A slope of 0 everywhere: no Newton step is possible.
+            |x| [x - 0.3, 0.0],
+        ];
+        for (k, f) in functions.into_iter().enumerate() {
+            for start in [-1.0, 0.0, 0.9] {
+                let root = find([0.0, 1.0], start, Course::Rising, close, f);
+                assert!((root - 0.3).abs() < 1e-15, "{k} {start}: {root}");
+                let falling = |x: f64| f(x).map(|value| -value);
+                let root = find([0.0, 1.0], start, Course::Falling, close, falling);
+                assert!((root - 0.3).abs() < 1e-15, "{k} {start}, falling: {root}");
+            }
+        }
+        let rough = CloseEnough {
+            value: 1e-3,
+            place: 0.0,
+        };
+        let root = find([0.0, 1.0], 0.5, Course::Rising, rough, |x| {
+            [x * x - 0.09, 2.0 * x]
+        });
+        assert!((root * root - 0.09).abs() < 1e-3 && (root - 0.3).abs() > 1e-9);
+    }
+
+    #[test]
+    fn a_root_without_known_bounds_is_found_and_a_missing_value_ends_the_search() {
+        let close = CloseEnough {
+            value: 1e-9,
+            place: 0.0,
+        };
+        let open = [f64::NEG_INFINITY, f64::INFINITY];
+        let mut last = f64::NAN;
+        // A kink at 2: the slope there is that of one side.
+        let kinked = |x: f64| {
+            last = x;
+            let slope = if x < 2.0 { -1.0 } else { -0.2 };
+            Ok::<_, ()>([slope * (x - 2.0) - 0.5, slope])
+        };
+        let root = try_find(open, 7.0, Course::Falling, close, kinked).unwrap();
+        assert!((root - 1.5).abs() < 1e-8, "{root}");
+        assert_eq!(root, last);
+        let missing = |x: f64| if x > 1.0 { Err(x) } else { Ok([x - 1.5, 1.0]) };
+        let ended = try_find(open, 0.0, Course::Rising, close, missing);
+        assert_eq!(ended, Err(1.5));
+    }
+}

@@ -1,0 +1,555 @@
+//! The damage models as functions of one number, and of an interval of it.
+//!
+//! Figures of the damage models: the named sets, and what a client puts in their place.
+//!
+//! The damage of one pass over a patch, from its resultants alone.
+
+use crate::contact::case::words::subsurface::{
+    ArchardFigures, DamageModel, DamageParameterWords, DamageSetName, DamageWords, UsfdFigures,
+    WlrmFigures,
+};
+use crate::contact::normal::hertz::Patch;
+use crate::contact::post::heat::{METRES, NANOMETRES};
+use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::contact::solution::words::answer::PointSolution;
+use crate::contact::solution::words::damage::{
+    ArchardWear, Damage, DamageFiguresUsed, RailFatigue, Ranged, ShakedownPlace, SurfaceFatigue,
+    TGamma, UsfdWear, WearAcross, WearRegime,
+};
+
+/// Wear rate in µg per m rolled and mm² of contact, for a power per area `x` in N/mm².
+#[must_use]
+pub fn usfd_rate(map: &UsfdFigures, x: f64) -> f64 {
+    let severe = map.mild_slope * map.mild_until;
+    let beyond = map.catastrophic_slope * (x - map.severe_until).max(0.0);
+    (map.mild_slope * x).min(severe) + beyond
+}
+
+/// The regime of the wear map at a power per area.
+#[must_use]
+pub fn usfd_regime(map: &UsfdFigures, x: f64) -> WearRegime {
+    match x {
+        x if x < map.mild_until => WearRegime::Mild,
+        x if x < map.severe_until => WearRegime::Severe,
+        _ => WearRegime::Catastrophic,
+    }
+}
+
+/// Archard's coefficient and its regime at a sliding speed in mm/s and a pressure over hardness: the geometric mean of the range, and
+/// the range.
+#[must_use]
+pub fn archard_coefficient(
+    map: &ArchardFigures,
+    speed: f64,
+    pressure: f64,
+) -> (WearRegime, Ranged) {
+    let [slow, fast] = map.speeds_mm_per_s;
+    let (regime, [low, high]) = if pressure > map.seizure_pressure {
+        (WearRegime::Seizure, map.seizure)
+    } else if speed >= slow && speed <= fast {
+        (WearRegime::Severe, map.severe)
+    } else {
+        (WearRegime::Mild, map.mild)
+    };
+    let range = Ranged {
+        value: (low * high).sqrt(),
+        low: Some(low),
+        high: Some(high),
+    };
+    (regime, range)
+}
+
+/// Damage of one pass by the Whole Life Rail Model at Tγ in N.
+#[must_use]
+pub fn wlrm_damage(function: &WlrmFigures, t_gamma: f64) -> f64 {
+    let WlrmFigures {
+        threshold_n,
+        peak_at_n,
+        zero_at_n,
+        peak,
+    } = *function;
+    if t_gamma <= threshold_n {
+        0.0
+    } else if t_gamma <= peak_at_n {
+        peak * (t_gamma - threshold_n) / (peak_at_n - threshold_n)
+    } else {
+        peak * (zero_at_n - t_gamma) / (zero_at_n - peak_at_n)
+    }
+}
+
+/// A function of a number that is known up to an interval: its value, and the least and the largest over the interval; `turns` are
+/// places where the function may turn.
+#[must_use]
+pub fn over(x: Ranged, turns: &[f64], function: impl Fn(f64) -> f64) -> Ranged {
+    let value = function(x.value);
+    let (Some(low), Some(high)) = (x.low, x.high) else {
+        return Ranged {
+            value,
+            low: None,
+            high: None,
+        };
+    };
+    let inside = turns
+        .iter()
+        .copied()
+        .filter(|turn| *turn > low && *turn < high);
+    let values = inside.chain([low, high]).map(function);
+    let (least, largest) = values.fold((value, value), |(least, largest), value| {
+        (least.min(value), largest.max(value))
+    });
+    Ranged {
+        value,
+        low: Some(least),
+        high: Some(largest),
+    }
+}
+
+/// A number with the same error in both directions, not below 0.
+#[must_use]
+pub fn about(value: f64, error: Option<f64>) -> Ranged {
+    Ranged {
+        value,
+        low: error.map(|error| (value - error).max(0.0)),
+        high: error.map(|error| value + error),
+    }
+}
+
+/// The product of two numbers that are not negative.
+#[must_use]
+pub fn times(a: Ranged, b: Ranged) -> Ranged {
+    let both = |a: Option<f64>, b: Option<f64>| Some(a? * b?);
+    Ranged {
+        value: a.value * b.value,
+        low: both(a.low, b.low),
+        high: both(a.high, b.high),
+    }
+}
+
+/// Subsurface limit of elastic shakedown, largest pressure over yield in shear (Johnson 1985, chapter 9, for a line contact, less than for
+/// any ellipse).
+pub const SHAKEDOWN_LIMIT: f64 = 4.0;
+
+/// Where the figures of the named sets are from.
+const SOURCES: [&str; 6] = [
+    "usfd: Lewis and Olofsson 2004, Braghin et al. 2006 (wheel R8T on rail UIC 900A), slopes and limits as programs in use have them; without the step that published offsets leave at the second limit",
+    "archard: Jendel 2002; not confirmed against the source",
+    "wlrm: Burstow 2004; not confirmed against the source; other rail grades have other functions",
+    "shear_yield_mpa: Ekberg, Kabo and Andersson 2002, cyclic; not confirmed against the source",
+    "hardness_mpa: 260 HB, the least of the grade",
+    "limits of shakedown: Johnson 1985, chapter 9: 4.0 for a line contact, less than for any ellipse, and 1 over the utilisation at the surface",
+];
+
+/// What is asked of the damage.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DamageTask {
+    /// The models.
+    pub models: Vec<DamageModel>,
+    /// Strip by strip too?
+    pub across: bool,
+    /// The figures.
+    pub figures: DamageFigures,
+}
+
+impl DamageTask {
+    /// The task that a case asks for.
+    #[must_use]
+    pub fn new(words: &DamageWords) -> DamageTask {
+        DamageTask {
+            models: words.models.clone(),
+            across: words.across,
+            figures: DamageFigures::new(words.parameters.as_ref()),
+        }
+    }
+
+    /// Is this model asked for?
+    #[must_use]
+    pub fn wants(&self, model: DamageModel) -> bool {
+        self.models.contains(&model)
+    }
+
+    /// The figures as they are answered.
+    #[must_use]
+    pub fn used(&self) -> DamageFiguresUsed {
+        let figures = &self.figures;
+        DamageFiguresUsed {
+            set: figures.set,
+            density_kg_per_m3: figures.density,
+            shear_yield_mpa: figures.shear_yield,
+            hardness_mpa: figures.hardness,
+            usfd: figures.usfd,
+            archard: figures.archard,
+            wlrm: figures.wlrm,
+            unconfirmed: self.unconfirmed(),
+            sources: SOURCES.map(str::to_owned).into(),
+        }
+    }
+
+    /// The models asked for whose figures are neither confirmed nor the client's.
+    #[must_use]
+    pub fn unconfirmed(&self) -> Vec<DamageModel> {
+        let own = &self.figures.own;
+        let doubtful = |model: &DamageModel| match model {
+            DamageModel::TGamma | DamageModel::UsfdWear => false,
+            DamageModel::ArchardWear => !own.archard,
+            DamageModel::Wlrm => !own.wlrm,
+            DamageModel::SurfaceFatigueIndex | DamageModel::Shakedown => !own.shear_yield,
+        };
+        self.models.iter().copied().filter(doubtful).collect()
+    }
+}
+
+/// All figures, with where they are from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DamageFigures {
+    /// The set that figures come from that are not the client's.
+    pub set: DamageSetName,
+    /// Density in kg/m³.
+    pub density: f64,
+    /// Yield in shear in MPa.
+    pub shear_yield: f64,
+    /// Hardness in MPa.
+    pub hardness: f64,
+    /// Wear map.
+    pub usfd: UsfdFigures,
+    /// Archard's coefficients.
+    pub archard: ArchardFigures,
+    /// Damage function.
+    pub wlrm: WlrmFigures,
+    /// Which are the client's.
+    pub own: OwnFigures,
+}
+
+/// Which figures are the client's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct OwnFigures {
+    /// Yield in shear.
+    pub shear_yield: bool,
+    /// Archard's coefficients.
+    pub archard: bool,
+    /// Damage function.
+    pub wlrm: bool,
+}
+
+impl DamageFigures {
+    fn new(words: Option<&DamageParameterWords>) -> DamageFigures {
+        let named = DamageFigures::named(DamageSetName::default());
+        match words {
+            None => named,
+            Some(DamageParameterWords::Named(name)) => DamageFigures::named(*name),
+            Some(DamageParameterWords::Own(own)) => DamageFigures {
+                set: named.set,
+                density: own.density_kg_per_m3.unwrap_or(named.density),
+                shear_yield: own.shear_yield_mpa.unwrap_or(named.shear_yield),
+                hardness: own.hardness_mpa.unwrap_or(named.hardness),
+                usfd: own.usfd.unwrap_or(named.usfd),
+                archard: own.archard.unwrap_or(named.archard),
+                wlrm: own.wlrm.unwrap_or(named.wlrm),
+                own: OwnFigures {
+                    shear_yield: own.shear_yield_mpa.is_some(),
+                    archard: own.archard.is_some(),
+                    wlrm: own.wlrm.is_some(),
+                },
+            },
+        }
+    }
+
+    fn named(set: DamageSetName) -> DamageFigures {
+        match set {
+            DamageSetName::Rail900aWheelR8t => DamageFigures {
+                set,
+                density: 7850.0,
+                shear_yield: 300.0,
+                hardness: 2550.0,
+                usfd: UsfdFigures {
+                    mild_slope: 5.3,
+                    mild_until: 10.4,
+                    severe_until: 77.2,
+                    catastrophic_slope: 61.9,
+                },
+                archard: ArchardFigures {
+                    mild: [1e-4, 1e-3],
+                    severe: [3e-3, 4e-3],
+                    seizure: [3e-2, 4e-2],
+                    speeds_mm_per_s: [200.0, 700.0],
+                    seizure_pressure: 0.8,
+                },
+                wlrm: WlrmFigures {
+                    threshold_n: 15.0,
+                    peak_at_n: 65.0,
+                    zero_at_n: 175.0,
+                    peak: 1e-5,
+                },
+                own: OwnFigures::default(),
+            },
+        }
+    }
+}
+
+/// A patch and its answer for one motion.
+#[derive(Debug, Clone, Copy)]
+pub struct DamagedPatch<'a> {
+    /// The patch.
+    pub patch: &'a Patch,
+    /// Its answer.
+    pub point: &'a PointSolution,
+    /// Friction limit in N.
+    pub limit: f64,
+    /// Rolling speed in mm/s, where it is known.
+    pub speed: Option<f64>,
+}
+
+/// The damage that the task asks for, but for wear strip by strip.
+#[must_use]
+pub fn damage(task: &DamageTask, of: DamagedPatch) -> Damage {
+    let (figures, wanted) = (&task.figures, |model| task.wants(model));
+    let t_gamma = t_gamma(of);
+    Damage {
+        t_gamma: wanted(DamageModel::TGamma).then_some(t_gamma),
+        usfd_wear: wanted(DamageModel::UsfdWear).then(|| usfd(figures, of, t_gamma)),
+        archard_wear: wanted(DamageModel::ArchardWear)
+            .then(|| archard(figures, of, t_gamma))
+            .flatten(),
+        wlrm: wanted(DamageModel::Wlrm).then(|| {
+            let function = &figures.wlrm;
+            let turns = [function.threshold_n, function.peak_at_n];
+            let damage = |t_gamma| wlrm_damage(function, t_gamma);
+            RailFatigue {
+                t_gamma_n: t_gamma.without_spin_n,
+                damage_per_pass: over(t_gamma.without_spin_n, &turns, damage),
+            }
+        }),
+        surface_fatigue_index: wanted(DamageModel::SurfaceFatigueIndex)
+            .then(|| surface_fatigue(figures, of)),
+        shakedown: wanted(DamageModel::Shakedown).then(|| shakedown(figures, of)),
+        across: None,
+    }
+}
+
+/// The errors of the forces times the creepages.
+fn t_gamma(of: DamagedPatch) -> TGamma {
+    let (point, motion) = (of.point, &of.point.motion);
+    let errors = point.error_estimate;
+    let forces = errors.map(|error| {
+        motion.creepage_x.abs() * error.force_x_n + motion.creepage_y.abs() * error.force_y_n
+    });
+    let moment = errors.map(|error| motion.spin_per_mm.abs() * error.moment_z_n_mm);
+    let all = forces.zip(moment).map(|(forces, moment)| forces + moment);
+    let with_spin_n = about(point.friction_power_n.max(0.0), all);
+    TGamma {
+        with_spin_n,
+        without_spin_n: about(point.friction_power_without_spin_n, forces),
+        over_area_n_per_mm2: scaled(with_spin_n, 1.0 / of.patch.area),
+    }
+}
+
+fn scaled(x: Ranged, factor: f64) -> Ranged {
+    over(x, &[], |x| x * factor)
+}
+
+/// Area over width in mm: the mean length that a point of the surface is in contact.
+fn mean_length(patch: &Patch) -> f64 {
+    patch.area / (patch.extent[3] - patch.extent[2])
+}
+
+fn usfd(figures: &DamageFigures, of: DamagedPatch, t_gamma: TGamma) -> UsfdWear {
+    let x = t_gamma.over_area_n_per_mm2;
+    let rate = over(x, &[], |x| usfd_rate(&figures.usfd, x));
+    // kg/m³ are µg/mm³.
+    let depth = mean_length(of.patch) * METRES / figures.density * NANOMETRES;
+    UsfdWear {
+        regime: usfd_regime(&figures.usfd, x.value),
+        rate_ug_per_m_mm2: rate,
+        mass_ug_per_m: scaled(rate, of.patch.area),
+        depth_nm: scaled(rate, depth),
+    }
+}
+
+/// Volume per length rolled: K ∬ p |s| dA/H, where p |s| is the power over μ.
+fn archard(figures: &DamageFigures, of: DamagedPatch, t_gamma: TGamma) -> Option<ArchardWear> {
+    let (patch, force) = (of.patch, of.patch.normal_force);
+    if of.limit <= 0.0 {
+        return None;
+    }
+    let slip = t_gamma.with_spin_n.value / of.limit;
+    let sliding_speed_mm_per_s = slip * of.speed?;
+    let pressure = force / patch.area / figures.hardness;
+    let (regime, coefficient) =
+        archard_coefficient(&figures.archard, sliding_speed_mm_per_s, pressure);
+    let sliding = scaled(t_gamma.with_spin_n, force / of.limit / figures.hardness);
+    // mm³ per mm rolled.
+    let volume = times(coefficient, sliding);
+    let width = patch.extent[3] - patch.extent[2];
+    Some(ArchardWear {
+        regime,
+        sliding_speed_mm_per_s,
+        coefficient,
+        volume_mm3_per_m: scaled(volume, 1.0 / METRES),
+        depth_nm: scaled(volume, NANOMETRES / width),
+    })
+}
+
+/// Tangential over normal force, with the errors of the forces.
+fn utilisation(of: DamagedPatch) -> Ranged {
+    let (point, force) = (of.point, of.patch.normal_force);
+    let error = point
+        .error_estimate
+        .map(|error| error.force_x_n.hypot(error.force_y_n) / force);
+    about(point.force_x_n.hypot(point.force_y_n) / force, error)
+}
+
+fn surface_fatigue(figures: &DamageFigures, of: DamagedPatch) -> SurfaceFatigue {
+    let utilisation = utilisation(of);
+    // 2π a b k/(3 N), with the area in the place of π a b.
+    let limit = 2.0 * of.patch.area * figures.shear_yield / (3.0 * of.patch.normal_force);
+    let traction = of.point.traction_max_mpa;
+    SurfaceFatigue {
+        utilisation,
+        index: over(utilisation, &[], |utilisation| utilisation - limit),
+        traction_excess_mpa: traction.map(|traction| traction - figures.shear_yield),
+    }
+}
+
+fn shakedown(figures: &DamageFigures, of: DamagedPatch) -> ShakedownPlace {
+    let utilisation = utilisation(of);
+    let load_factor = of.patch.pressure_max / figures.shear_yield;
+    let limit = |utilisation: f64| SHAKEDOWN_LIMIT.min(1.0 / utilisation.max(f64::MIN_POSITIVE));
+    let over_limit = over(utilisation, &[], |utilisation| {
+        load_factor / limit(utilisation)
+    });
+    ShakedownPlace {
+        utilisation,
+        load_factor,
+        limit: limit(utilisation.value),
+        over_limit,
+        ratchets: over_limit.value > 1.0,
+    }
+}
+
+/// The power of every cell over the rolling speed in N, and the size of its slip.
+#[derive(Debug, Clone, Copy)]
+pub struct CellWear<'a> {
+    /// The level.
+    pub level: &'a StripMesh,
+    /// Tractions times slips and areas, in N.
+    pub power: &'a [f64],
+    /// Slips over the rolling speed.
+    pub slip: &'a [f64],
+    /// Rolling speed in mm/s, where it is known.
+    pub speed: Option<f64>,
+}
+
+/// Wear of the strips of a patch. Segments of one strip are added up.
+#[must_use]
+pub fn across(task: &DamageTask, of: CellWear, patch: usize) -> WearAcross {
+    let figures = &task.figures;
+    let mut found = WearAcross::default();
+    let (mut usfd, mut archard): (Vec<[f64; 3]>, Vec<[f64; 3]>) = (Vec::new(), Vec::new());
+    let mut last = None;
+    let mesh = &of.level.mesh;
+    for segment in mesh.segments.iter().filter(|s| s.chord.patch == patch) {
+        let chord = &segment.chord;
+        if last != Some(chord.strip) {
+            found.y_mm.push(chord.y);
+            found.dy_mm.push(chord.dy);
+            found.t_gamma_n_per_mm.push(0.0);
+            usfd.push([0.0; 3]);
+            archard.push([0.0; 3]);
+            last = Some(chord.strip);
+        }
+        let place = found.y_mm.len() - 1;
+        for i in segment.cells.clone() {
+            let length = mesh.right[i] - mesh.left[i];
+            found.t_gamma_n_per_mm[place] += of.power[i] / chord.dy;
+            let over_area = of.power[i] / of.level.area[i];
+            let rate = usfd_rate(&figures.usfd, over_area);
+            usfd[place][regime(usfd_regime(&figures.usfd, over_area))] +=
+                rate * length * METRES / figures.density * NANOMETRES;
+            let pressure = of.level.pressure[i] / figures.hardness;
+            let speed = of.slip[i] * of.speed.unwrap_or(0.0);
+            let (of_archard, coefficient) = archard_coefficient(&figures.archard, speed, pressure);
+            archard[place][regime(of_archard)] +=
+                coefficient.value * pressure * of.slip[i] * length * NANOMETRES;
+        }
+    }
+    let sums = |parts: &[[f64; 3]]| parts.iter().map(|parts| parts.iter().sum()).collect();
+    if task.wants(DamageModel::UsfdWear) {
+        found.usfd_depth_nm = Some(sums(&usfd));
+        found.usfd_regimes_nm = Some(usfd);
+    }
+    if task.wants(DamageModel::ArchardWear) {
+        found.archard_depth_nm = Some(sums(&archard));
+        found.archard_regimes_nm = Some(archard);
+    }
+    found
+}
+
+/// Place of a regime among mild, severe, and catastrophic or seizure.
+fn regime(regime: WearRegime) -> usize {
+    match regime {
+        WearRegime::Mild => 0,
+        WearRegime::Severe => 1,
+        WearRegime::Catastrophic | WearRegime::Seizure => 2,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WEAR: UsfdFigures = UsfdFigures {
+        mild_slope: 5.3,
+        mild_until: 10.4,
+        severe_until: 77.2,
+        catastrophic_slope: 61.9,
+    };
+    const FATIGUE: WlrmFigures = WlrmFigures {
+        threshold_n: 15.0,
+        peak_at_n: 65.0,
+        zero_at_n: 175.0,
+        peak: 1e-5,
+    };
+
+    #[test]
+    fn the_wear_map_has_its_three_regimes_and_no_steps() {
+        for (x, rate) in [
+            (0.0, 0.0),
+            (2.0, 10.6),
+            (10.4, 55.12),
+            (50.0, 55.12),
+            (77.2, 55.12),
+        ] {
+            assert!((usfd_rate(&WEAR, x) - rate).abs() < 1e-12, "{x}");
+        }
+        // 61.9 x − 4723.56 beyond the second limit.
+        assert!((usfd_rate(&WEAR, 100.0) - (6190.0 - 4723.56)).abs() < 1e-9);
+        let steps = (0..2000).map(|k| 0.05 * f64::from(k));
+        for x in steps {
+            assert!(
+                usfd_rate(&WEAR, x + 1e-9) - usfd_rate(&WEAR, x) < 1e-6,
+                "{x}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_damage_function_rises_peaks_and_goes_below_zero() {
+        for (t_gamma, damage) in [(15.0, 0.0), (40.0, 5e-6), (65.0, 1e-5), (175.0, 0.0)] {
+            assert!(
+                (wlrm_damage(&FATIGUE, t_gamma) - damage).abs() < 1e-18,
+                "{t_gamma}"
+            );
+        }
+        // Slopes +2e-7 and −9.1e-8 per N.
+        assert!((wlrm_damage(&FATIGUE, 16.0) - 2e-7).abs() < 1e-12);
+        assert!((wlrm_damage(&FATIGUE, 176.0) + 9.0909e-8).abs() < 1e-11);
+    }
+
+    #[test]
+    fn an_interval_over_the_peak_has_the_peak_as_its_largest() {
+        let t_gamma = about(60.0, Some(20.0));
+        let found = over(t_gamma, &[15.0, 65.0], |x| wlrm_damage(&FATIGUE, x));
+        assert!((found.high.unwrap() - 1e-5).abs() < 1e-18);
+        assert!((found.low.unwrap() - 5e-6).abs() < 1e-18);
+        assert!((found.value - 9e-6).abs() < 1e-18);
+    }
+}

@@ -1,0 +1,475 @@
+//! Outlines of the stick and slip zones and of the patch, as closed polygons.
+//!
+//! Cells are rectangles `x ± dx/2`, `y ± dy/2`. Outer loops run counter-clockwise, holes clockwise (x to the right,
+//! y up); the first point is not repeated. No loop touches itself: where two loops meet in a corner each closes alone.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::contact::post::strip_segments::{Strips, join_tolerance};
+use crate::contact::solution::words::answer::{PatchCells, Zone};
+
+/// Outlines of the union of the cells of one zone, or of all cells when `which` is `None`, in mm.
+///
+/// The polygons are rectilinear and enclose exactly the cells: their signed areas (holes negative) add up to the
+/// area of the cells. Edges of neighbouring cells that differ by rounding (1e-9 of the cell) count as one. Loops are
+/// sorted by their lowest, then leftmost point and start there. With `which` given and no `zones` there is no outline.
+///
+/// # Panics
+/// If the vectors differ in length.
+#[must_use]
+pub fn outlines(
+    fields: &PatchCells,
+    zones: Option<&[Zone]>,
+    which: Option<Zone>,
+) -> Vec<Vec<[f64; 2]>> {
+    let n = fields.x_mm.len();
+    assert!(
+        zones.is_none_or(|z| z.len() == n),
+        "there must be one zone per cell"
+    );
+    let wanted = |i: usize| which.is_none_or(|zone| zones.is_some_and(|z| z[i] == zone));
+    let cells: Vec<usize> = (0..n).filter(|&i| wanted(i)).collect();
+
+    let x = CellBorders::new(&fields.x_mm, &fields.dx_mm, &cells);
+    let y = CellBorders::new(&fields.y_mm, &fields.dy_mm, &cells);
+    let mut rows: BTreeMap<(usize, usize), Vec<(usize, usize)>> = BTreeMap::new();
+    for (&from_to_x, &from_to_y) in x.of_cell.iter().zip(&y.of_cell) {
+        rows.entry(from_to_y).or_default().push(from_to_x);
+    }
+    let mut loops: Vec<Vec<Corner>> = chain(boundary(&rows))
+        .iter()
+        .map(|l| straighten(l))
+        .collect();
+    loops.sort_by_key(|corners| (corners[0].1, corners[0].0));
+    loops
+        .iter()
+        .map(|corners| {
+            corners
+                .iter()
+                .map(|&(i, j)| [x.values[i], y.values[j]])
+                .collect()
+        })
+        .collect()
+}
+
+/// Outline of the patch through the ends of the chords, in mm.
+///
+/// For a patch with one segment per strip: the leading ends upward, then the trailing ends downward; at the first and
+/// last strip's outer border the chord is extrapolated (its squared half-length as a parabola in y, exact for an
+/// ellipse, where it closes in one point). Second order in the strips' width. Any other patch gets the rectilinear
+/// outline of [`outlines`].
+#[must_use]
+pub fn patch_outline(fields: &PatchCells) -> Vec<Vec<[f64; 2]>> {
+    let strips = Strips::new(fields);
+    if !strips.is_simple() {
+        return outlines(fields, None, None);
+    }
+    let last = strips.segments.len() - 1;
+    let (bottom, top) = (&strips.segments[0], &strips.segments[last]);
+    let (bottom_y, top_y) = (bottom.y - 0.5 * bottom.dy, top.y + 0.5 * top.dy);
+    let (bottom_left, bottom_right) = strips.tip(0, false);
+    let (top_left, top_right) = strips.tip(last, true);
+
+    let mut polygon = vec![[bottom_right, bottom_y]];
+    polygon.extend(strips.segments.iter().map(|s| [s.right, s.y]));
+    polygon.push([top_right, top_y]);
+    if top_left < top_right {
+        polygon.push([top_left, top_y]);
+    }
+    polygon.extend(strips.segments.iter().rev().map(|s| [s.left, s.y]));
+    if bottom_left < bottom_right {
+        polygon.push([bottom_left, bottom_y]);
+    }
+    vec![polygon]
+}
+
+/// Distinct edges along one axis; every cell knows its two by rank.
+struct CellBorders {
+    values: Vec<f64>,
+    of_cell: Vec<(usize, usize)>,
+}
+
+impl CellBorders {
+    fn new(centres: &[f64], widths: &[f64], cells: &[usize]) -> CellBorders {
+        let mut sides: Vec<(f64, f64, usize)> = Vec::with_capacity(2 * cells.len());
+        for (k, &i) in cells.iter().enumerate() {
+            let (centre, width) = (centres[i], widths[i]);
+            let tolerance = join_tolerance(centre, width);
+            sides.push((centre - 0.5 * width, tolerance, 2 * k));
+            sides.push((centre + 0.5 * width, tolerance, 2 * k + 1));
+        }
+        sides.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut values: Vec<f64> = Vec::new();
+        let mut ranks = vec![0; sides.len()];
+        let mut last_tolerance = 0.0;
+        for &(value, tolerance, side) in &sides {
+            // Compared with the first edge of its group, so that groups cannot creep.
+            if values
+                .last()
+                .is_none_or(|&last| value - last > tolerance.min(last_tolerance))
+            {
+                values.push(value);
+                last_tolerance = tolerance;
+            }
+            ranks[side] = values.len() - 1;
+        }
+        let of_cell = ranks
+            .chunks_exact(2)
+            .map(|pair| (pair[0], pair[1]))
+            .collect();
+        CellBorders { values, of_cell }
+    }
+}
+
+/// Directed boundary edges, the cells on their left, from rows `(bottom, top) → cells (left, right)`.
+fn boundary(rows: &BTreeMap<(usize, usize), Vec<(usize, usize)>>) -> Vec<(Corner, Corner)> {
+    let mut edges = Vec::new();
+    // Along every horizontal line: runs that end on it from below count −1, runs that begin on it count +1.
+    let mut lines: BTreeMap<usize, BTreeMap<usize, i32>> = BTreeMap::new();
+    for (&(bottom, top), cells) in rows {
+        for (left, right) in runs(cells) {
+            edges.push(((left, top), (left, bottom)));
+            edges.push(((right, bottom), (right, top)));
+            for (line, step) in [(bottom, 1), (top, -1)] {
+                let line = lines.entry(line).or_default();
+                *line.entry(left).or_default() += step;
+                *line.entry(right).or_default() -= step;
+            }
+        }
+    }
+    for (y, steps) in lines {
+        let (mut side, mut from) = (0, 0);
+        for (x, step) in steps.into_iter().filter(|&(_, step)| step != 0) {
+            match side {
+                1 => edges.push(((from, y), (x, y))),
+                -1 => edges.push(((x, y), (from, y))),
+                _ => {}
+            }
+            (side, from) = (side + step, x);
+        }
+    }
+    edges
+}
+
+/// Unbroken runs of the cells of one row.
+fn runs(cells: &[(usize, usize)]) -> Vec<(usize, usize)> {
+    let mut sorted = cells.to_vec();
+    sorted.sort_unstable();
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for (left, right) in sorted {
+        match runs.last_mut() {
+            Some(run) if run.1 >= left => run.1 = run.1.max(right),
+            _ => runs.push((left, right)),
+        }
+    }
+    runs
+}
+
+/// A corner as the ranks of its x and y among the distinct cell edges.
+pub(crate) type Corner = (usize, usize);
+
+/// Joins directed edges to loops that visit every corner at most once.
+///
+/// At a corner where two cells meet diagonally the walk turns left, which keeps the two apart; if it comes back to a
+/// corner it has already passed, the part in between is a loop of its own (a hole that touches the outside).
+pub(crate) fn chain(edges: Vec<(Corner, Corner)>) -> Vec<Vec<Corner>> {
+    let mut leaving: BTreeMap<Corner, BTreeSet<Corner>> = BTreeMap::new();
+    for (from, to) in edges {
+        leaving.entry(from).or_default().insert(to);
+    }
+    let mut loops = Vec::new();
+    while let Some((&start, _)) = leaving.first_key_value() {
+        let mut path: Vec<Corner> = vec![start];
+        let mut place: BTreeMap<Corner, usize> = BTreeMap::from([(start, 0)]);
+        while let Some(&here) = path.last() {
+            let before = path.len().checked_sub(2).map(|k| path[k]);
+            let Some(next) = take_next(&mut leaving, before, here) else {
+                break;
+            };
+            if let Some(&first) = place.get(&next) {
+                for corner in &path[first + 1..] {
+                    place.remove(corner);
+                }
+                loops.push(path.split_off(first));
+                path.push(next);
+                if path.len() == 1 {
+                    break;
+                }
+            } else {
+                place.insert(next, path.len());
+                path.push(next);
+            }
+        }
+    }
+    loops
+}
+
+/// Takes the edge that leaves `here`, the leftmost turn seen from `before` if there are two.
+fn take_next(
+    leaving: &mut BTreeMap<Corner, BTreeSet<Corner>>,
+    before: Option<Corner>,
+    here: Corner,
+) -> Option<Corner> {
+    let ways = leaving.get_mut(&here)?;
+    let turns_left = |to: &Corner| before.is_some_and(|before| turn(before, here, *to) > 0);
+    let next = ways
+        .iter()
+        .copied()
+        .find(turns_left)
+        .or_else(|| ways.first().copied())?;
+    ways.remove(&next);
+    if ways.is_empty() {
+        leaving.remove(&here);
+    }
+    Some(next)
+}
+
+/// Sign of the turn from `a` over `b` to `c`: 1 left, −1 right, 0 straight.
+fn turn(a: Corner, b: Corner, c: Corner) -> i64 {
+    let step = |from: Corner, to: Corner| {
+        (
+            i64::from(to.0 > from.0) - i64::from(to.0 < from.0),
+            i64::from(to.1 > from.1) - i64::from(to.1 < from.1),
+        )
+    };
+    let (p, q) = (step(a, b), step(b, c));
+    p.0 * q.1 - p.1 * q.0
+}
+
+/// Drops corners that are passed straight on, and starts at the lowest, then leftmost corner.
+pub(crate) fn straighten(corners: &[Corner]) -> Vec<Corner> {
+    let n = corners.len();
+    let mut kept: Vec<Corner> = (0..n)
+        .filter(|&k| turn(corners[(k + n - 1) % n], corners[k], corners[(k + 1) % n]) != 0)
+        .map(|k| corners[k])
+        .collect();
+    let lowest = (0..kept.len())
+        .min_by_key(|&k| (kept[k].1, kept[k].0))
+        .unwrap_or(0);
+    kept.rotate_left(lowest);
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::f64::consts::PI;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::contact::post::strip_segments::samples::{ellipse, push_segment};
+
+    fn area(polygon: &[[f64; 2]]) -> f64 {
+        let next = polygon.iter().cycle().skip(1);
+        0.5 * polygon
+            .iter()
+            .zip(next)
+            .map(|(p, q)| p[0] * q[1] - q[0] * p[1])
+            .sum::<f64>()
+    }
+
+    fn total(polygons: &[Vec<[f64; 2]>]) -> f64 {
+        polygons.iter().map(|p| area(p)).sum()
+    }
+
+    /// Unit cells where the pattern has `#`; the last line is the lowest strip.
+    fn pattern(lines: &[&str]) -> PatchCells {
+        let mut fields = PatchCells::default();
+        for (j, line) in (0u32..).zip(lines.iter().rev()) {
+            for (i, _) in line.bytes().enumerate().filter(|&(_, c)| c == b'#') {
+                let x = i as f64;
+                push_segment(&mut fields, j, f64::from(j) + 0.5, 1.0, &[x, x + 1.0]);
+            }
+        }
+        fields
+    }
+
+    fn assert_well_formed(polygons: &[Vec<[f64; 2]>]) {
+        for polygon in polygons {
+            let n = polygon.len();
+            assert!(
+                n >= 4 && n.is_multiple_of(2),
+                "a rectilinear loop has an even number of corners: {polygon:?}"
+            );
+            let mut corners = BTreeSet::new();
+            for k in 0..n {
+                let (p, q, r) = (polygon[k], polygon[(k + 1) % n], polygon[(k + 2) % n]);
+                let flat = p[1] == q[1];
+                assert!(
+                    flat != (p[0] == q[0]),
+                    "neither along x nor along y: {p:?} {q:?}"
+                );
+                assert!(
+                    flat != (q[1] == r[1]),
+                    "passed straight on: {p:?} {q:?} {r:?}"
+                );
+                assert!(
+                    corners.insert((q[0].to_bits(), q[1].to_bits())),
+                    "passed twice: {q:?} in {polygon:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn one_cell_is_its_own_outline() {
+        let mut fields = PatchCells::default();
+        push_segment(&mut fields, 0, 5.0, 2.0, &[1.0, 4.0]);
+        let square = vec![vec![[1.0, 4.0], [4.0, 4.0], [4.0, 6.0], [1.0, 6.0]]];
+        assert_eq!(outlines(&fields, None, None), square);
+        assert_eq!(
+            patch_outline(&fields).iter().map(|p| area(p)).sum::<f64>(),
+            6.0
+        );
+        assert!(outlines(&fields, Some(&[Zone::Slip]), Some(Zone::Stick)).is_empty());
+        assert!(outlines(&fields, None, Some(Zone::Stick)).is_empty());
+        assert!(outlines(&PatchCells::default(), None, None).is_empty());
+    }
+
+    #[test]
+    fn a_hole_is_a_clockwise_loop() {
+        let loops = outlines(&pattern(&["####", "#..#", "####"]), None, None);
+        assert_well_formed(&loops);
+        assert_eq!(
+            loops.iter().map(|l| area(l)).collect::<Vec<_>>(),
+            vec![12.0, -2.0]
+        );
+    }
+
+    #[test]
+    fn diagonal_cells_and_diagonal_holes_stay_apart() {
+        let loops = outlines(&pattern(&["#.#.", ".#.#", "#.#.", ".#.#"]), None, None);
+        assert_well_formed(&loops);
+        assert_eq!(
+            loops.iter().map(|l| area(l)).collect::<Vec<_>>(),
+            vec![1.0; 8]
+        );
+
+        let loops = outlines(&pattern(&["####", "##.#", "#.##", "####"]), None, None);
+        assert_well_formed(&loops);
+        assert_eq!(
+            loops.iter().map(|l| area(l)).collect::<Vec<_>>(),
+            vec![16.0, -1.0, -1.0]
+        );
+    }
+
+    #[test]
+    fn a_hole_that_touches_the_outside_in_a_corner_is_still_a_hole() {
+        let loops = outlines(&pattern(&["###", "#.#", "##."]), None, None);
+        assert_well_formed(&loops);
+        assert_eq!(
+            loops.iter().map(|l| area(l)).collect::<Vec<_>>(),
+            vec![8.0, -1.0]
+        );
+    }
+
+    #[test]
+    fn rounding_of_edges_does_not_tear_the_outline() {
+        let mut fields = PatchCells::default();
+        let edges: Vec<f64> = (0..=10).map(|k| 0.1 + 0.7 * f64::from(k) / 3.0).collect();
+        for j in 0..10 {
+            push_segment(&mut fields, j, 0.3 * f64::from(j) + 1e3, 0.3, &edges);
+        }
+        for (k, x) in fields.x_mm.iter_mut().enumerate() {
+            *x += 1e-11 * (k as f64 * 7.3).sin();
+        }
+        let loops = outlines(&fields, None, None);
+        assert_eq!(loops.len(), 1);
+        assert_eq!(loops[0].len(), 4);
+        // A real gap, however narrow, stays.
+        for (x, dx) in fields.x_mm.iter_mut().zip(&mut fields.dx_mm).take(1) {
+            *x -= 1e-7;
+            *dx -= 1e-7;
+        }
+        assert!(outlines(&fields, None, None)[0].len() > 4);
+    }
+
+    #[test]
+    fn patch_outline_of_an_ellipse_converges_to_its_area() {
+        let error = |strips| {
+            let loops = patch_outline(&ellipse(2.0, 3.0, 0.2, strips, 4));
+            assert_eq!(loops.len(), 1);
+            area(&loops[0]) / (6.0 * PI) - 1.0
+        };
+        assert!(error(16).abs() < 0.011, "{}", error(16));
+        let rate = error(16) / error(64);
+        assert!(
+            (7.0..9.0).contains(&rate),
+            "strips of the tips cost h^1.5: {rate}"
+        );
+        let loops = patch_outline(&ellipse(2.0, 3.0, 0.2, 16, 4));
+        let tip = loops[0][0];
+        assert!((tip[0] + 0.6).abs() < 1e-9 && tip[1] == -3.0, "{tip:?}");
+        assert_eq!(loops[0].len(), 34, "both tips close in one point");
+    }
+
+    #[test]
+    fn patch_outline_of_a_patch_with_two_lobes_is_rectilinear() {
+        let fields = pattern(&["#.#", "###"]);
+        assert_eq!(patch_outline(&fields), outlines(&fields, None, None));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+
+        #[test]
+        fn loops_enclose_exactly_the_cells(
+            strips in prop::collection::vec((0.1f64..2.0, prop::collection::vec((0.05f64..1.5, 0u8..3), 1..9)), 1..9),
+        ) {
+            let mut fields = PatchCells::default();
+            let mut zones = Vec::new();
+            let mut y = -1.0;
+            for (j, (dy, cells)) in (0u32..).zip(&strips) {
+                let mut x = -2.0;
+                for &(width, state) in cells {
+                    // Coarse steps make edges of neighbouring strips meet.
+                    let width = (width * 4.0).ceil() / 4.0;
+                    if state < 2 {
+                        push_segment(&mut fields, j, y + 0.5 * dy, *dy, &[x, x + width]);
+                        zones.push(if state == 0 { Zone::Stick } else { Zone::Slip });
+                    }
+                    x += width;
+                }
+                y += dy;
+            }
+            let cell_area = |wanted: Option<Zone>| -> f64 {
+                (0..zones.len())
+                    .filter(|&i| wanted.is_none_or(|w| zones[i] == w))
+                    .map(|i| fields.dx_mm[i] * fields.dy_mm[i])
+                    .sum()
+            };
+            for wanted in [None, Some(Zone::Stick), Some(Zone::Slip)] {
+                let loops = outlines(&fields, Some(&zones), wanted);
+                assert_well_formed(&loops);
+                prop_assert!((total(&loops) - cell_area(wanted)).abs() < 1e-9);
+            }
+            let [all, stick, slip] = [None, Some(Zone::Stick), Some(Zone::Slip)].map(|w| total(&outlines(&fields, Some(&zones), w)));
+            prop_assert!((stick + slip - all).abs() < 1e-9);
+        }
+    }
+
+    fn square(x: usize, y: usize) -> [(Corner, Corner); 4] {
+        let c = [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)];
+        [0, 1, 2, 3].map(|k| (c[k], c[(k + 1) % 4]))
+    }
+
+    #[test]
+    fn squares_that_meet_in_a_corner_stay_two_loops() {
+        let edges = [square(0, 0), square(1, 1)].concat();
+        let loops = chain(edges);
+        assert_eq!(
+            loops,
+            vec![
+                vec![(0, 0), (1, 0), (1, 1), (0, 1)],
+                vec![(1, 1), (2, 1), (2, 2), (1, 2)]
+            ]
+        );
+    }
+
+    #[test]
+    fn corners_passed_straight_on_are_dropped_and_the_lowest_comes_first() {
+        let corners = [(4, 3), (2, 3), (1, 3), (1, 0), (4, 0)];
+        assert_eq!(straighten(&corners), vec![(1, 0), (4, 0), (4, 3), (1, 3)]);
+    }
+}

@@ -1,3 +1,0 @@
-//! Borders of patches and zones as closed curves.
-
-pub mod outline;
