@@ -133,8 +133,8 @@ test('a rail whose points jump says so, and is solved all the same on request', 
   await titled(page, 'wheel on rail');
   await page.getByLabel('Shift to the left').fill('-1');
   await ready(page);
-  await page.getByRole('button', { name: /^Solve/ }).click();
-  // A result while typing says so too, until the job has failed.
+  await page.getByRole('button', { name: /^Solve Ctrl/ }).click();
+  await page.waitForURL(/#\/jobs\//);
   const failed = page.locator('.result');
   await failed.getByText("the rail's points jump at y = ").waitFor({ timeout: 60_000 });
   await failed.getByRole('button', { name: 'Solve it all the same' }).click();

@@ -94,7 +94,7 @@ if (!FIREFOX) {
     await firefox.run("window.complaints = []; addEventListener('error', (event) => complaints.push(event.message)); addEventListener('unhandledrejection', (event) => complaints.push(String(event.reason)));");
     for (const [name, hash, sign] of views) {
       await firefox.run('location.hash = arguments[0];', [hash]);
-      await until(() => firefox.run('return document.querySelector(arguments[0]) !== null;', [sign]));
+      await until(() => firefox.run('return document.querySelector(arguments[0]) !== null;', [sign]), `${name}: ${sign}`);
       const [needed, given] = await firefox.run('return [document.documentElement.scrollWidth, document.documentElement.clientWidth];');
       assert.ok(needed <= given, `${name}: ${needed} > ${given}`);
       const { value } = await firefox.ask('WebDriver:TakeScreenshot', { full: false });

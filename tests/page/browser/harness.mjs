@@ -167,11 +167,11 @@ export async function dropFiles(page, place, files) {
   await page.dispatchEvent(place, 'drop', { dataTransfer });
 }
 
-/** Waits up to 15 s until something holds. @param {() => Promise<boolean>} holds */
-export async function until(holds) {
-  for (let round = 0; round < 75; round += 1) {
+/** Waits up to 60 s until something holds. @param {() => Promise<boolean>} holds @param {string} [what] */
+export async function until(holds, what = `${holds}`) {
+  for (let round = 0; round < 300; round += 1) {
     if (await holds()) return;
     await new Promise((resolve) => setTimeout(resolve, 200));
   }
-  assert.fail(`${holds}`);
+  assert.fail(what);
 }
