@@ -3,7 +3,7 @@
 //! | to find | look in |
 //! |---|---|
 //! | a command, and the flags of all but `serve` | [`commands`] |
-//! | a flag of `serve` | [`serve_args`], [`worker_args`], [`http_args`], [`case_args`], [`database_args`] |
+//! | a flag of `serve` | [`serve_args`], [`worker_args`], [`HttpOptions`](crate::http::HttpOptions), [`case_args`], [`database_args`] |
 //! | in which order a service starts and stops | [`serve`], [`stop`] |
 
 mod backup;
@@ -12,7 +12,6 @@ mod commands;
 mod config;
 mod database_args;
 mod healthcheck;
-mod http_args;
 mod keys;
 #[cfg(feature = "cluster")]
 mod migrate;

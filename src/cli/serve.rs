@@ -198,7 +198,7 @@ async fn start_listening(
     stop: CancellationToken,
 ) -> anyhow::Result<JoinHandle<()>> {
     let (options, origins) = http_options(args, anonymous)?;
-    let probe_listener = match args.http.probe_listen {
+    let probe_listener = match args.probe_listen {
         Some(address) => Some(bind(address).await?),
         None => None,
     };
@@ -273,7 +273,9 @@ fn http_options(
         anonymous_proxied: args.anonymous == Anonymous::Always,
         origins: args.cors_origin.as_slice().into(),
         requests_per_second: args.rate_limit,
-        ..args.http.options()
+        trusted_proxies: args.trusted_proxies.as_slice().into(),
+        allowed_hosts: args.allowed_host.as_slice().into(),
+        ..args.http.clone()
     };
     // A connection is a file. Many systems allow few at first and more to those who ask.
     match rlimit::increase_nofile_limit(u64::MAX) {

@@ -9,9 +9,9 @@ use clap::Args;
 
 use crate::cli::case_args::CaseArgs;
 use crate::cli::database_args::{DATA_DIR_DEFAULT, DATA_DIR_VARIABLE, DatabaseArgs};
-use crate::cli::http_args::HttpArgs;
 use crate::cli::values::{Anonymous, Retention, address, origin, retention};
 use crate::cli::worker_args::WorkerArgs;
+use crate::http::{AddressRange, HttpOptions};
 use crate::telemetry::{Endpoint, LogFormat};
 
 /// Settings of `serve`.
@@ -110,8 +110,31 @@ pub(super) struct ServeArgs {
     pub otlp_endpoint: Option<Endpoint>,
     #[command(flatten)]
     pub worker: WorkerArgs,
+    /// Address and port of a second listener that answers `/healthz`, `/readyz` and `/metrics` only; without it they are
+    /// answered on the first one alone, where a few places are kept for them.
+    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]
+    pub probe_listen: Option<SocketAddr>,
     #[command(flatten)]
-    pub http: HttpArgs,
+    pub http: HttpOptions,
+    /// Addresses of proxies, separated by commas, such as `10.0.0.0/8`, that are believed when they name the addresses of their clients
+    /// in `Forwarded` or `X-Forwarded-For`. Wrong keys and requests without a key are then counted by these addresses, and
+    /// `--address-connections-max` does not hold for the proxies.
+    #[arg(
+        long,
+        env = "RAILHEAD_TRUSTED_PROXIES",
+        value_delimiter = ',',
+        value_name = "ADDRESSES"
+    )]
+    pub trusted_proxies: Vec<AddressRange>,
+    /// Names of the service, separated by commas, by which it may be asked without a key; addresses and `localhost` always
+    /// may. Others are refused, as a web page could make its own name lead here.
+    #[arg(
+        long,
+        env = "RAILHEAD_ALLOWED_HOST",
+        value_delimiter = ',',
+        value_name = "NAME"
+    )]
+    pub allowed_host: Vec<String>,
     #[command(flatten)]
     pub log: LogArgs,
 }

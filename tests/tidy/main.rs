@@ -101,7 +101,6 @@ fn outside_libraries_stay_in_their_rooms() {
                 "sqlx",
                 "object_store",
                 "faer",
-                "clap",
                 "std::env::var",
                 "std::env::args",
                 "opentelemetry_otlp",

@@ -130,7 +130,6 @@ const ORDER: &[&str] = &[
     "cli::case_args",
     "cli::database_args",
     "cli::worker_args",
-    "cli::http_args",
     "cli::serve_args",
     "cli::commands",
     "cli::stop",
