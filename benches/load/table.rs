@@ -46,6 +46,7 @@ pub async fn claims() -> Vec<Row> {
                 jobs: 256,
                 cost_us: 200_000,
                 each_slice_us: None,
+                suspects: true,
                 workers,
                 lease: Lease {
                     now: 0,

@@ -92,6 +92,7 @@ async fn work(store: Arc<PostgresStore>, until: Instant, group: usize) -> Work {
         jobs: group,
         cost_us: u64::MAX,
         each_slice_us: None,
+        suspects: true,
         workers: 1,
         lease: Lease { now: 0, ms: 30_000 },
         now: 0,

@@ -20,25 +20,9 @@ pub(super) struct WorkerArgs {
     #[arg(long, env = "RAILHEAD_LEASE_S", default_value_t = 30, value_name = "SECONDS",
           value_parser = clap::value_parser!(u32).range(1..=3600))]
     pub lease_s: u32,
-    /// Solver seconds after which a solve waits while others have their turn, if there are any.
+    /// Solver seconds after which a solve makes room for others that wait.
     #[arg(long, env = "RAILHEAD_SLICE_S", default_value = "2", value_name = "SECONDS", value_parser = positive)]
     pub slice_s: f64,
-    /// Most solves that wait so, each with all that it has in memory.
-    #[arg(
-        long,
-        env = "RAILHEAD_PARKED_MAX",
-        default_value_t = 4,
-        value_name = "N"
-    )]
-    pub parked_max: u16,
-    /// Most memory that they are estimated to hold together, in MB.
-    #[arg(
-        long,
-        env = "RAILHEAD_PARKED_MEMORY_MB",
-        default_value_t = 4096,
-        value_name = "MB"
-    )]
-    pub parked_memory_mb: u32,
     /// Solver threads that do not stop when they are told to, beyond which the process ends with code 75, to be started again.
     #[arg(
         long,
@@ -77,8 +61,6 @@ impl WorkerArgs {
             lease: Duration::from_secs(self.lease_s.into()),
             time_limit: Duration::from_secs(self.time_limit_s.into()),
             slice: Duration::from_secs_f64(self.slice_s),
-            parked_max: self.parked_max.into(),
-            parked_bytes_max: bytes(self.parked_memory_mb),
             abandoned_max: self.abandoned_max.into(),
             staging: StagingBounds {
                 all: bytes(self.staged_mb),

@@ -110,8 +110,9 @@ impl Jobs {
                 recent_batches: RecentReads::default(),
                 recent_jobs: RecentReads::default(),
                 leaps: ClockSteps::default(),
-                solo: Arc::default(),
-                suspects_waiting: AtomicUsize::new(0),
+                suspect: Arc::default(),
+                long_solves: AtomicUsize::new(0),
+                wake_spare: Notify::new(),
                 abandoned: Arc::default(),
                 broken: CancellationToken::new(),
                 recovered: SetOnce::new(),
@@ -140,8 +141,10 @@ impl Jobs {
     /// # Errors
     /// A solver thread could not be started.
     pub fn start(&self) -> Result<(), JobsError> {
-        for number in 0..self.shared.options.workers {
-            let worker = self.worker(&format!("solver-{number}"))?;
+        let workers = self.shared.options.workers;
+        for number in 0..=workers {
+            let mut worker = self.worker(&format!("solver-{number}"))?;
+            worker.spare = number == workers;
             let runs = self.shared.tasks.track_future(worker.run());
             let runtime = Handle::current();
             // A thread of its own may wait for the disk of the embedded table.

@@ -50,7 +50,6 @@ pub(crate) struct Metrics {
     ended: Family<Label, Counter>,
     failures: Family<Label, Counter>,
     storage_failing: Gauge,
-    pub(crate) parked: Gauge,
     pub(crate) abandoned: Gauge,
     pub(crate) workers: Gauge,
     working: Gauge,
@@ -152,12 +151,6 @@ impl Metrics {
                 all,
                 "storage_failing",
                 "1 while the disk is full or cannot be written, or database or object store cannot be reached",
-                Gauge::default(),
-            ),
-            parked: registered(
-                all,
-                "solves_waiting",
-                "Solves that wait for their next turn, with all that they have in memory",
                 Gauge::default(),
             ),
             abandoned: registered(

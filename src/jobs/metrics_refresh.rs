@@ -24,7 +24,6 @@ impl Jobs {
     pub async fn refresh_metrics(&self) -> Result<(), JobsError> {
         let metrics = &self.shared.metrics;
         metrics.workers.set(count(self.shared.options.workers));
-        metrics.parked.set(count(self.shared.turns.parked().0));
         let abandoned = self.shared.abandoned.load(Ordering::Acquire);
         metrics.abandoned.set(count(abandoned));
         let stats = self.shared.store.stats().await.map_err(JobsError::from);

@@ -10,16 +10,16 @@
 //! 3. **Insert** ([`store`]): one transaction decides key, quota and queue bound and inserts the job. Single
 //!    submissions that arrive together share it. From here on the job survives the process.
 //! 4. **Claim** ([`worker::pool`], [`worker::claim_loop`]): a worker, whose loop is `Worker::step`, asks whose [turn](attempts::fair_scheduler) it is and claims a group of that
-//!    tenant's jobs, or resumes a solve that waits for its next turn. A single job is a group of one. Each claim has a
+//!    tenant's jobs. A single job is a group of one. Each claim has a
 //!    fencing token, which every later write names.
 //! 5. **Keep the lease** ([`worker::heartbeat`]): from the claim until the end is written. A lease is renewed while the
-//!    solver ticks, while it waits for its turn, and while results are being stored; otherwise it runs out and the
+//!    solver ticks and while results are being stored; otherwise it runs out and the
 //!    [reaper](maintenance::reaper) takes the job back.
 //! 6. **Settle without solving** ([`worker::record`]): jobs with a known answer end with it; equal jobs of the group wait
 //!    for the first of them.
 //! 7. **Solve** ([`worker::turn`], [`worker::begin`], [`worker::solve`]): on a thread, outside any transaction, one case after the other. A
-//!    solve that takes longer than a slice of time waits at its [pause point](attempts::pause_point) while others have their turn; a
-//!    long sweep is cut into [slices](attempts::slices), each stored when it is solved.
+//!    long sweep is cut into [slices](attempts::slices), each stored when it is solved, between which others have their turn. While
+//!    every worker is at a solve without a cut, a spare one serves short jobs.
 //! 8. **Judge** ([`worker::disposition`]): the one place that decides what an outcome means for the job.
 //! 9. **Store and finish** ([`worker::record`]): a large result goes to the [`blobs`] first, under a key with the fencing
 //!    token; then one transaction writes all ends of the group, small results included. What was not begun is released.

@@ -49,10 +49,6 @@ pub struct Options {
     pub time_limit: Duration,
     /// Solver time after which a solve makes room for others that wait.
     pub slice: Duration,
-    /// Most solves that wait for their next turn.
-    pub parked_max: usize,
-    /// Most memory in bytes that they are estimated to hold together.
-    pub parked_bytes_max: u64,
     /// Solver threads that do not stop beyond which the process ends, for whoever supervises it to start it again.
     pub abandoned_max: usize,
     /// Attempts at a job before it fails as `worker_lost`.
@@ -82,8 +78,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// The defaults for a data folder: one worker, a lease of 30 s, a day of solver time, slices of 2 s, 4 solves of 4 GiB that
-    /// wait for a turn, 3 abandoned threads, 5 attempts, 300 000 queued jobs of which
+    /// The defaults for a data folder: one worker, a lease of 30 s, a day of solver time, slices of 2 s,
+    /// 3 abandoned threads, 5 attempts, 300 000 queued jobs of which
     /// 250 000 of one tenant, 16 GiB of batches being received of which 4 GiB of one tenant,
     /// groups of 256, results up to 32 KiB in the database, results used again,
     /// ended jobs kept for ever, the system's clock, no spans.
@@ -98,8 +94,6 @@ impl Options {
             lease: Duration::from_secs(30),
             time_limit: Duration::from_secs(24 * 3600),
             slice: Duration::from_secs(2),
-            parked_max: 4,
-            parked_bytes_max: 4 << 30,
             abandoned_max: 3,
             attempts_max: 5,
             queue_max: 300_000,

@@ -78,12 +78,14 @@ pub(crate) struct Shared {
     pub(crate) recent_jobs: RecentReads<Option<Job>>,
     /// Steps of the wall clock.
     pub(crate) leaps: ClockSteps,
-    /// Whose turn it is, and solves that wait for theirs.
+    /// Whose turn it is.
     pub(crate) turns: FairScheduler,
-    /// Held by all that is solved; alone by what may have killed a process.
-    pub(crate) solo: Arc<tokio::sync::RwLock<()>>,
-    /// Attempts that wait to be solved alone.
-    pub(crate) suspects_waiting: AtomicUsize,
+    /// Held while a job is solved that may have killed a process.
+    pub(crate) suspect: Arc<tokio::sync::Mutex<()>>,
+    /// Solves that have taken longer than a slice while others wait.
+    pub(crate) long_solves: AtomicUsize,
+    /// Wakes the spare worker.
+    pub(crate) wake_spare: Notify,
     /// Solver threads that did not stop and still run.
     pub(crate) abandoned: Arc<AtomicUsize>,
     /// Set when there are too many of them.
@@ -162,6 +164,11 @@ impl Shared {
     pub(crate) fn all_workers(&self) -> usize {
         let others = self.cluster_workers.load(Ordering::Relaxed);
         self.options.workers.max(others)
+    }
+
+    /// Whether every worker is at a solve that has taken longer than a slice while others wait.
+    pub(crate) fn all_workers_are_long(&self) -> bool {
+        self.long_solves.load(Ordering::Acquire) >= self.options.workers
     }
 
     /// Wakes one worker for one job.

@@ -23,7 +23,6 @@ pub struct Row {
     pub lease_token: u64,
     pub lease_until: i64,
     pub group_size: usize,
-    pub solving: bool,
     pub suspect: bool,
     pub cancel_requested: bool,
     pub ended_at: i64,
@@ -64,7 +63,6 @@ impl Row {
             lease_token: 0,
             lease_until: 0,
             group_size: 1,
-            solving: false,
             suspect: false,
             cancel_requested: false,
             ended_at: 0,
@@ -92,13 +90,11 @@ impl Row {
         self.lease_token = lease_token;
         self.lease_until = lease_until;
         self.group_size = group_size;
-        self.solving = !self.suspect;
     }
 
     /// Back to the queue without counting the attempt, unless it is to be cancelled.
     pub fn released(&mut self, now: i64) {
         self.attempt -= 1;
-        self.solving = false;
         let state = match self.cancel_requested {
             true => State::Cancelled,
             false => State::Queued,
@@ -112,7 +108,6 @@ impl Row {
             self.suspect = true;
             return self.released(now);
         }
-        self.solving = false;
         let state = match (self.cancel_requested, self.attempt >= ATTEMPTS_MAX) {
             (true, _) => State::Cancelled,
             (false, true) => State::Failed,
@@ -201,14 +196,13 @@ impl Model {
             .filter(|row| row.state == State::Running && row.lease_token == lease_token)
     }
 
-    /// A dead process leaves its jobs: those that were not solved alone count no attempt.
+    /// A dead process leaves its jobs: those that were not certainly its cause count no attempt.
     pub fn reap_dead(&mut self, now: i64) -> BTreeMap<Uuid, State> {
-        let running = |row: &&Row| row.state == State::Running;
-        let solving = self.rows.values().filter(running).filter(|row| row.solving);
-        let solving = solving.count();
+        let running = self.rows.values().filter(|row| row.state == State::Running);
+        let running = running.count();
         self.take_back(|row| {
-            if !row.solving || row.group_size > 1 || solving > 1 {
-                row.suspect |= row.solving;
+            if row.group_size > 1 || (!row.suspect && running > 1) {
+                row.suspect = true;
                 row.released(now);
             } else {
                 row.reaped(now);
@@ -259,7 +253,6 @@ impl Model {
             return false;
         };
         (row.blob, row.cached, row.cache_key) = (blob, true, None);
-        row.solving = false;
         // A submission that is answered at once was never queued for anybody to see.
         (row.state, row.ended_at) = (State::Succeeded, now);
         row.slices.clear();

@@ -182,6 +182,7 @@ pub async fn claim_up_to(store: &dyn Store, now: i64, lease_ms: i64, jobs: usize
             cost_us: 1_000_000,
             kind: ClaimKind::New,
             each_slice_us: None,
+            suspects: true,
             workers: 1,
             lease: Lease { now, ms: lease_ms },
             now,

@@ -420,7 +420,6 @@ async fn of_no_jobs_nothing_is_asked(kind: StoreKind) {
     assert!(store.finish(&[], 1).await.unwrap().is_empty());
     let why = ReleaseReason::NotBegun;
     assert!(store.release(&[], why, 1).await.unwrap().is_empty());
-    store.set_solving(&[], true).await.unwrap();
     assert_eq!(store.orphans(&[]).await.unwrap(), Orphans::default());
     assert!(store.cached(&[]).await.unwrap().is_empty());
     assert!(table.finish(&claim, &success(), 1).await.is_some());

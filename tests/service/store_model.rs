@@ -44,7 +44,6 @@ enum Move {
     Deadlines,
     Expire,
     Renew(Index),
-    SetSolving(Index, bool),
     AddSlice(Index),
     Finish(Index, u8),
     FinishGroup(Index),
@@ -74,7 +73,6 @@ fn moves() -> impl Strategy<Value = Move> {
         1 => Just(Move::Deadlines),
         1 => Just(Move::Expire),
         2 => at().prop_map(Move::Renew),
-        1 => (at(), any::<bool>()).prop_map(|(at, solving)| Move::SetSolving(at, solving)),
         2 => at().prop_map(Move::AddSlice),
         4 => (at(), 0..4_u8).prop_map(|(at, how)| Move::Finish(at, how)),
         2 => at().prop_map(Move::FinishGroup),
@@ -133,7 +131,6 @@ impl Pair {
             }
             _ if claims.is_empty() => {}
             Move::Renew(at) => self.renew(at.get(&claims)).await,
-            Move::SetSolving(at, solving) => self.set_solving(at.get(&claims), solving).await,
             Move::AddSlice(at) => self.add_slice(at.get(&claims)).await,
             Move::Finish(at, how) => self.finish(at.get(&claims), how).await,
             Move::Release(at) => self.release(at.get(&claims)).await,

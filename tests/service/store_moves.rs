@@ -112,6 +112,7 @@ impl Pair {
             jobs,
             cost_us: 1_000_000,
             each_slice_us: None,
+            suspects: true,
             workers: 1,
             lease: Lease {
                 now: self.now,
@@ -210,14 +211,6 @@ impl Pair {
             }
         });
         assert_eq!(renewals, [expected]);
-    }
-
-    pub async fn set_solving(&mut self, claim: &Claim, solving: bool) {
-        let claims = std::slice::from_ref(claim);
-        self.store.set_solving(claims, solving).await.unwrap();
-        if let Some(row) = self.model.held(claim.id, claim.lease_token) {
-            (row.group_size, row.solving) = (1, solving);
-        }
     }
 
     pub async fn add_slice(&mut self, claim: &Claim) {

@@ -28,6 +28,7 @@ async fn claim_begun(store: &dyn Store, now: i64) -> Option<Claim> {
         jobs: 1,
         cost_us: 1_000_000,
         each_slice_us: None,
+        suspects: true,
         workers: 1,
         lease: Lease { now, ms: 1000 },
         now,

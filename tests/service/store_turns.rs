@@ -1,6 +1,6 @@
 //! In which order are jobs claimed, and what is held against them when their process dies?
 
-use railhead::jobs::model::kind::Kind;
+use railhead::jobs::model::kind::{Kind, Queue};
 use railhead::jobs::model::submit_options::{Priority, SubmitOptions};
 use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason};
 use railhead::jobs::store::submission::{
@@ -49,6 +49,22 @@ async fn jobs_are_claimed_by_priority_and_then_by_age(kind: StoreKind) {
     assert_eq!(claimed, [2, 4, 1, 3, 0].map(|place: usize| added[place]));
 }
 
+fn request(queue: &Queue) -> ClaimRequest<'_> {
+    ClaimRequest {
+        worker: "w",
+        queue,
+        jobs: 8,
+        cost_us: 200_000,
+        kind: ClaimKind::New,
+        each_slice_us: None,
+        suspects: true,
+        workers: 1,
+        lease: Lease { now: 0, ms: 1000 },
+        now: 2,
+        late_before: 2,
+    }
+}
+
 async fn a_bystander_of_a_dead_process_counts_no_attempt(kind: StoreKind) {
     let table = Table::new(kind).await;
     let store = &*table.store;
@@ -62,30 +78,28 @@ async fn a_bystander_of_a_dead_process_counts_no_attempt(kind: StoreKind) {
         let job = store.job("anonymous", id).await.unwrap().unwrap();
         assert_eq!((job.state, job.attempt), (State::Queued, 0));
     }
-    // Now each comes alone, and is marked when it is solved alone.
+    // Now each comes alone, and a process that solves one does not ask for the other.
     let suspect = claim_up_to(store, 2, 1000, 8).await;
     assert_eq!((suspect.len(), suspect[0].suspect), (1, true));
-    let waiting = claim_up_to(store, 2, 1000, 8).await;
-    store.set_solving(&suspect, true).await.unwrap();
+    let queue = queue_of("anonymous");
+    let without = ClaimRequest {
+        suspects: false,
+        ..request(&queue)
+    };
+    assert_eq!(store.claim(&without).await.unwrap(), []);
+    let beside = table.add(new_job()).await.id;
+    assert_eq!(store.claim(&without).await.unwrap()[0].id, beside);
+    // The suspect is to blame; what was solved beside it is not.
     let mut taken = store.reap(Reap::Dead, 3, 1).await.unwrap();
     taken.sort_unstable();
-    assert_eq!(taken, [(ids[0], State::Failed), (ids[1], State::Queued)]);
-    assert_eq!(waiting[0].id, ids[1]);
-    assert_eq!(
-        store
-            .job("anonymous", ids[1])
-            .await
-            .unwrap()
-            .unwrap()
-            .attempt,
-        0
-    );
-    // One that waited at its pause point is no suspect either.
-    let other = claim_up_to(store, 4, 1000, 1).await;
-    store.set_solving(&other, false).await.unwrap();
+    assert_eq!(taken, [(ids[0], State::Failed), (beside, State::Queued)]);
+    let job = store.job("anonymous", beside).await.unwrap().unwrap();
+    assert_eq!(job.attempt, 0);
+    // What was all that was running counts its attempt, suspect or not.
+    assert_eq!(claim_up_to(store, 4, 1000, 1).await[0].id, ids[1]);
     assert_eq!(
         store.reap(Reap::Dead, 5, 1).await.unwrap(),
-        [(ids[1], State::Queued)]
+        [(ids[1], State::Failed)]
     );
 }
 
@@ -103,16 +117,8 @@ async fn a_job_that_was_longer_than_thought_is_known_as_long(kind: StoreKind) {
     );
     let queue = queue_of("anonymous");
     let request = |each_slice_us| ClaimRequest {
-        worker: "w",
-        queue: &queue,
-        jobs: 8,
-        cost_us: 200_000,
-        kind: ClaimKind::New,
         each_slice_us,
-        workers: 1,
-        lease: Lease { now: 0, ms: 1000 },
-        now: 2,
-        late_before: 2,
+        ..request(&queue)
     };
     assert!(
         store

@@ -14,17 +14,16 @@
 //! ```
 
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use tokio::sync::OwnedMutexGuard;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt_control::{AttemptControl, StopReason};
 use crate::jobs::attempts::lease::GroupLease;
 use crate::jobs::attempts::outcome::Outcome;
-use crate::jobs::attempts::pause_point::PausePoint;
 use crate::jobs::attempts::running::RunningEntry;
 use crate::jobs::attempts::slices::SlicedWork;
 use crate::jobs::attempts::solver_thread::SolverThread;
@@ -61,28 +60,16 @@ pub(crate) enum Phase {
     Done,
 }
 
-/// What a worker spent its time on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum TimeSpentOn {
-    /// Jobs that came from the queue for the first time.
-    New,
-    /// A sweep that had been in the queue between two of its slices.
-    Begun,
-    /// A solve that had waited at its pause point.
-    Parked,
-}
-
 /// Claimed jobs with the thread that solves them one after the other.
 #[derive(Debug)]
 pub(crate) struct Attempt {
     pub(crate) queue: Queue,
     pub(crate) members: Vec<Member>,
     pub(crate) lease: GroupLease,
-    pub(crate) pause_point: Arc<PausePoint>,
-    /// It was running when a process died, and is solved while nothing else is.
-    pub(crate) suspect: bool,
-    /// What its time is spent on.
-    pub(crate) on: TimeSpentOn,
+    /// It was running when a process died; this process solves no other such job at the same time.
+    pub(crate) _suspect: Option<OwnedMutexGuard<()>>,
+    /// It is a sweep that had been in the queue between two of its slices.
+    pub(crate) was_begun: bool,
     /// Begin of its turn.
     pub(crate) turn_began: Instant,
     /// Solver time spent on what it is at.
@@ -101,7 +88,7 @@ pub(crate) struct Solver {
     /// Set when there will be no more outcomes.
     pub(crate) over: CancellationToken,
     /// Nothing more shall be begun.
-    pub(crate) closed: Arc<AtomicBool>,
+    pub(crate) closed: Arc<Mutex<bool>>,
 }
 
 impl Attempt {
@@ -137,15 +124,15 @@ impl Attempt {
         none
     }
 
-    /// Nothing more is begun: what the thread has not taken up goes back to the queue. To be called while the thread waits
-    /// at the pause point, has ended, or is left behind.
+    /// Nothing more is begun: what the thread has not taken up goes back to the queue.
     pub(crate) fn close(&mut self) {
         if let Some(solver) = &self.solver {
-            solver.closed.store(true, Ordering::Release);
+            *lock(&solver.closed) = true;
         }
         self.take_outcomes();
         for member in &mut self.members {
-            if matches!(member.phase, Phase::Solving) && !member.control.is_started() {
+            let solving = member.control.is_started() && member.sliced.is_none();
+            if matches!(member.phase, Phase::Solving) && !solving {
                 member.phase = Phase::NotBegun;
             }
         }
@@ -180,18 +167,6 @@ impl Attempt {
         solving.count() > 1 && waiting.count() > 0
     }
 
-    /// Tells the member that the solver is at to stop, and lets it begin no other.
-    pub(crate) fn stop_begun(&self, reason: StopReason) {
-        if let Some(solver) = &self.solver {
-            solver.closed.store(true, Ordering::Release);
-        }
-        for member in &self.members {
-            if matches!(member.phase, Phase::Solving) && member.control.is_started() {
-                member.control.stop(reason);
-            }
-        }
-    }
-
     /// Tells every member to stop.
     pub(crate) fn stop(&self, reason: StopReason) {
         for member in &self.members {
@@ -207,23 +182,6 @@ impl Attempt {
                 && member.control.is_started()
                 && matches!(reason, Some(StopReason::Cancel | StopReason::Deadline))
         })
-    }
-
-    /// Was it told to stop, or has its solver ended, while it waited?
-    pub(crate) fn is_stopped(&self) -> bool {
-        let stopped = |member: &Member| {
-            matches!(member.phase, Phase::Solving) && member.control.reason().is_some()
-        };
-        self.members.iter().any(stopped)
-    }
-
-    /// Bytes that its solver is estimated to hold.
-    pub(crate) fn memory_bytes(&self) -> u64 {
-        let bytes = self
-            .members
-            .iter()
-            .map(|member| member.control.memory_bytes());
-        bytes.max().unwrap_or(0)
     }
 
     /// Claims of the members that are in the phase that `is` tells.
@@ -268,7 +226,6 @@ mod tests {
     use crate::jobs::model::kind::Kind;
 
     fn attempt(jobs: u32) -> Attempt {
-        let pause_point = Arc::new(PausePoint::default());
         let claim = || Claim {
             id: Uuid::now_v7(),
             attempt: 1,
@@ -280,7 +237,7 @@ mod tests {
             slices: 0,
         };
         let member = |claim: Claim| {
-            let control = Arc::new(AttemptControl::new(pause_point.clone()));
+            let control = Arc::new(AttemptControl::default());
             Member {
                 _listed: RunningAttempts::default().enter(claim.id, &control),
                 claim,
@@ -297,9 +254,8 @@ mod tests {
             },
             members: (0..jobs).map(|_| member(claim())).collect(),
             lease: GroupLease(Arc::new(HeldLeases::new(Vec::new(), 0))),
-            pause_point,
-            suspect: false,
-            on: TimeSpentOn::New,
+            _suspect: None,
+            was_begun: false,
             turn_began: Instant::now(),
             spent: Duration::ZERO,
             solver: None,

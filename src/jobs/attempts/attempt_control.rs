@@ -2,11 +2,10 @@
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+use std::sync::{Mutex, MutexGuard, OnceLock};
 use std::time::{Duration, Instant};
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::jobs::attempts::pause_point::PausePoint;
 use crate::jobs::sync::lock;
 
 /// Why a running solve was told to stop. The first reason given stays.
@@ -20,7 +19,7 @@ pub enum StopReason {
     Lost,
     /// The deadline of the job has passed.
     Deadline,
-    /// It takes longer than was expected, and no pause point is free to hold it; the job goes back to the queue.
+    /// It takes longer than was expected of a short job; it goes back to the queue.
     TooLong,
 }
 
@@ -32,8 +31,6 @@ pub struct AttemptControl {
     progress: AtomicU64,
     clock: Mutex<SolveClock>,
     taken_up: AtomicBool,
-    memory_bytes: AtomicU64,
-    pause_point: Arc<PausePoint>,
 }
 
 /// How long a solve has taken.
@@ -41,20 +38,11 @@ pub struct AttemptControl {
 struct SolveClock {
     /// Before it last went on.
     spent: Duration,
-    /// Since when it goes on, and how long it had waited at the pause point by then.
-    since: Option<(Instant, Duration)>,
+    /// Since when it goes on.
+    since: Option<Instant>,
 }
 
 impl AttemptControl {
-    /// The control of an attempt whose solver passes this pause point.
-    #[must_use]
-    pub fn new(pause_point: Arc<PausePoint>) -> AttemptControl {
-        AttemptControl {
-            pause_point,
-            ..AttemptControl::default()
-        }
-    }
-
     /// The solver's thread has come to this job.
     pub fn take_up(&self) {
         self.taken_up.store(true, Ordering::Release);
@@ -71,26 +59,14 @@ impl AttemptControl {
         self.taken_up.load(Ordering::Acquire)
     }
 
-    /// Notes what the solve is estimated to hold.
-    pub fn set_memory_bytes(&self, bytes: u64) {
-        self.memory_bytes.store(bytes, Ordering::Release);
-    }
-
-    /// What the solve is estimated to hold; 0 before that is known.
-    #[must_use]
-    pub fn memory_bytes(&self) -> u64 {
-        self.memory_bytes.load(Ordering::Acquire)
-    }
-
     /// Starts the clock of the solve, against which `contact` holds the time limit of the case, at the time that was spent
     /// before. It goes on until [`AttemptControl::pause`]; a clock that goes is left alone.
     pub fn begin(&self, spent: Duration) {
-        let waited = self.pause_point.waited();
         let mut clock = self.clock();
         if clock.since.is_none() {
             *clock = SolveClock {
                 spent,
-                since: Some((Instant::now(), waited)),
+                since: Some(Instant::now()),
             };
         }
     }
@@ -110,7 +86,6 @@ impl AttemptControl {
     pub fn stop(&self, reason: StopReason) {
         // A second reason changes nothing: the solver is stopping already.
         let _ = self.reason.set(reason);
-        self.pause_point.nudge();
     }
 
     /// Why the solver was told to stop, if it was.
@@ -139,7 +114,6 @@ impl Monitor for AttemptControl {
             self.progress
                 .store(progress.clamp(0.0, 1.0).to_bits(), Ordering::Release);
         }
-        self.pause_point.pass(|| self.reason().is_some());
         if self.reason().is_some() {
             return ControlFlow::Break(Stop::Cancelled);
         }
@@ -147,13 +121,8 @@ impl Monitor for AttemptControl {
     }
 
     fn elapsed(&self) -> Duration {
-        let waited = self.pause_point.waited();
         let clock = self.clock();
-        let since = clock.since.map_or(Duration::ZERO, |(since, before)| {
-            // Time at the pause point belongs to others.
-            since.elapsed().saturating_sub(waited - before)
-        });
-        clock.spent + since
+        clock.spent + clock.since.map_or(Duration::ZERO, |since| since.elapsed())
     }
 }
 

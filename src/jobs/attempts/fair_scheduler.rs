@@ -1,12 +1,11 @@
-//! Which queue has the next turn. Tenants share solver seconds; within a queue, long solves and new jobs take turns.
+//! Which queue has the next turn. Tenants share solver seconds; within a queue, begun sweeps and new jobs take turns.
 //!
 //! The seconds are kept in memory, by the process that spends them, and fade: what counts is the last minutes.
 
 use std::collections::HashMap;
-use std::sync::{Mutex, MutexGuard};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use crate::jobs::attempts::attempt::{Attempt, TimeSpentOn};
 use crate::jobs::model::kind::{Kind, Queue};
 use crate::jobs::sync::lock;
 
@@ -16,25 +15,17 @@ const HALF_LIFE: Duration = Duration::from_secs(60);
 /// Less than this is forgotten, in s.
 const FORGOTTEN: f64 = 1e-6;
 
-/// Solver seconds of tenants and the attempts that wait at their pause points.
+/// Solver seconds of tenants.
 #[derive(Debug, Default)]
-pub(crate) struct FairScheduler(Mutex<Inner>);
-
-#[derive(Debug, Default)]
-struct Inner {
-    used: HashMap<Queue, Used>,
-    parked: Vec<Attempt>,
-}
+pub(crate) struct FairScheduler(Mutex<HashMap<Queue, Used>>);
 
 #[derive(Debug, Clone, Copy)]
 struct Used {
     /// As of `at`.
     seconds: f64,
     at: Instant,
-    /// Seconds that new jobs of the queue have had since one of its long solves had a turn.
+    /// Seconds that new jobs of the queue have had since one of its begun sweeps had a turn.
     queue_since: f64,
-    /// That was one that had waited at its pause point.
-    parked_was_last: bool,
 }
 
 impl Used {
@@ -45,45 +36,31 @@ impl Used {
     }
 }
 
-/// One of the two kinds of long solves that wait.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum LongSolve {
-    /// At its pause point, with all that it has in memory.
-    Parked,
-    /// In the queue, between two slices.
-    Begun,
-}
-
 impl FairScheduler {
-    /// Puts solver time on the account of a queue.
-    pub(crate) fn charge(&self, queue: &Queue, time: Duration, spent: TimeSpentOn) {
-        let mut inner = self.lock();
+    /// Puts solver time on the account of a queue; `was_begun` if a sweep used it that had been in the queue between two slices.
+    pub(crate) fn charge(&self, queue: &Queue, time: Duration, was_begun: bool) {
+        let mut queues = lock(&self.0);
         let now = Instant::now();
-        let used = inner.used.entry(queue.clone()).or_insert(Used {
+        let used = queues.entry(queue.clone()).or_insert(Used {
             seconds: 0.0,
             at: now,
             queue_since: 0.0,
-            parked_was_last: false,
         });
         used.seconds = used.at(now) + time.as_secs_f64();
         used.at = now;
-        match spent {
-            TimeSpentOn::New => used.queue_since += time.as_secs_f64(),
-            TimeSpentOn::Parked | TimeSpentOn::Begun => {
-                used.queue_since = 0.0;
-                used.parked_was_last = spent == TimeSpentOn::Parked;
-            }
+        match was_begun {
+            false => used.queue_since += time.as_secs_f64(),
+            true => used.queue_since = 0.0,
         }
-        inner.used.retain(|_, used| used.at(now) > FORGOTTEN);
+        queues.retain(|_, used| used.at(now) > FORGOTTEN);
     }
 
     /// Queues in the order of their turns: first those of the tenant that has used the least in all, and of these the one that has.
-    pub(crate) fn order(&self, mut queues: Vec<Queue>) -> Vec<Queue> {
-        let inner = self.lock();
-        queues.extend(inner.parked.iter().map(|attempt| attempt.queue.clone()));
+    pub(crate) fn order(&self, queues: Vec<Queue>) -> Vec<Queue> {
+        let accounts = lock(&self.0);
         // One present for all, so that both queues of a tenant have the same sum.
         let now = Instant::now();
-        let used = |queue: &Queue| inner.used.get(queue).map_or(0.0, |used| used.at(now));
+        let used = |queue: &Queue| accounts.get(queue).map_or(0.0, |used| used.at(now));
         let mut keyed: Vec<_> = queues
             .into_iter()
             .map(|queue| {
@@ -102,66 +79,14 @@ impl FairScheduler {
             let used = a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
             used.then_with(|| first.cmp(second))
         });
-        keyed.dedup_by(|a, b| a.1 == b.1);
         keyed.into_iter().map(|(_, queue)| queue).collect()
     }
 
-    /// Have new jobs of this queue had a slice of time since one of its long solves had a turn?
+    /// Have new jobs of this queue had a slice of time since one of its begun sweeps had a turn?
     pub(crate) fn queue_had_its_share(&self, queue: &Queue, slice: Duration) -> bool {
-        let inner = self.lock();
-        let used = inner.used.get(queue);
+        let queues = lock(&self.0);
+        let used = queues.get(queue);
         used.is_some_and(|used| used.queue_since >= slice.as_secs_f64())
-    }
-
-    /// The kinds of long solves of this queue in the order of their turns.
-    pub(crate) fn long_ones(&self, queue: &Queue) -> [LongSolve; 2] {
-        let inner = self.lock();
-        match inner
-            .used
-            .get(queue)
-            .is_some_and(|used| used.parked_was_last)
-        {
-            true => [LongSolve::Begun, LongSolve::Parked],
-            false => [LongSolve::Parked, LongSolve::Begun],
-        }
-    }
-
-    /// An attempt waits at its pause point from now on.
-    pub(crate) fn park(&self, attempt: Attempt) {
-        self.lock().parked.push(attempt);
-    }
-
-    /// The attempt of a queue that waits longest.
-    pub(crate) fn resume(&self, queue: &Queue) -> Option<Attempt> {
-        let mut inner = self.lock();
-        let place = inner
-            .parked
-            .iter()
-            .position(|attempt| attempt.queue == *queue)?;
-        Some(inner.parked.remove(place))
-    }
-
-    /// An attempt that was told to stop, or whose solver has ended: it needs no solver time.
-    pub(crate) fn resume_stopped(&self) -> Option<Attempt> {
-        let mut inner = self.lock();
-        let place = inner.parked.iter().position(Attempt::is_stopped)?;
-        Some(inner.parked.remove(place))
-    }
-
-    /// Any attempt that waits.
-    pub(crate) fn resume_any(&self) -> Option<Attempt> {
-        self.lock().parked.pop()
-    }
-
-    /// Number of attempts that wait, and the bytes that they are estimated to hold.
-    pub(crate) fn parked(&self) -> (usize, u64) {
-        let inner = self.lock();
-        let bytes = inner.parked.iter().map(Attempt::memory_bytes).sum();
-        (inner.parked.len(), bytes)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Inner> {
-        lock(&self.0)
     }
 }
 
@@ -191,15 +116,15 @@ mod tests {
             names(&turns.order(tenants.clone())),
             ["a case", "b case", "c case"]
         );
-        turns.charge(&tenants[0], Duration::from_secs(100), TimeSpentOn::New);
-        turns.charge(&tenants[1], Duration::from_secs(1), TimeSpentOn::New);
+        turns.charge(&tenants[0], Duration::from_secs(100), false);
+        turns.charge(&tenants[1], Duration::from_secs(1), false);
         assert_eq!(
             names(&turns.order(tenants.clone())),
             ["c case", "b case", "a case"]
         );
         // Many short jobs weigh what they take, not how many they are.
         for _ in 0..1000 {
-            turns.charge(&tenants[2], Duration::from_micros(10), TimeSpentOn::New);
+            turns.charge(&tenants[2], Duration::from_micros(10), false);
         }
         assert_eq!(names(&turns.order(tenants)), ["c case", "b case", "a case"]);
     }
@@ -212,32 +137,22 @@ mod tests {
             queue("a", Kind::Rows),
             queue("b", Kind::Case),
         ];
-        turns.charge(&queues[1], Duration::from_secs(10), TimeSpentOn::New);
+        turns.charge(&queues[1], Duration::from_secs(10), false);
         let order = turns.order(queues.clone());
         assert_eq!(names(&order), ["b case", "a case", "a rows"]);
-        turns.charge(&queues[2], Duration::from_secs(20), TimeSpentOn::New);
+        turns.charge(&queues[2], Duration::from_secs(20), false);
         let order = turns.order(queues);
         assert_eq!(names(&order), ["a case", "a rows", "b case"]);
     }
 
     #[test]
-    fn queue_and_long_solves_of_a_tenant_take_turns() {
+    fn new_jobs_and_begun_sweeps_of_a_tenant_take_turns() {
         let turns = FairScheduler::default();
         let (queue, slice) = (queue("a", Kind::Case), Duration::from_secs(2));
         assert!(!turns.queue_had_its_share(&queue, slice));
-        turns.charge(&queue, slice, TimeSpentOn::New);
+        turns.charge(&queue, slice, false);
         assert!(turns.queue_had_its_share(&queue, slice));
-        turns.charge(&queue, slice, TimeSpentOn::Parked);
+        turns.charge(&queue, slice, true);
         assert!(!turns.queue_had_its_share(&queue, slice));
-        // So do those at a pause point and those in the queue.
-        assert_eq!(
-            turns.long_ones(&queue),
-            [LongSolve::Begun, LongSolve::Parked]
-        );
-        turns.charge(&queue, slice, TimeSpentOn::Begun);
-        assert_eq!(
-            turns.long_ones(&queue),
-            [LongSolve::Parked, LongSolve::Begun]
-        );
     }
 }

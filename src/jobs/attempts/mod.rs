@@ -9,7 +9,6 @@ pub mod fair_scheduler;
 pub mod heap;
 pub mod lease;
 pub mod outcome;
-pub mod pause_point;
 pub mod running;
 pub mod slices;
 pub mod solver_thread;

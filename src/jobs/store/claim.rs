@@ -20,7 +20,7 @@ pub struct Claim {
     pub traceparent: Option<String>,
     /// What tells identical cases; `None` for a job that must be solved.
     pub cache_key: Option<CacheKey>,
-    /// It ran together with others when their process died, and comes alone.
+    /// It ran together with others when their process died: it comes alone.
     pub suspect: bool,
     /// Slices that are solved and stored.
     pub slices: u32,
@@ -60,6 +60,8 @@ pub struct ClaimRequest<'a> {
     pub cost_us: u64,
     /// Largest expected solve time of one slice of each job in µs, if there is such a bound.
     pub each_slice_us: Option<u64>,
+    /// Also jobs that may have killed a process.
+    pub suspects: bool,
     /// Workers among which the queue is shared.
     pub workers: usize,
     /// The lease that begins.

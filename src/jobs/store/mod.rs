@@ -305,9 +305,6 @@ pub trait Leases: Send + Sync {
         lease: Lease,
     ) -> Result<Vec<Renewal>, StoreError>;
 
-    /// Notes that claimed jobs are being solved, or that they wait for their turn; each stands for itself from now on.
-    async fn set_solving(&self, claims: &[Claim], solving: bool) -> Result<(), StoreError>;
-
     /// Gives claimed jobs back to the queue without counting their attempts; those that the client has cancelled end.
     /// Returns those that were still held, with their new states.
     async fn release(

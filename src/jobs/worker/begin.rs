@@ -1,15 +1,14 @@
 //! The beginning of an attempt: its jobs are listed as running, their leases kept, its work handed to a thread.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use tokio::sync::OwnedMutexGuard;
 use tokio_util::sync::CancellationToken;
 
-use crate::jobs::attempts::attempt::{Attempt, Member, Outcomes, Phase, Solver, TimeSpentOn};
+use crate::jobs::attempts::attempt::{Attempt, Member, Outcomes, Phase, Solver};
 use crate::jobs::attempts::attempt_control::AttemptControl;
 use crate::jobs::attempts::outcome::{Outcome, Work};
-use crate::jobs::attempts::pause_point::PausePoint;
 use crate::jobs::attempts::solver_thread::{SolverThread, Task};
 use crate::jobs::job_trace::JobTrace;
 use crate::jobs::model::job::{Failure, FailureKind};
@@ -24,17 +23,17 @@ use crate::jobs::worker::solve::solve_guarded;
 const GROUP_TIME: Duration = Duration::from_millis(400);
 
 /// Lists claimed jobs as running and keeps their leases from now on.
-pub(crate) fn take_up(shared: &Arc<Shared>, queue: Queue, claims: Vec<Claim>) -> Attempt {
-    let pause_point = Arc::new(PausePoint::default());
-    let suspect = claims.iter().any(|claim| claim.suspect);
-    let on = match claims.iter().any(|claim| claim.slices > 0) {
-        true => TimeSpentOn::Begun,
-        false => TimeSpentOn::New,
-    };
+pub(crate) fn take_up(
+    shared: &Arc<Shared>,
+    queue: Queue,
+    claims: Vec<Claim>,
+    suspect: Option<OwnedMutexGuard<()>>,
+) -> Attempt {
+    let was_begun = claims.iter().any(|claim| claim.slices > 0);
     let members: Vec<Member> = claims
         .into_iter()
         .map(|claim| {
-            let control = Arc::new(AttemptControl::new(pause_point.clone()));
+            let control = Arc::new(AttemptControl::default());
             Member {
                 _listed: shared.running.enter(claim.id, &control),
                 claim,
@@ -52,9 +51,8 @@ pub(crate) fn take_up(shared: &Arc<Shared>, queue: Queue, claims: Vec<Claim>) ->
         queue,
         lease: heartbeat::keep(shared, held.collect()),
         members,
-        pause_point,
-        suspect,
-        on,
+        _suspect: suspect,
+        was_begun,
         turn_began: Instant::now(),
         spent: Duration::ZERO,
         solver: None,
@@ -71,7 +69,7 @@ pub(crate) fn begin(
     attempt.spent = Duration::ZERO;
     let outcomes = Outcomes::default();
     let over = CancellationToken::new();
-    let closed = Arc::new(AtomicBool::new(false));
+    let closed = Arc::new(Mutex::new(false));
     let work: Vec<_> = work
         .into_iter()
         .map(|(place, work)| {
@@ -90,10 +88,13 @@ pub(crate) fn begin(
             let start = Instant::now();
             for (number, (place, control, work, traced)) in work.into_iter().enumerate() {
                 let late = number > 0 && start.elapsed() > GROUP_TIME;
-                if late || closed.load(Ordering::Acquire) || shared.stopping.is_cancelled() {
-                    break;
+                {
+                    let closed = lock(&closed);
+                    if late || *closed || shared.stopping.is_cancelled() {
+                        break;
+                    }
+                    control.take_up();
                 }
-                control.take_up();
                 let from_queue = matches!(work, Work::New(..));
                 let solve = || solve_guarded(&shared, &control, work);
                 let outcome = JobTrace::solving(traced.as_ref(), from_queue, solve);

@@ -29,7 +29,6 @@ pub(crate) fn begin(
     notes: &[SliceRecord],
 ) -> Ended {
     let task = Evolution::check(request, &shared.options.limits)?;
-    control.set_memory_bytes(task.memory_bytes);
     advance(shared, control, SlicedEvolution::new(task, notes))
 }
 

@@ -6,7 +6,6 @@ use std::time::Duration;
 use tokio::time::sleep;
 use uuid::Uuid;
 
-use crate::jobs::attempts::attempt::{Phase, TimeSpentOn};
 use crate::jobs::attempts::solver_thread::SolverThread;
 use crate::jobs::error::JobsError;
 use crate::jobs::model::job::State;
@@ -20,6 +19,8 @@ const POLL_INTERVAL: Duration = Duration::from_secs(1);
 pub struct Worker {
     pub(crate) shared: Arc<Shared>,
     pub(crate) name: String,
+    /// It serves short jobs while every other worker is at a long solve.
+    pub(crate) spare: bool,
     /// A thread without work.
     pub(crate) thread: Option<SolverThread>,
 }
@@ -35,16 +36,6 @@ pub struct StepReport {
     pub handed_back: Vec<Uuid>,
     /// Jobs that had been given away; their outcomes were discarded.
     pub lost: Vec<Uuid>,
-    /// Jobs whose solve waits for its next turn.
-    pub parked: Vec<Uuid>,
-}
-
-/// How a turn ended.
-pub(crate) enum Turn {
-    /// The solver is done, or was left behind.
-    Over,
-    /// The solver waits at its pause point.
-    Held,
 }
 
 impl Worker {
@@ -53,29 +44,34 @@ impl Worker {
             thread: Some(SolverThread::start(name)?),
             shared,
             name: name.to_owned(),
+            spare: false,
         })
     }
 
-    /// Steps until the service drains and nothing waits at a pause point.
+    /// Steps until the service drains.
     pub(crate) async fn run(mut self) {
         let shared = self.shared.clone();
         let recovered = shared.recovered.wait();
         let _ = shared.draining.run_until_cancelled(recovered).await;
-        while !shared.draining.is_cancelled() || shared.turns.parked().0 > 0 {
+        let wake = match self.spare {
+            true => &shared.wake_spare,
+            false => &shared.wake,
+        };
+        while !shared.draining.is_cancelled() {
             match self.step().await {
                 Ok(step) if step.busy => continue,
                 Ok(_) => {}
                 Err(error) => tracing::error!(worker = self.name, %error, "worker step failed"),
             }
             tokio::select! {
-                () = shared.wake.notified() => {}
+                () = wake.notified() => {}
                 () = sleep(POLL_INTERVAL) => {}
                 () = shared.draining.cancelled() => {}
             }
         }
     }
 
-    /// Takes one turn: claims or resumes, solves, and writes down what became of each job. The pool calls this, and tests do.
+    /// Takes one turn: claims, solves, and writes down what became of each job. The pool calls this, and tests do.
     ///
     /// # Errors
     /// The database failed; claimed jobs are given back if that is possible, or taken back when their leases run out.
@@ -87,20 +83,9 @@ impl Worker {
             busy: true,
             ..StepReport::default()
         };
-        let done = self.turn(&mut attempt, &mut step).await;
-        match done {
-            Ok(Turn::Held) => {
-                let held = attempt.claims(|phase| matches!(phase, Phase::Solving));
-                step.parked = held.iter().map(|claim| claim.id).collect();
-                attempt.on = TimeSpentOn::Parked;
-                self.shared.turns.park(attempt);
-                self.shared.wake.notify_one();
-            }
-            Ok(Turn::Over) => {}
-            Err(error) => {
-                self.give_up(&mut attempt).await;
-                return Err(error);
-            }
+        if let Err(error) = self.turn(&mut attempt, &mut step).await {
+            self.give_up(&mut attempt).await;
+            return Err(error);
         }
         Ok(step)
     }

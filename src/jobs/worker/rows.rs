@@ -26,9 +26,6 @@ pub(crate) fn solve_chunk(shared: &Shared, control: &AttemptControl, stored: &St
     let first_row = chunk.first_row;
     let (varied, carried) = parted(&head, chunk);
     let limits = &shared.options.limits;
-    if let Ok(checked) = (shared.engine.check)(&head.case, limits) {
-        control.set_memory_bytes(checked.cost().own_bytes());
-    }
     let task = ManyTask {
         case: &head.case,
         columns: &varied,

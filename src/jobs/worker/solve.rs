@@ -60,7 +60,6 @@ fn check_and_solve(
     let mut checked = (shared.engine.check)(&case, &shared.options.limits)?;
     let limit = shared.options.time_limit;
     checked.run.time_limit = Some(checked.run.time_limit.map_or(limit, |time| time.min(limit)));
-    control.set_memory_bytes(checked.cost().own_bytes());
     let slices = (shared.engine.slices)(&checked);
     solve_next(shared, control, SlicedCase::new(checked, slices, notes))
 }

@@ -43,6 +43,7 @@ fn request(queue: &Queue, kind: ClaimKind) -> ClaimRequest<'_> {
         jobs: GROUP,
         cost_us: u64::MAX,
         each_slice_us: None,
+        suspects: true,
         workers: 1,
         lease: Lease { now: 0, ms: 60_000 },
         now: 1,

@@ -39,6 +39,7 @@ fn request(queue: &Queue) -> ClaimRequest<'_> {
         jobs: GROUP,
         cost_us: u64::MAX,
         each_slice_us: None,
+        suspects: true,
         workers: 1,
         lease: Lease { now: 0, ms: 30_000 },
         now: 0,

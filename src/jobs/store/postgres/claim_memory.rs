@@ -37,7 +37,7 @@ macro_rules! peek_of {
     ($rank:literal, $after:literal) => {
         concat!(
             "SELECT * FROM (SELECT id, suspect, cost_us, rank FROM jobs \
-             WHERE state = 'queued' AND tenant = $1 AND kind = $8 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND slices = 0 \
+             WHERE state = 'queued' AND tenant = $1 AND kind = $8 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND suspect <= $9 AND slices = 0 \
              AND (batch_id IS NULL OR batch_id NOT IN (SELECT id FROM batches WHERE complete = 0 AND tenant = $1)) \
              AND rank = ",
             $rank,
@@ -62,10 +62,10 @@ const PEEK_FROM: &str = concat!(
 
 /// The jobs of a queue that come first: by priority, the oldest of each first. Jobs whose deadline has passed are
 /// left to whoever ends them, jobs of a batch that is not acknowledged to whoever fills it.
-const PEEK: &str = peek!("slices = 0", "$2");
+const PEEK: &str = peek!("slices = 0", "$2", "$6");
 
 /// Like `PEEK`, for jobs of which some slices are solved.
-pub(crate) const PEEK_BEGUN: &str = peek!("slices > 0", "$2");
+pub(crate) const PEEK_BEGUN: &str = peek!("slices > 0", "$2", "$6");
 
 /// Jobs in a queue.
 const WAITING: &str = "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts \
@@ -162,6 +162,7 @@ impl ClaimMemory {
                 .bind(normal)
                 .bind(low)
                 .bind(request.queue.kind.name())
+                .bind(i64::from(request.suspects))
                 .fetch_all(&mut *connection)
                 .await?;
             if i64::try_from(found.len()).unwrap_or(i64::MAX) == most {
@@ -230,6 +231,7 @@ pub(crate) async fn first_queued(
         .bind(request.late_before)
         .bind(request.each_slice_us.map_or(i64::MAX, count))
         .bind(request.queue.kind.name())
+        .bind(i64::from(request.suspects))
         .fetch_all(connection)
         .await?;
     Ok(rows)

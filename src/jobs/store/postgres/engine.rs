@@ -141,7 +141,7 @@ impl PostgresStore {
         update.push(", updated_at = ").push_bind(request.now);
         update.push(", group_size = ");
         update.push_bind(count(ids.len()));
-        update.push(", solving = 1 - suspect, progress = done, version = version + 1 WHERE state = 'queued' AND id IN (");
+        update.push(", progress = done, version = version + 1 WHERE state = 'queued' AND id IN (");
         push_list(&mut update, &ids);
         update.push(concat!(") RETURNING ", claimed!()));
         let rows = update.build().fetch_all(&mut *transaction).await?;

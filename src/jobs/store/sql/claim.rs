@@ -12,12 +12,12 @@ use crate::jobs::store::Claims;
 use crate::jobs::store::claim::{Claim, ClaimRequest, Lease};
 use crate::jobs::store_error::StoreError;
 
-/// Selects the first jobs of the queue $1 and $5, at most `$most`.
+/// Selects the first jobs of the queue $1 and $5, at most `$most`; suspects if `$suspects` is 1.
 macro_rules! peek {
-    ($begun:literal, $most:literal) => {
+    ($begun:literal, $most:literal, $suspects:literal) => {
         concat!(
             "SELECT id, suspect, cost_us, rank FROM jobs \
-             WHERE state = 'queued' AND tenant = $1 AND kind = $5 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND ",
+             WHERE state = 'queued' AND tenant = $1 AND kind = $5 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND suspect <= ", $suspects, " AND ",
             $begun,
             " AND (batch_id IS NULL OR batch_id NOT IN (SELECT id FROM batches WHERE complete = 0 AND tenant = $1)) \
              ORDER BY rank, id LIMIT ",
@@ -29,7 +29,7 @@ macro_rules! peek {
 
 pub(crate) use peek;
 
-/// The columns that a [`Claim`] is read from. A suspect waits until nothing else is solved.
+/// The columns that a [`Claim`] is read from.
 macro_rules! claimed {
     () => {
         "id, rank, attempt, lease_token, method, traceparent, suspect, slices, \

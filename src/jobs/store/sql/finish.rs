@@ -57,7 +57,7 @@ impl SqlStore {
             ", remarks = done.remarks, failure = done.failure, blob_id = done.blob, \
              field_patches = done.patches, \
              progress = CASE WHEN done.state = 'succeeded' THEN 1.0 ELSE progress END, \
-             lease_until = NULL, worker = NULL, solving = 0, version = version + 1 \
+             lease_until = NULL, worker = NULL, version = version + 1 \
              FROM done WHERE jobs.id = done.id AND jobs.lease_token = done.lease_token \
              AND ",
             unordered!("jobs.state"),

@@ -111,18 +111,6 @@ impl Leases for SqlStore {
         Ok(answers.collect())
     }
 
-    async fn set_solving(&self, claims: &[Claim], solving: bool) -> Result<(), StoreError> {
-        if claims.is_empty() {
-            return Ok(());
-        }
-        let mut query = with_held(claims);
-        query.push(" UPDATE jobs SET group_size = 1, solving = ");
-        query.push_bind(i64::from(solving));
-        query.push(OF_HELD).push("jobs.id AS id");
-        query.build().execute(&self.writer).await?;
-        Ok(())
-    }
-
     async fn release(
         &self,
         claims: &[Claim],
@@ -136,7 +124,7 @@ impl Leases for SqlStore {
         query.push(
             " UPDATE jobs SET state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
              started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
-             attempt = attempt - 1, progress = done, lease_until = NULL, worker = NULL, solving = 0, \
+             attempt = attempt - 1, progress = done, lease_until = NULL, worker = NULL, \
              version = version + 1",
         );
         match why {

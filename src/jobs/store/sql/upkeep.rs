@@ -26,22 +26,22 @@ pub(crate) const REAP: &str = concat!(
      started_at = CASE WHEN cancel_requested = 1 OR (group_size = 1 AND attempt >= $1) THEN started_at ELSE NULL END, \
      attempt = CASE WHEN group_size > 1 THEN attempt - 1 ELSE attempt END, \
      suspect = CASE WHEN group_size > 1 THEN 1 ELSE suspect END, \
-     progress = done, lease_until = NULL, worker = NULL, solving = 0, version = version + 1, updated_at = $3 \
+     progress = done, lease_until = NULL, worker = NULL, version = version + 1, updated_at = $3 \
      WHERE state = 'running' AND lease_until <= ",
     lease_now!("$4"),
     " RETURNING id, state, slices"
 );
 
-/// Those of a dead process that were not, or not certainly, the cause of its death: none counts the attempt, and those that
-/// were being solved come alone next time. What is left was solved alone.
+/// Those of a dead process that were not certainly the cause of its death: none counts the attempt, and each comes alone next time.
+/// What is left was the only suspect, or all that was running.
 pub(crate) const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
      state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
      ended_at = CASE WHEN cancel_requested = 1 THEN $1 ELSE NULL END, \
      started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
-     attempt = attempt - 1, suspect = CASE WHEN solving = 1 THEN 1 ELSE suspect END, \
-     progress = done, lease_until = NULL, worker = NULL, solving = 0, version = version + 1, updated_at = $1 \
-     WHERE state = 'running' AND (solving = 0 OR group_size > 1 \
-         OR (SELECT COUNT(*) FROM jobs AS other WHERE other.state = 'running' AND other.solving = 1) > 1) \
+     attempt = attempt - 1, suspect = 1, \
+     progress = done, lease_until = NULL, worker = NULL, version = version + 1, updated_at = $1 \
+     WHERE state = 'running' AND (group_size > 1 \
+         OR (suspect = 0 AND (SELECT COUNT(*) FROM jobs AS other WHERE other.state = 'running') > 1)) \
      RETURNING id, state, slices";
 
 #[repeat_conflicts]

@@ -28,13 +28,13 @@ macro_rules! claim {
     ($begun:literal, $most:literal) => {
         concat!(
             "WITH queued AS MATERIALIZED (",
-            peek!($begun, $most),
+            peek!($begun, $most, "$12"),
             "), placed AS (SELECT id, ROW_NUMBER() OVER in_order AS place, SUM(cost_us) OVER in_order AS cost_us, \
                  SUM(suspect) OVER in_order AS suspects FROM queued WINDOW in_order AS (ORDER BY rank, id)), \
              chosen AS MATERIALIZED (SELECT id FROM placed WHERE place = 1 OR (cost_us <= $7 AND suspects = 0)) \
              UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = $8, lease_until = $9, worker = $10, \
              started_at = $11, updated_at = $11, group_size = (SELECT COUNT(*) FROM chosen), \
-             solving = 1 - suspect, progress = done, version = version + 1 \
+             progress = done, version = version + 1 \
              WHERE id IN (SELECT id FROM chosen) RETURNING ",
             claimed!()
         )
@@ -128,6 +128,7 @@ impl SqliteStore {
             .bind(request.lease.now.saturating_add(request.lease.ms))
             .bind(request.worker)
             .bind(request.now)
+            .bind(i64::from(request.suspects))
             .fetch_all(&mut *transaction)
             .await?;
         transaction.commit().await?;
