@@ -5,7 +5,6 @@
 
 use std::time::Duration;
 
-use tokio::sync::broadcast;
 use tokio::time::{Instant, sleep, timeout_at};
 use uuid::Uuid;
 
@@ -16,15 +15,11 @@ use crate::jobs::model::job::Job;
 use crate::jobs::model::kind::Kind;
 use crate::jobs::shared::POLL_INTERVAL;
 
-/// Shortest time between two reads of one waiting caller.
+/// Shortest time between two reads of what nothing was announced of.
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// Time between two reads of a batch for each of its jobs: counting them takes time.
 const PAUSE_PER_JOB: Duration = Duration::from_micros(10);
-
-/// Announcements of ended jobs since the subscription.
-#[derive(Debug)]
-pub struct Announcements(broadcast::Receiver<Uuid>);
 
 impl Jobs {
     /// Waits until a job is at another version than `seen` and returns it; at once if it is, or if nothing was seen yet.
@@ -54,7 +49,6 @@ impl Jobs {
             }
             let again = Instant::now() + POLL_INTERVAL;
             let end = async {
-                sleep(PAUSE).await;
                 // A lagging receiver may have missed the announcement, so it reads again as well.
                 while ended.recv().await.is_ok_and(|ended| ended != id) {}
             };
@@ -63,32 +57,6 @@ impl Jobs {
                 () = self.shared.draining.cancelled() => return Ok(None),
             }
         }
-    }
-
-    /// Waits until all jobs of a batch or run have ended, but not longer than `at_most`, and returns it as it then is. Returns at once when the service is
-    /// about to stop.
-    ///
-    /// # Errors
-    /// [`JobsError::BatchNotFound`], or a failed database.
-    pub(crate) async fn wait_batch(
-        &self,
-        kind: Kind,
-        id: Uuid,
-        at_most: Duration,
-    ) -> Result<Batch, JobsError> {
-        let until = Instant::now() + at_most;
-        let mut seen = None;
-        while let Ok(changed) =
-            timeout_at(until, self.batch_changed_since(kind, id, seen.as_deref())).await
-        {
-            let Some(batch) = changed? else { break };
-            let (ended, all) = batch.ended();
-            if ended == all {
-                return Ok(batch);
-            }
-            seen = Some(batch.change_tag());
-        }
-        self.batch(kind, id).await
     }
 
     /// Waits until the jobs of a batch or run are in other states than `seen` says and returns it; at once if they are, or if
@@ -122,9 +90,7 @@ impl Jobs {
             }
         }
     }
-}
 
-impl Jobs {
     /// As [`Jobs::get`], as the job was a moment ago: one read serves all who follow it.
     ///
     /// # Errors
@@ -157,52 +123,5 @@ impl Jobs {
             .at(&self.tenant, id, age, read)
             .await?;
         self.visible(kind, id, batch).await
-    }
-}
-
-impl Jobs {
-    /// Waits until a job has ended, but not longer than `at_most`, and returns it as it then is. Returns at once when
-    /// the service is about to stop.
-    ///
-    /// # Errors
-    /// [`JobsError::NotFound`], or a failed database.
-    pub async fn wait(&self, id: Uuid, at_most: Duration) -> Result<Job, JobsError> {
-        // Subscribe first, then read: what ends in between is announced.
-        let ended = self.announcements();
-        let job = self.get(id).await?;
-        self.wait_job_from(ended, job, at_most).await
-    }
-
-    /// Subscribes to the announcements of ended jobs.
-    #[must_use]
-    pub fn announcements(&self) -> Announcements {
-        Announcements(self.shared.ended.subscribe())
-    }
-
-    /// As [`Jobs::wait`], for a job that was read after the subscription.
-    ///
-    /// # Errors
-    /// As [`Jobs::wait`].
-    pub(crate) async fn wait_job_from(
-        &self,
-        Announcements(mut ended): Announcements,
-        mut job: Job,
-        at_most: Duration,
-    ) -> Result<Job, JobsError> {
-        let (id, until) = (job.id, Instant::now() + at_most);
-        loop {
-            if job.state.ended() || Instant::now() >= until || self.shared.draining.is_cancelled() {
-                return Ok(job);
-            }
-            let announced = async {
-                // A lagging receiver may have missed the announcement, so it reads again as well.
-                while ended.recv().await.is_ok_and(|ended| ended != id) {}
-            };
-            tokio::select! {
-                _ = timeout_at(until.min(Instant::now() + POLL_INTERVAL), announced) => {}
-                () = self.shared.draining.cancelled() => {}
-            }
-            job = self.get(id).await?;
-        }
     }
 }

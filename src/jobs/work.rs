@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use tokio::time::{Instant, timeout_at};
 use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
@@ -9,7 +10,6 @@ use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
 use crate::jobs::model::batch::Batch;
 use crate::jobs::model::job::Job;
 use crate::jobs::model::kind::Kind;
-use crate::jobs::notify::Announcements;
 use crate::jobs::run::model::Run;
 use crate::jobs::store::list::{Filter, Page};
 
@@ -187,28 +187,30 @@ impl Jobs {
     /// # Errors
     /// As [`Jobs::work`].
     pub async fn wait_for(&self, id: Uuid, at_most: Duration) -> Result<Work, JobsError> {
-        match self.kind {
-            Kind::Case | Kind::Evolution => Ok(self.wait(id, at_most).await?.into()),
-            kind => {
-                self.work_of(self.wait_batch(kind, id, at_most).await?)
-                    .await
+        let until = Instant::now() + at_most;
+        let mut seen = None;
+        while let Ok(changed) = timeout_at(until, self.changed_since(id, seen.as_deref())).await {
+            let Some(work) = changed? else { break };
+            if work.ended() {
+                return Ok(work);
             }
+            seen = Some(work.version());
+        }
+        match self.kind {
+            // Its place in the queue is for those who look at it.
+            Kind::Case | Kind::Evolution => Ok(self.get(id).await?.into()),
+            _ => self.work(id).await,
         }
     }
 
-    /// As [`Jobs::wait_for`], for work that was read after the subscription.
+    /// As [`Jobs::wait_for`], for a job.
     ///
     /// # Errors
-    /// As [`Jobs::work`].
-    pub async fn wait_from(
-        &self,
-        ended: Announcements,
-        work: Work,
-        at_most: Duration,
-    ) -> Result<Work, JobsError> {
-        match work {
-            Work::Job(job) => Ok(self.wait_job_from(ended, *job, at_most).await?.into()),
-            work => self.wait_for(work.id(), at_most).await,
+    /// As [`Jobs::get`].
+    pub async fn wait(&self, id: Uuid, at_most: Duration) -> Result<Job, JobsError> {
+        match self.wait_for(id, at_most).await? {
+            Work::Job(job) => Ok(*job),
+            _ => Err(JobsError::NotFound),
         }
     }
 

@@ -32,7 +32,6 @@ use crate::jobs::Jobs;
 use crate::jobs::model::job::State as JobState;
 use crate::jobs::model::kind::Kind;
 use crate::jobs::model::submit_options::SubmitOptions;
-use crate::jobs::notify::Announcements;
 use crate::jobs::work::Work;
 
 /// Longest idempotency key in characters.
@@ -87,11 +86,7 @@ pub(crate) struct Submission<P> {
 }
 
 /// How a submission is answered.
-pub(crate) struct Reply {
-    wait: Wait,
-    /// Of jobs that end from now on.
-    announcements: Announcements,
-}
+pub(crate) struct Reply(Wait);
 
 impl<S: Send + Sync, P: Parameters<Limits = ()>> FromRequestParts<S> for Submission<P>
 where
@@ -109,10 +104,7 @@ where
             own,
             options: submit.options(&parts.headers),
             idempotency_key,
-            reply: Reply {
-                wait,
-                announcements: jobs.announcements(),
-            },
+            reply: Reply(wait),
             jobs,
         })
     }
@@ -140,22 +132,20 @@ impl Reply {
         (mut work, replayed): (Work, bool),
         errors: Option<Vec<Fault>>,
     ) -> Result<Response, ApiError> {
-        let Reply {
-            wait,
-            announcements,
-        } = self;
+        let Reply(wait) = self;
         let jobs = jobs.of_kind(work.kind());
+        let (id, ended) = (work.id(), work.ended());
         // The work is stored: whatever ends the wait early, the client must learn its id.
-        let stored = work.clone();
-        let waited = wait.hold(&jobs, async |at_most| {
-            jobs.wait_from(announcements, stored, at_most).await
+        let waited = wait.hold(&jobs, async |at_most| match ended {
+            true => Ok(None),
+            false => jobs.wait_for(id, at_most).await.map(Some),
         });
         match waited.await {
-            Ok(Some(Ok(later))) => work = later,
+            Ok(Some(Ok(Some(later)))) => work = later,
             Ok(Some(Err(reason))) => {
                 tracing::debug!(%reason, work = %work.id(), "the wait ended early");
             }
-            Ok(None) | Err(_) => {}
+            Ok(Some(Ok(None)) | None) | Err(_) => {}
         }
         let in_time = wait.at_most().is_some() && work.ended();
         let location = format!("/v1/{}/{}", work.kind().nouns(), work.id());
