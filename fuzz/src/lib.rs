@@ -7,8 +7,9 @@ use railhead::contact::geometry::formats;
 use railhead::contact::geometry::formats::Format;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::http::extract::batch::splitter::{Element, Layout, Splitter};
-use railhead::http::extract::batch::table::TableBody;
+use railhead::http::extract::batch::table::{columns_of, row_of};
 use railhead::http::extract::json::read_strict;
+use railhead::http::extract::tables::CsvRows;
 use railhead::jobs::batch::template::{fill_in_place, restore};
 use serde_json::{Value, json};
 
@@ -112,28 +113,26 @@ fn cut(layout: Layout, data: &[u8], piece: usize) -> Option<Vec<Element>> {
     whole
 }
 
-/// A table of cases: the first byte is the size of the pieces in which the others arrive.
+/// A table of cases; the first byte belongs to none of them.
 pub fn table(data: &[u8]) {
-    let Some((piece, text)) = data.split_first() else {
+    let text = data.get(1..).unwrap_or_default();
+    let Ok(mut rows) = CsvRows::new(text, 1 << 16) else {
         return;
     };
-    let Some(lines) = cut(Layout::Rows, text, usize::from(*piece)) else {
+    let Ok(columns) = columns_of(&rows.titles) else {
         return;
     };
-    let mut table = TableBody::default();
     let mut filled = template();
-    for line in lines {
-        match table.take(&line.text) {
-            Ok(None) => {}
-            Ok(Some(Ok(row))) => {
+    while let Ok(Some((_, record))) = rows.record() {
+        match row_of(&columns, rows.decimal_comma, &record) {
+            Ok(row) => {
                 if let Ok(replaced) = fill_in_place(&mut filled, &row.cells) {
                     check(&filled);
                     restore(&mut filled, &row.cells, replaced);
                 }
                 assert_eq!(filled, template());
             }
-            Ok(Some(Err(reason))) => assert!(!reason.is_empty()),
-            Err(_) => return,
+            Err(reason) => assert!(!reason.is_empty()),
         }
     }
 }

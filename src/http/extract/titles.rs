@@ -677,6 +677,15 @@ fn place_of(
     }
 }
 
+/// Does the column hold texts, which have no unit?
+#[must_use]
+pub fn is_text(title: &str) -> bool {
+    title == "name"
+        || title == "/name"
+        || title.starts_with("label:")
+        || title.starts_with("/labels/")
+}
+
 /// The unit that a title or a line of units names.
 fn unit_of<'a>(title: &'a str, below: Option<&'a str>) -> Option<&'a str> {
     let below = below.map(unbracketed).filter(|unit| !unit.is_empty());

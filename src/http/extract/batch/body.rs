@@ -1,5 +1,8 @@
 //! Reads the body of a batch: cut into cases while it arrives, checked portion by portion.
 
+use std::fs::File;
+use std::io::BufReader;
+
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::HeaderMap;
@@ -8,12 +11,12 @@ use serde_json::Value;
 use crate::contact::error::Fault;
 use crate::http::extract::batch::own_options;
 use crate::http::extract::batch::splitter::{Element, Layout, Splitter};
-use crate::http::extract::batch::table::{TableBody, columns_of, rows_of};
+use crate::http::extract::batch::table::{columns_of, row_of, rows_of};
 use crate::http::extract::body_reader::BodyReader;
 use crate::http::extract::json::{essence, read_strict, weigh_case};
 use crate::http::extract::multipart::{Template, template_missing};
 use crate::http::extract::run_body::spool;
-use crate::http::extract::tables::{TableForm, TableRows, TableSource, unsupported};
+use crate::http::extract::tables::{CsvRows, TableForm, TableRows, TableSource, unsupported};
 use crate::http::limits::memory::{Memory, SMALL_BYTES};
 use crate::http::limits::tenant_semaphore::Permit;
 use crate::http::limits::turns::Computation;
@@ -31,30 +34,9 @@ const PORTION_BYTES: usize = 256 << 10;
 #[derive(Debug)]
 pub enum Form {
     /// Cases one after the other, checked while they arrive.
-    Cases(CasesForm),
-    /// A table, other than CSV, that fills a template.
+    Cases(Layout),
+    /// A table that fills a template.
     Rows(TableForm, Value),
-}
-
-/// The form of cases that stand one after the other.
-#[derive(Debug)]
-pub enum CasesForm {
-    /// A JSON array of cases.
-    Array,
-    /// One case per line.
-    Lines,
-    /// CSV that fills a template.
-    Table(Box<TableBody>, Value),
-}
-
-impl CasesForm {
-    fn layout(&self) -> Layout {
-        match self {
-            CasesForm::Array => Layout::Array,
-            CasesForm::Lines => Layout::Lines,
-            CasesForm::Table(..) => Layout::Rows,
-        }
-    }
 }
 
 /// The form that a body is declared to have.
@@ -72,8 +54,8 @@ pub async fn form(
         (Some(form), Some(template)) => (form, template),
         (table, template) => {
             return match (essence.as_str(), table, template) {
-                ("application/json", _, None) => Ok((Form::Cases(CasesForm::Array), None)),
-                (_, Some(TableForm::Ndjson), None) => Ok((Form::Cases(CasesForm::Lines), None)),
+                ("application/json", _, None) => Ok((Form::Cases(Layout::Array), None)),
+                (_, Some(TableForm::Ndjson), None) => Ok((Form::Cases(Layout::Lines), None)),
                 (_, Some(_), None) => Err(template_missing()),
                 ("application/json", _, Some(_)) => Err(ApiError::bad_parameter(
                     "template",
@@ -88,11 +70,7 @@ pub async fn form(
     };
     let (case, share) = template.case(jobs).await?;
     let case = jobs.with_profiles(case).await?;
-    let form = match form {
-        TableForm::Csv => Form::Cases(CasesForm::Table(Box::default(), case)),
-        form => Form::Rows(form, case),
-    };
-    Ok((form, share))
+    Ok((Form::Rows(form, case), share))
 }
 
 /// Reads and checks the body as it arrives.
@@ -113,18 +91,15 @@ pub async fn read_draft(
         request,
     )?;
     let mut draft = jobs.draft(Kind::Cases)?;
-    let mut form = match form {
-        Form::Cases(form) => form,
+    let layout = match form {
+        Form::Cases(layout) => layout,
         Form::Rows(form, template) => {
             draft.set_row_template(template);
-            let source = TableSource::File(spool(jobs, reader).await?);
-            return read_rows((jobs, memory, options), draft, form, source).await;
+            let file = spool(jobs, reader).await?;
+            return read_rows((jobs, memory, options), draft, form, file).await;
         }
     };
-    if let CasesForm::Table(_, template) = &mut form {
-        draft.set_row_template(template.take());
-    }
-    let mut splitter = Splitter::new(form.layout(), options.body_max_bytes);
+    let mut splitter = Splitter::new(layout, options.body_max_bytes);
     let mut portion = Vec::new();
     let mut held = 0;
     let mut share = None;
@@ -141,14 +116,14 @@ pub async fn read_draft(
         splitter.feed(&piece, &mut portion)?;
         if held >= PORTION_BYTES {
             held = 0;
-            (draft, form) = checking
-                .check(draft, form, std::mem::take(&mut portion))
+            draft = checking
+                .check(draft, layout, std::mem::take(&mut portion))
                 .await?;
             require_count(&draft, options)?;
         }
     }
     splitter.end(&mut portion)?;
-    (draft, _) = checking.check(draft, form, portion).await?;
+    draft = checking.check(draft, layout, portion).await?;
     drop(share);
     require_count(&draft, options)?;
     Ok(draft)
@@ -159,21 +134,37 @@ async fn read_rows(
     (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
     mut draft: BatchUpload,
     form: TableForm,
-    source: TableSource,
+    file: File,
 ) -> Result<BatchUpload, ApiError> {
-    let bytes = 2 * options.evaluate_max_bytes;
+    // An archive is read as a whole, once packed and once as numbers.
+    let bytes = match form {
+        TableForm::Csv => options.body_max_bytes,
+        _ => 2 * options.evaluate_max_bytes,
+    };
     let share = memory.rows(jobs.tenant(), bytes).await?;
     let mut computation = memory.computation(jobs.tenant());
     let options = options.clone();
     let read = computation.run(move |pace| {
         let _held = share;
+        let told = |detail| vec![Fault::new("", detail)];
+        if form == TableForm::Csv {
+            let mut rows = CsvRows::new(BufReader::new(file), options.body_max_bytes)?;
+            let columns = columns_of(&rows.titles)?;
+            while let Some((line, record)) = rows.record()? {
+                pace.step()?;
+                let row = row_of(&columns, rows.decimal_comma, &record).map_err(told);
+                draft.add_row(Some(line), record.as_slice().as_bytes(), row)?;
+                require_count(&draft, &options)?;
+            }
+            return Ok(draft);
+        }
+        let source = TableSource::File(file);
         let rows = TableRows::new(form, source, options.evaluate_max_bytes)?;
         let columns = columns_of(&rows.titles)?;
         for chunk in rows {
             for row in rows_of(&columns, &chunk?) {
                 pace.step()?;
-                let row = row.map_err(|detail| vec![Fault::new("", detail)]);
-                draft.add_row(None, b"", row)?;
+                draft.add_row(None, b"", row.map_err(told))?;
                 require_count(&draft, &options)?;
             }
         }
@@ -206,19 +197,19 @@ impl Checking {
     async fn check(
         &mut self,
         mut draft: BatchUpload,
-        mut form: CasesForm,
+        layout: Layout,
         portion: Vec<Element>,
-    ) -> Result<(BatchUpload, CasesForm), ApiError> {
+    ) -> Result<BatchUpload, ApiError> {
         if portion.is_empty() {
-            return Ok((draft, form));
+            return Ok(draft);
         }
         let max_bytes = self.parsed_max_bytes;
         let checked = self.computation.run(move |pace| {
             for element in portion {
                 pace.step()?;
-                add(&mut draft, &mut form, &element, max_bytes)?;
+                add(&mut draft, layout, &element, max_bytes)?;
             }
-            Ok((draft, form))
+            Ok(draft)
         });
         checked.await
     }
@@ -227,28 +218,22 @@ impl Checking {
 /// Adds one case to a draft, with its faults if it has any.
 fn add(
     draft: &mut BatchUpload,
-    form: &mut CasesForm,
+    layout: Layout,
     element: &Element,
     parsed_max_bytes: usize,
 ) -> Result<(), ApiError> {
     weigh_case(&element.text, parsed_max_bytes)?;
-    match form {
-        CasesForm::Array => {
+    match layout {
+        Layout::Array => {
             let case = read_strict(&element.text)
                 .map_err(|error| ApiError::malformed_element(draft.cases, &error))?;
             draft.add(element.line, &element.text, own_options::read(case))?;
         }
-        CasesForm::Lines => {
+        Layout::Lines => {
             let case = read_strict(&element.text)
                 .map_err(|error| vec![Fault::new("", format!("the line is not JSON: {error}"))])
                 .and_then(own_options::read);
             draft.add(element.line, &element.text, case)?;
-        }
-        CasesForm::Table(table, _) => {
-            if let Some(row) = table.take(&element.text)? {
-                let row = row.map_err(|detail| vec![Fault::new("", detail)]);
-                draft.add_row(element.line, &element.text, row)?;
-            }
         }
     }
     Ok(())

@@ -13,8 +13,6 @@ pub enum Layout {
     Lines,
     /// As elements of one JSON array.
     Array,
-    /// As lines of CSV: a line break within quotes belongs to the field.
-    Rows,
 }
 
 /// The text of one case.
@@ -79,7 +77,6 @@ impl Splitter {
     pub fn feed(&mut self, piece: &[u8], out: &mut Vec<Element>) -> Result<(), ApiError> {
         match self.layout {
             Layout::Lines => self.feed_lines(piece, out),
-            Layout::Rows => self.feed_rows(piece, out),
             Layout::Array => piece.iter().try_for_each(|byte| self.feed_byte(*byte, out)),
         }
     }
@@ -91,7 +88,6 @@ impl Splitter {
     pub fn end(mut self, out: &mut Vec<Element>) -> Result<(), ApiError> {
         match self.layout {
             Layout::Lines => self.complete_line(out),
-            Layout::Rows => self.complete_row(out),
             Layout::Array if self.place == SplitterState::After => {}
             Layout::Array if self.place == SplitterState::Before => {
                 return Err(malformed("the body is empty; send an array of cases"));
@@ -116,34 +112,6 @@ impl Splitter {
             }
         }
         Ok(())
-    }
-
-    fn feed_rows(&mut self, piece: &[u8], out: &mut Vec<Element>) -> Result<(), ApiError> {
-        for part in piece.split_inclusive(|byte| *byte == b'\n') {
-            self.require_room(part.len())?;
-            self.held.extend_from_slice(part);
-            let quotes = part.iter().filter(|byte| **byte == b'"').count();
-            self.in_string ^= quotes % 2 == 1;
-            if part.ends_with(b"\n") {
-                self.elements += 1;
-                if !self.in_string {
-                    self.complete_row(out);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// A row stands on the line on which it begins; `elements` counts the line breaks so far.
-    fn complete_row(&mut self, out: &mut Vec<Element>) {
-        if !blank(&self.held) {
-            out.push(Element {
-                line: Some(self.line),
-                text: std::mem::take(&mut self.held),
-            });
-        }
-        self.held.clear();
-        self.line = self.elements + 1;
     }
 
     fn complete_line(&mut self, out: &mut Vec<Element>) {
@@ -224,7 +192,7 @@ impl Splitter {
             return Ok(());
         }
         let place = match self.layout {
-            Layout::Lines | Layout::Rows => format!("line {}", self.line),
+            Layout::Lines => format!("line {}", self.line),
             Layout::Array => format!("element {} (counted from 0)", self.elements),
         };
         Err(ApiError::new(

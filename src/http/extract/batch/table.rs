@@ -12,29 +12,11 @@ use crate::contact::evaluate::placing::members;
 use crate::contact::evaluate::varied::Values;
 use crate::http::extract::batch::own_options;
 use crate::http::extract::tables::{Chunk, Title};
-use crate::http::extract::titles::{
-    Place, delimiter, faulty, is_line_of_units, number, place, question, require_few, short_names,
-};
+use crate::http::extract::titles::{Place, faulty, is_text, number, place, question, short_names};
 use crate::http::problem::error::ApiError;
 use crate::jobs::batch::template::Cell;
 use crate::jobs::batch::upload::BatchRow;
 use crate::jobs::run::head::converted;
-
-/// A table under way.
-#[derive(Debug, Default)]
-pub struct TableBody {
-    header: Option<Header>,
-}
-
-/// The titles of a table.
-#[derive(Debug)]
-struct Header {
-    titles: Vec<String>,
-    /// What parts the fields.
-    delimiter: u8,
-    /// Known with the line below the titles, which may give their units.
-    columns: Option<Vec<TemplateColumn>>,
-}
 
 /// What a line puts into the template, or why it stands for no case.
 pub type Row = Result<BatchRow, String>;
@@ -52,95 +34,28 @@ pub struct TemplateColumn {
     text: bool,
 }
 
-impl TableBody {
-    /// Takes the next line: what it puts into the template, or why it stands for no case. Nothing for the header and a line of units.
-    ///
-    /// # Errors
-    /// `faulty-table`: the header cannot be understood.
-    pub fn take(&mut self, line: &[u8]) -> Result<Option<Row>, ApiError> {
-        let Some(header) = &mut self.header else {
-            self.header = Some(Header::read(line)?);
-            return Ok(None);
-        };
-        let columns = match &header.columns {
-            Some(columns) => columns,
-            None => {
-                let units = header.units(line);
-                let columns = header.columns(units.as_deref())?;
-                let columns = header.columns.insert(columns);
-                if units.is_some() {
-                    return Ok(None);
-                }
-                columns
-            }
-        };
-        Ok(Some(read_row(columns, header.delimiter, line)))
-    }
-}
-
-impl Header {
-    fn read(line: &[u8]) -> Result<Header, ApiError> {
-        let line = line.strip_prefix(b"\xef\xbb\xbf").unwrap_or(line);
-        let delimiter = delimiter(line);
-        let titles = fields(line, delimiter);
-        let titles = titles.map_err(|detail| faulty(format!("line 1: {detail}")))?;
-        require_few(titles.len())?;
-        Ok(Header {
-            titles: titles.iter().map(|title| title.trim().to_owned()).collect(),
-            delimiter,
-            columns: None,
-        })
-    }
-
-    /// The units of the columns, if this line holds units.
-    fn units(&self, line: &[u8]) -> Option<Vec<String>> {
-        let units = fields(line, self.delimiter).ok()?;
-        let said = |(title, unit): (&String, &String)| !is_text(title) && !unit.trim().is_empty();
-        let some = self.titles.iter().zip(&units).any(said);
-        let all =
-            units.len() == self.titles.len() && is_line_of_units(units.iter().map(String::as_str));
-        (some && all).then_some(units)
-    }
-
-    fn columns(&self, units: Option<&[String]>) -> Result<Vec<TemplateColumn>, ApiError> {
-        let unit = |place: usize| units.and_then(|units| Some(units.get(place)?.trim()));
-        let titles = self.titles.iter().enumerate();
-        let columns = template_columns(titles.map(|(place, title)| (title.as_str(), unit(place))));
-        columns.map_err(|detail| faulty(format!("line 1: {detail}")))
-    }
-}
-
-/// The columns of these titles, each with its unit in a line of units.
-fn template_columns<'a>(
-    titles: impl Iterator<Item = (&'a str, Option<&'a str>)>,
-) -> Result<Vec<TemplateColumn>, String> {
+/// The columns of a table.
+///
+/// # Errors
+/// `faulty-table`: a title names no column, or two the same.
+pub fn columns_of(titles: &[Title]) -> Result<Vec<TemplateColumn>, ApiError> {
     let mut seen = HashSet::new();
     let mut columns = Vec::new();
-    for (title, unit) in titles {
-        let column = column(title, unit)?;
+    for Title { name, unit, .. } in titles {
+        let column = column(name, unit.as_deref()).map_err(faulty)?;
         let place = match column.path.is_empty() {
             true => vec![String::new(), column.title.clone()],
             false => column.path.clone(),
         };
         if !seen.insert(place) {
-            return Err(format!("the column `{title}` is there twice"));
+            return Err(faulty(format!("the column `{name}` is there twice")));
         }
         columns.push(column);
     }
     Ok(columns)
 }
 
-/// The columns of a table that is not read line by line.
-///
-/// # Errors
-/// `faulty-table`: a title names no column, or two the same.
-pub fn columns_of(titles: &[Title]) -> Result<Vec<TemplateColumn>, ApiError> {
-    let titles = titles.iter();
-    let columns = template_columns(titles.map(|title| (&*title.name, title.unit.as_deref())));
-    columns.map_err(faulty)
-}
-
-/// The rows of a part of such a table.
+/// The rows of a part of a table whose columns have kinds.
 pub fn rows_of(columns: &[TemplateColumn], chunk: &Chunk) -> impl Iterator<Item = Row> {
     let rows = chunk.first().map_or(0, Values::len);
     (0..rows).map(move |row| {
@@ -176,14 +91,6 @@ impl TemplateColumn {
     }
 }
 
-/// Does the column hold texts, which have no unit?
-fn is_text(title: &str) -> bool {
-    title == "name"
-        || title == "/name"
-        || title.starts_with("label:")
-        || title.starts_with("/labels/")
-}
-
 fn column(title: &str, unit: Option<&str>) -> Result<TemplateColumn, String> {
     let label = title.strip_prefix("label:").filter(|key| !key.is_empty());
     let (path, factor) = if own_options::NAMES.contains(&title) {
@@ -216,24 +123,26 @@ fn column(title: &str, unit: Option<&str>) -> Result<TemplateColumn, String> {
     })
 }
 
-fn read_row(columns: &[TemplateColumn], delimiter: u8, line: &[u8]) -> Row {
-    let fields = fields(line, delimiter)?;
-    if fields.len() != columns.len() {
+/// What a record of CSV puts into the template.
+///
+/// # Errors
+/// It has another number of fields, or a value of an option is not allowed.
+pub fn row_of(columns: &[TemplateColumn], decimal_comma: bool, record: &csv::StringRecord) -> Row {
+    if record.len() != columns.len() {
         return Err(format!(
             "the line has {} fields, the header has {}",
-            fields.len(),
+            record.len(),
             columns.len()
         ));
     }
     let mut row = BatchRow::default();
-    for (column, field) in columns.iter().zip(&fields) {
-        let field = field.trim();
+    for (column, field) in columns.iter().zip(record) {
         if field.is_empty() {
             continue;
         }
         let value = match column.text {
             true => Value::from(field),
-            false => read_value(field, column.factor, delimiter != b','),
+            false => read_value(field, column.factor, decimal_comma),
         };
         column.put(value, &mut row)?;
     }
@@ -258,32 +167,24 @@ fn read_value(field: &str, factor: f64, decimal_comma: bool) -> Value {
     }
 }
 
-/// The fields of one line of CSV.
-fn fields(line: &[u8], delimiter: u8) -> Result<Vec<String>, String> {
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .delimiter(delimiter)
-        .from_reader(line);
-    let mut record = csv::StringRecord::new();
-    match reader.read_record(&mut record) {
-        Ok(true) => Ok(record.iter().map(str::to_owned).collect()),
-        Ok(false) => Ok(Vec::new()),
-        Err(error) => Err(format!("the line cannot be read: {error}")),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::http::extract::tables::CsvRows;
     use crate::jobs::batch::template::fill;
     use crate::jobs::codec::table::COLUMNS_MAX;
 
     fn taken(lines: &[&str]) -> Result<Vec<Row>, ApiError> {
-        let mut table = TableBody::default();
-        let rows = lines.iter().map(|line| table.take(line.as_bytes()));
-        rows.filter_map(Result::transpose).collect()
+        let text = lines.join("\n");
+        let mut table = CsvRows::new(text.as_bytes(), 1 << 20)?;
+        let columns = columns_of(&table.titles)?;
+        let mut rows = Vec::new();
+        while let Some((_, record)) = table.record()? {
+            rows.push(row_of(&columns, table.decimal_comma, &record));
+        }
+        Ok(rows)
     }
 
     fn filled(lines: &[&str]) -> Value {

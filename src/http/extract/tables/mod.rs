@@ -10,7 +10,8 @@ use axum::body::Bytes;
 
 use self::npz::read_arrays;
 pub use self::npz::too_large;
-use self::text::{CsvRows, JsonRows};
+pub use self::text::CsvRows;
+use self::text::JsonRows;
 use crate::contact::evaluate::varied::Values;
 use crate::http::extract::titles::{NamedColumns, Titled, faulty, require_few};
 use crate::http::problem::error::ApiError;
@@ -22,6 +23,9 @@ use crate::jobs::run::head::RunColumn;
 
 /// Largest group of rows of a Parquet file, unpacked, in bytes.
 const GROUP_BYTES_MAX: i64 = 1 << 28;
+
+/// Longest row of a CSV table, in bytes.
+const ROW_BYTES_MAX: usize = 1 << 20;
 
 /// The form of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,7 +146,7 @@ impl TableRows {
     ) -> Result<TableRows, ApiError> {
         match form {
             TableForm::Csv => {
-                let rows = CsvRows::new(source.reader())?;
+                let rows = CsvRows::new(source.reader(), ROW_BYTES_MAX)?;
                 Ok(TableRows {
                     titles: rows.titles.clone(),
                     chunks: Box::new(rows),

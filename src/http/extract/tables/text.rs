@@ -1,12 +1,14 @@
 //! Rows as CSV and NDJSON, some lines at a time. What a column holds, numbers or texts, is decided by the first row.
 
-use std::io::{BufRead, Chain, Cursor, Read};
+use std::io::{self, BufRead, Chain, Cursor, Read};
 
 use serde_json::{Map, Value};
 
 use crate::contact::evaluate::varied::Values;
 use crate::http::extract::tables::{Chunk, Title};
-use crate::http::extract::titles::{delimiter, faulty, is_line_of_units, number, require_few};
+use crate::http::extract::titles::{
+    delimiter, faulty, is_line_of_units, is_text, number, require_few,
+};
 use crate::http::problem::error::ApiError;
 
 /// Rows that are read at once.
@@ -17,12 +19,31 @@ const LINE_BYTES_MAX: u64 = 1 << 20;
 /// A source from its first line on, with an end of line behind it.
 type Ended<R> = Chain<Chain<Cursor<Vec<u8>>, R>, &'static [u8]>;
 
+/// A source of which a record takes a bounded number of bytes.
+struct Bounded<R> {
+    source: R,
+    /// Most bytes of a record.
+    max: usize,
+    /// What is left of them.
+    left: usize,
+}
+
+impl<R: Read> Read for Bounded<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.source.read(buffer)?;
+        let left = self.left.checked_sub(read);
+        let too_long = || io::Error::other(format!("a row is longer than {} bytes", self.max));
+        self.left = left.ok_or_else(too_long)?;
+        Ok(read)
+    }
+}
+
 /// Rows in CSV, whose first line names the columns; fields are parted by what parts the titles, commas, semicolons or tabs. A second line may give
 /// the units.
-pub(super) struct CsvRows<R: Read> {
-    reader: csv::Reader<Ended<R>>,
+pub struct CsvRows<R: Read> {
+    reader: csv::Reader<Bounded<Ended<R>>>,
     /// Commas may stand in numbers.
-    decimal_comma: bool,
+    pub decimal_comma: bool,
     /// The titles of the columns.
     pub titles: Vec<Title>,
     /// The next row, if there is one.
@@ -30,11 +51,11 @@ pub(super) struct CsvRows<R: Read> {
 }
 
 impl<R: BufRead> CsvRows<R> {
-    /// Reads the header and the first row.
+    /// Reads the header and the first row; no row may take more than `record_max` bytes.
     ///
     /// # Errors
     /// `faulty-table`
-    pub(super) fn new(mut source: R) -> Result<CsvRows<R>, ApiError> {
+    pub fn new(mut source: R, record_max: usize) -> Result<CsvRows<R>, ApiError> {
         let mut first = Vec::new();
         let read = (&mut source).take(LINE_BYTES_MAX);
         let read = { read }.read_until(b'\n', &mut first);
@@ -51,7 +72,11 @@ impl<R: BufRead> CsvRows<R> {
             .flexible(true)
             .delimiter(delimiter)
             // The last line ends as the others do.
-            .from_reader(Cursor::new(first).chain(source).chain(&b"\n"[..]));
+            .from_reader(Bounded {
+                max: record_max,
+                left: record_max + first.len(),
+                source: Cursor::new(first).chain(source).chain(&b"\n"[..]),
+            });
         let titles = reader.headers();
         let titles = titles.map_err(|error| faulty(format!("line 1: {error}")))?;
         require_few(titles.len())?;
@@ -66,8 +91,13 @@ impl<R: BufRead> CsvRows<R> {
             record: Some(csv::StringRecord::new()),
         };
         rows.advance()?;
-        let units = rows.record.clone();
-        let units = units.filter(|units| is_line_of_units(units.iter()));
+        let units = rows.record.clone().filter(|units| {
+            // Texts have no units.
+            let said = |(title, unit): (&String, &str)| !is_text(title) && !unit.is_empty();
+            units.len() == titles.len()
+                && titles.iter().zip(units).any(said)
+                && is_line_of_units(units.iter())
+        });
         if units.is_some() {
             rows.advance()?;
         }
@@ -122,9 +152,24 @@ impl<R: BufRead> CsvRows<R> {
         Ok(values)
     }
 
+    /// The fields of the next row and the line on which it begins, whatever the fields hold.
+    ///
+    /// # Errors
+    /// `faulty-table`
+    pub fn record(&mut self) -> Result<Option<(u64, csv::StringRecord)>, ApiError> {
+        let Some(record) = self.record.clone() else {
+            return Ok(None);
+        };
+        let line = self.line(&record);
+        self.advance()?;
+        Ok(Some((line, record)))
+    }
+
     /// Reads the next record that is no blank line.
     fn advance(&mut self) -> Result<(), ApiError> {
         while let Some(record) = &mut self.record {
+            let source = self.reader.get_mut();
+            source.left = source.max;
             let more = self.reader.read_record(record);
             if !more.map_err(|error| faulty(format!("the table cannot be read: {error}")))? {
                 self.record = None;
@@ -269,6 +314,8 @@ fn there(chunk: Chunk) -> Option<Chunk> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::BufReader;
+
     use axum::body::Bytes;
 
     use super::*;
@@ -361,6 +408,17 @@ mod tests {
         ] {
             let fault = format!("{:?}", read.expect_err("it is faulty"));
             assert!(words.iter().all(|word| fault.contains(word)), "{fault}");
+        }
+    }
+
+    #[test]
+    fn a_row_that_does_not_end_is_refused_before_it_fills_the_memory() {
+        for begin in ["a,b\n1,\"", "a,b\n1,2\n3,4\n1,\"\n"] {
+            let source = begin.as_bytes().chain(io::repeat(b'x'));
+            let rows = CsvRows::new(BufReader::new(source), 1 << 16);
+            let refused = rows.and_then(|mut rows| rows.next().transpose().map(|_| ()));
+            let refused = format!("{:?}", refused.unwrap_err());
+            assert!(refused.contains("longer than 65536 bytes"), "{refused}");
         }
     }
 }
