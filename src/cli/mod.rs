@@ -3,7 +3,7 @@
 //! | to find | look in |
 //! |---|---|
 //! | a command, and the flags of all but `serve` | [`commands`] |
-//! | a flag of `serve` | [`serve_args`], [`worker_args`], [`HttpOptions`](crate::http::HttpOptions), [`case_args`], [`database_args`] |
+//! | a flag of `serve` | [`serve_args`], [`Options`](crate::jobs::Options), [`HttpOptions`](crate::http::HttpOptions), [`case_args`], [`database_args`] |
 //! | in which order a service starts and stops | [`serve`], [`stop`] |
 
 mod backup;
@@ -24,7 +24,6 @@ mod serve_args;
 mod solve;
 mod stop;
 mod values;
-mod worker_args;
 
 use std::process::ExitCode;
 

@@ -165,20 +165,16 @@ fn exit_code(jobs: &Jobs) -> u8 {
 
 /// Opens the data folder with the settings of the workers.
 async fn open_jobs(args: &ServeArgs, traces: Option<&Traces>) -> anyhow::Result<Jobs> {
-    let options = args.worker.apply(Options {
+    let options = Options {
+        data_dir: args.data_dir.clone(),
         workers: args.worker_count(),
         limits: args.case.limits(),
-        attempts_max: args.attempts_max,
-        queue_max: args.queue_max,
-        cache: args.cache,
         retention: args.retention.0,
-        tenant_queue_max: args.tenant_queue_max,
-        tenant_profiles_max_bytes: u64::from(args.tenant_profiles_mb) << 20,
         tracer: traces.map(Traces::tracer),
         database: args.database.database(),
         results: args.database.results.place(),
-        ..Options::new(&args.data_dir)
-    });
+        ..args.jobs.clone()
+    };
     let recipe = Engine::with_operators(args.case.operators());
     Ok(Jobs::open_with(options, recipe).await?)
 }

@@ -10,8 +10,8 @@ use clap::Args;
 use crate::cli::case_args::CaseArgs;
 use crate::cli::database_args::{DATA_DIR_DEFAULT, DATA_DIR_VARIABLE, DatabaseArgs};
 use crate::cli::values::{Anonymous, Retention, address, origin, retention};
-use crate::cli::worker_args::WorkerArgs;
 use crate::http::{AddressRange, HttpOptions};
+use crate::jobs::Options;
 use crate::telemetry::{Endpoint, LogFormat};
 
 /// Settings of `serve`.
@@ -43,18 +43,6 @@ pub(super) struct ServeArgs {
     pub workers: Option<u16>,
     #[command(flatten)]
     pub case: CaseArgs,
-    /// Attempts at a job whose worker is lost each time, before it fails.
-    #[arg(long, env = "RAILHEAD_ATTEMPTS_MAX", default_value_t = 5, value_name = "N",
-          value_parser = clap::value_parser!(u32).range(1..))]
-    pub attempts_max: u32,
-    /// Queued jobs beyond which new ones are turned away.
-    #[arg(long, env = "RAILHEAD_QUEUE_MAX", default_value_t = 300_000, value_name = "N",
-          value_parser = clap::value_parser!(u64).range(1..))]
-    pub queue_max: u64,
-    /// Answer a case that is identical to one solved before with that result, without solving it again.
-    #[arg(long, env = "RAILHEAD_CACHE", default_value_t = true, value_name = "BOOL",
-          action = clap::ArgAction::Set)]
-    pub cache: bool,
     /// How long ended jobs and their results are kept, such as `30d`, `30days` or `12h`; `forever`: until they are deleted.
     #[arg(long, env = "RAILHEAD_RETENTION", default_value = "forever", value_name = "TIME", value_parser = retention)]
     pub retention: Retention,
@@ -75,14 +63,6 @@ pub(super) struct ServeArgs {
         value_name = "SECONDS"
     )]
     pub drain_delay_s: u32,
-    /// Queued jobs of one tenant beyond which its new ones are turned away.
-    #[arg(long, env = "RAILHEAD_TENANT_QUEUE_MAX", default_value_t = 250_000, value_name = "N",
-          value_parser = clap::value_parser!(u64).range(1..))]
-    pub tenant_queue_max: u64,
-    /// Profiles in MB that one tenant may keep; beyond: 429.
-    #[arg(long, env = "RAILHEAD_TENANT_PROFILES_MB", default_value_t = 64, value_name = "MB",
-          value_parser = clap::value_parser!(u32).range(1..=65536))]
-    pub tenant_profiles_mb: u32,
     /// Whether requests without an API key are answered. Without keys and without anonymous use the service does not
     /// start.
     #[arg(
@@ -109,7 +89,7 @@ pub(super) struct ServeArgs {
     #[arg(long, env = "RAILHEAD_OTLP_ENDPOINT", value_name = "URL")]
     pub otlp_endpoint: Option<Endpoint>,
     #[command(flatten)]
-    pub worker: WorkerArgs,
+    pub jobs: Options,
     /// Address and port of a second listener that answers `/healthz`, `/readyz` and `/metrics` only; without it they are
     /// answered on the first one alone, where a few places are kept for them.
     #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]

@@ -88,14 +88,6 @@ pub(super) fn bound_label(text: &str) -> Result<(String, String), String> {
         .map_err(|(_, allowed)| allowed.to_owned())
 }
 
-/// Reads a time of at least a millisecond, and not above a day, in s.
-pub(super) fn positive(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(seconds) if (0.001..=86_400.0).contains(&seconds) => Ok(seconds),
-        _ => Err("a number of seconds from 0.001 to 86400".to_owned()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

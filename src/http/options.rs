@@ -9,7 +9,9 @@ use std::thread::available_parallelism;
 use std::time::Duration;
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use clap::{Args, Command, FromArgMatches, value_parser};
+use clap::{Args, value_parser};
+
+use crate::jobs::options::{defaults, mib, seconds};
 
 /// The limits of a service; nearly every one is a flag of `serve`, declared here.
 #[derive(Debug, Clone, Args)]
@@ -123,15 +125,9 @@ pub struct HttpOptions {
     pub requests_per_second: u32,
 }
 
-/// The defaults of the flags, whatever the environment says.
 impl Default for HttpOptions {
     fn default() -> Self {
-        let mut command =
-            HttpOptions::augment_args(Command::new("")).mut_args(|flag| flag.env(None::<&str>));
-        let none = command
-            .try_get_matches_from_mut([""])
-            .expect("no flag is needed");
-        HttpOptions::from_arg_matches(&none).expect("every flag has a default")
+        defaults()
     }
 }
 
@@ -144,18 +140,8 @@ fn count(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = usize>
     number.map(|number| number as usize)
 }
 
-fn mib(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = u64> {
-    let number = value_parser!(u32).range(allowed);
-    number.map(|number| u64::from(number) << 20)
-}
-
 fn memory(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = usize> {
     mib(allowed).map(|bytes| bytes as usize)
-}
-
-fn seconds(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = Duration> {
-    let number = value_parser!(u32).range(allowed);
-    number.map(|number| Duration::from_secs(number.into()))
 }
 
 fn milliseconds(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = Duration> {
@@ -214,6 +200,8 @@ impl FromStr for AddressRange {
 
 #[cfg(test)]
 mod tests {
+    use clap::{Command, FromArgMatches};
+
     use super::*;
     use crate::jobs::runtime_probe::USUAL_LIMIT;
 

@@ -1,13 +1,16 @@
 //! How jobs are kept and worked on.
 
 use std::fmt;
+use std::ops::RangeBounds;
 use std::path::PathBuf;
 use std::time::Duration;
+
+use clap::builder::TypedValueParser;
+use clap::{ArgAction, Args, Command, value_parser};
 
 use crate::contact::case::solver::Limits;
 use crate::jobs::clock::Clock;
 use crate::jobs::result_place::url::ResultsPlace;
-use crate::jobs::staged_bytes::StagingBounds;
 use crate::jobs::trace::Tracer;
 
 pub use crate::jobs::store::cluster::NotifyMode;
@@ -30,86 +33,124 @@ impl fmt::Debug for Database {
     }
 }
 
-/// How jobs are kept and worked on.
-#[derive(Debug, Clone)]
+/// How jobs are kept and worked on; most of it is a flag of `serve`, declared here.
+#[derive(Debug, Clone, Args)]
 pub struct Options {
     /// Folder of the job table and the results; created if it is not there.
+    #[arg(skip)]
     pub data_dir: PathBuf,
     /// The database that keeps jobs and results, if several processes share them; otherwise they are in the data folder.
+    #[arg(skip)]
     pub database: Option<Database>,
     /// Where large results are kept, if neither in the data folder nor in the database.
+    #[arg(skip)]
     pub results: Option<ResultsPlace>,
     /// Number of workers, each with a solver thread of its own.
+    #[arg(skip = 1_usize)]
     pub workers: usize,
     /// What one case may use.
+    #[arg(skip)]
     pub limits: Limits,
-    /// How long a worker may go without a heartbeat before its job is given to another.
-    pub lease: Duration,
-    /// Longest solver time of a case, also of one that names no `time_limit_s`.
-    pub time_limit: Duration,
-    /// Solver time after which a solve makes room for others that wait.
-    pub slice: Duration,
-    /// Solver threads that do not stop beyond which the process ends, for whoever supervises it to start it again.
-    pub abandoned_max: usize,
-    /// Attempts at a job before it fails as `worker_lost`.
+    /// Attempts at a job whose worker is lost each time, before it fails.
+    #[arg(long, env = "RAILHEAD_ATTEMPTS_MAX", default_value = "5", value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub attempts_max: u32,
-    /// Bound of queued jobs.
+    /// Queued jobs beyond which new ones are turned away.
+    #[arg(long, env = "RAILHEAD_QUEUE_MAX", default_value = "300000", value_name = "N", value_parser = value_parser!(u64).range(1..))]
     pub queue_max: u64,
-    /// Bound of queued jobs of one tenant.
+    /// Queued jobs of one tenant beyond which its new ones are turned away.
+    #[arg(long, env = "RAILHEAD_TENANT_QUEUE_MAX", default_value = "250000", value_name = "N", value_parser = value_parser!(u64).range(1..))]
     pub tenant_queue_max: u64,
-    /// Bytes of cross-sections that a tenant may keep.
-    pub tenant_profiles_max_bytes: u64,
-    /// Bytes of cases, templates and results that a tenant may have stored before its submissions are refused, if they are bounded.
-    pub tenant_stored_max_bytes: Option<u64>,
-    /// Bounds of what batches that are being received stand for.
-    pub staging: StagingBounds,
-    /// Most jobs a worker claims together, if they are small; 1 means no groups.
-    pub group_max: usize,
-    /// Results up to this size in bytes are kept in the database, larger ones in folders.
-    pub small_result_max_bytes: usize,
-    /// Identical cases get the result of the first one that was solved.
+    /// Answer a case that is identical to one solved before with that result, without solving it again.
+    #[arg(long, env = "RAILHEAD_CACHE", default_value_t = true, value_name = "BOOL", action = ArgAction::Set)]
     pub cache: bool,
     /// How long ended jobs are kept; `None`: until they are deleted.
+    #[arg(skip)]
     pub retention: Option<Duration>,
+    /// Profiles in MB that one tenant may keep; beyond: 429.
+    #[arg(long = "tenant-profiles-mb", env = "RAILHEAD_TENANT_PROFILES_MB", default_value = "64", value_name = "MB", value_parser = mib(1..=65536))]
+    pub tenant_profiles_max_bytes: u64,
+    /// Most solver seconds of a case: for those that name no `time_limit_s`, and the most that one may name.
+    #[arg(long = "time-limit-s", env = "RAILHEAD_TIME_LIMIT_S", default_value = "86400", value_name = "SECONDS", value_parser = seconds(1..))]
+    pub time_limit: Duration,
+    /// Seconds after which the jobs of a worker that shows no sign of life are given to another; it shows one three times
+    /// as often.
+    #[arg(long = "lease-s", env = "RAILHEAD_LEASE_S", default_value = "30", value_name = "SECONDS", value_parser = seconds(1..=3600))]
+    pub lease: Duration,
+    /// Solver seconds after which a solve makes room for others that wait.
+    #[arg(long = "slice-s", env = "RAILHEAD_SLICE_S", default_value = "2", value_name = "SECONDS", value_parser = part_of_a_day)]
+    pub slice: Duration,
+    /// Solver threads that do not stop when they are told to, beyond which the process ends with code 75, to be started again.
+    #[arg(long, env = "RAILHEAD_ABANDONED_MAX", default_value = "3", value_name = "N", value_parser = value_parser!(u16).map(usize::from))]
+    pub abandoned_max: usize,
+    /// Bounds of what batches that are being received stand for.
+    #[command(flatten)]
+    pub staging: StagingBounds,
+    /// Size in MB of the cases, templates and results that one tenant may have stored; further submissions get 507 [default: any size].
+    #[arg(long = "tenant-stored-mb", env = "RAILHEAD_TENANT_STORED_MB", value_name = "MB", value_parser = mib(..))]
+    pub tenant_stored_max_bytes: Option<u64>,
+    /// Most jobs a worker claims together, if they are small; 1 means no groups.
+    #[arg(skip = 256_usize)]
+    pub group_max: usize,
+    /// Results up to this size in bytes are kept in the database, larger ones in folders.
+    #[arg(skip = 32_usize << 10)]
+    pub small_result_max_bytes: usize,
     /// What leases, ends and expiries are measured with.
+    #[arg(skip = Clock::system())]
     pub clock: Clock,
     /// What makes spans of jobs, if they are collected.
+    #[arg(skip)]
     pub tracer: Option<Tracer>,
 }
 
+/// Bounds of staged bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+pub struct StagingBounds {
+    /// Most MB that batches being received stand for, a row of a table counted with its template.
+    #[arg(id = "staged", long = "staged-mb", env = "RAILHEAD_STAGED_MB", default_value = "16384", value_name = "MB", value_parser = mib(..))]
+    pub all: u64,
+    /// The same of one tenant.
+    #[arg(id = "tenant_staged", long = "tenant-staged-mb", env = "RAILHEAD_TENANT_STAGED_MB", default_value = "4096", value_name = "MB", value_parser = mib(..))]
+    pub tenant: u64,
+}
+
 impl Options {
-    /// The defaults for a data folder: one worker, a lease of 30 s, a day of solver time, slices of 2 s,
-    /// 3 abandoned threads, 5 attempts, 300 000 queued jobs of which
-    /// 250 000 of one tenant, 16 GiB of batches being received of which 4 GiB of one tenant,
-    /// groups of 256, results up to 32 KiB in the database, results used again,
-    /// ended jobs kept for ever, the system's clock, no spans.
+    /// The defaults for a data folder: those of the flags, one worker, ended jobs kept for ever, the system's clock, no spans.
     #[must_use]
     pub fn new(data_dir: impl Into<PathBuf>) -> Options {
         Options {
             data_dir: data_dir.into(),
-            database: None,
-            results: None,
-            workers: 1,
-            limits: Limits::default(),
-            lease: Duration::from_secs(30),
-            time_limit: Duration::from_secs(24 * 3600),
-            slice: Duration::from_secs(2),
-            abandoned_max: 3,
-            attempts_max: 5,
-            queue_max: 300_000,
-            tenant_queue_max: 250_000,
-            tenant_profiles_max_bytes: 64 << 20,
-            tenant_stored_max_bytes: None,
-            staging: StagingBounds {
-                all: 16 << 30,
-                tenant: 4 << 30,
-            },
-            group_max: 256,
-            small_result_max_bytes: 32 << 10,
-            cache: true,
-            retention: None,
-            clock: Clock::system(),
-            tracer: None,
+            ..defaults()
         }
+    }
+}
+
+/// The defaults of flags, whatever the environment says.
+pub(crate) fn defaults<T: Args>() -> T {
+    let mut command = T::augment_args(Command::new("")).mut_args(|flag| flag.env(None::<&str>));
+    let none = command
+        .try_get_matches_from_mut([""])
+        .expect("no flag is needed");
+    T::from_arg_matches(&none).expect("every flag has a default")
+}
+
+/// A number of MiB as bytes.
+pub(crate) fn mib(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = u64> {
+    let number = value_parser!(u32).range(allowed);
+    number.map(|number| u64::from(number) << 20)
+}
+
+/// A whole number of seconds.
+pub(crate) fn seconds(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = Duration> {
+    let number = value_parser!(u32).range(allowed);
+    number.map(|number| Duration::from_secs(number.into()))
+}
+
+/// A time of at least a millisecond, and not above a day, in s.
+fn part_of_a_day(text: &str) -> Result<Duration, String> {
+    match text.parse() {
+        Ok(seconds) if (0.001..=86_400.0).contains(&seconds) => {
+            Ok(Duration::from_secs_f64(seconds))
+        }
+        _ => Err("a number of seconds from 0.001 to 86400".to_owned()),
     }
 }

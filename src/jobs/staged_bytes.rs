@@ -5,16 +5,8 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
 use crate::jobs::error::JobsError;
+use crate::jobs::options::StagingBounds;
 use crate::jobs::sync::lock;
-
-/// Bounds of staged bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StagingBounds {
-    /// Of all tenants.
-    pub all: u64,
-    /// Of one tenant.
-    pub tenant: u64,
-}
 
 /// The bytes that are staged at present.
 #[derive(Debug, Default)]

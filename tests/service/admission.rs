@@ -1,7 +1,7 @@
 //! Are the bounds of the queue exact, whoever submits how much at the same time, and is nothing kept that was refused?
 
 use railhead::jobs::State;
-use railhead::jobs::staged_bytes::StagingBounds;
+use railhead::jobs::options::StagingBounds;
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
 
