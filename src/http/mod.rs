@@ -51,7 +51,6 @@ use crate::http::extract::{accept, query};
 use crate::http::layers::metrics::Metrics;
 #[cfg(feature = "otlp")]
 use crate::http::layers::otel;
-use crate::http::layers::shared::Shared;
 use crate::http::layers::{
     admission, catch_panic, client_address, compression, etag, final_newline, metrics,
     origin_guard, rate_limit, request_id, request_log, security_headers,
@@ -139,20 +138,17 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
         .merge(answers::routes(options.page_dir.clone()))
         .fallback(|uri: Uri| async move { error::unknown_route(uri.path()) })
         .method_not_allowed_fallback(method_not_allowed)
-        .layer(Shared)
         .layer(DefaultBodyLimit::max(options.body_max_bytes))
         .layer(RequestDecompressionLayer::new().gzip(true).zstd(true))
         .layer(from_fn_with_state(options.clone(), admission::limit_packed))
         .layer(CatchPanicLayer::custom(catch_panic::answer_panic))
         .layer(from_fn(holding_body::hold))
-        .layer(Shared)
         .layer(from_fn({
             let per_second = options.requests_per_second;
             move |request, next| rate_limit::add_rate_limit_headers(per_second, request, next)
         }))
         .layer(from_fn(origin_guard::admit))
         .layer(from_fn(error::name_instance))
-        .layer(Shared)
         .layer(from_fn(final_newline::end_line))
         .layer(compression::compression_layer())
         .layer(from_fn(etag::complete))
@@ -160,7 +156,6 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
     #[cfg(feature = "otlp")]
     let router = otel::trace(router, jobs.tracer());
     let router = router
-        .layer(Shared)
         .layer(request_log::span_layer())
         .layer(from_fn(request_id::carry_request_id))
         .layer(from_fn(drain_body::drain_body))

@@ -17,4 +17,3 @@ pub(super) mod rate_limit;
 pub(super) mod request_id;
 pub(super) mod request_log;
 pub(super) mod security_headers;
-pub(super) mod shared;
