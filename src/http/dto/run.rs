@@ -119,35 +119,15 @@ pub(crate) struct AnswerColumn {
     /// Its name.
     name: String,
     /// What it holds.
-    kind: AnswerColumnKind,
-}
-
-/// What a column of answers holds.
-#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum AnswerColumnKind {
-    /// Whole numbers.
-    Integer,
-    /// Numbers, null where a row has none.
-    Number,
-    /// Texts, null where a row has none.
-    Text,
+    kind: TableKind,
 }
 
 /// The columns of the answers of a run.
 #[must_use]
 pub(crate) fn answer_columns(run: &Run) -> Vec<AnswerColumn> {
     let columns = run.head.answers().into_iter();
-    columns
-        .map(|(name, kind)| AnswerColumn {
-            name,
-            kind: match kind {
-                TableKind::Integers => AnswerColumnKind::Integer,
-                TableKind::Numbers => AnswerColumnKind::Number,
-                TableKind::Texts => AnswerColumnKind::Text,
-            },
-        })
-        .collect()
+    let column = |(name, kind)| AnswerColumn { name, kind };
+    columns.map(column).collect()
 }
 
 impl From<Run> for RunAnswer {

@@ -1,5 +1,8 @@
 //! A table of rows: named columns of numbers and texts.
 
+use serde::Serialize;
+use utoipa::ToSchema;
+
 /// Most columns of a table that is read. A case has far fewer members that differ from row to row.
 pub const COLUMNS_MAX: usize = 1000;
 
@@ -14,14 +17,18 @@ pub enum TableColumn {
     Texts(Vec<Option<String>>),
 }
 
-/// The kinds of columns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What a column of answers holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[schema(as = AnswerColumnKind)]
 pub enum TableKind {
-    /// [`TableColumn::Integers`].
+    /// Whole numbers.
+    #[serde(rename = "integer")]
     Integers,
-    /// [`TableColumn::Numbers`].
+    /// Numbers, null where a row has none.
+    #[serde(rename = "number")]
     Numbers,
-    /// [`TableColumn::Texts`].
+    /// Texts, null where a row has none.
+    #[serde(rename = "text")]
     Texts,
 }
 
