@@ -3,7 +3,7 @@
 //! `cargo bench --bench load [-- PART … [workers=N] [jobs=N]]` starts the real program on loopback with a data folder of its own and
 //! prints a table. The parts: `mixed` (64 clients for a minute), `soak` (20 000 small jobs, one by one, removed after a
 //! while; `jobs=N` for another number), `batch` (20 000 cases in one request), `crowds` (silent connections, followers, large bodies,
-//! unread answers), `claims` (1 and 64 workers), `lists` (filters that match nothing among 200 000 jobs), `mixed-lengths` (a long sweep
+//! unread answers), `claims`, `lists` (filters that match nothing among 200 000 jobs), `mixed-lengths` (a long sweep
 //! and short jobs on one worker), `rows` (`/v1/evaluate` and runs of a million rows), `memory` (four workers and
 //! mixed cases), `shared` (claims and ends on the PostgreSQL that `RAILHEAD_TEST_POSTGRES` names); all of them without a name. The driver runs on one thread of the same
 //! machine. A broken promise (a wrong answer, a lost or doubled job) ends it with a panic; missed goals are printed.

@@ -93,7 +93,7 @@ async fn work(store: Arc<PostgresStore>, until: Instant, group: usize) -> Work {
         cost_us: u64::MAX,
         each_slice_us: None,
         suspects: true,
-        workers: 1,
+        waiting: 0,
         lease: Lease { now: 0, ms: 30_000 },
         now: 0,
         late_before: 0,

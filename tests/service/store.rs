@@ -174,7 +174,7 @@ pub fn queue_of(tenant: &str) -> Queue {
 /// Claims at most `jobs` small jobs of the first queue that has any.
 pub async fn claim_up_to(store: &dyn Store, now: i64, lease_ms: i64, jobs: usize) -> Vec<Claim> {
     let queues = store.queues().await.unwrap();
-    for queue in &queues {
+    for (queue, _) in &queues {
         let request = ClaimRequest {
             worker: "w",
             queue,
@@ -183,7 +183,7 @@ pub async fn claim_up_to(store: &dyn Store, now: i64, lease_ms: i64, jobs: usize
             kind: ClaimKind::New,
             each_slice_us: None,
             suspects: true,
-            workers: 1,
+            waiting: 0,
             lease: Lease { now, ms: lease_ms },
             now,
             late_before: now,

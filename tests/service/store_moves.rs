@@ -113,7 +113,7 @@ impl Pair {
             cost_us: 1_000_000,
             each_slice_us: None,
             suspects: true,
-            workers: 1,
+            waiting: 0,
             lease: Lease {
                 now: self.now,
                 ms: LEASE,

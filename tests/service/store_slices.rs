@@ -29,7 +29,7 @@ async fn claim_begun(store: &dyn Store, now: i64) -> Option<Claim> {
         cost_us: 1_000_000,
         each_slice_us: None,
         suspects: true,
-        workers: 1,
+        waiting: 0,
         lease: Lease { now, ms: 1000 },
         now,
         late_before: now,

@@ -58,7 +58,7 @@ fn request(queue: &Queue) -> ClaimRequest<'_> {
         kind: ClaimKind::New,
         each_slice_us: None,
         suspects: true,
-        workers: 1,
+        waiting: 0,
         lease: Lease { now: 0, ms: 1000 },
         now: 2,
         late_before: 2,
@@ -193,7 +193,7 @@ async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind:
     assert_eq!(known, Some(BatchBegun::Existing(run.id)));
 
     let queues = store.queues().await.unwrap();
-    let kinds: Vec<Kind> = queues.iter().map(|queue| queue.kind).collect();
+    let kinds: Vec<Kind> = queues.iter().map(|(queue, _)| queue.kind).collect();
     assert_eq!(kinds, [Kind::Case, Kind::Rows]);
     let claims = claim_up_to(store, 0, 1000, 8).await;
     assert_eq!(

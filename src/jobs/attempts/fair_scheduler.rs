@@ -56,30 +56,28 @@ impl FairScheduler {
     }
 
     /// Queues in the order of their turns: first those of the tenant that has used the least in all, and of these the one that has.
-    pub(crate) fn order(&self, queues: Vec<Queue>) -> Vec<Queue> {
+    pub(crate) fn order(&self, mut queues: Vec<(Queue, u64)>) -> Vec<(Queue, u64)> {
         let accounts = lock(&self.0);
         // One present for all, so that both queues of a tenant have the same sum.
         let now = Instant::now();
         let used = |queue: &Queue| accounts.get(queue).map_or(0.0, |used| used.at(now));
-        let mut keyed: Vec<_> = queues
-            .into_iter()
-            .map(|queue| {
-                let of_kind = |kind| {
-                    used(&Queue {
-                        tenant: queue.tenant.clone(),
-                        kind,
-                    })
-                };
-                let of_tenant =
-                    of_kind(Kind::Case) + of_kind(Kind::Rows) + of_kind(Kind::Evolution);
-                ([of_tenant, used(&queue)], queue)
-            })
-            .collect();
-        keyed.sort_by(|(a, first), (b, second)| {
-            let used = a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
-            used.then_with(|| first.cmp(second))
+        let keys = |queue: &Queue| {
+            let of_kind = |kind| {
+                used(&Queue {
+                    tenant: queue.tenant.clone(),
+                    kind,
+                })
+            };
+            let of_tenant = of_kind(Kind::Case) + of_kind(Kind::Rows) + of_kind(Kind::Evolution);
+            [of_tenant, used(queue)]
+        };
+        queues.sort_by(|a, b| {
+            let (first, second) = (keys(&a.0), keys(&b.0));
+            let used = first[0].total_cmp(&second[0]);
+            let used = used.then(first[1].total_cmp(&second[1]));
+            used.then_with(|| a.0.cmp(&b.0))
         });
-        keyed.into_iter().map(|(_, queue)| queue).collect()
+        queues
     }
 
     /// Have new jobs of this queue had a slice of time since one of its begun sweeps had a turn?
@@ -101,9 +99,10 @@ mod tests {
         }
     }
 
-    fn names(queues: &[Queue]) -> Vec<String> {
-        let name = |queue: &Queue| format!("{} {}", queue.tenant, queue.kind.name());
-        queues.iter().map(name).collect()
+    fn order(turns: &FairScheduler, queues: &[Queue]) -> Vec<String> {
+        let queues = queues.iter().map(|queue| (queue.clone(), 1)).collect();
+        let name = |(queue, _): (Queue, u64)| format!("{} {}", queue.tenant, queue.kind.name());
+        turns.order(queues).into_iter().map(name).collect()
     }
 
     #[test]
@@ -112,21 +111,15 @@ mod tests {
         let tenants = ["a", "b", "c"]
             .map(|tenant| queue(tenant, Kind::Case))
             .to_vec();
-        assert_eq!(
-            names(&turns.order(tenants.clone())),
-            ["a case", "b case", "c case"]
-        );
+        assert_eq!(order(&turns, &tenants), ["a case", "b case", "c case"]);
         turns.charge(&tenants[0], Duration::from_secs(100), false);
         turns.charge(&tenants[1], Duration::from_secs(1), false);
-        assert_eq!(
-            names(&turns.order(tenants.clone())),
-            ["c case", "b case", "a case"]
-        );
+        assert_eq!(order(&turns, &tenants), ["c case", "b case", "a case"]);
         // Many short jobs weigh what they take, not how many they are.
         for _ in 0..1000 {
             turns.charge(&tenants[2], Duration::from_micros(10), false);
         }
-        assert_eq!(names(&turns.order(tenants)), ["c case", "b case", "a case"]);
+        assert_eq!(order(&turns, &tenants), ["c case", "b case", "a case"]);
     }
 
     #[test]
@@ -138,11 +131,9 @@ mod tests {
             queue("b", Kind::Case),
         ];
         turns.charge(&queues[1], Duration::from_secs(10), false);
-        let order = turns.order(queues.clone());
-        assert_eq!(names(&order), ["b case", "a case", "a rows"]);
+        assert_eq!(order(&turns, &queues), ["b case", "a case", "a rows"]);
         turns.charge(&queues[2], Duration::from_secs(20), false);
-        let order = turns.order(queues);
-        assert_eq!(names(&order), ["a case", "a rows", "b case"]);
+        assert_eq!(order(&turns, &queues), ["a case", "a rows", "b case"]);
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub struct ClaimRequest<'a> {
     pub queue: &'a Queue,
     /// Which of its jobs.
     pub kind: ClaimKind,
-    /// Most jobs.
+    /// Most jobs; of begun ones there is one.
     pub jobs: usize,
     /// Largest sum of the expected solve times in µs; one job may be above it.
     pub cost_us: u64,
@@ -62,8 +62,8 @@ pub struct ClaimRequest<'a> {
     pub each_slice_us: Option<u64>,
     /// Also jobs that may have killed a process.
     pub suspects: bool,
-    /// Workers among which the queue is shared.
-    pub workers: usize,
+    /// Jobs in the queue, when that was asked last.
+    pub waiting: u64,
     /// The lease that begins.
     pub lease: Lease,
     /// The present, epoch milliseconds.

@@ -284,8 +284,8 @@ pub trait Profiles: Send + Sync {
 /// Claims of queued jobs.
 #[async_trait]
 pub trait Claims: Send + Sync {
-    /// Queues with jobs in them.
-    async fn queues(&self) -> Result<Vec<Queue>, StoreError>;
+    /// Queues with jobs in them, and how many.
+    async fn queues(&self) -> Result<Vec<(Queue, u64)>, StoreError>;
 
     /// Claims the first job of a queue, by priority and then by age, together with those behind it that are small
     /// enough, in their order. A suspect comes alone, and no job of a batch that is not acknowledged.

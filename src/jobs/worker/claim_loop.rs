@@ -18,7 +18,7 @@ impl Worker {
             return Ok(None);
         }
         let queues = shared.store.queues().await?;
-        for queue in shared.turns.order(queues) {
+        for (queue, waiting) in shared.turns.order(queues) {
             let mut kinds = [ClaimKind::New, ClaimKind::Begun];
             if shared
                 .turns
@@ -27,7 +27,7 @@ impl Worker {
                 kinds.reverse();
             }
             for kind in kinds {
-                if let Some(attempt) = self.claim(&queue, kind).await? {
+                if let Some(attempt) = self.claim((&queue, waiting), kind).await? {
                     return Ok(Some(attempt));
                 }
             }
@@ -35,21 +35,28 @@ impl Worker {
         Ok(None)
     }
 
-    async fn claim(&self, queue: &Queue, kind: ClaimKind) -> Result<Option<Attempt>, JobsError> {
+    async fn claim(
+        &self,
+        (queue, waiting): (&Queue, u64),
+        kind: ClaimKind,
+    ) -> Result<Option<Attempt>, JobsError> {
         let shared = &self.shared;
         let options = &shared.options;
         let slice_us = u64::try_from(options.slice.as_micros()).unwrap_or(u64::MAX);
+        // Each worker gets some of a short queue.
+        let share = usize::try_from(waiting).unwrap_or(usize::MAX);
+        let share = share.div_ceil(shared.all_workers().max(1));
         // Of two suspects that are solved at the same time, nobody would know which one has killed the process.
         let suspect = shared.suspect.clone().try_lock_owned().ok();
         let request = ClaimRequest {
             worker: &self.name,
             queue,
             kind,
-            jobs: options.group_max.max(1),
+            jobs: share.clamp(1, options.group_max.max(1)),
+            waiting,
             cost_us: GROUP_COST_US,
             each_slice_us: self.spare.then_some(slice_us),
             suspects: suspect.is_some(),
-            workers: shared.all_workers(),
             lease: shared.lease(),
             now: shared.now_ms(),
             late_before: shared.now_ms().saturating_sub(shared.clock_step().ms),

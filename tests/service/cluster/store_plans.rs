@@ -44,7 +44,7 @@ fn request(queue: &Queue, kind: ClaimKind) -> ClaimRequest<'_> {
         cost_us: u64::MAX,
         each_slice_us: None,
         suspects: true,
-        workers: 1,
+        waiting: 10_000,
         lease: Lease { now: 0, ms: 60_000 },
         now: 1,
         late_before: 1,

@@ -40,7 +40,7 @@ fn request(queue: &Queue) -> ClaimRequest<'_> {
         cost_us: u64::MAX,
         each_slice_us: None,
         suspects: true,
-        workers: 1,
+        waiting: QUEUED.unsigned_abs(),
         lease: Lease { now: 0, ms: 30_000 },
         now: 0,
         late_before: 0,

@@ -14,18 +14,15 @@ use sqlx::postgres::{PgConnection, PgRow};
 use crate::jobs::model::kind::Queue;
 use crate::jobs::store::claim::ClaimRequest;
 use crate::jobs::store::postgres::sql::claim::peek;
-use crate::jobs::store::postgres::sql::rows::{count, read_count};
+use crate::jobs::store::postgres::sql::rows::count;
 use crate::jobs::store_error::StoreError;
 use crate::jobs::sync::lock;
 
 /// Queues that are shorter are counted and walked from their start at every claim.
-const LONG: i64 = 2000;
+const LONG: u64 = 2000;
 
 /// How long the place of a claim is remembered.
 const PLACE_KEPT: Duration = Duration::from_secs(2);
-
-/// How long the length of a queue is remembered, less what was claimed since.
-const LENGTH_KEPT: Duration = Duration::from_secs(1);
 
 /// How long the queues with jobs in them are remembered while one is long.
 const QUEUES_KEPT: Duration = Duration::from_millis(250);
@@ -67,24 +64,13 @@ const PEEK: &str = peek!("slices = 0", "$2", "$6");
 /// Like `PEEK`, for jobs of which some slices are solved.
 pub(crate) const PEEK_BEGUN: &str = peek!("slices > 0", "$2", "$6");
 
-/// Jobs in a queue.
-const WAITING: &str = "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts \
-     WHERE state = 'queued' AND tenant = $1 AND kind = $2";
-
-/// Number of waiting jobs of a queue, and where its last claims began.
-#[derive(Debug, Clone)]
-struct KnownQueue {
-    waiting: i64,
-    counted: Instant,
-    /// Where the last claim began, in each rank; empty: at its start.
-    places: [String; RANKS],
-    placed: Option<Instant>,
-}
+/// Where the claims of a long queue began, in each rank; empty: at its start. The time is that of the last one from the start.
+type Places = (Instant, [String; RANKS]);
 
 #[derive(Debug, Default)]
 struct Known {
-    queues: HashMap<Queue, KnownQueue>,
-    all: Option<(Instant, Vec<Queue>)>,
+    places: HashMap<Queue, Places>,
+    queues: Option<(Instant, Vec<(Queue, u64)>)>,
 }
 
 /// What a process remembers; clones share it.
@@ -98,64 +84,22 @@ impl ClaimMemory {
 
     /// Jobs went back to the queue: the next claims walk it from the start.
     pub(crate) fn forget_places(&self) {
-        for queue in self.known().queues.values_mut() {
-            queue.placed = None;
-        }
+        self.known().places.clear();
     }
 
-    /// The number of jobs in a queue, exact for a short one.
-    pub(crate) async fn waiting(
-        &self,
-        connection: &mut PgConnection,
-        queue: &Queue,
-    ) -> Result<i64, StoreError> {
-        if let Some(known) = self.known().queues.get(queue)
-            && known.waiting >= LONG
-            && known.counted.elapsed() < LENGTH_KEPT
-        {
-            return Ok(known.waiting);
-        }
-        let waiting = count_waiting(connection, queue).await?;
-        let mut known = self.known();
-        match known.queues.get_mut(queue) {
-            Some(known) => {
-                (known.waiting, known.counted) = (waiting, Instant::now());
-            }
-            None if waiting >= LONG => {
-                let long = KnownQueue {
-                    waiting,
-                    counted: Instant::now(),
-                    places: Default::default(),
-                    placed: None,
-                };
-                known.queues.insert(queue.clone(), long);
-            }
-            None => {}
-        }
-        if waiting < LONG {
-            known.queues.remove(queue);
-        }
-        Ok(waiting)
-    }
-
-    /// The first jobs of a queue, locked, at most `most`.
+    /// The first jobs of a queue, locked, at most as many as are asked for.
     pub(crate) async fn peek(
         &self,
         connection: &mut PgConnection,
         request: &ClaimRequest<'_>,
-        most: i64,
     ) -> Result<Vec<PgRow>, StoreError> {
-        let places = {
-            let known = self.known();
-            let queue = known.queues.get(request.queue);
-            let kept =
-                |queue: &&KnownQueue| queue.placed.is_some_and(|at| at.elapsed() < PLACE_KEPT);
-            queue.filter(kept).map(|queue| queue.places.clone())
-        };
-        if let Some([high, normal, low]) = places {
+        let places = self.known().places.get(request.queue).cloned();
+        if let Some((since, [high, normal, low])) = places
+            && since.elapsed() < PLACE_KEPT
+        {
             let found = sqlx::query(PEEK_FROM)
                 .bind(&*request.queue.tenant)
-                .bind(most)
+                .bind(count(request.jobs))
                 .bind(request.late_before)
                 .bind(request.each_slice_us.map_or(i64::MAX, count))
                 .bind(high)
@@ -165,56 +109,56 @@ impl ClaimMemory {
                 .bind(i64::from(request.suspects))
                 .fetch_all(&mut *connection)
                 .await?;
-            if i64::try_from(found.len()).unwrap_or(i64::MAX) == most {
-                self.remember(request.queue, &found, false)?;
-                return Ok(found);
-            }
-            self.forget_places();
+            self.remember(request, &found, since)?;
             if !found.is_empty() {
                 return Ok(found);
             }
         }
-        let found = first_queued(connection, PEEK, request, most).await?;
-        if i64::try_from(found.len()).unwrap_or(i64::MAX) == most {
-            self.remember(request.queue, &found, true)?;
-        }
+        let found = first_queued(connection, PEEK, request, count(request.jobs)).await?;
+        self.remember(request, &found, Instant::now())?;
         Ok(found)
     }
 
-    /// Remembers where a full group began.
-    fn remember(&self, queue: &Queue, found: &[PgRow], anew: bool) -> Result<(), StoreError> {
+    /// Remembers where a full group of a long queue began; without one the next claim begins at the start.
+    fn remember(
+        &self,
+        request: &ClaimRequest<'_>,
+        found: &[PgRow],
+        since: Instant,
+    ) -> Result<(), StoreError> {
         let mut known = self.known();
-        let Some(queue) = known.queues.get_mut(queue) else {
+        let Some((_, mut places)) = known.places.remove(request.queue).or_else(|| {
+            let begin = (since, Default::default());
+            (request.waiting >= LONG).then_some(begin)
+        }) else {
             return Ok(());
         };
-        if anew {
-            queue.places = Default::default();
-            queue.placed = Some(Instant::now());
+        if found.len() < request.jobs {
+            return Ok(());
         }
-        queue.waiting -= i64::try_from(found.len()).unwrap_or(0);
         // The first of each rank, in the order of the queue.
         for row in found.iter().rev() {
             let rank: i64 = row.try_get("rank")?;
-            if let Some(place) = usize::try_from(rank)
-                .ok()
-                .and_then(|rank| queue.places.get_mut(rank))
-            {
+            let place = usize::try_from(rank).ok();
+            if let Some(place) = place.and_then(|rank| places.get_mut(rank)) {
                 *place = row.try_get("id")?;
             }
         }
+        known.places.insert(request.queue.clone(), (since, places));
         Ok(())
     }
 
     /// The queues with jobs in them as they were a moment ago, if one is long.
-    pub(crate) fn queues(&self) -> Option<Vec<Queue>> {
+    pub(crate) fn queues(&self) -> Option<Vec<(Queue, u64)>> {
         let known = self.known();
-        let (at, queues) = known.all.as_ref()?;
-        (!known.queues.is_empty() && at.elapsed() < QUEUES_KEPT).then(|| queues.clone())
+        let (at, queues) = known.queues.as_ref()?;
+        let long = queues.iter().any(|(_, waiting)| *waiting >= LONG);
+        (long && at.elapsed() < QUEUES_KEPT).then(|| queues.clone())
     }
 
     /// Remembers the queues with jobs in them.
-    pub(crate) fn remember_queues(&self, queues: &[Queue]) {
-        self.known().all = Some((Instant::now(), queues.to_vec()));
+    pub(crate) fn remember_queues(&self, queues: &[(Queue, u64)]) {
+        self.known().queues = Some((Instant::now(), queues.to_vec()));
     }
 }
 
@@ -235,14 +179,4 @@ pub(crate) async fn first_queued(
         .fetch_all(connection)
         .await?;
     Ok(rows)
-}
-
-/// Jobs in a queue.
-async fn count_waiting(connection: &mut PgConnection, queue: &Queue) -> Result<i64, StoreError> {
-    let row = sqlx::query(WAITING)
-        .bind(&*queue.tenant)
-        .bind(queue.kind.name())
-        .fetch_one(connection)
-        .await?;
-    Ok(count(read_count(&row, "number")?))
 }

@@ -111,20 +111,7 @@ impl PostgresStore {
     ) -> Result<Vec<DbRow>, StoreError> {
         let mut transaction = begin(&self.writer).await?;
         let queued = match request.kind {
-            ClaimKind::New => {
-                let waiting = self
-                    .claim_memory
-                    .waiting(&mut transaction, request.queue)
-                    .await?;
-                // So that each worker gets some of a short queue.
-                let share = usize::try_from(waiting)
-                    .unwrap_or(0)
-                    .div_ceil(request.workers.max(1));
-                let most = count(share.min(request.jobs).max(1));
-                self.claim_memory
-                    .peek(&mut transaction, request, most)
-                    .await?
-            }
+            ClaimKind::New => self.claim_memory.peek(&mut transaction, request).await?,
             ClaimKind::Begun => first_queued(&mut transaction, PEEK_BEGUN, request, 1).await?,
         };
         if queued.is_empty() {
@@ -160,11 +147,11 @@ impl PostgresStore {
     }
 
     /// The queues with jobs in them, if they were read a moment ago and one is long.
-    pub(crate) fn known_queues(&self) -> Option<Vec<Queue>> {
+    pub(crate) fn known_queues(&self) -> Option<Vec<(Queue, u64)>> {
         self.claim_memory.queues()
     }
 
-    pub(crate) fn remember_queues(&self, queues: &[Queue]) {
+    pub(crate) fn remember_queues(&self, queues: &[(Queue, u64)]) {
         self.claim_memory.remember_queues(queues);
     }
 

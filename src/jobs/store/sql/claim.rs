@@ -39,12 +39,12 @@ macro_rules! claimed {
 pub(crate) use claimed;
 
 /// Queues with jobs in them.
-pub(crate) const QUEUES: &str = "SELECT tenant, kind FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0 ORDER BY tenant, kind";
+pub(crate) const QUEUES: &str = "SELECT tenant, kind, CAST(SUM(number) AS bigint) AS waiting FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0 ORDER BY tenant, kind";
 
 #[repeat_conflicts]
 #[async_trait]
 impl Claims for SqlStore {
-    async fn queues(&self) -> Result<Vec<Queue>, StoreError> {
+    async fn queues(&self) -> Result<Vec<(Queue, u64)>, StoreError> {
         if let Some(known) = self.known_queues() {
             return Ok(known);
         }
@@ -52,10 +52,11 @@ impl Claims for SqlStore {
         let rows = query(QUEUES).fetch_all(&mut *connection).await?;
         drop(connection);
         let read = |row: &DbRow| {
-            Ok(Queue {
+            let queue = Queue {
                 tenant: row.try_get::<String, _>("tenant")?.into(),
                 kind: read_kind(row)?,
-            })
+            };
+            Ok((queue, read_count(row, "waiting")?))
         };
         let queues = rows
             .iter()

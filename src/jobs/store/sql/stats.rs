@@ -85,7 +85,7 @@ impl Statistics for SqlStore {
             .fetch_one(&self.readers)
             .await?;
         let queues = self.queues().await?;
-        let tenants: HashSet<&str> = queues.iter().map(|queue| &*queue.tenant).collect();
+        let tenants: HashSet<&str> = queues.iter().map(|(queue, _)| &*queue.tenant).collect();
         Ok(QueueAhead {
             jobs: read_count(&row, "jobs")?,
             cost_us: read_count(&row, "cost_us")?,

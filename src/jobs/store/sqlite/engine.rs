@@ -28,12 +28,12 @@ macro_rules! claim {
     ($begun:literal, $most:literal) => {
         concat!(
             "WITH queued AS MATERIALIZED (",
-            peek!($begun, $most, "$12"),
+            peek!($begun, $most, "$11"),
             "), placed AS (SELECT id, ROW_NUMBER() OVER in_order AS place, SUM(cost_us) OVER in_order AS cost_us, \
                  SUM(suspect) OVER in_order AS suspects FROM queued WINDOW in_order AS (ORDER BY rank, id)), \
-             chosen AS MATERIALIZED (SELECT id FROM placed WHERE place = 1 OR (cost_us <= $7 AND suspects = 0)) \
-             UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = $8, lease_until = $9, worker = $10, \
-             started_at = $11, updated_at = $11, group_size = (SELECT COUNT(*) FROM chosen), \
+             chosen AS MATERIALIZED (SELECT id FROM placed WHERE place = 1 OR (cost_us <= $6 AND suspects = 0)) \
+             UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = $7, lease_until = $8, worker = $9, \
+             started_at = $10, updated_at = $10, group_size = (SELECT COUNT(*) FROM chosen), \
              progress = done, version = version + 1 \
              WHERE id IN (SELECT id FROM chosen) RETURNING ",
             claimed!()
@@ -41,12 +41,8 @@ macro_rules! claim {
     };
 }
 
-/// Claims the first new jobs of a queue, of a short queue only a share for each worker.
-pub(crate) const CLAIM_NEW: &str = claim!(
-    "slices = 0",
-    "MAX(1, MIN($2, (SELECT (COALESCE(SUM(number), 0) + $6 - 1) / $6 FROM job_counts \
-     WHERE state = 'queued' AND tenant = $1 AND kind = $5)))"
-);
+/// Claims the first new jobs of a queue.
+pub(crate) const CLAIM_NEW: &str = claim!("slices = 0", "$2");
 
 /// Claims the first job of a queue of which some slices are solved.
 pub(crate) const CLAIM_BEGUN: &str = claim!("slices > 0", "1");
@@ -122,7 +118,6 @@ impl SqliteStore {
             .bind(request.late_before)
             .bind(request.each_slice_us.map_or(i64::MAX, count))
             .bind(request.queue.kind.name())
-            .bind(count(request.workers.max(1)))
             .bind(count(request.cost_us))
             .bind(token)
             .bind(request.lease.now.saturating_add(request.lease.ms))
@@ -141,11 +136,11 @@ impl SqliteStore {
     }
 
     /// Not cached: the query is cheap.
-    pub(crate) fn known_queues(&self) -> Option<Vec<Queue>> {
+    pub(crate) fn known_queues(&self) -> Option<Vec<(Queue, u64)>> {
         None
     }
 
-    pub(crate) fn remember_queues(&self, _: &[Queue]) {}
+    pub(crate) fn remember_queues(&self, _: &[(Queue, u64)]) {}
 
     /// Every claim walks the queue from its start.
     pub(crate) fn requeued(&self) {}

@@ -113,7 +113,6 @@ async fn the_claim_and_the_reaper_find_their_jobs_by_index() {
     let bystanders = REAP_BYSTANDERS;
     for (statement, seek) in [
         (QUEUES, "PRIMARY KEY (state=?"),
-        (CLAIM_NEW, "PRIMARY KEY (state=? AND tenant=? AND kind=?"),
         (CLAIM_NEW, "jobs_queued (tenant=? AND kind=?"),
         (CLAIM_BEGUN, "jobs_begun (tenant=? AND kind=?"),
         (REAP, "jobs_by_state (state=?"),
