@@ -37,15 +37,36 @@ fn hold(process: u32, name: &str) -> std::thread::JoinHandle<()> {
     // A thread is held by the one that took it, and let go when that one ends.
     let holder = std::thread::spawn(move || {
         ptrace::seize(thread, Options::empty()).expect("a thread that may be traced");
-        ptrace::interrupt(thread).expect("a thread that is traced");
         let all = Some(WaitPidFlag::__WALL);
-        waitpid(thread, all).expect("a thread that stands still");
+        loop {
+            ptrace::interrupt(thread).expect("a thread that is traced");
+            waitpid(thread, all).expect("a thread that stands still");
+            if !is_in_libc(process, thread) {
+                break;
+            }
+            ptrace::cont(thread, None).expect("a thread that goes on");
+        }
         held.send(()).expect("a test that waits");
         // The end of the thread, without which that of its process is not told.
         while waitpid(thread, all).is_ok_and(|status| status.pid().is_some() && !ended(status)) {}
     });
     is_held.recv().expect("a thread that is held");
     holder
+}
+
+/// Whether a thread that stands still is in the C library, where it may hold the lock of the allocator, which all other threads need.
+fn is_in_libc(process: u32, thread: Pid) -> bool {
+    let folder = PathBuf::from(format!("/proc/{process}"));
+    let state = std::fs::read_to_string(folder.join(format!("task/{thread}/syscall"))).unwrap();
+    let place = state.split_whitespace().last().unwrap();
+    let number = |text: &str| u64::from_str_radix(text.trim_start_matches("0x"), 16).unwrap();
+    let maps = std::fs::read_to_string(folder.join("maps")).unwrap();
+    let mut of_libc = maps.lines().filter(|line| line.contains("/libc"));
+    of_libc.any(|line| {
+        let (range, _) = line.split_once(' ').unwrap();
+        let (first, end) = range.split_once('-').unwrap();
+        (number(first)..number(end)).contains(&number(place))
+    })
 }
 
 fn ended(status: nix::sys::wait::WaitStatus) -> bool {
