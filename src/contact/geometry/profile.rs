@@ -10,7 +10,7 @@ use crate::contact::geometry::orientation::{
     self, Flange, FormatSenses, FoundSenses, StatedSenses, SureBody,
 };
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
-use crate::contact::geometry::profile_quality::{KnownStretches, Points, PointsRead};
+use crate::contact::geometry::profile_quality::{Points, PointsRead};
 use crate::contact::geometry::{crossing, profile_quality};
 use crate::contact::lazy_field::LazyField;
 use crate::contact::remark::list::Remark;
@@ -70,7 +70,6 @@ pub struct Reading {
 pub struct Profile {
     curve: PlaneCurve,
     measured: Arc<MeasuredCurve>,
-    stretches: Arc<KnownStretches>,
     /// Remarks on what was found and changed when it was read.
     pub remarks: Vec<Remark>,
 }
@@ -188,7 +187,6 @@ impl Profile {
         Profile {
             curve: PlaneCurve::through(&measured.points, &measured.along, measured.smoothing),
             measured: Arc::new(measured),
-            stretches: Arc::default(),
             remarks,
         }
     }
@@ -245,12 +243,6 @@ impl Profile {
             digits: self.measured.digits,
             rounding: self.measured.rounding,
         }
-    }
-
-    /// How the readings of its points differ, where that was asked for.
-    #[must_use]
-    pub fn stretches(&self) -> &KnownStretches {
-        &self.stretches
     }
 
     /// Median distance of neighbouring points in mm.

@@ -8,7 +8,6 @@
 
 use std::cell::RefCell;
 use std::f64::consts::{PI, TAU};
-use std::sync::{Arc, Mutex, PoisonError};
 
 use realfft::RealFftPlanner;
 
@@ -532,12 +531,8 @@ pub struct Roughness {
     pub ambiguity: f64,
 }
 
-/// Length in mm to whose multiples stretches are cut: contacts that lie near each other share one. Chosen by judgement: contacts of one pair
-/// then need a dozen stretches.
+/// Length in mm to whose multiples stretches are cut, so that contacts that lie near each other are judged on the same one. Chosen by judgement.
 const STRETCH: f64 = 10.0;
-/// Most stretches that are kept for one profile. Keeps the memory small; it changes times, no answer.
-const STRETCHES_MAX: usize = 32;
-
 /// How the readings of a stretch of a profile differ, at places with equal distances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProfileStretch {
@@ -551,35 +546,6 @@ pub struct ProfileStretch {
     ambiguity: Vec<f64>,
     /// Deviation of the waves, from their median.
     everywhere: f64,
-}
-
-/// The stretches of one profile that were asked for. They follow from the profile, so that two of them never make profiles differ.
-#[derive(Debug, Default)]
-pub struct KnownStretches(Mutex<Vec<([f64; 2], Arc<ProfileStretch>)>>);
-
-impl PartialEq for KnownStretches {
-    fn eq(&self, _: &KnownStretches) -> bool {
-        true
-    }
-}
-
-impl KnownStretches {
-    /// The stretch about a contact on the profile with these points and this curve through them.
-    #[must_use]
-    pub fn about(&self, reading: &PointsRead, contact: [f64; 2]) -> Arc<ProfileStretch> {
-        let window = stretch_about(reading.points, contact);
-        // A panic while it was held leaves the list as it is: only whole stretches are put there.
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, stretch)) = known.iter().find(|(of, _)| *of == window) {
-            return Arc::clone(stretch);
-        }
-        let stretch = Arc::new(ProfileStretch::new(reading, window));
-        if known.len() == STRETCHES_MAX {
-            known.remove(0);
-        }
-        known.push((window, Arc::clone(&stretch)));
-        stretch
-    }
 }
 
 /// The points of a profile and the curve in use.
@@ -608,8 +574,10 @@ fn stretch_about(points: Points, [low, high]: [f64; 2]) -> [f64; 2] {
 }
 
 impl ProfileStretch {
-    /// The readings compared between two places in mm along the profile.
-    fn new(reading: &PointsRead, window: [f64; 2]) -> ProfileStretch {
+    /// The readings compared about a contact, given by its ends in mm along the profile.
+    #[must_use]
+    pub fn about(reading: &PointsRead, contact: [f64; 2]) -> ProfileStretch {
+        let window = stretch_about(reading.points, contact);
         let PointsRead {
             points,
             curve,
@@ -794,7 +762,6 @@ pub fn polygon_of(reading: &PointsRead, range: [usize; 2]) -> Option<f64> {
 #[must_use]
 pub fn under_contact(
     reading: &PointsRead,
-    known: &KnownStretches,
     contact: [f64; 2],
     modulus: f64,
 ) -> UnderContact {
@@ -819,7 +786,7 @@ pub fn under_contact(
     let near = half.max(REFERENCE_MIN);
     let near = points.numbers([low - near, high + near]);
     let noise = noise_of(reading, around).or_else(|| noise_of(reading, whole));
-    let roughness = known.about(reading, contact).roughness(contact, modulus);
+    let roughness = ProfileStretch::about(reading, contact).roughness(contact, modulus);
     let rounding = reading.rounding;
     let rounding = rounding.filter(|step| noise.is_some_and(|noise| noise <= ROUNDED_MAX * step));
     let white = rounding.is_some() || is_white(points, around);
@@ -1137,7 +1104,7 @@ mod readings_tests {
             digits: 0.0,
             rounding: None,
         };
-        let stretch = KnownStretches::default().about(&reading, CONTACT);
+        let stretch = ProfileStretch::about(&reading, CONTACT);
         stretch.roughness(CONTACT, MODULUS)
     }
 

@@ -60,7 +60,7 @@ impl<'a> Under<'a> {
             body,
             profile,
             contact,
-            found: under_contact(&profile.read(), profile.stretches(), contact, modulus),
+            found: under_contact(&profile.read(), contact, modulus),
         }
     }
 

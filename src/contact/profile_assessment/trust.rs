@@ -327,7 +327,7 @@ const NEAR: f64 = 5.0;
 /// Noise and spacing of a profile near a place in mm along it. A few displaced points are no noise: smoothing only spreads their error.
 fn grain_near(profile: &Profile, place: f64, modulus: f64) -> Grain {
     let contact = [place - NEAR, place + NEAR];
-    let found = under_contact(&profile.read(), profile.stretches(), contact, modulus);
+    let found = under_contact(&profile.read(), contact, modulus);
     let noise = found.noise.filter(|_| found.oddity.is_none());
     Grain {
         noise: noise.unwrap_or(0.0),
