@@ -760,11 +760,7 @@ pub fn polygon_of(reading: &PointsRead, range: [usize; 2]) -> Option<f64> {
 
 /// Quality of the points of a body under the contact `[low, high]` (mm along the profile); the contact modulus is in MPa.
 #[must_use]
-pub fn under_contact(
-    reading: &PointsRead,
-    contact: [f64; 2],
-    modulus: f64,
-) -> UnderContact {
+pub fn under_contact(reading: &PointsRead, contact: [f64; 2], modulus: f64) -> UnderContact {
     let points = reading.points;
     let [low, high] = contact;
     let half = 0.5 * (high - low);

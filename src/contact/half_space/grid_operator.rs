@@ -1,11 +1,13 @@
-//! Normal influence between equal rectangles on a regular grid, applied as a convolution: by transforms along the longer axis, where the
-//! grid is padded, and as plain sums along the shorter one.
+//! Normal influence between equal rectangles on a regular grid, applied as a convolution by transforms along both axes.
+
+use std::sync::Arc;
 
 use pulp::NullaryFnOnce;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
 
-use crate::contact::half_space::line_sums::{LineSums, Spectra};
-use crate::contact::half_space::transforms::{FftFloat, FftPlanners, FftPlans};
+use crate::contact::half_space::transforms::FftFloat;
 use crate::contact::numerics::simd;
 use crate::contact::numerics::simd::Float;
 
@@ -15,119 +17,121 @@ use crate::contact::numerics::simd::Float;
 /// With `E* = G/(1−ν)` the displacement is `1/(πE*) Σ p [[ q asinh(p/|q|) + p asinh(q/|p|) ]]` (Boussinesq; Love 1929),
 /// the coefficient [`rectangle`](crate::contact::half_space::kernels::rectangle) calls `zz`. Values are stored at
 /// `j * nx + i`, i along x. The product equals that of the dense matrix to about 1e-14 (`f64`) or 1e-6 (`f32`) of the largest displacement.
-///
-/// Lines along the longer axis are padded to twice their length and transformed, two as the real and the imaginary part of one. Between the
-/// lines each wave is summed by itself. In place of transforms along both axes this takes 2 % off a row with one patch, on 31 × 31 cells, and
-/// 12 % off one with two, on 31 × 150 (`cargo bench --bench wheels -- rows 1000`).
-pub struct GridOperator<T> {
+pub struct GridOperator<T: FftFloat> {
     nx: usize,
     ny: usize,
-    /// Lines along the longer axis: how many, of how many cells, and where their cells are stored.
-    lines: GridLines,
-    /// Padded length of a line.
-    width: usize,
     /// Displacement of a cell per unit of its own pressure.
     own: f64,
     /// Coefficients at a distance of i and j cells, i from `1 − nx` to `nx − 1` and j from 0, row by row.
     coefficients: Vec<f64>,
-    /// Transforms of the coefficients relative to `own`, divided by the padded length: one for each distance of two lines. They are
-    /// real because the coefficients are even.
-    sums: LineSums<T>,
-    plans: FftPlans<T>,
+    /// Transform of the coefficients relative to `own`, divided by the padded sizes, wave by wave along x. It is real because the coefficients
+    /// are even.
+    factors: Vec<T>,
+    plans: GridPlans<T>,
 }
 
-/// The cells of a grid as lines: cell i of line m is stored at `m * between + i * along`.
-#[derive(Debug, Clone, Copy)]
-struct GridLines {
-    count: usize,
-    cells: usize,
-    between: usize,
-    along: usize,
-}
-
-impl GridLines {
-    /// The lines along the longer axis.
-    fn of(nx: usize, ny: usize) -> GridLines {
-        let [count, cells, between, along] = if nx >= ny {
-            [ny, nx, nx, 1]
-        } else {
-            [nx, ny, 1, nx]
-        };
-        GridLines {
-            count,
-            cells,
-            between,
-            along,
-        }
-    }
-
-    fn pairs(self) -> usize {
-        self.count.div_ceil(2)
-    }
-
-    /// The first and the last line with a value that is not 0; the first one if there is none.
-    fn loaded(self, values: &[f64]) -> [usize; 2] {
-        let is_loaded = |number: &usize| {
-            let mut any = false;
-            self.each(*number, |_, place| any |= values[place] != 0.0);
-            any
-        };
-        let first = (0..self.count).find(is_loaded).unwrap_or(0);
-        let last = (0..self.count).rfind(is_loaded).unwrap_or(0);
-        [first, last]
-    }
-
-    /// Calls with each cell of a line, from its first on, and the place of its value.
-    #[inline(always)]
-    fn each(self, number: usize, mut call: impl FnMut(usize, usize)) {
-        let first = number * self.between;
-        // Two loops, because the compiler runs the one over neighbours in the machine's lanes.
-        if self.along == 1 {
-            (0..self.cells).for_each(|i| call(i, first + i));
-        } else {
-            (0..self.cells).for_each(|i| call(i, first + i * self.along));
-        }
-    }
+/// Transforms of a grid that is padded to twice its size: real along x, complex along y.
+struct GridPlans<T> {
+    rows: [usize; 2],
+    forward: Arc<dyn RealToComplex<T>>,
+    backward: Arc<dyn ComplexToReal<T>>,
+    across: [Arc<dyn Fft<T>>; 2],
 }
 
 /// Plans and buffers for the products of one solve. It fits grids of any size and carries no state from one product to the next.
 pub struct GridWorkspace<T: FftFloat> {
-    planners: FftPlanners<T>,
-    /// Lines, two and two.
-    pairs: Vec<Complex<T>>,
+    along: RealFftPlanner<T>,
+    across: FftPlanner<T>,
+    row: Vec<T>,
+    /// Waves of one row.
+    waves: Vec<Complex<T>>,
+    /// Waves of all rows: those of one wave along x after those of another.
+    columns: Vec<Complex<T>>,
     scratch: Vec<Complex<T>>,
-    /// Spectra of pressures and of displacements.
-    spectra: [Spectra<T>; 2],
 }
 
 impl<T: FftFloat> Default for GridWorkspace<T> {
     fn default() -> Self {
         GridWorkspace {
-            planners: FftPlanners::default(),
-            pairs: Vec::new(),
+            along: RealFftPlanner::new(),
+            across: FftPlanner::new(),
+            row: Vec::new(),
+            waves: Vec::new(),
+            columns: Vec::new(),
             scratch: Vec::new(),
-            spectra: [Spectra::default(), Spectra::default()],
         }
     }
 }
 
 impl<T: FftFloat> GridWorkspace<T> {
-    /// Resizes the buffers for an operator.
-    fn fit(&mut self, operator: &GridOperator<T>) {
-        let plans = &operator.plans;
-        let scratch = [
-            plans.forward.get_inplace_scratch_len(),
-            plans.backward.get_inplace_scratch_len(),
-        ];
+    fn plans(&mut self, nx: usize, ny: usize) -> GridPlans<T> {
+        let [width, height] = [nx, ny].map(|cells| smooth_even(2 * cells));
+        GridPlans {
+            rows: [width, height],
+            forward: self.along.plan_fft_forward(width),
+            backward: self.along.plan_fft_inverse(width),
+            across: [
+                self.across.plan_fft_forward(height),
+                self.across.plan_fft_inverse(height),
+            ],
+        }
+    }
+
+    /// Transforms the rows for which `fill` writes values into a buffer of zeros; the others are 0.
+    fn forward(&mut self, plans: &GridPlans<T>, mut fill: impl FnMut(usize, &mut [T]) -> bool) {
+        let [width, height] = plans.rows;
         let zero = Complex::new(T::zero(), T::zero());
-        self.pairs
-            .resize(operator.width * operator.lines.pairs(), zero);
-        self.scratch
-            .resize(scratch.into_iter().max().unwrap_or(0), zero);
-        let waves = operator.width / 2 + 1;
-        let [from, to] = &mut self.spectra;
-        from.fit(operator.lines.count, waves);
-        to.fit(operator.lines.count, waves);
+        self.row.resize(width, T::zero());
+        self.waves.resize(width / 2 + 1, zero);
+        self.columns.clear();
+        self.columns.resize((width / 2 + 1) * height, zero);
+        let scratch = [
+            plans.forward.get_scratch_len(),
+            plans.backward.get_scratch_len(),
+            plans.across[0].get_inplace_scratch_len(),
+            plans.across[1].get_inplace_scratch_len(),
+        ];
+        let most = scratch.into_iter().max().unwrap_or(0);
+        self.scratch.resize(most.max(self.scratch.len()), zero);
+        for j in 0..height {
+            self.row.fill(T::zero());
+            if !fill(j, &mut self.row) {
+                continue;
+            }
+            // The buffers have the lengths of the plans, so that no transform can fail.
+            let done = plans.forward.process_with_scratch(
+                &mut self.row,
+                &mut self.waves,
+                &mut self.scratch[..plans.forward.get_scratch_len()],
+            );
+            debug_assert!(done.is_ok());
+            for (column, wave) in self.columns.chunks_exact_mut(height).zip(&self.waves) {
+                column[j] = *wave;
+            }
+        }
+        plans.across[0].process_with_scratch(&mut self.columns, &mut self.scratch);
+    }
+
+    /// Transforms back, and hands over the first rows.
+    fn backward(&mut self, plans: &GridPlans<T>, rows: usize, mut take: impl FnMut(usize, &[T])) {
+        let [_, height] = plans.rows;
+        plans.across[1].process_with_scratch(&mut self.columns, &mut self.scratch);
+        for j in 0..rows {
+            for (column, wave) in self.columns.chunks_exact(height).zip(&mut self.waves) {
+                *wave = column[j];
+            }
+            // Rounding leaves imaginary parts where a real row has none.
+            self.waves[0].im = T::zero();
+            let last = self.waves.len() - 1;
+            self.waves[last].im = T::zero();
+            let done = plans.backward.process_with_scratch(
+                &mut self.waves,
+                &mut self.row,
+                &mut self.scratch[..plans.backward.get_scratch_len()],
+            );
+            debug_assert!(done.is_ok());
+            take(j, &self.row);
+        }
     }
 }
 
@@ -140,22 +144,30 @@ impl<T: FftFloat> GridOperator<T> {
         contact_modulus: f64,
         workspace: &mut GridWorkspace<T>,
     ) -> Self {
-        let cells = GridLines::of(nx, ny);
-        let width = smooth_even(2 * cells.cells);
+        let plans = workspace.plans(nx, ny);
         let coefficients = coefficients(nx, ny, dx, dy, contact_modulus);
-        let mut operator = GridOperator {
+        let [width, height] = plans.rows;
+        let scale = 1.0 / (coefficients[0] * (width * height) as f64);
+        workspace.forward(&plans, |j, row| {
+            let distance = j.min(height - j);
+            if distance >= ny {
+                return false;
+            }
+            let own = &coefficients[distance * nx..(distance + 1) * nx];
+            for (i, coefficient) in own.iter().enumerate() {
+                row[i] = T::of(scale * coefficient);
+                row[(width - i) % width] = row[i];
+            }
+            true
+        });
+        GridOperator {
             nx,
             ny,
-            lines: cells,
-            width,
             own: coefficients[0],
+            factors: workspace.columns.iter().map(|wave| wave.re).collect(),
             coefficients: lines(nx, &coefficients),
-            sums: LineSums::new(cells.count, width / 2 + 1),
-            plans: workspace.planners.plans(width),
-        };
-        workspace.fit(&operator);
-        operator.transform_coefficients(&coefficients, workspace);
-        operator
+            plans,
+        }
     }
 
     /// Displacement at the centre of a cell per unit of its own pressure, in mm/MPa.
@@ -176,28 +188,24 @@ impl<T: FftFloat> GridOperator<T> {
             displacement.fill(0.0);
             return;
         }
-        workspace.fit(self);
-        let (lines, width) = (self.lines, self.width);
-        // A pair of lines leaves twice its spectra.
-        let (down, up) = (0.5 / largest, largest * self.own);
-        let [first, last] = lines.loaded(pressure).map(|line| line / 2);
-        let GridWorkspace {
-            pairs,
-            scratch,
-            spectra,
-            ..
-        } = workspace;
-        let loaded = &mut pairs[first * width..(last + 1) * width];
-        for (k, pair) in loaded.chunks_exact_mut(width).enumerate() {
-            let one = 2 * (first + k);
-            fill(pair, one, lines, |p| T::of(p * down), pressure);
+        let (nx, up) = (self.nx, largest * self.own);
+        workspace.forward(&self.plans, |j, row| {
+            let Some(own) = pressure.get(j * nx..(j + 1) * nx) else {
+                return false;
+            };
+            for (value, p) in row.iter_mut().zip(own) {
+                *value = T::of(p / largest);
+            }
+            own.iter().any(|p| *p != 0.0)
+        });
+        for (wave, factor) in workspace.columns.iter_mut().zip(&self.factors) {
+            *wave = *wave * *factor;
         }
-        self.plans.forward.process_with_scratch(loaded, scratch);
-        simd::dispatch(self.sums.of_pairs(pairs, first..last + 1, spectra));
-        self.plans.backward.process_with_scratch(pairs, scratch);
-        for (k, pair) in pairs.chunks_exact(width).enumerate() {
-            spread(&pair[..lines.cells], 2 * k, lines, up, displacement);
-        }
+        workspace.backward(&self.plans, self.ny, |j, row| {
+            for (u, value) in displacement[j * nx..(j + 1) * nx].iter_mut().zip(row) {
+                *u = up * (*value).into();
+            }
+        });
     }
 
     /// Adds the displacement in mm at every centre caused by additional pressures in MPa on some cells.
@@ -208,77 +216,6 @@ impl<T: FftFloat> GridOperator<T> {
             changes,
             displacement,
         });
-    }
-
-    /// Fills the transforms of the coefficients; `coefficients[j * nx + i]` belongs to the distance of i and j cells.
-    fn transform_coefficients(&mut self, coefficients: &[f64], workspace: &mut GridWorkspace<T>) {
-        let (lines, width) = (self.lines, self.width);
-        let scale = 1.0 / (self.own * width as f64);
-        let GridWorkspace { pairs, scratch, .. } = workspace;
-        for (k, pair) in pairs.chunks_exact_mut(width).enumerate() {
-            fill(pair, 2 * k, lines, |c| T::of(c * scale), coefficients);
-            for i in 1..lines.cells {
-                pair[width - i] = pair[i];
-            }
-        }
-        self.plans.forward.process_with_scratch(pairs, scratch);
-        for (k, pair) in pairs.chunks_exact(width).enumerate() {
-            // Spectra of even lines are real: each keeps the part that it came in.
-            self.sums.set(2 * k, pair.iter().map(|value| value.re));
-            if 2 * k + 1 < lines.count {
-                self.sums.set(2 * k + 1, pair.iter().map(|value| value.im));
-            }
-        }
-    }
-}
-
-/// Two lines as real and imaginary part, padded with 0.
-fn fill<T: FftFloat>(
-    pair: &mut [Complex<T>],
-    one: usize,
-    lines: GridLines,
-    of: impl Fn(f64) -> T,
-    values: &[f64],
-) {
-    let zero = T::zero();
-    let (own, padding) = pair.split_at_mut(lines.cells);
-    if one + 1 == lines.count {
-        lines.each(one, |i, place| {
-            own[i] = Complex::new(of(values[place]), zero);
-        });
-    } else if lines.along == 1 {
-        let (re, im) = values[one * lines.between..].split_at(lines.cells);
-        for ((cell, re), im) in own.iter_mut().zip(re).zip(im) {
-            *cell = Complex::new(of(*re), of(*im));
-        }
-    } else {
-        for (cell, row) in own.iter_mut().zip(values.chunks_exact(lines.along)) {
-            *cell = Complex::new(of(row[one]), of(row[one + 1]));
-        }
-    }
-    padding.fill(Complex::new(zero, zero));
-}
-
-/// What [`fill`] does, the other way, and times a factor.
-fn spread<T: FftFloat>(
-    pair: &[Complex<T>],
-    one: usize,
-    lines: GridLines,
-    factor: f64,
-    values: &mut [f64],
-) {
-    let of = |part: T| factor * part.into();
-    if one + 1 == lines.count {
-        lines.each(one, |i, place| values[place] = of(pair[i].re));
-    } else if lines.along == 1 {
-        let (re, im) = values[one * lines.between..].split_at_mut(lines.cells);
-        for ((cell, re), im) in pair.iter().zip(re).zip(im) {
-            (*re, *im) = (of(cell.re), of(cell.im));
-        }
-    } else {
-        for (cell, row) in pair.iter().zip(values.chunks_exact_mut(lines.along)) {
-            (row[one], row[one + 1]) = (of(cell.re), of(cell.im));
-        }
     }
 }
 
@@ -325,7 +262,7 @@ fn smooth_even(n: usize) -> usize {
     n
 }
 
-impl<T> std::fmt::Debug for GridOperator<T> {
+impl<T: FftFloat> std::fmt::Debug for GridOperator<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.debug_struct("GridOperator")
             .field("nx", &self.nx)

@@ -3,7 +3,6 @@
 pub mod bent_surface;
 pub mod grid_operator;
 pub mod kernels;
-pub mod line_sums;
 pub mod strip_operator;
 pub mod transforms;
 pub mod unlike_bodies;
