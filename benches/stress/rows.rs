@@ -277,18 +277,21 @@ fn evaluated(seed: u64) -> Class {
             }
         };
         for row in 0..EVALUATE[1] {
-            let force = [answer.force_x_n[row], answer.force_y_n[row]];
+            let force = [
+                answer.column("force_x_n")[row],
+                answer.column("force_y_n")[row],
+            ];
             let has = matches!(answer.status[row], RowStatus::Ok | RowStatus::TargetMissed);
             class.answered += usize::from(has);
             let limit = draw.limit(row);
             let above = if method == "fastsim" {
                 1e-9 * limit
             } else {
-                1.5 * answer.error_estimate[row]
+                1.5 * answer.column("error_estimate")[row]
             };
             let lawful = force[0].hypot(force[1]) <= limit + above
-                && answer.friction_power_n[row] >= -1e-9 * limit
-                && answer.moment_z_n_mm[row].abs() <= 2.0 * limit * draw.length(row);
+                && answer.column("friction_power_n")[row] >= -1e-9 * limit
+                && answer.column("moment_z_n_mm")[row].abs() <= 2.0 * limit * draw.length(row);
             if has != force.iter().all(|force| force.is_finite()) || has && !lawful {
                 class
                     .broken

@@ -79,7 +79,7 @@ fn ns_of_row(method: &str, radii: bool) -> f64 {
     }
     let checked = contact::check(&case, &Limits::default()).expect("a sound case");
     let rows = Rows::new(&case, &checked, columns).expect("sound rows");
-    best(|| rows.evaluate().friction_power_n.iter().sum())
+    best(|| rows.evaluate().column("friction_power_n").iter().sum())
 }
 
 /// Time in ns of one of [`VALUES`] values, the best of some runs.

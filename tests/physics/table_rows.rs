@@ -66,24 +66,32 @@ fn rows_are_answered_as_jobs_of_the_same_method_are() {
             let within = if method == "table" { 0.0 } else { 2e-3 };
             let near = |found: f64, known: f64, unit: f64| (found - known).abs() <= within * unit;
             assert!(
-                near(answer.force_x_n[row], point.force_x_n, limit),
+                near(answer.column("force_x_n")[row], point.force_x_n, limit),
                 "{method} {row}: {answer:?} {point:?}"
             );
             assert!(
-                near(answer.force_y_n[row], point.force_y_n, limit),
+                near(answer.column("force_y_n")[row], point.force_y_n, limit),
                 "{method} {row}: {answer:?} {point:?}"
             );
             assert!(
-                near(answer.moment_z_n_mm[row], point.moment_z_n_mm, limit * c),
+                near(
+                    answer.column("moment_z_n_mm")[row],
+                    point.moment_z_n_mm,
+                    limit * c
+                ),
                 "{method} {row}"
             );
             assert!(
-                near(answer.friction_power_n[row], point.friction_power_n, limit),
+                near(
+                    answer.column("friction_power_n")[row],
+                    point.friction_power_n,
+                    limit
+                ),
                 "{method} {row}"
             );
             let stated = point.error_estimate.expect("a bound").force_x_n;
             assert!(
-                near(answer.error_estimate[row], stated, limit),
+                near(answer.column("error_estimate")[row], stated, limit),
                 "{method} {row}"
             );
             let known = [RowStatus::Ok, RowStatus::TargetMissed]
@@ -100,7 +108,7 @@ fn rows_outside_the_table_or_above_the_target_say_so_and_faults_name_row_and_col
     let (_, answer) = rows("auto", contact.clone(), &columns);
     let answer = answer.expect("sound rows");
     assert_eq!(answer.status[..2], [RowStatus::Ok, RowStatus::NotCovered]);
-    assert!(answer.force_x_n[0].is_finite() && answer.force_x_n[1].is_nan());
+    assert!(answer.column("force_x_n")[0].is_finite() && answer.column("force_x_n")[1].is_nan());
     let columns = [
         ("/load/normal_force_n", vec![8e4, -1.0, 8e4]),
         ("/motion/creepage_x", vec![1e-3, 1e-3]),
@@ -153,10 +161,10 @@ fn many_rows_are_answered_as_a_few_are() {
             let at = row % (count / 2);
             let of = |answer: &RowsAnswer, row: usize| {
                 [
-                    answer.force_x_n[row],
-                    answer.force_y_n[row],
-                    answer.stick_share[row],
-                    answer.error_estimate[row],
+                    answer.column("force_x_n")[row],
+                    answer.column("force_y_n")[row],
+                    answer.column("stick_share")[row],
+                    answer.column("error_estimate")[row],
                 ]
             };
             assert_eq!(of(&whole, row), of(half, at), "{row}");

@@ -18,34 +18,27 @@ use crate::contact::method::{Method, TractionBound};
 use crate::contact::post::heat::ThermalTask;
 use crate::contact::rolling::task::{Motion, RelativeTo};
 
-impl From<SideName> for Side {
-    fn from(name: SideName) -> Side {
-        match name {
-            SideName::Left => Side::Left,
-            SideName::Right => Side::Right,
-        }
-    }
+/// Words that stand for a type of the numerics variant by variant.
+macro_rules! words {
+    ($($from:ident => $to:ident { $($name:ident),+ })+) => {
+        $(impl From<$from> for $to {
+            fn from(name: $from) -> $to {
+                match name {
+                    $($from::$name => $to::$name),+
+                }
+            }
+        })+
+    };
 }
 
-impl From<UnitName> for LengthUnit {
-    fn from(name: UnitName) -> LengthUnit {
-        match name {
-            UnitName::Mm => LengthUnit::Mm,
-            UnitName::Cm => LengthUnit::Cm,
-            UnitName::M => LengthUnit::M,
-            UnitName::Inch => LengthUnit::Inch,
-        }
-    }
-}
-
-impl From<FormatName> for Format {
-    fn from(name: FormatName) -> Format {
-        match name {
-            FormatName::Columns => Format::Columns,
-            FormatName::Simpack => Format::Simpack,
-            FormatName::Miniprof => Format::Miniprof,
-        }
-    }
+words! {
+    SideName => Side { Left, Right }
+    UnitName => LengthUnit { Mm, Cm, M, Inch }
+    FormatName => Format { Columns, Simpack, Miniprof }
+    FallName => FallForm { Exponential, Rational, Linear }
+    RelativeToName => RelativeTo { FrictionLimit, Force }
+    TractionBoundName => TractionBound { Elliptic, Parabolic }
+    Method => MethodName { BoundaryElement, LiuHsu, Fastsim, Table }
 }
 
 impl From<MotionWords> for Motion {
@@ -64,16 +57,6 @@ impl From<Motion> for MotionWords {
             creepage_x: motion.creepage_x,
             creepage_y: motion.creepage_y,
             spin_per_mm: motion.spin_per_mm,
-        }
-    }
-}
-
-impl From<FallName> for FallForm {
-    fn from(name: FallName) -> FallForm {
-        match name {
-            FallName::Exponential => FallForm::Exponential,
-            FallName::Rational => FallForm::Rational,
-            FallName::Linear => FallForm::Linear,
         }
     }
 }
@@ -177,35 +160,6 @@ impl From<MethodName> for Method {
             MethodName::LiuHsu => Method::LiuHsu,
             MethodName::Fastsim => Method::Fastsim,
             MethodName::Table => Method::Table,
-        }
-    }
-}
-
-impl From<Method> for MethodName {
-    fn from(method: Method) -> MethodName {
-        match method {
-            Method::BoundaryElement => MethodName::BoundaryElement,
-            Method::LiuHsu => MethodName::LiuHsu,
-            Method::Fastsim => MethodName::Fastsim,
-            Method::Table => MethodName::Table,
-        }
-    }
-}
-
-impl From<RelativeToName> for RelativeTo {
-    fn from(name: RelativeToName) -> RelativeTo {
-        match name {
-            RelativeToName::FrictionLimit => RelativeTo::FrictionLimit,
-            RelativeToName::Force => RelativeTo::Force,
-        }
-    }
-}
-
-impl From<TractionBoundName> for TractionBound {
-    fn from(name: TractionBoundName) -> TractionBound {
-        match name {
-            TractionBoundName::Elliptic => TractionBound::Elliptic,
-            TractionBoundName::Parabolic => TractionBound::Parabolic,
         }
     }
 }

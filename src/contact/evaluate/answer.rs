@@ -1,7 +1,5 @@
 //! What rows are answered with: columns of numbers, and a word for each row.
 
-use std::collections::BTreeMap;
-
 use crate::contact::evaluate::many_answer::{GRADIENT_NAMES, ManyAnswer, ManyStatus};
 
 /// What became of a row.
@@ -55,34 +53,31 @@ impl RowStatus {
     }
 }
 
+/// Names of the columns of numbers that every answer has.
+pub const ROW_NAMES: [&str; 6] = [
+    "force_x_n",
+    "force_y_n",
+    "moment_z_n_mm",
+    "error_estimate",
+    "friction_power_n",
+    "stick_share",
+];
+
 /// The answers to rows, one number of each column for a row; not a number where a row has none.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RowsAnswer {
-    /// Longitudinal force on the lower body in N.
-    pub force_x_n: Vec<f64>,
-    /// Lateral force in N.
-    pub force_y_n: Vec<f64>,
-    /// Moment about the centre of the ellipse in N·mm.
-    pub moment_z_n_mm: Vec<f64>,
-    /// Bound of the error of either force in N; that of the moment is this times √(ab).
-    pub error_estimate: Vec<f64>,
-    /// ν_x F_x + ν_y F_y + φ M_z in N.
-    pub friction_power_n: Vec<f64>,
-    /// Share of the patch that sticks.
-    pub stick_share: Vec<f64>,
-    /// Derivatives, if they were asked for, named by [`GRADIENT_NAMES`].
-    pub gradients: Option<[Vec<f64>; 9]>,
-    /// Further columns of rows that need the solver, with their names.
-    pub more: Vec<(&'static str, Vec<f64>)>,
+    /// The columns with their names: [`ROW_NAMES`], derivatives ([`GRADIENT_NAMES`]) if they were asked for, further ones of rows that need
+    /// the solver. The error estimate is the bound of that of either force; that of the moment is this times √(ab).
+    pub numbers: Vec<(&'static str, Vec<f64>)>,
     /// What became of the rows.
     pub status: Vec<RowStatus>,
 }
 
-/// The numbers of a row, in the order of [`RowsAnswer::columns`].
+/// The numbers of a row, in the order of [`ROW_NAMES`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RowAnswer {
-    pub(crate) numbers: [f64; 6],
-    pub(crate) gradients: [f64; 9],
+    pub(crate) numbers: [f64; ROW_NAMES.len()],
+    pub(crate) gradients: [f64; GRADIENT_NAMES.len()],
     pub(crate) status: RowStatus,
 }
 
@@ -90,19 +85,9 @@ impl RowAnswer {
     /// A row without an answer.
     pub(crate) fn without(status: RowStatus) -> RowAnswer {
         RowAnswer {
-            numbers: [f64::NAN; 6],
-            gradients: [f64::NAN; 9],
+            numbers: [f64::NAN; ROW_NAMES.len()],
+            gradients: [f64::NAN; GRADIENT_NAMES.len()],
             status,
-        }
-    }
-
-    /// The row, without its answer if a number is not finite.
-    fn finite(self, with_gradients: bool) -> RowAnswer {
-        let gradients = self.gradients.iter().filter(|_| with_gradients);
-        let mut answered = self.numbers.iter().chain(gradients);
-        match self.status.has_answer() && !answered.all(|number| number.is_finite()) {
-            true => RowAnswer::without(RowStatus::NotFinite),
-            false => self,
         }
     }
 }
@@ -110,33 +95,25 @@ impl RowAnswer {
 impl RowsAnswer {
     /// Room for so many rows.
     pub(crate) fn with_capacity(rows: usize, gradients: bool) -> RowsAnswer {
-        let column = || Vec::with_capacity(rows);
+        let more = GRADIENT_NAMES.into_iter().filter(|_| gradients);
+        let names = ROW_NAMES.into_iter().chain(more);
         RowsAnswer {
-            force_x_n: column(),
-            force_y_n: column(),
-            moment_z_n_mm: column(),
-            error_estimate: column(),
-            friction_power_n: column(),
-            stick_share: column(),
-            gradients: gradients.then(|| std::array::from_fn(|_| column())),
-            more: Vec::new(),
+            numbers: names.map(|name| (name, Vec::with_capacity(rows))).collect(),
             status: Vec::with_capacity(rows),
         }
     }
 
-    /// Adds a row. No other function writes rows, so all numbers of a row with an answer are finite.
+    /// Adds a row. No other function writes rows; a row with a number that is not finite has no answer.
     pub(crate) fn push(&mut self, row: RowAnswer) {
-        let row = row.finite(self.gradients.is_some());
-        let columns = [
-            &mut self.force_x_n,
-            &mut self.force_y_n,
-            &mut self.moment_z_n_mm,
-            &mut self.error_estimate,
-            &mut self.friction_power_n,
-            &mut self.stick_share,
-        ];
-        let gradients = self.gradients.iter_mut().flatten().zip(row.gradients);
-        for (column, number) in columns.into_iter().zip(row.numbers).chain(gradients) {
+        let of = |row: RowAnswer| row.numbers.into_iter().chain(row.gradients);
+        let is_finite = of(row)
+            .take(self.numbers.len())
+            .all(|number| number.is_finite());
+        let row = match row.status.has_answer() && !is_finite {
+            true => RowAnswer::without(RowStatus::NotFinite),
+            false => row,
+        };
+        for ((_, column), number) in self.numbers.iter_mut().zip(of(row)) {
             column.push(number);
         }
         self.status.push(row.status);
@@ -145,81 +122,45 @@ impl RowsAnswer {
     /// Bytes that it takes.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let numbers: usize = self.columns().iter().map(|(_, column)| column.len()).sum();
-        size_of::<f64>() * numbers + self.status.len()
+        (size_of::<f64>() * self.numbers.len() + 1) * self.status.len()
     }
 
     /// The columns of numbers with their names, in their order.
     #[must_use]
     pub fn columns(&self) -> Vec<(&'static str, &[f64])> {
-        let mut columns: Vec<(&'static str, &[f64])> = vec![
-            ("force_x_n", &self.force_x_n),
-            ("force_y_n", &self.force_y_n),
-            ("moment_z_n_mm", &self.moment_z_n_mm),
-            ("error_estimate", &self.error_estimate),
-            ("friction_power_n", &self.friction_power_n),
-            ("stick_share", &self.stick_share),
-        ];
-        if let Some(gradients) = &self.gradients {
-            let named = GRADIENT_NAMES.iter().zip(gradients);
-            columns.extend(named.map(|(name, column)| (*name, &column[..])));
-        }
-        let more = self.more.iter();
-        columns.extend(more.map(|(name, column)| (*name, &column[..])));
-        columns
+        let columns = self.numbers.iter();
+        columns.map(|(name, column)| (*name, &column[..])).collect()
+    }
+
+    /// The numbers of a column; none if there is no such column.
+    #[must_use]
+    pub fn column(&self, name: &str) -> &[f64] {
+        let found = self.numbers.iter().find(|(own, _)| *own == name);
+        found.map_or(&[], |(_, numbers)| numbers)
     }
 
     /// All answers of the solver, with all of its columns.
     pub(crate) fn of_solver(answer: ManyAnswer) -> RowsAnswer {
-        let rows = answer.status.len();
-        let mut columns: BTreeMap<_, _> = answer
-            .columns
-            .names()
-            .into_iter()
-            .zip(answer.numbers)
-            .collect();
-        let mut take = |name| {
-            let column = columns.remove(name);
-            column.unwrap_or_else(|| vec![f64::NAN; rows])
-        };
-        let gradients = answer.columns.gradients;
-        let solved = RowsAnswer {
-            force_x_n: take("force_x_n"),
-            force_y_n: take("force_y_n"),
-            moment_z_n_mm: take("moment_z_n_mm"),
-            error_estimate: take("error_estimate"),
-            friction_power_n: take("friction_power_n"),
-            stick_share: take("stick_share"),
-            gradients: gradients.then(|| GRADIENT_NAMES.map(&mut take)),
-            more: Vec::new(),
-            status: answer
-                .status
-                .into_iter()
-                .map(RowStatus::of_solver)
-                .collect(),
-        };
         let names = answer.columns.names().into_iter();
+        let mut numbers: Vec<_> = names.zip(answer.numbers).collect();
+        let place = |name: &&'static str| {
+            let first = ROW_NAMES.iter().chain(&GRADIENT_NAMES);
+            first
+                .clone()
+                .position(|own| own == name)
+                .unwrap_or(usize::MAX)
+        };
+        numbers.sort_by_key(|(name, _)| place(name));
+        let status = answer.status.into_iter().map(RowStatus::of_solver);
         RowsAnswer {
-            more: names
-                .filter_map(|name| Some((name, columns.remove(name)?)))
-                .collect(),
-            ..solved
+            numbers,
+            status: status.collect(),
         }
     }
 
     /// Replaces rows by answers of the solver, in the same order.
     pub(crate) fn replace(&mut self, rows: &[usize], solved: &RowsAnswer) {
-        let columns = [
-            (&mut self.force_x_n, &solved.force_x_n),
-            (&mut self.force_y_n, &solved.force_y_n),
-            (&mut self.moment_z_n_mm, &solved.moment_z_n_mm),
-            (&mut self.error_estimate, &solved.error_estimate),
-            (&mut self.friction_power_n, &solved.friction_power_n),
-            (&mut self.stick_share, &solved.stick_share),
-        ];
-        let gradients = self.gradients.iter_mut().flatten();
-        let gradients = gradients.zip(solved.gradients.iter().flatten());
-        for (column, numbers) in columns.into_iter().chain(gradients) {
+        for ((_, column), (_, numbers)) in self.numbers.iter_mut().zip(&solved.numbers) {
             for (row, number) in rows.iter().zip(numbers) {
                 column[*row] = *number;
             }

@@ -220,23 +220,24 @@ fn take(
         return true;
     }
     let area = std::f64::consts::PI * c * c;
-    let error = evaluated.error_estimate[row];
+    let mut numbers = evaluated.numbers.iter().map(|(_, column)| column[row]);
+    let mut next = || numbers.next().unwrap_or(f64::NAN);
+    let [x, y, moment, error, power, stick] = std::array::from_fn(|_| next());
+    let slopes: Vec<f64> = numbers.collect();
     let numbers: RowNumbers = [
         normal_force,
-        evaluated.force_x_n[row],
-        evaluated.force_y_n[row],
-        evaluated.moment_z_n_mm[row],
+        x,
+        y,
+        moment,
         error,
         error * c,
-        evaluated.friction_power_n[row],
-        evaluated.stick_share[row],
+        power,
+        stick,
         area,
         1.5 * normal_force / area,
         1.0,
         f64::NAN,
     ];
-    let slopes = evaluated.gradients.iter().flatten();
-    let slopes = slopes.map(|column| column[row]);
     let solved = SolvedRow {
         target_met: status == RowStatus::Ok,
         method: Some(match method {

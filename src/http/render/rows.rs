@@ -130,18 +130,19 @@ mod tests {
 
     fn answer(rows: usize) -> RowsAnswer {
         let column = |scale: f64| (0..rows).map(|k| scale * k as f64).collect();
+        let mut numbers: Vec<(&'static str, Vec<f64>)> = vec![
+            ("force_x_n", column(0.1)),
+            ("force_y_n", column(-1e-9)),
+            ("moment_z_n_mm", column(1e12)),
+            ("error_estimate", column(3.0)),
+            ("friction_power_n", column(0.0)),
+            ("stick_share", column(1.0)),
+        ];
+        numbers[5].1[1] = f64::NAN;
         let mut answer = RowsAnswer {
-            force_x_n: column(0.1),
-            force_y_n: column(-1e-9),
-            moment_z_n_mm: column(1e12),
-            error_estimate: column(3.0),
-            friction_power_n: column(0.0),
-            stick_share: column(1.0),
-            gradients: None,
-            more: Vec::new(),
+            numbers,
             status: vec![RowStatus::Ok; rows],
         };
-        answer.stick_share[1] = f64::NAN;
         answer.status[1] = RowStatus::NotCovered;
         answer
     }
