@@ -1,11 +1,10 @@
 //! From the solved columns to the values at the nodes of the table.
 
 use railhead::contact::rolling::linear_theory::{coefficients, spin_coefficient};
-use railhead::contact::rolling::methods::table::coordinates::Shape;
 use railhead::contact::rolling::methods::table::evaluate::{growth, linear, linear_part};
 use railhead::contact::rolling::methods::table::spline::{
-    DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, VALUES, direction, pole,
-    ratio, size,
+    DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, Shape, VALUES,
+    direction, pole, ratio, size,
 };
 
 use crate::nodes::column_of;

@@ -7,9 +7,8 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use railhead::contact::rolling::linear_theory::coefficients;
-use railhead::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
 use railhead::contact::rolling::methods::table::evaluate::CreepTable;
-use railhead::contact::rolling::methods::table::spline::size;
+use railhead::contact::rolling::methods::table::spline::{Shape, size, spin_factor};
 use railhead::contact::rolling::operator_store::OperatorStore;
 use serde_json::{Value, json};
 

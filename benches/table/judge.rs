@@ -1,9 +1,8 @@
 //! The errors of the table at motions that it was not made from.
 
 use railhead::contact::rolling::linear_theory::coefficients;
-use railhead::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
 use railhead::contact::rolling::methods::table::evaluate::CreepTable;
-use railhead::contact::rolling::methods::table::spline::{cell, sigma};
+use railhead::contact::rolling::methods::table::spline::{Shape, cell, sigma, spin_factor};
 use serde_json::{Value, json};
 
 use crate::held_out::{CONTACTS, contact, name};

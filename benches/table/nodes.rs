@@ -6,10 +6,10 @@ use std::time::Instant;
 
 use cpu_time::{ProcessTime, ThreadTime};
 use railhead::contact::rolling::linear_theory::coefficients;
-use railhead::contact::rolling::methods::table::coordinates::Shape;
 use railhead::contact::rolling::methods::table::evaluate::CreepTable;
 use railhead::contact::rolling::methods::table::spline::{
-    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, direction, pole, ratio, size,
+    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, Shape, direction, pole, ratio,
+    size,
 };
 use railhead::contact::rolling::operator_store::OperatorStore;
 

@@ -9,10 +9,9 @@ use thiserror::Error;
 
 use crate::contact::case::solver::Limits;
 use crate::contact::case::words::contact::{
-    Contact, CrossSection, Elastic, FormatName, InfluenceName, Load, Material, SideName, Smoothing,
-    SurfaceName,
+    Contact, CrossSection, Elastic, FormatName, Friction, InfluenceName, Load, Material, SideName,
+    Smoothing, SurfaceName,
 };
-use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::motion::{AskedMotion, Motions, Wheelset};
 use crate::contact::case::words::solver::{Case, MethodName, Output, Solver};
 use crate::contact::error::{CaseError, Fault, SolveError};

@@ -185,7 +185,7 @@ fn solve_motions(
             (solution, fields)
         }
         NormalTask::Wheelset(wheelset) => {
-            wheelset::solve::solve(operators, case, wheelset, monitor)?
+            wheelset::balance::solve(operators, case, wheelset, monitor)?
         }
         NormalTask::Hertz(_) | NormalTask::Given(_) | NormalTask::Gap(_) => {
             let monitor = &TimeLimit::new(monitor, case.run.time_limit, case.problem.motions.len());

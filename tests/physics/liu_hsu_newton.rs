@@ -2,7 +2,7 @@
 
 use railhead::contact::mesh::Grading;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::methods::liu_hsu::newton_raphson::newton_step;
+use railhead::contact::rolling::methods::liu_hsu::active_set::newton_step;
 use railhead::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, DenseTask, SlipSystem, both_components,
 };

@@ -1,15 +1,22 @@
 //! What a case asks for beyond its contact: stresses below the surface, damage, temperatures.
+//!
+//! From words to task: where stresses below the surface are computed, and in which body.
 
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::solver::Limits;
-use crate::contact::case::subsurface;
-use crate::contact::case::words::contact::{ThermalBodyWords, ThermalWords};
+use crate::contact::case::words::contact::{Material, ThermalBodyWords, ThermalWords};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{Case, Output};
-use crate::contact::case::words::subsurface::{DamageModel, DamageWords, SubsurfaceWords};
+use crate::contact::case::words::subsurface::{
+    BodyName, DamageModel, DamageWords, DepthLineAt, FoundPlace, GridAxis, StressGrid,
+    SubsurfaceWords,
+};
 use crate::contact::error::Fault;
 use crate::contact::post::damage::DamageTask;
-use crate::contact::post::heat::{ThermalBody, ThermalTask};
+use crate::contact::post::local_power::{ThermalBody, ThermalTask};
+use crate::contact::post::subsurface::states::{
+    LoadedBody, PassageTask, StressPlaces, SubsurfaceTask,
+};
 use crate::contact::problem::physics::AfterTasks;
 
 impl Case {
@@ -28,7 +35,7 @@ impl AfterTasks {
     pub(crate) fn new(case: &Case) -> AfterTasks {
         let subsurface = case.subsurface.as_ref();
         AfterTasks {
-            subsurface: subsurface.map(|words| subsurface::task(words, &case.material)),
+            subsurface: subsurface.map(|words| task(words, &case.material)),
             damage: case.damage.as_ref().map(DamageTask::new),
             thermal: case
                 .thermal
@@ -49,7 +56,7 @@ pub(crate) struct AfterWords<'a> {
 impl AfterWords<'_> {
     /// Points of every motion at which stresses are answered.
     pub(crate) fn stress_points(&self) -> usize {
-        self.subsurface.map_or(0, subsurface::count)
+        self.subsurface.map_or(0, count)
     }
 
     /// Faults beside the motions, which were written as `given`.
@@ -61,8 +68,8 @@ impl AfterWords<'_> {
     ) -> Vec<Fault> {
         let mut faults = Vec::new();
         if let Some(words) = self.subsurface {
-            faults.extend(subsurface::fault(words, motions.motions.len(), limits));
-            faults.extend(subsurface::passage_fault(words, given));
+            faults.extend(fault(words, motions.motions.len(), limits));
+            faults.extend(passage_fault(words, given));
         }
         let archard = self
             .damage
@@ -97,6 +104,115 @@ impl From<ThermalBodyWords> for ThermalBody {
             density: words.density_kg_per_m3,
             specific_heat: words.specific_heat_j_per_kgk,
             bulk: words.bulk_c,
+        }
+    }
+}
+
+/// Number of points of every motion.
+pub(crate) fn count(words: &SubsurfaceWords) -> usize {
+    let grid = |grid: &StressGrid| {
+        let sides = [&grid.x_mm, &grid.y_mm, &grid.depths_mm];
+        let counts = sides.map(GridAxis::count);
+        counts.into_iter().fold(1, usize::saturating_mul)
+    };
+    let points = words.points_mm.as_ref().map(Vec::len);
+    let depths = words.depths_mm.as_ref().map(Vec::len);
+    let grid = words.plane.as_ref().map(grid);
+    points.or(depths).or(grid).unwrap_or(0)
+}
+
+/// The fault of a case with more stresses than the limits allow.
+pub(crate) fn fault(words: &SubsurfaceWords, motions: usize, limits: &Limits) -> Option<Fault> {
+    let count = count(words).saturating_mul(motions);
+    (count > limits.samples_max).then(|| {
+        Fault::new(
+            "/subsurface",
+            format!(
+                "{count} points over all motions given; at most {} are allowed in one case",
+                limits.samples_max
+            ),
+        )
+    })
+}
+
+/// The fault of a passage judged beside a history.
+pub(crate) fn passage_fault(words: &SubsurfaceWords, motion: &Motions) -> Option<Fault> {
+    let history = matches!(motion, Motions::History { .. });
+    (history && words.passage.is_some()).then(|| {
+        Fault::new(
+            "/subsurface/passage",
+            "given with a history; a passage is judged in steady rolling only",
+        )
+    })
+}
+
+/// The task of a checked case.
+pub(crate) fn task(words: &SubsurfaceWords, material: &Material) -> SubsurfaceTask {
+    let (lower, upper) = match material {
+        Material::Same(both) => (both, both),
+        Material::Pair { lower, upper } => (lower, upper),
+    };
+    let (body, elastic) = match words.body {
+        BodyName::Lower => (LoadedBody::Lower, lower),
+        BodyName::Upper => (LoadedBody::Upper, upper),
+    };
+    SubsurfaceTask {
+        places: places(words),
+        body,
+        poisson_ratio: elastic.poisson_ratio,
+        worst: words.worst,
+        passage: words.passage.map(|passage| PassageTask {
+            dang_van_slope: passage.dang_van_slope,
+        }),
+    }
+}
+
+fn places(words: &SubsurfaceWords) -> StressPlaces {
+    let depths = words.depths_mm.as_deref().unwrap_or_default();
+    if let Some(points) = &words.points_mm {
+        return StressPlaces::Points(points.clone());
+    }
+    if let Some(grid) = &words.plane {
+        let [xs, ys] = [&grid.x_mm, &grid.y_mm].map(GridAxis::values);
+        let mut points = Vec::with_capacity(count(words));
+        for depth in grid.depths_mm.values() {
+            for y in &ys {
+                points.extend(xs.iter().map(|x| [*x, *y, depth]));
+            }
+        }
+        return StressPlaces::Points(points);
+    }
+    match words.along_depth_at_mm {
+        Some(DepthLineAt::Place([x, y])) => {
+            StressPlaces::Points(depths.iter().map(|depth| [x, y, *depth]).collect())
+        }
+        Some(DepthLineAt::Found(FoundPlace::Worst)) => StressPlaces::BelowWorst(depths.to_vec()),
+        None => StressPlaces::Points(Vec::new()),
+    }
+}
+
+impl GridAxis {
+    /// Number of coordinates.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        match self {
+            GridAxis::One(_) => 1,
+            GridAxis::List(list) => list.len(),
+            GridAxis::Spaced { points, .. } => *points as usize,
+        }
+    }
+
+    /// The coordinates.
+    #[must_use]
+    pub fn values(&self) -> Vec<f64> {
+        match self {
+            GridAxis::One(value) => vec![*value],
+            GridAxis::List(list) => list.clone(),
+            GridAxis::Spaced { from, to, points } => {
+                let last = f64::from(points.saturating_sub(1).max(1));
+                let at = |k: u32| from + (to - from) * (f64::from(k) / last);
+                (0..*points).map(at).collect()
+            }
         }
     }
 }

@@ -9,8 +9,7 @@ use serde_json::Value;
 use crate::contact::case::checks::{CheckedParts, PartialCase, missing_load, unusual_friction};
 use crate::contact::case::digest::digest;
 use crate::contact::case::motions::ExpandedMotions;
-use crate::contact::case::read::faults::Faults;
-use crate::contact::case::read::object::Object;
+use crate::contact::case::read::object::{Faults, Object};
 use crate::contact::case::read::wheel_rail::section_of;
 use crate::contact::case::solver::{KnownPair, Limits, resolution};
 use crate::contact::case::wheel_task::profile;
@@ -22,9 +21,9 @@ use crate::contact::geometry::orientation::SureBody;
 use crate::contact::geometry::profile::Body;
 use crate::contact::geometry::profile_quality::advised_smoothing;
 use crate::contact::normal::footprint::NormalTask;
+use crate::contact::problem::checked_case;
 use crate::contact::problem::checked_case::{CheckedCase, Label};
 use crate::contact::problem::physics::{AfterTasks, Checked, MotionPart, Problem, Run};
-use crate::contact::problem::{checked_case, plausibility};
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::task::{Motion, PrescribedForces};
@@ -76,7 +75,7 @@ impl CheckedCase {
         let remarks = merged(
             of_case
                 .chain(remarks)
-                .chain(plausibility::of_case(&case.contact, &patches, given))
+                .chain(checked_case::of_case(&case.contact, &patches, given))
                 .chain(units::remarks(case, &patches)),
         );
         let digest = digest(case, &elasticity, &motions, &forces, &speeds);

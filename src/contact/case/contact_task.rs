@@ -6,8 +6,7 @@
 
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::error::Fault;
-use crate::contact::geometry::length_unit::LengthUnit;
-use crate::contact::geometry::profile::Profile;
+use crate::contact::geometry::profile::{LengthUnit, Profile};
 use crate::contact::normal::footprint::NormalTask;
 use crate::contact::normal::gap::surface::GapSurface;
 use crate::contact::normal::gap::task::{GapTask, PreviewCache};

@@ -1,21 +1,21 @@
 //! Between the words of a case and the types of the numerics: a change of a solver does not change the contract.
 
-use crate::contact::case::words::contact::{FormatName, SideName, ThermalWords, UnitName};
-use crate::contact::case::words::friction::{FallName, Friction};
+use crate::contact::case::words::contact::{
+    FallName, FormatName, Friction, SideName, ThermalWords, UnitName,
+};
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::{
     MeshSizeWords, MethodName, Output, RelativeToName, TractionBoundName,
 };
-use crate::contact::friction::coefficient_table::{AcrossLaw, AcrossPlace, AlongLaw};
-use crate::contact::friction::law::FrictionLaw;
+use crate::contact::friction::law::{AcrossLaw, AcrossPlace, AlongLaw, FrictionLaw};
 use crate::contact::friction::path_dependent::{HeatedLaw, Interface, LayerYield};
 use crate::contact::friction::velocity_weakening::{FallForm, FallingLaw, SofteningTerm};
 use crate::contact::geometry::formats::Format;
-use crate::contact::geometry::length_unit::LengthUnit;
+use crate::contact::geometry::profile::LengthUnit;
 use crate::contact::geometry::wheel_rail::Side;
 use crate::contact::mesh::MeshSize;
 use crate::contact::method::{Method, TractionBound};
-use crate::contact::post::heat::ThermalTask;
+use crate::contact::post::local_power::ThermalTask;
 use crate::contact::rolling::task::{Motion, RelativeTo};
 
 /// Words that stand for a type of the numerics variant by variant.

@@ -10,7 +10,6 @@ pub mod motions;
 pub mod read;
 pub mod solve_time;
 pub mod solver;
-pub mod subsurface;
 pub mod understood;
 pub(crate) mod units;
 pub mod wheel_task;

@@ -4,7 +4,6 @@
 pub mod answer;
 pub mod many;
 pub mod many_answer;
-pub mod placing;
 pub mod rows;
 pub mod variable;
 pub mod varied;

@@ -9,7 +9,7 @@ use crate::contact::evolution::section::{add, along, lengths, smoothed};
 use crate::contact::evolution::task::{Evolution, Sections, SolveContext};
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::footprint::NormalTask;
-use crate::contact::post::heat::NANOMETRES;
+use crate::contact::post::local_power::NANOMETRES;
 use crate::contact::solution::words::answer::PatchSolution;
 use crate::contact::solution::words::evolution::{StateContact, StatePatch};
 

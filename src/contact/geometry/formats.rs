@@ -23,7 +23,7 @@
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
-use crate::contact::geometry::length_unit::LengthUnit;
+use crate::contact::geometry::profile::LengthUnit;
 
 /// A file format that a client can name; each is read in the file of that name in this folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

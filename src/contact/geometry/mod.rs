@@ -2,12 +2,10 @@
 
 pub mod conicity;
 pub mod contact_locus;
-pub mod crossing;
 pub mod curve_place;
 pub mod envelope;
 pub mod formats;
 pub mod holes;
-pub mod length_unit;
 pub mod locus_lines;
 pub mod orientation;
 pub mod plane_curve;

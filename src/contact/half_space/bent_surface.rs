@@ -20,8 +20,7 @@ use std::cmp::Ordering;
 use pulp::NullaryFnOnce;
 use rustfft::num_complex::Complex;
 
-use crate::contact::half_space::grid_operator::{coefficients, lines};
-use crate::contact::half_space::transforms::{FftPlanners, FftPlans};
+use crate::contact::half_space::grid_operator::{FftPlanners, FftPlans, coefficients, lines};
 use crate::contact::half_space::unlike_bodies::{Elasticity, displacement_by_cell};
 use crate::contact::lazy_field::LazyField;
 use crate::contact::numerics::simd;

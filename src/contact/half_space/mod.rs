@@ -4,5 +4,4 @@ pub mod bent_surface;
 pub mod grid_operator;
 pub mod kernels;
 pub mod strip_operator;
-pub mod transforms;
 pub mod unlike_bodies;

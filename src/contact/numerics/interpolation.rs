@@ -8,7 +8,7 @@
 //! `w_i` half the distance between the neighbours of `s_i`, so that `λ = (L/2π)⁴` halves waves of length L whatever the
 //! spacing. Source: Reinsch, "Smoothing by spline functions", Numerische Mathematik 10 (1967).
 
-use crate::contact::numerics::cubic::interval;
+use crate::contact::numerics::roots::interval;
 
 /// Value of the curve with these values and slopes at the nodes of an ascending axis, at least 2; beyond its ends that of the
 /// outermost cubics.

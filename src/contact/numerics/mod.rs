@@ -20,12 +20,11 @@
 //!
 //! - [`rigid_touch`](crate::contact::geometry::rigid_touch) starts within 0.02 mm of the root and takes four steps untested; where the rail
 //!   is upright, it keeps the start instead of failing.
-//! - [`coordinates`](crate::contact::rolling::methods::table::coordinates) of the creep table always takes six steps, without a test in
+//! - [`coordinates`](crate::contact::rolling::methods::table::spline) of the creep table always takes six steps, without a test in
 //!   between, because it is evaluated for millions of rows.
 //! - The [search](crate::contact::rolling::history::plan) of a history looks for two creepages at once as [`pair_root`] does, and keeps its
 //!   compliance from step to step.
 
-pub mod cubic;
 pub mod flood_fill;
 pub mod gmres;
 pub mod interpolation;

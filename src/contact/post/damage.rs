@@ -9,7 +9,7 @@ use crate::contact::case::words::subsurface::{
     WlrmFigures,
 };
 use crate::contact::normal::hertz::Patch;
-use crate::contact::post::heat::{METRES, NANOMETRES};
+use crate::contact::post::local_power::{METRES, NANOMETRES};
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::words::answer::PointSolution;
 use crate::contact::solution::words::damage::{

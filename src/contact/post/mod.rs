@@ -1,10 +1,8 @@
 //! Quantities derived from cell values: friction power, outlines, samples on a grid, stresses below the surface, damage, temperatures.
 
 pub mod damage;
-pub mod heat;
 pub mod local_power;
 pub mod outlines;
 pub mod resample;
 pub mod smooth;
-pub mod strip_segments;
 pub mod subsurface;

@@ -1,6 +1,6 @@
 //! Interpolates cell values onto a regular grid, for pictures and for programs that read arrays.
 
-use crate::contact::post::strip_segments::{StoredSegment, Strips};
+use crate::contact::post::outlines::{StoredSegment, Strips};
 use crate::contact::solution::words::answer::{PatchCells, Zone};
 
 /// Values on a regular grid; `None` outside the patch.
@@ -220,7 +220,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::contact::post::strip_segments::samples::{ellipse, push_segment};
+    use crate::contact::post::outlines::samples::{ellipse, push_segment};
 
     const A: f64 = 2.0;
     const B: f64 = 3.0;

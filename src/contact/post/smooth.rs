@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use crate::contact::numerics::interpolation::monotone;
-use crate::contact::post::strip_segments::Strips;
+use crate::contact::post::outlines::Strips;
 use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// SheetNodes of the grid along one axis, at least and at most; between them four per cell or strip.
@@ -473,8 +473,8 @@ impl ZoneChanges {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::post::outlines::samples::{ellipse, push_segment};
     use crate::contact::post::smooth::signed_area;
-    use crate::contact::post::strip_segments::samples::{ellipse, push_segment};
 
     #[test]
     fn eight_strips_show_an_ellipse_and_hertz_pressure_on_it() {
@@ -564,7 +564,7 @@ mod contour_tests {
 #[cfg(test)]
 mod stick_tests {
     use super::*;
-    use crate::contact::post::strip_segments::samples::ellipse;
+    use crate::contact::post::outlines::samples::ellipse;
 
     /// Carter's tractions along every strip of an ellipse: sticks where the second root is not 0.
     fn carter(cells: &PatchCells, a: f64, b: f64, shrink: f64) -> (PatchCells, PointFields) {

@@ -3,4 +3,3 @@
 pub mod checked_case;
 pub mod memory;
 pub mod physics;
-pub mod plausibility;

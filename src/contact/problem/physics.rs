@@ -19,7 +19,7 @@ use crate::contact::normal::footprint::NormalTask;
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::normal::wheel::{ReferenceSurface, WheelTask};
 use crate::contact::post::damage::DamageTask;
-use crate::contact::post::heat::ThermalTask;
+use crate::contact::post::local_power::ThermalTask;
 use crate::contact::post::subsurface::states::SubsurfaceTask;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::MotionAnswer;

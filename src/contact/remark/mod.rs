@@ -6,4 +6,3 @@
 pub mod entry;
 pub mod kind;
 pub mod list;
-pub mod table;

@@ -26,6 +26,5 @@ pub mod own_blocks;
 pub mod refinement;
 pub mod slip_equations;
 pub mod slip_rules;
-pub mod strip_chords;
 pub mod strip_mesh;
 pub mod task;

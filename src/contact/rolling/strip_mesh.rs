@@ -11,11 +11,11 @@ use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::{Footprint, SurfaceSlip};
 use crate::contact::normal::hertz::Ellipse;
+use crate::contact::rolling::load_ellipse;
+use crate::contact::rolling::load_ellipse::StripChord;
 use crate::contact::rolling::operator_store::{
     CaseOperators, LevelOperator, OperatorKind, OperatorStore,
 };
-use crate::contact::rolling::strip_chords;
-use crate::contact::rolling::strip_chords::StripChord;
 use crate::contact::rolling::task::{MeshPlan, Motion, RollingTask};
 
 /// With an operator in single precision, dimensionless coordinates are rounded to multiples of this, so that patches of one shape get
@@ -344,7 +344,7 @@ fn fitted_chords(footprint: &Footprint, plan: &MeshPlan) -> Result<Vec<StripChor
             Some([_, y]) => strips_about(y, low, high, strips as usize),
             None => equal_strips(low, high, strips as usize),
         };
-        let chords = strip_chords::chords(footprint, k, &edges);
+        let chords = load_ellipse::chords(footprint, k, &edges);
         if chords.is_empty() {
             return Err(SolveError::Unmeshable { patch: k, strips });
         }

@@ -2,6 +2,8 @@
 //! checks that all numbers are finite.
 //!
 //! Values per cell as the client reads them: with units, and only those requested.
+//!
+//! Moves the coordinates of a patch to another origin.
 
 use std::f64::consts::PI;
 use std::time::Duration;
@@ -9,16 +11,19 @@ use std::time::Duration;
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::SolveError;
 use crate::contact::numerics::simd::length;
+use crate::contact::post::subsurface::states::STORED;
+use crate::contact::problem::checked_case;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::plausibility;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::{LevelAnswer, SolvedFields};
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::solution::finite;
 use crate::contact::solution::words::answer::{
-    Fields, PatchCells, PatchSolution, PointFields, PointSolution, Solution, Zone,
+    Fields, GradientErrors, Gradients, PatchCells, PatchFields, PatchSolution, PointFields,
+    PointSolution, Solution, Zone,
 };
+use crate::contact::solution::words::evolution::SubsurfaceSummary;
 
 /// Values below this fraction of their scale are rounding residues and reported as 0.
 const DUST: f64 = 1e-14;
@@ -135,9 +140,9 @@ fn implausible(solution: &Solution, before: usize) -> Vec<RemarkEntry> {
             ..remark.into()
         };
         let length = Some((patch.area_mm2 / PI).sqrt());
-        said.extend(plausibility::pressure(patch.pressure_max_mpa).map(|remark| at(remark, None)));
+        said.extend(checked_case::pressure(patch.pressure_max_mpa).map(|remark| at(remark, None)));
         for (motion, point) in patch.points.iter().enumerate() {
-            let remark = plausibility::creepage(&point.motion.into(), length);
+            let remark = checked_case::creepage(&point.motion.into(), length);
             said.extend(remark.map(|remark| at(remark, Some(before + motion))));
         }
     }
@@ -146,7 +151,7 @@ fn implausible(solution: &Solution, before: usize) -> Vec<RemarkEntry> {
         .as_ref()
         .map_or(1, |all| all.positions.len());
     let load = force.sum::<f64>() / positions as f64;
-    said.extend(plausibility::load(load).map(RemarkEntry::from));
+    said.extend(checked_case::load(load).map(RemarkEntry::from));
     said
 }
 
@@ -209,4 +214,93 @@ pub(crate) fn traction_max(level: &StripMesh, fields: &SolvedFields, patch: usiz
     let [x, y] = &fields.tangential.traction;
     let lengths = level.patch_cells(patch).map(|i| length(x[i], y[i]));
     lengths.fold(0.0, f64::max) * level.scale.traction
+}
+
+/// Moves the origin of a patch by `[x, y]` in mm: its extent, its moments and derivatives, and all places in its answer and its fields.
+pub(crate) fn move_origin(
+    patch: &mut PatchSolution,
+    fields: Option<&mut PatchFields>,
+    by: [f64; 2],
+) {
+    for (end, by) in patch.extent_mm.iter_mut().zip([by[0], by[0], by[1], by[1]]) {
+        *end -= by;
+    }
+    patch
+        .points
+        .iter_mut()
+        .for_each(|point| move_point(point, by));
+    let [dx, dy] = by;
+    let Some(PatchFields { meshes, points }) = fields else {
+        return;
+    };
+    for cells in meshes {
+        cells.x_mm.iter_mut().for_each(|x| *x -= dx);
+        cells.y_mm.iter_mut().for_each(|y| *y -= dy);
+    }
+    let stored = points.iter_mut().flat_map(|point| &mut point.subsurface);
+    for place in stored.flat_map(|stored| stored.chunks_exact_mut(STORED)) {
+        place[0] -= dx;
+        place[1] -= dy;
+    }
+}
+
+fn move_point(point: &mut PointSolution, [dx, dy]: [f64; 2]) {
+    point.moment_z_n_mm += dy * point.force_x_n - dx * point.force_y_n;
+    if let Some(gradients) = &mut point.gradients {
+        move_gradients(gradients, [dx, dy]);
+    }
+    if let Some(SubsurfaceSummary { worst, passage, .. }) = &mut point.subsurface {
+        if let Some(worst) = worst {
+            worst.at_mm[0] -= dx;
+            worst.at_mm[1] -= dy;
+        }
+        if let Some(passage) = passage {
+            let places = [
+                &mut passage.yield_without_residual,
+                &mut passage.yield_with_residual,
+            ];
+            for place in places.into_iter().chain(&mut passage.dang_van) {
+                place.at_mm[0] -= dy;
+            }
+        }
+    }
+    if let Some(temperature) = &mut point.temperature {
+        temperature.at_mm = [temperature.at_mm[0] - dx, temperature.at_mm[1] - dy];
+    }
+    let across = point
+        .damage
+        .as_mut()
+        .and_then(|damage| damage.across.as_mut());
+    for y in across.into_iter().flat_map(|across| &mut across.y_mm) {
+        *y -= dy;
+    }
+}
+
+/// A spin about the new origin moves the old one sideways; the moment takes the forces with it.
+fn move_gradients(gradients: &mut Gradients, [dx, dy]: [f64; 2]) {
+    let Gradients {
+        force_x_n: x,
+        force_y_n: y,
+        moment_z_n_mm: m,
+        error_estimate,
+        ..
+    } = gradients;
+    moved([x, y, m], [dy, -dx]);
+    if let Some(GradientErrors {
+        force_x_n: x,
+        force_y_n: y,
+        moment_z_n_mm: m,
+        ..
+    }) = error_estimate
+    {
+        moved([x, y, m], [dy.abs(), dx.abs()]);
+    }
+}
+
+/// Adds to the row of the moment, and to the column of the spin, those of the forces and creepages times their arms.
+fn moved([x, y, m]: [&mut [f64; 3]; 3], [along, across]: [f64; 2]) {
+    *m = [0, 1, 2].map(|k| m[k] + along * x[k] + across * y[k]);
+    for row in [x, y, m] {
+        row[2] += along * row[0] + across * row[1];
+    }
 }

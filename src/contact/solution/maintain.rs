@@ -9,8 +9,7 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::hertz::Patch;
 use crate::contact::post::damage::{CellWear, DamageTask, DamagedPatch, across, damage};
-use crate::contact::post::heat::{ThermalTask, heating};
-use crate::contact::post::local_power::{CellPower, PowerTask, cell_power};
+use crate::contact::post::local_power::{CellPower, PowerTask, ThermalTask, cell_power, heating};
 use crate::contact::post::subsurface::load_parts::LoadResolution;
 use crate::contact::post::subsurface::states::{
     LoadedBody, STORED, StressPlaces, SubsurfaceTask, in_patch_axes, point, stored,

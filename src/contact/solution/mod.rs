@@ -4,5 +4,4 @@ pub mod assemble;
 pub mod finish;
 pub mod finite;
 pub mod maintain;
-pub(crate) mod moved;
 pub mod words;

@@ -9,7 +9,7 @@ use crate::contact::post::damage::{DamagedPatch, damage};
 use crate::contact::problem::physics::Run;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::solution::assemble::normalised;
-use crate::contact::solution::moved::move_origin;
+use crate::contact::solution::finish::move_origin;
 use crate::contact::solution::words::answer::{
     ErrorEstimate, Fields, Origin, PatchFields, Position, Solution, Total,
 };

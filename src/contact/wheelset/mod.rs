@@ -1,6 +1,4 @@
 //! Solves a wheelset on both rails: its roll and height, the patches of both wheels, and its kinematics as a rigid body.
 
 pub mod balance;
-pub mod gather;
 pub mod kinematics;
-pub mod solve;

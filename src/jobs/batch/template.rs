@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::contact::evaluate::placing::{self, Replaced, put};
+use crate::contact::evaluate::varied::{self, Replaced, put};
 use crate::jobs::error::JobsError;
 use crate::jobs::idempotency;
 use crate::jobs::store::submission::StoredCase;
@@ -35,7 +35,7 @@ pub fn digest(cells: &[Cell]) -> [u8; 32] {
 pub fn fill_in_place(template: &mut Value, row: &[Cell]) -> Result<Vec<Replaced>, (usize, String)> {
     let mut filled = Vec::with_capacity(row.len());
     for (number, Cell(path, value)) in row.iter().enumerate() {
-        match placing::replace(template, path, value.clone()) {
+        match varied::replace(template, path, value.clone()) {
             Ok(replaced) => filled.push(replaced),
             Err(reason) => {
                 restore(template, row, filled);
@@ -49,7 +49,7 @@ pub fn fill_in_place(template: &mut Value, row: &[Cell]) -> Result<Vec<Replaced>
 /// Undoes [`fill_in_place`].
 pub fn restore(template: &mut Value, row: &[Cell], filled: Vec<Replaced>) {
     for (Cell(path, _), replaced) in row.iter().zip(filled).rev() {
-        placing::restore(template, path, replaced);
+        varied::restore(template, path, replaced);
     }
 }
 

@@ -4,8 +4,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, names, shown};
+use crate::contact::case::read::object::{AllowedRange, Object, names, shown};
 use crate::contact::case::read::samples::{SampleQuantity, axis, line, samples};
 use crate::contact::case::read::{wheel_rail, wheelset};
 use crate::contact::case::words::contact::{Contact, Elastic, Load, Material};

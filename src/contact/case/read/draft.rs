@@ -9,12 +9,10 @@ use serde_json::Value;
 
 use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::checks::{PartialCase, faults_of};
-use crate::contact::case::read::faults::Faults;
-use crate::contact::case::read::object::{Object, has_controls, join, shown};
-use crate::contact::case::read::{contact, damage, friction, motion, solver, subsurface, thermal};
+use crate::contact::case::read::object::{Faults, Object, has_controls, join, shown};
+use crate::contact::case::read::{contact, damage, friction, motion, solver, subsurface};
 use crate::contact::case::solver::{KnownPair, Limits};
-use crate::contact::case::words::contact::{Contact, Load, Material, ThermalWords};
-use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::contact::{Contact, Friction, Load, Material, ThermalWords};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{Case, Output, Solver};
 use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
@@ -144,7 +142,7 @@ fn read(case: &mut Object) -> CaseDraft {
     let outputs = solver::read_outputs(case, without_fields);
     let subsurface = subsurface::read(case, outputs.as_deref());
     let damage = damage::read(case, outputs.as_deref(), without_fields.is_some());
-    let thermal = thermal::read(case, outputs.as_deref(), friction.as_ref());
+    let thermal = damage::read_thermal(case, outputs.as_deref(), friction.as_ref());
     CaseDraft {
         name,
         labels,

@@ -2,8 +2,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::{AllowedRange, Faults};
-use crate::contact::case::read::object::{Object, join, number, shown};
+use crate::contact::case::read::object::{AllowedRange, Faults, Object, join, number, shown};
 use crate::contact::case::read::wheel_rail::section_of;
 use crate::contact::case::words::evolution::{
     EvolutionAccuracy, EvolutionEvent, EvolutionExtent, EvolutionWords, Traffic, TrafficColumn,

@@ -1,8 +1,7 @@
 //! Reads `friction`: a coefficient, a law that falls with slip or temperature or a coefficient across or along, and what lies between the bodies.
 
-use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, join};
-use crate::contact::case::words::friction::{
+use crate::contact::case::read::object::{AllowedRange, Object, join};
+use crate::contact::case::words::contact::{
     AcrossWords, AlongWords, ByTemperatureWords, FallName, FallTermWords, Friction, LayerWords,
 };
 

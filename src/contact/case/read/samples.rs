@@ -2,8 +2,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, count_rest, join, numbers};
+use crate::contact::case::read::object::{AllowedRange, Object, count_rest, join, numbers};
 
 const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 /// Points of one axis of a grid.

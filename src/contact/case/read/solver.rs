@@ -1,7 +1,6 @@
 //! Reads `solver` and `outputs`: how to solve, how exactly, and what to answer.
 
-use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, join, names, shown, word};
+use crate::contact::case::read::object::{AllowedRange, Object, join, names, shown, word};
 use crate::contact::case::solver::TARGET_ERROR_DEFAULT;
 use crate::contact::case::words::solver::{
     MeshSizeWords, MethodName, Output, RelativeToName, Solver, TractionBoundName,
@@ -167,7 +166,7 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::*;
-    use crate::contact::case::read::faults::Faults;
+    use crate::contact::case::read::object::Faults;
     use crate::contact::error::Fault;
 
     /// What is read of a case, by a method that computes resultants only.

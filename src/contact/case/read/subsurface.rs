@@ -2,8 +2,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{Object, join, number, shown};
+use crate::contact::case::read::object::{AllowedRange, Object, join, number, shown};
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::{
     BodyName, DepthLineAt, FoundPlace, GridAxis, PassageWords, StressGrid, SubsurfaceWords,

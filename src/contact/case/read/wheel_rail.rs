@@ -2,8 +2,9 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::faults::AllowedRange;
-use crate::contact::case::read::object::{LISTED_MAX, Object, join, names, number, shown};
+use crate::contact::case::read::object::{
+    AllowedRange, LISTED_MAX, Object, join, names, number, shown,
+};
 use crate::contact::case::words::contact::{
     Contact, CrossSection, FormatName, InfluenceName, SideName, Smoothing, SmoothingWord,
     SurfaceName, UnitName,

@@ -1,8 +1,7 @@
 //! Reads a contact of the type `wheelset`, and the load that goes with it.
 
-use crate::contact::case::read::faults::AllowedRange;
 use crate::contact::case::read::motion::swept;
-use crate::contact::case::read::object::{Object, shown};
+use crate::contact::case::read::object::{AllowedRange, Object, shown};
 use crate::contact::case::read::wheel_rail::{
     ANGLE, CANT, DISTANCE, PLACE, ROLLING_RADIUS, flag, rail_place, section, surface,
 };

@@ -2,7 +2,6 @@
 
 pub mod contact;
 pub mod evolution;
-pub mod friction;
 pub mod motion;
 pub mod solver;
 pub mod subsurface;

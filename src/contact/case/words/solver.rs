@@ -13,8 +13,7 @@ use railhead_macros::{Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::case::words::contact::{Contact, Load, Material, ThermalWords};
-use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::contact::{Contact, Friction, Load, Material, ThermalWords};
 use crate::contact::case::words::motion::{
     History, HistoryStartName, MotionWords, Motions, Wheelset,
 };

@@ -4,8 +4,7 @@
 //! prescribed (Polonsky and Keer 1999). Cells may differ in size: scalar products are weighted with their areas, and
 //! distances are scaled by what a cell's own pressure displaces, so that small cells take no more iterations than large ones.
 
-use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
-use crate::contact::half_space::transforms::FftFloat;
+use crate::contact::half_space::grid_operator::{FftFloat, GridOperator, GridWorkspace};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::gap::cell_sums;
 use crate::contact::normal::gap::cell_sums::{

@@ -15,8 +15,8 @@ use crate::contact::normal::pressure_field::grid_pressure::{
 use crate::contact::normal::pressure_field::level_set::State;
 use crate::contact::normal::pressure_field::line::GridLine;
 use crate::contact::normal::pressure_field::{grid_pressure, level_set, line};
-use crate::contact::numerics::cubic::{interval, weights};
 use crate::contact::numerics::quadrature::{GaussPoints, integral};
+use crate::contact::numerics::roots::{interval, weights};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 

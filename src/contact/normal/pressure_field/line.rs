@@ -1,6 +1,6 @@
 //! Squared pressure along a straight grid-parallel line: where it is positive.
 
-use crate::contact::numerics::cubic::Cubic;
+use crate::contact::numerics::roots::Cubic;
 
 /// Values at the nodes of an axis, and the intervals that may belong to a patch. Everything is asked for when it is needed: most
 /// intervals of a line lie inside the contact, where no values are.

@@ -1,6 +1,5 @@
 //! Pressures on a grid of samples: given by the client, or computed from a gap.
 
-pub mod computed;
 pub mod field;
 pub mod given;
 pub mod grid_pressure;

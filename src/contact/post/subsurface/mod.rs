@@ -2,7 +2,6 @@
 
 pub mod load_parts;
 pub(crate) mod loaded_run;
-pub mod passage;
 pub mod states;
 pub mod surface_load;
 pub mod worst;

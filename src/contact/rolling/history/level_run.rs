@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use crate::contact::friction::coefficient_table::AlongLaw;
+use crate::contact::friction::law::AlongLaw;
 use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::mesh::Mesh;

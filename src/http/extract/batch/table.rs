@@ -8,8 +8,7 @@ use std::collections::HashSet;
 
 use serde_json::Value;
 
-use crate::contact::evaluate::placing::members;
-use crate::contact::evaluate::varied::Values;
+use crate::contact::evaluate::varied::{Values, members};
 use crate::http::extract::batch::own_options;
 use crate::http::extract::tables::{Chunk, Title};
 use crate::http::extract::titles::{Place, faulty, is_text, number, place, question, short_names};

@@ -64,7 +64,6 @@
 //! cells take seconds and more than 100 MB, and the checks of a case allow no more cells than that.
 
 pub mod active_set;
-pub mod newton_raphson;
 pub mod on_level;
 pub mod solve;
 pub mod stick_block;

@@ -5,13 +5,13 @@
 use pulp::{Simd, WithSimd};
 
 use crate::contact::numerics::simd;
-use crate::contact::rolling::methods::table::coordinates::{Shape, spin_factor};
 use crate::contact::rolling::methods::table::shape_coefficients::{
     ShapeCoefficients, poisson_weights,
 };
 use crate::contact::rolling::methods::table::spline::{
     Axis, DIRECTION_COEFFICIENTS, DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLE_COEFFICIENTS, POLES,
-    RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, Weights, cell, coefficients, ln_ratio_max, sigma,
+    RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, Shape, Weights, cell, coefficients, ln_ratio_max, sigma,
+    spin_factor,
 };
 
 /// The size at which everything slips without spin: f(r) = 1 from here on (Vermeulen and Johnson 1964).

@@ -1,6 +1,5 @@
 //! Creep forces of an elliptic patch from a table that the boundary-element solver made.
 
-pub mod coordinates;
 pub mod evaluate;
 pub mod file;
 pub mod shape_coefficients;
