@@ -37,6 +37,9 @@ pub(crate) struct ExpandedMotions {
     pub(crate) history: Option<HistoryTask>,
 }
 
+/// Faults of forces that are named one by one.
+const FAULTS_MAX: usize = 100;
+
 /// The motions and prescribed forces of a case.
 ///
 /// # Errors
@@ -126,9 +129,6 @@ impl ExpandedMotions {
         Some(Fault::new(pointer, detail))
     }
 }
-
-/// Faults of forces that are named one by one.
-const FAULTS_MAX: usize = 100;
 
 /// The component with the larger prescribed force, if there is any.
 fn larger(forces: &PrescribedForces) -> Option<usize> {

@@ -12,15 +12,13 @@ use crate::contact::post::subsurface::states::StressPlaces;
 use crate::contact::problem::checked_case;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::history::solve::usual_work;
-use crate::contact::rolling::task::Resolution;
+use crate::contact::rolling::task::{Resolution, TARGET_LEAST};
 
 /// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`].
 const MOTION_SECONDS: f64 = 3e-4;
 const TARGET_USUAL: f64 = 0.005;
 /// Power with which the time grows as the target falls.
 const TARGET_POWER: f64 = 1.4;
-/// Smaller targets cost no more: they end on the largest mesh.
-const TARGET_LEAST: f64 = 1e-4;
 /// Time of a motion with spin, with a prescribed force, or with friction that depends on slip, over that of one without.
 const HARD_TIMES: f64 = 3.0;
 /// A motion by the table, with its place in the answer, in s; twice what a row of a run of a million takes on an idle machine

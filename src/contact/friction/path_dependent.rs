@@ -5,15 +5,12 @@
 
 use std::sync::Arc;
 
-use crate::contact::friction::velocity_weakening::SLIP_OF_CELL;
+use crate::contact::friction::velocity_weakening::{SLIP_OF_CELL, STABILITY_MAX};
 use crate::contact::mesh::Mesh;
 use crate::contact::numerics::roots::{self, CloseEnough, Course};
 
 /// Largest temperature in K by which the temperature of a cell may be missed; bounds change by some 10⁻⁴ per K. Keeps the numbers safe; not tuned.
 const KELVIN: f64 = 1e-6;
-/// Largest stability number that is answered: bounds and slips are found in turn. Of 200 random motions on one ellipse with numbers from 0.1 to
-/// 0.95 all were solved, with half as many products again at 0.95 as at 0.1.
-const STABILITY_MAX: f64 = 1.0;
 
 /// A coefficient that falls with the temperature of the contact: linear between points, constant outside.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,8 +10,9 @@ const ROUNDING: f64 = 1e-14;
 /// Largest slip that a unit of traction over G on one cell takes from it: `max |M_ii|` of the three-point rule on ellipses with a/b from
 /// 0.5 to 1.2, meshes from 6 × 12 to 12 × 24, is 1.5 to 1.8 (`cargo test --test physics -- friction_as_it_is --nocapture` prints it).
 pub(crate) const SLIP_OF_CELL: f64 = 1.7;
-/// Largest stability number that is answered. Up to 1.0 no second state was found in 360 random motions from two starts, at 1.5 one.
-const STABILITY_MAX: f64 = 1.0;
+/// Largest stability number that is answered, for slip and for heat. Up to 1.0 no second state was found in 360 random motions from two starts,
+/// at 1.5 one.
+pub(crate) const STABILITY_MAX: f64 = 1.0;
 
 /// Parts of the fall that bounds are given one after the other where the iteration does not settle with all of it.
 pub const CONTINUATION: [f64; 5] = [0.25, 0.5, 0.75, 0.9, 1.0];

@@ -14,6 +14,7 @@ use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::{Grain, advised_smoothing, noise_of, polygon_of};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::footprint::Footprint;
+use crate::contact::normal::gap::outcome::{APPROACH_USUAL_MAX, HALF_WIDTH_USUAL_MAX};
 use crate::contact::normal::hertz::Patch;
 use crate::contact::normal::wheel::WheelTask;
 use crate::contact::problem::physics::{MotionPart, Problem, Run};
@@ -190,10 +191,6 @@ const SHAKEDOWN_LIMIT: f64 = 1500.0;
 const LOAD_USUAL_MAX: f64 = 1e7;
 /// Creepage above which sliding is no longer small compared with the rolling speed.
 const CREEPAGE_USUAL_MAX: f64 = 0.2;
-/// Half width relative to the radius above which half-spaces are a poor approximation of the bodies.
-const HALF_WIDTH_USUAL_MAX: f64 = 0.3;
-/// Approach relative to the smaller half width above which strains are too large for linear elasticity.
-const APPROACH_USUAL_MAX: f64 = 0.15;
 
 /// The remarks on patches that are known from the case alone.
 pub(crate) fn of_case(

@@ -9,10 +9,11 @@ use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 
-/// Half-length over rolling radius from which on half-spaces are a poor likeness of the bodies. A judgement, not a measurement.
-const HALF_LENGTH_USUAL_MAX: f64 = 0.3;
+/// Half of a side of a patch over the radius in its direction from which on half-spaces are a poor likeness of the bodies. A judgement, not a
+/// measurement.
+pub(crate) const HALF_WIDTH_USUAL_MAX: f64 = 0.3;
 /// Approach over the smaller half width from which on strains are too large for linear elasticity. A judgement, not a measurement.
-const APPROACH_USUAL_MAX: f64 = 0.15;
+pub(crate) const APPROACH_USUAL_MAX: f64 = 0.15;
 /// A patch with less than this fraction of the load need not be resolved.
 const SHARE_MIN: f64 = 0.02;
 /// Fewest cells across a patch that is resolved: Hertz's width and pressure then come out within 1 %.
@@ -89,7 +90,7 @@ impl GapTask {
         let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
         let mut remarks = Vec::new();
         if let Some(rolling) = self.gap.rolling_radius()
-            && a > HALF_LENGTH_USUAL_MAX * rolling
+            && a > HALF_WIDTH_USUAL_MAX * rolling
         {
             let remark = Remark::NearlyConformal {
                 length_mm: 2.0 * a,

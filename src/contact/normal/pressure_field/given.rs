@@ -12,9 +12,8 @@ use crate::contact::normal::hertz::Patch;
 use crate::contact::normal::pressure_field::grid_pressure::{
     GridPressure, NOWHERE, PADDING, PATCHES_MAX, PatchShape, SampleGrid, padded,
 };
-use crate::contact::normal::pressure_field::level_set::State;
-use crate::contact::normal::pressure_field::line::GridLine;
-use crate::contact::normal::pressure_field::{grid_pressure, level_set, line};
+use crate::contact::normal::pressure_field::level_set::{GridLine, State};
+use crate::contact::normal::pressure_field::{grid_pressure, level_set};
 use crate::contact::numerics::quadrature::{GaussPoints, integral};
 use crate::contact::numerics::roots::{interval, weights};
 use crate::contact::remark::entry::RemarkEntry;
@@ -39,7 +38,7 @@ impl RowsAbout<'_> {
         let [a, b, c, d] = self.weights;
         let value = a * q[0] + b * q[1] + c * q[2] + d * q[3];
         let smooth = self.smooth[0][column] && self.smooth[1][column];
-        let [low, high] = line::bounds(q[1], q[2], smooth);
+        let [low, high] = level_set::bounds(q[1], q[2], smooth);
         value.clamp(low, high)
     }
 }
@@ -235,7 +234,7 @@ impl GridPressure {
         let value = |i: usize| rows.value(i);
         let mut values: [f64; 4] = std::array::from_fn(|k| value(first - 1 + k));
         if x0 == x1 {
-            let cubic = line::cubic(x, first, values);
+            let cubic = level_set::cubic(x, first, values);
             return self.pressure_max * cubic.at(low).sqrt();
         }
         let centre = 0.5 * (chord.right + chord.left);
@@ -251,7 +250,7 @@ impl GridPressure {
             if i > first {
                 values = [values[1], values[2], values[3], value(i + 2)];
             }
-            let cubic = line::cubic(x, i, values);
+            let cubic = level_set::cubic(x, i, values);
             let (from, to) = (low.max(x[i]), high.min(x[i + 1]));
             let pressure = |x: f64| cubic.at(x).sqrt();
             if from < centre.min(to) {
@@ -279,7 +278,7 @@ impl GridPressure {
         let last = x.len() - 3;
         let mut i = self.column_interval(places[0].max(chord.left));
         let mut values: [f64; 4] = std::array::from_fn(|k| value(i - 1 + k));
-        let mut cubic = line::cubic(x, i, values);
+        let mut cubic = level_set::cubic(x, i, values);
         places.map(|place| {
             if place < chord.left || place > chord.right {
                 return 0.0;
@@ -290,7 +289,7 @@ impl GridPressure {
                 values = [values[1], values[2], values[3], value(i + 2)];
             }
             if i != before {
-                cubic = line::cubic(x, i, values);
+                cubic = level_set::cubic(x, i, values);
             }
             self.pressure_max * cubic.at(place).sqrt()
         })

@@ -4,4 +4,3 @@ pub mod field;
 pub mod given;
 pub mod grid_pressure;
 pub mod level_set;
-pub mod line;

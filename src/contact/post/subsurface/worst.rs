@@ -20,7 +20,7 @@ use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad}
 /// Columns along and across, depths over the half-width of the patch.
 const ALONG: usize = 13;
 const ACROSS: usize = 7;
-const DEPTHS: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0];
+pub(crate) const DEPTHS: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0];
 /// The outermost columns, relative to half chord and half width.
 const REACH: [f64; 2] = [1.02, 0.9];
 /// Points from which a search starts, and how far apart they lie at least.

@@ -22,14 +22,13 @@ use crate::contact::normal::footprint::Footprint;
 use crate::contact::post::subsurface::load_parts::LoadResolution;
 use crate::contact::post::subsurface::states::{PassageTask, principal, von_mises};
 use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
-use crate::contact::post::subsurface::worst::{Deviator, enclosing_ball};
+use crate::contact::post::subsurface::worst::{DEPTHS, Deviator, enclosing_ball};
 use crate::contact::solution::words::evolution::{PassagePlace, PassageSummary};
 
 // The numbers below are chosen by judgement; `cargo test --test physics -- shakes_down` holds what they give against closed forms.
 
-/// Places across, relative to the half width, and depths over the half-width of the patch.
+/// Places across, relative to the half width.
 const ACROSS: [f64; 7] = [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9];
-const DEPTHS: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0];
 /// States: so many on each side of the middle up to 1.5 half-lengths, and these further out.
 const NEAR: usize = 16;
 const NEAR_REACH: f64 = 1.5;

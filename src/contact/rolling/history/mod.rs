@@ -3,6 +3,5 @@
 pub(crate) mod level_record;
 pub mod level_run;
 pub mod plan;
-pub(crate) mod press;
 pub(crate) mod self_similar;
 pub mod solve;
