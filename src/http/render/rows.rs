@@ -176,7 +176,7 @@ mod tests {
             }
             assert_eq!(
                 read["columns"]["force_x_n"][row],
-                json!(given.force_x_n[row])
+                json!(given.column("force_x_n")[row])
             );
         }
     }
