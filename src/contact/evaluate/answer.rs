@@ -106,9 +106,7 @@ impl RowsAnswer {
     /// Adds a row. No other function writes rows; a row with a number that is not finite has no answer.
     pub(crate) fn push(&mut self, row: RowAnswer) {
         let of = |row: RowAnswer| row.numbers.into_iter().chain(row.gradients);
-        let is_finite = of(row)
-            .take(self.numbers.len())
-            .all(|number| number.is_finite());
+        let is_finite = of(row).take(self.numbers.len()).all(f64::is_finite);
         let row = match row.status.has_answer() && !is_finite {
             true => RowAnswer::without(RowStatus::NotFinite),
             false => row,
