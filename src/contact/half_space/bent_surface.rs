@@ -17,7 +17,7 @@
 
 use std::cmp::Ordering;
 
-use pulp::NullaryFnOnce;
+use pulp::{Simd, WithSimd};
 use rustfft::num_complex::Complex;
 
 use crate::contact::half_space::grid_operator::{FftPlanners, FftPlans, coefficients, lines};
@@ -519,11 +519,54 @@ struct StripSums<'a> {
     to: &'a mut [[[f32; WAVES]; 2]],
 }
 
-impl NullaryFnOnce for StripSums<'_> {
+/// The sums of a group of waves.
+struct GroupSums<'a> {
+    kernel: &'a [[f32; WAVES]],
+    from: &'a [[[f32; WAVES]; 2]],
+    factors: &'a [f32],
+    number: &'a [usize],
+    acting: &'a [usize],
+}
+
+impl GroupSums<'_> {
+    /// The real and the imaginary parts of successive strips from `first` on. Several at once share what acts, and do not wait for each other.
+    #[inline(always)]
+    fn of<S: Simd, const STRIPS: usize>(
+        &self,
+        simd: S,
+        first: usize,
+    ) -> [[[f32; WAVES]; 2]; STRIPS] {
+        let count = self.number.len();
+        let number = &self.number[first..first + STRIPS];
+        let factors = &self.factors[first * count..(first + STRIPS) * count];
+        let mut found = [[[0.0; WAVES]; 2]; STRIPS];
+        for lanes in 0..WAVES / S::F32_LANES {
+            let mut sums = [[simd.splat_f32s(0.0); 2]; STRIPS];
+            for ([re, im], strip) in self.from.iter().zip(self.acting) {
+                let [re, im] = [re, im].map(|part| S::as_simd_f32s(part).0[lanes]);
+                for (k, [real, imaginary]) in sums.iter_mut().enumerate() {
+                    let kernel = &self.kernel[number[k].abs_diff(self.number[*strip])];
+                    let factor = simd.splat_f32s(factors[k * count + strip]);
+                    let influence = simd.mul_f32s(factor, S::as_simd_f32s(kernel).0[lanes]);
+                    *real = simd.mul_add_e_f32s(influence, re, *real);
+                    *imaginary = simd.mul_add_e_f32s(influence, im, *imaginary);
+                }
+            }
+            for (found, sums) in found.iter_mut().zip(sums) {
+                for (found, sum) in found.iter_mut().zip(sums) {
+                    S::as_mut_simd_f32s(found).0[lanes] = sum;
+                }
+            }
+        }
+        found
+    }
+}
+
+impl WithSimd for StripSums<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let StripSums {
             spectrum,
             factors,
@@ -556,20 +599,21 @@ impl NullaryFnOnce for StripSums<'_> {
             }
         }
         for group in 0..groups {
-            let kernel = &spectrum[group * distances..][..distances];
-            let from = &from[group * from_all..][..acting.len()];
+            let sums = GroupSums {
+                kernel: &spectrum[group * distances..][..distances],
+                from: &from[group * from_all..][..acting.len()],
+                factors,
+                number,
+                acting,
+            };
             let to = &mut to[group * to_all..][..count];
-            for ((to, factors), at) in to.iter_mut().zip(factors.chunks_exact(count)).zip(number) {
-                let mut sum = [[0.0_f32; WAVES]; 2];
-                for ([re, im], strip) in from.iter().zip(acting) {
-                    let (factor, kernel) = (factors[*strip], &kernel[at.abs_diff(number[*strip])]);
-                    for k in 0..WAVES {
-                        let influence = factor * kernel[k];
-                        sum[0][k] += influence * re[k];
-                        sum[1][k] += influence * im[k];
-                    }
-                }
-                *to = sum;
+            let (blocks, rest) = to.as_chunks_mut::<4>();
+            let first = 4 * blocks.len();
+            for (block, to) in blocks.iter_mut().enumerate() {
+                *to = sums.of(simd, 4 * block);
+            }
+            for (k, to) in rest.iter_mut().enumerate() {
+                [*to] = sums.of(simd, first + k);
             }
         }
         for (pair, line) in lines.chunks_exact_mut(width).enumerate() {
