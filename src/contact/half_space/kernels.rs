@@ -228,10 +228,8 @@ pub mod rectangle_stress {
 
     #[cfg(test)]
     mod tests {
-        use std::ops::Range;
-
         use super::*;
-        use crate::contact::half_space::kernels::{LoadPack, stress};
+        use crate::contact::half_space::kernels::{LANES, LoadPack, stresses};
 
         fn rectangle(at: [f64; 3], sides: [f64; 4], loads: [f64; 3], nu: f64) -> Stress {
             let mut sum = [0.0; 6];
@@ -354,6 +352,12 @@ pub mod rectangle_stress {
                 [0.1, -0.3, 4.0],
                 [2.0, 2.0, 0.1],
             ];
+            let mut points = [[1.0; LANES]; 3];
+            for (lane, place) in places.iter().enumerate() {
+                for k in 0..3 {
+                    points[k][lane] = place[k] as f32;
+                }
+            }
             for force in [
                 [1.0, 0.0, 0.0],
                 [0.0, 1.0, 0.0],
@@ -365,14 +369,14 @@ pub mod rectangle_stress {
                 for (forces, force) in pack.force.iter_mut().zip(force) {
                     forces[0] = force as f32;
                 }
-                for place in places {
-                    let point = place.map(|part| part as f32);
-                    let found = stress(&[pack], &[Range { start: 0, end: 1 }], point, 0.28);
+                let felt = std::array::from_fn(|_| std::iter::once(0..1).collect());
+                let found = stresses(&[pack], &felt, &points, 0.28);
+                for (place, found) in places.iter().zip(found) {
                     let mut known = [0.0; 6];
                     let [x, y, z] = force.map(|f| f / (side * side));
                     let half = 0.5 * side;
                     add_rectangle(
-                        place,
+                        *place,
                         [-half, half, -half, half],
                         [z, x, y],
                         0.28,
@@ -395,10 +399,10 @@ pub mod rectangle_stress {
 /// Stresses `xx, yy, zz, xy, xz, yz`.
 pub type Stress = [f64; 6];
 
-/// Loads that are taken side by side.
+/// Points that are answered side by side.
 pub const LANES: usize = 16;
 
-/// One number for each of them.
+/// One number for each of the points.
 pub type Lanes = [f32; LANES];
 
 /// Forces on the surface, [`LANES`] side by side. Those that are not needed are 0.
@@ -410,37 +414,48 @@ pub struct LoadPack {
     pub force: [Lanes; 3],
 }
 
-/// The stress in MPa at a point `[x, y, z]` in mm, z more than 0, for Poisson's ratio `nu`; it feels some packs of the list of all.
+/// The stresses in MPa at the points `[x, y, z]` in mm, z more than 0, for Poisson's ratio `nu`; each point feels its own packs of the list
+/// of all.
 #[must_use]
-pub fn stress(packs: &[LoadPack], felt: &[Range<usize>], point: [f32; 3], nu: f64) -> Stress {
-    simd::dispatch(FeltStress {
+pub fn stresses(
+    packs: &[LoadPack],
+    felt: &[Vec<Range<usize>>; LANES],
+    points: &[Lanes; 3],
+    nu: f64,
+) -> [Stress; LANES] {
+    simd::dispatch(FeltStresses {
         packs,
         felt,
-        point,
+        points,
         rest: (1.0 - 2.0 * nu) as f32,
     })
 }
 
-struct FeltStress<'a> {
+struct FeltStresses<'a> {
     packs: &'a [LoadPack],
-    felt: &'a [Range<usize>],
-    point: [f32; 3],
+    felt: &'a [Vec<Range<usize>>; LANES],
+    points: &'a [Lanes; 3],
     /// 1 − 2ν.
     rest: f32,
 }
 
-impl NullaryFnOnce for FeltStress<'_> {
-    type Output = Stress;
+impl NullaryFnOnce for FeltStresses<'_> {
+    type Output = [Stress; LANES];
 
     #[inline(always)]
-    fn call(self) -> Stress {
-        let mut sums = StressSums::default();
-        for packs in self.felt {
-            for pack in &self.packs[packs.clone()] {
-                add(pack, self.point, self.rest, &mut sums);
+    fn call(self) -> [Stress; LANES] {
+        let mut stresses = [[0.0; 6]; LANES];
+        let points = (0..LANES).map(|k| self.points.map(|axis| axis[k]));
+        for ((stress, felt), point) in stresses.iter_mut().zip(self.felt).zip(points) {
+            let mut sums = StressSums::default();
+            for packs in felt {
+                for pack in &self.packs[packs.clone()] {
+                    add(pack, point, self.rest, &mut sums);
+                }
             }
+            *stress = sums.total();
         }
-        sums.total()
+        stresses
     }
 }
 
@@ -622,17 +637,23 @@ mod point_loads_tests {
             force: [[0.1; LANES], [0.2; LANES], [1.0; LANES]],
         };
         let packs = [pack(0.0), pack(0.7), pack(-0.4)];
-        let felt = |ranges: &[Range<usize>]| stress(&packs, ranges, [1.0, 0.3, 0.5], 0.3);
-        assert_eq!(felt(&[0..1, 1..3]), felt(&[Range { start: 0, end: 3 }]));
-        assert_eq!(
-            felt(&[Range { start: 0, end: 1 }]),
-            stress(
-                &packs[..1],
-                &[Range { start: 0, end: 1 }],
-                [1.0, 0.3, 0.5],
-                0.3
-            )
-        );
-        assert_eq!(felt(&[]), [0.0; 6]);
+        let points = [
+            std::array::from_fn(|lane| lane as f32),
+            [0.3; LANES],
+            [0.5; LANES],
+        ];
+        // Ends of what a point feels.
+        let felt = |first: &[usize], second: &[usize]| {
+            let mut felt = [const { Vec::new() }; LANES];
+            for (felt, ends) in felt.iter_mut().zip([first, second]) {
+                felt.extend(ends.windows(2).map(|ends| ends[0]..ends[1]));
+            }
+            felt
+        };
+        let all = stresses(&packs, &felt(&[0, 1, 3], &[0, 1]), &points, 0.3);
+        let first = stresses(&packs, &felt(&[0, 3], &[]), &points, 0.3);
+        let second = stresses(&packs, &felt(&[], &[0, 1]), &points, 0.3);
+        assert_eq!((all[0], all[1]), (first[0], second[1]));
+        assert_eq!(all[2], [0.0; 6]);
     }
 }

@@ -3,12 +3,15 @@
 //! A part is halved along its larger side, whatever the point: only how far the halving goes depends on the distance. So the parts of a region
 //! are a tree that is the same for all points, and each part is worked out once.
 //!
-//! The size of a part over its distance tells how many points of a quadrature it needs along and across.
+//! How large parts of the loads look from several points at once: how many points of a quadrature each needs along and across.
 
 use std::ops::Range;
 
-use crate::contact::half_space::kernels::LoadPack;
+use pulp::NullaryFnOnce;
+
+use crate::contact::half_space::kernels::{LANES, Lanes, LoadPack};
 use crate::contact::numerics::quadrature::RULES;
+use crate::contact::numerics::simd;
 
 /// Parts, and packs of point loads, that are kept, in 45 MB together; only memory depends on them.
 const PARTS_MAX: usize = 100_000;
@@ -219,8 +222,10 @@ impl Piece {
     }
 }
 
-/// Number of rules; the number one above the last asks for a division of the part.
+/// Number of rules; the code one above the last asks for a division of the part.
 pub const ORDERS: usize = RULES.len();
+/// Codes of one axis.
+const CODES: u32 = ORDERS as u32 + 1;
 /// How finely the loads are resolved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadResolution {
@@ -242,7 +247,7 @@ impl LoadResolution {
     };
 }
 
-/// What decides which rules a part needs.
+/// What decides how a part is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartBox {
     /// `[x0, x1, y0, y1]` in mm.
@@ -251,17 +256,64 @@ pub struct PartBox {
     pub squares: [f32; 2],
 }
 
-impl PartBox {
-    /// Which rules a point `[x, y, z]` in mm needs along and across; [`ORDERS`] where the part has to be divided.
-    #[must_use]
-    pub fn orders(&self, [x, y, z]: [f32; 3], resolution: LoadResolution) -> [usize; 2] {
-        let [x0, x1, y0, y1] = self.sides;
-        let dx = (x0 - x).max(x - x1).max(0.0);
-        let dy = (y0 - y).max(y - y1).max(0.0);
-        let square = dx * dx + dy * dy + z * z;
-        let limits = resolution.sizes.map(|size| size * size * square);
-        let passed = |own: f32| limits.iter().filter(|limit| own > **limit).count();
-        self.squares.map(passed)
+/// The codes of one part, point by point: see [`orders`].
+pub type PartCodes = [u8; LANES];
+
+/// Which rules a code stands for, along and across; [`ORDERS`] where the part has to be divided.
+#[must_use]
+pub fn orders(code: u8) -> [usize; 2] {
+    let codes = CODES as usize;
+    [usize::from(code) / codes, usize::from(code) % codes]
+}
+
+/// Appends the codes of every part as seen from the points `x, y, z` in mm.
+pub fn look(
+    parts: impl Iterator<Item = PartBox>,
+    points: &[Lanes; 3],
+    resolution: LoadResolution,
+    codes: &mut Vec<PartCodes>,
+) {
+    let LoadResolution { sizes } = resolution;
+    simd::dispatch(Look {
+        parts,
+        points,
+        limits: sizes.map(|size| size * size),
+        codes,
+    });
+}
+
+struct Look<'a, I> {
+    parts: I,
+    points: &'a [Lanes; 3],
+    /// Squares of the sizes over distance.
+    limits: [f32; ORDERS],
+    codes: &'a mut Vec<PartCodes>,
+}
+
+impl<I: Iterator<Item = PartBox>> NullaryFnOnce for Look<'_, I> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let [xs, ys, zs] = self.points;
+        let limits = self.limits;
+        for PartBox { sides, squares } in self.parts {
+            let [x0, x1, y0, y1] = sides;
+            let mut code = [0_u32; LANES];
+            for lane in 0..LANES {
+                let (x, y, z) = (xs[lane], ys[lane], zs[lane]);
+                let dx = (x0 - x).max(x - x1).max(0.0);
+                let dy = (y0 - y).max(y - y1).max(0.0);
+                let square = dx * dx + dy * dy + z * z;
+                let mut sum = 0;
+                for limit in limits {
+                    let limit = limit * square;
+                    sum += CODES * u32::from(squares[0] > limit) + u32::from(squares[1] > limit);
+                }
+                code[lane] = sum;
+            }
+            self.codes.push(code.map(|code| code as u8));
+        }
     }
 }
 
@@ -275,11 +327,17 @@ mod seen_parts_tests {
             sides: [-1.0, 1.0, -0.5, 0.5],
             squares: [4.0, 1.0],
         };
-        let seen: [[usize; 2]; 16] = std::array::from_fn(|k| {
-            let depth = 0.1 * 1.6_f32.powi(k as i32);
-            part.orders([0.0, 0.0, depth], LoadResolution::FINE)
-        });
-        assert_eq!((seen[0], seen[15]), ([ORDERS; 2], [0; 2]));
+        let depths = std::array::from_fn(|lane| 0.1 * 1.6_f32.powi(lane as i32));
+        let points = [[0.0; LANES], [0.0; LANES], depths];
+        let mut codes = Vec::new();
+        look(
+            [part].into_iter(),
+            &points,
+            LoadResolution::FINE,
+            &mut codes,
+        );
+        let seen = codes[0].map(orders);
+        assert_eq!((seen[0], seen[LANES - 1]), ([ORDERS; 2], [0; 2]));
         for pair in seen.windows(2) {
             assert!(pair[0][0] >= pair[1][0] && pair[0][1] >= pair[1][1]);
         }
