@@ -15,7 +15,7 @@ use crate::jobs::model::job::Job;
 use crate::jobs::model::kind::Kind;
 use crate::jobs::shared::POLL_INTERVAL;
 
-/// Shortest time between two reads of what nothing was announced of.
+/// Time between two reads of a job or batch of which no change is announced. Within it, what another request has read serves.
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// Time between two reads of a batch for each of its jobs: counting them takes time.

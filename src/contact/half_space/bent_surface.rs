@@ -529,7 +529,8 @@ struct GroupSums<'a> {
 }
 
 impl GroupSums<'_> {
-    /// The real and the imaginary parts of successive strips from `first` on. Several at once share what acts, and do not wait for each other.
+    /// The real and the imaginary parts of `STRIPS` successive strips, the first of which is `first`. Each transform that acts is loaded once for all of them, and
+    /// their sums are independent of each other, which hides the latency of the additions.
     #[inline(always)]
     fn of<S: Simd, const STRIPS: usize>(
         &self,

@@ -32,8 +32,8 @@ pub(crate) const REAP: &str = concat!(
     " RETURNING id, state, slices"
 );
 
-/// Those of a dead process that were not certainly the cause of its death: none counts the attempt, and each comes alone next time.
-/// What is left was the only suspect, or all that was running.
+/// Returns the jobs of a dead process that may not have caused its death to the queue: the attempt does not count, and each is claimed alone next time.
+/// The remaining job was the only suspect, or the only one that was running.
 pub(crate) const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
      state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
      ended_at = CASE WHEN cancel_requested = 1 THEN $1 ELSE NULL END, \
