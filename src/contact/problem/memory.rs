@@ -99,15 +99,6 @@ impl SizeInput {
         self.finest().0
     }
 
-    /// Cells whose values are kept of each motion.
-    pub(crate) fn field_cells(&self) -> f64 {
-        if self.fields {
-            self.usual_cells(self.cells())
-        } else {
-            0.0
-        }
-    }
-
     /// Peak memory in bytes.
     pub(crate) fn bytes(&self) -> f64 {
         let (cells, segments) = self.finest();
