@@ -6,7 +6,7 @@
 //! |---|---|---|---|
 //! | check | JSON, [`Limits`] | [`CheckedCase`]: [`problem`], run, label | [`case`] |
 //! | region and pressure | [`NormalTask`] | [`SolvedFootprint`](normal_stage::SolvedFootprint) | [`normal_stage`], [`geometry`], [`normal`] |
-//! | motions, from coarse to fine levels | footprint, [`friction`] | [`MotionAnswer`](rolling::motion_answer::MotionAnswer) | [`rolling_stage`], [`rolling`], [`mesh`], [`half_space`] |
+//! | motions, from coarse to fine levels | footprint, [`friction`] | [`MotionAnswer`](rolling::answer::MotionAnswer) | [`rolling_stage`], [`rolling`], [`mesh`], [`half_space`] |
 //! | answer | answers of motions | [`Solution`], [`Fields`] | [`post`], [`solution`] |
 //!
 //! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`] (in `unlike_motions`), [`wheel_on_rail`] (in [`profile_assessment`]), [`wheelset`].
@@ -14,7 +14,7 @@
 //!
 //! # The way of a motion
 //!
-//! 1. **Read**: [`case::read::draft`] turns JSON into the words of a [`Case`](case::words::question::Case) and names every fault of the text.
+//! 1. **Read**: [`case::read::draft`] turns JSON into the words of a [`Case`](case::words::solver::Case) and names every fault of the text.
 //! 2. **Check**: [`case::checks`] turns each part into numbers and names every fault of them; [`case::check`] puts the parts together.
 //!    From here on there is only the [`CheckedCase`].
 //! 3. **Cut**: [`slices()`] divides a long sweep; [`solve_slice`] starts the clock of the recipe for each slice.
@@ -25,7 +25,7 @@
 //! 6. **Refine**: [`rolling::refinement::adapt`] solves the motion on the meshes of its [family](rolling::refinement::mesh_family), coarse to
 //!    fine, and stops when the [estimate](rolling::refinement::error_estimate) meets the target.
 //! 7. **Solve one mesh**: [`rolling::refinement::on_mesh`] chooses the start and calls the [method](rolling::methods).
-//! 8. **Answer**: [`solution::assemble`] turns the [`MotionAnswer`](rolling::motion_answer::MotionAnswer) into the words of the client, with
+//! 8. **Answer**: [`solution::assemble`] turns the [`MotionAnswer`](rolling::answer::MotionAnswer) into the words of the client, with
 //!    the outputs that were asked for ([`solution::maintain`]: stresses, damage, temperatures).
 //! 9. **Finish**: [`solution::finish`] distributes the time, adds remarks on implausible numbers, and refuses numbers that are not finite.
 

@@ -2,15 +2,15 @@
 //!
 //! | question | where |
 //! |---|---|
-//! | what is asked | [`task`], [`motion`], [`resolution`] |
+//! | what is asked | [`task`] |
 //! | which creepages give a prescribed force | [`force_control`], with its unknowns in [`force_places`] |
 //! | on which meshes, until when | [`refinement`] |
 //! | how one mesh is solved | [`methods`] |
 //! | which equations they solve | [`slip_equations`], [`slip_rules`] |
-//! | mesh, pressures and bounds of one level | [`strip_mesh`], [`strip_chords`] |
+//! | mesh, pressures and bounds of one level | [`strip_mesh`] |
 //! | operators kept for later cases | [`operator_store`], [`own_blocks`] |
 //! | rolling that changes, step by step | [`history`], with [`displacement_memory`] |
-//! | what comes out | [`answer`] (one level), [`motion_answer`] (one motion), [`resultants`] |
+//! | what comes out | [`answer`] |
 //! | closed forms | [`linear_theory`], [`load_ellipse`] |
 
 pub mod answer;

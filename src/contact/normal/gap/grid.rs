@@ -548,7 +548,7 @@ pub(crate) struct GapOutcome {
     pub(crate) iterations: u32,
     /// How the refinement of the grids ended.
     pub(crate) exit: GridsExit,
-    /// See [`NormalWork`](crate::contact::normal::gap::grid::NormalWork).
+    /// See [`NormalWork`].
     pub(crate) pressure_change: f64,
     /// The least gap in mm.
     pub(crate) least: f64,

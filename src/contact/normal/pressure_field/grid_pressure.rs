@@ -26,7 +26,7 @@ use crate::contact::remark::list::Remark;
 /// Pressure samples on one rectangular grid and the patches they form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridPressure {
-    /// The given grid with [`PADDING`](crate::contact::normal::pressure_field::grid_pressure::PADDING) more lines on each side.
+    /// The given grid with [`PADDING`] more lines on each side.
     pub(crate) grid: SampleGrid,
     /// Squared pressure relative to its largest value, continued below 0 outside the contact.
     pub(crate) q: Vec<f64>,

@@ -6,9 +6,8 @@
 //! | sizes and grading of the meshes of a motion | [`mesh_family`] |
 //! | one mesh: start, method, resultants | [`on_mesh`] |
 //! | error and extrapolated value | [`error_estimate`] |
-//! | starts from motions before and from coarser meshes | [`predictor`], [`interpolate`] |
+//! | starts from motions before and from coarser meshes; meshes kept from one motion to the next | [`predictor`], [`interpolate`] |
 //! | derivatives by creepages and spin | [`gradients`] |
-//! | meshes kept from one motion to the next | [`levels`], [`state`] |
 
 pub mod adapt;
 pub mod error_estimate;

@@ -9,7 +9,7 @@
 //! 2. Stick cells at or above their bound and slip cells whose traction opposes their slip (eq. 10) change zones
 //!    ([`active_set`]).
 //! 3. The stick tractions are eliminated (eq. 13, [`stick_block`]); Newton–Raphson gives the slip tractions
-//!    (eq. 8 and 9, [`newton_raphson`]) from an initial guess (eq. 14 or 15, [`active_set`]). Steps 2 and 3 are repeated
+//!    (eq. 8 and 9, [`solve`]) from an initial guess (eq. 14 or 15, [`active_set`]). Steps 2 and 3 are repeated
 //!    until no cell changes.
 //! 4. The first run uses guess 1. If it fails, a solution on a coarse mesh with guess 1 gives the spin pole
 //!    ([`vortex`](crate::contact::rolling::methods::liu_hsu::solve)) for guess 2.
