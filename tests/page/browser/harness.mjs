@@ -8,8 +8,6 @@ import { after, before } from 'node:test';
 import { chromium } from 'playwright-core';
 
 export const OUTPUT = join(import.meta.dirname, '../output');
-/** Times are measured with others at work: they may be three times as long as on an idle machine. */
-export const SLACK = 3;
 
 const BROWSER_ARGUMENTS = [
   '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update',
