@@ -142,7 +142,9 @@ impl Jobs {
     /// A solver thread could not be started.
     pub fn start(&self) -> Result<(), JobsError> {
         let workers = self.shared.options.workers;
-        for number in 0..=workers {
+        // A process without workers has no spare one either.
+        let threads = if workers == 0 { 0 } else { workers + 1 };
+        for number in 0..threads {
             let mut worker = self.worker(&format!("solver-{number}"))?;
             worker.spare = number == workers;
             let runs = self.shared.tasks.track_future(worker.run());
