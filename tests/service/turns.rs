@@ -105,6 +105,17 @@ async fn short_jobs_are_served_beside_a_long_solve_which_goes_on() {
 }
 
 #[tokio::test]
+async fn a_process_without_workers_solves_nothing() {
+    let shop = shop(|options| options.workers = 0).await;
+    let jobs = &shop.jobs;
+    jobs.start().unwrap();
+    let id = jobs.submit(small("short"), None).await.unwrap().id;
+    let job = jobs.wait(id, Duration::from_millis(500)).await.unwrap();
+    assert_eq!((job.state, job.attempt), (State::Queued, 0));
+    jobs.shutdown(Duration::ZERO).await;
+}
+
+#[tokio::test]
 async fn beside_a_long_solve_jobs_that_turn_out_to_be_long_go_back() {
     let shop = shop(|_| {}).await;
     let jobs = &shop.jobs;
