@@ -117,7 +117,7 @@ pub struct HttpOptions {
     /// Requests without a key are answered, as those of a tenant of their own.
     #[arg(skip = true)]
     pub anonymous: bool,
-    /// The same for those that came through a proxy.
+    /// Requests without a key that came through a proxy are answered too.
     #[arg(skip)]
     pub anonymous_proxied: bool,
     /// Requests per second of one key, or of one address without a key; 0 for any number.

@@ -243,7 +243,7 @@ pub fn put(case: &mut Value, path: &[String], value: Value) -> Result<(), String
 pub struct Replaced {
     /// How many of the members lead to the part.
     depth: usize,
-    /// The part; nothing if there was none.
+    /// The replaced part; `None` if the case had no such member.
     before: Option<Value>,
 }
 

@@ -429,7 +429,7 @@ pub(crate) fn each_line(text: &str) -> impl Iterator<Item = Line<'_>> {
         })
 }
 
-/// The same, if they are not too many.
+/// The lines of a text, if there are no more than allowed.
 ///
 /// # Errors
 /// A sentence with the limit.

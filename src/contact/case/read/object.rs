@@ -79,7 +79,7 @@ impl<'v, 'f> Object<'v, 'f> {
         self.fault_with(name, detail, figures);
     }
 
-    /// The same with what programs can read of it.
+    /// Notes a fault of a member, with its code and values for programs.
     pub(crate) fn fault_with(
         &mut self,
         name: &str,
@@ -452,7 +452,7 @@ impl Faults {
         self.add_with(pointer, detail, FaultFigures::default());
     }
 
-    /// The same with what programs can read of it.
+    /// Notes one fault, with its code and values for programs.
     pub(crate) fn add_with(
         &mut self,
         pointer: impl Into<String>,

@@ -234,7 +234,7 @@ impl HistoryCourse {
         }
     }
 
-    /// The values at so many points.
+    /// The values at `points` points.
     #[must_use]
     pub fn values(&self, points: usize) -> Vec<f64> {
         match self {
