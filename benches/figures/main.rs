@@ -8,15 +8,22 @@ use std::path::{Path, PathBuf};
 use drawing::{Curve, Frame, Picture};
 use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::Unmonitored;
-use railhead::contact::post::smooth::Sheet;
 use railhead::contact::rolling::task::Motion;
 use railhead::contact::solution::words::answer::{Fields, Solution};
-use railhead::contact::{check, solve};
+use railhead::contact::{self, check, solve};
 use serde_json::{Value, json};
+use shape::sheet::Sheet;
 
 extern crate railhead_contact as railhead;
 
 mod drawing;
+#[path = "../../src/http/render/shape/mod.rs"]
+#[allow(
+    dead_code,
+    unused_imports,
+    reason = "the service uses and tests the rest"
+)]
+mod shape;
 
 /// Fine enough for a border without steps that the eye minds.
 const STRIPS: u32 = 44;

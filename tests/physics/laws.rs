@@ -1,6 +1,5 @@
 //! What holds exactly in theory and on every symmetric mesh: symmetry, scaling, friction, power.
 
-use railhead::contact::post::outlines::outlines;
 use railhead::contact::solution::words::answer::{Fields, PatchCells, Zone};
 
 use crate::reference::{Ellipse, assert_none, solve};
@@ -46,18 +45,6 @@ fn tractions(fields: &Fields) -> (&PatchCells, &[f64], &[f64]) {
         point.traction_x_mpa.as_ref().unwrap(),
         point.traction_y_mpa.as_ref().unwrap(),
     )
-}
-
-fn signed_area(polygons: &[Vec<[f64; 2]>]) -> f64 {
-    let area = |p: &Vec<[f64; 2]>| -> f64 {
-        let next = p.iter().cycle().skip(1);
-        0.5 * p
-            .iter()
-            .zip(next)
-            .map(|(a, b)| a[0] * b[1] - b[0] * a[1])
-            .sum::<f64>()
-    };
-    polygons.iter().map(area).sum()
 }
 
 #[test]
@@ -209,11 +196,6 @@ fn zones_fill_the_patch_and_stick_touches_the_leading_edge() {
             stick > 0.05 * whole && slip > 0.05 * whole,
             "{stick} {slip}"
         );
-        // The outlines enclose the cells, whose area differs from the patch's by one factor for both zones.
-        let zones = patch.points[0].zone.as_deref();
-        let [outlined_stick, outlined_slip] = [Zone::Stick, Zone::Slip]
-            .map(|zone| signed_area(&outlines(patch.cells(0), zones, Some(zone))));
-        assert!((outlined_stick / outlined_slip - stick / slip).abs() < 1e-9 * stick / slip);
         let zone = patch.points[0].zone.as_ref().unwrap();
         // In the two middle strips: slip at the trailing end, stick at the leading end.
         for strip in [5, 6] {

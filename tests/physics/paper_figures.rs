@@ -1,6 +1,5 @@
 //! The examples that redraw the figures of Liu and Hsu's paper show what the paper says, on a patch without symmetry.
 
-use railhead::contact::post::outlines::outlines;
 use railhead::contact::solution::words::answer::{Fields, Solution, Zone};
 use serde_json::{Value, json};
 
@@ -81,11 +80,12 @@ fn pure_spin_leaves_separate_poles_and_then_one() {
     let (solution, fields) = solve(&case);
     let [_, leading, ..] = solution.patches[0].extent_mm;
     let poles = |point: usize| -> Vec<f64> {
-        let zones = fields.patches[0].points[point].zone.as_deref();
-        let loops = outlines(fields.patches[0].cells(point), zones, Some(Zone::Stick));
-        loops
-            .iter()
-            .map(|l| l.iter().map(|at| at[0]).sum::<f64>() / l.len() as f64 / leading)
+        let patch = &fields.patches[0];
+        let zones = patch.points[point].zone.iter().flatten();
+        let cells = patch.cells(point).x_mm.iter().zip(zones);
+        cells
+            .filter(|(_, zone)| **zone == Zone::Stick)
+            .map(|(x, _)| x / leading)
             .collect()
     };
     let (separate, one) = (poles(0), poles(1));

@@ -55,7 +55,8 @@ impl Place {
 
 /// Values at any places of the curve that has no extreme between its nodes (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat.
 /// Comput. 5, 1984); beyond the first and last node their values. Nodes ascend; none of two at the same place counts twice.
-pub(crate) fn monotone(axis: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
+#[must_use]
+pub fn monotone(axis: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
     let last = axis.len() - 1;
     if last == 0 {
         return vec![values[0]; at.len()];
@@ -261,7 +262,8 @@ pub(crate) fn polynomial_weights<const N: usize>(nodes: &[f64; N], at: f64) -> [
 }
 
 /// Value at `at` of the polynomial of least degree through points `(place, value)`, of which there is at least one.
-pub(crate) fn polynomial_value(points: &[(f64, f64)], at: f64) -> f64 {
+#[must_use]
+pub fn polynomial_value(points: &[(f64, f64)], at: f64) -> f64 {
     let mut sum = 0.0;
     for (i, (node, value)) in points.iter().enumerate() {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);

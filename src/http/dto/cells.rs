@@ -3,8 +3,7 @@
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::post::outlines::{outlines, patch_outline};
-use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
+use crate::contact::solution::words::answer::Zone;
 
 /// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run
 /// counter-clockwise, holes clockwise.
@@ -18,20 +17,6 @@ pub(crate) struct Outlines {
     /// Around the cells that slip; only with zones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub slip: Option<Vec<Vec<[f64; 2]>>>,
-}
-
-impl Outlines {
-    /// The border of a patch, and those of its zones if they are wanted and known.
-    #[must_use]
-    pub(crate) fn of(cells: &PatchCells, point: &PointFields, with_zones: bool) -> Outlines {
-        let zones = point.zone.as_deref().filter(|_| with_zones);
-        let around = |zone| zones.map(|zones| outlines(cells, Some(zones), Some(zone)));
-        Outlines {
-            patch: patch_outline(cells),
-            stick: around(Zone::Stick),
-            slip: around(Zone::Slip),
-        }
-    }
 }
 
 /// Values per cell, strip by strip from smaller to larger y, in each strip from smaller to larger x. All arrays have

@@ -10,6 +10,7 @@ pub(super) mod pieces;
 pub(super) mod resultants;
 pub(super) mod row_tables;
 pub(super) mod rows;
+pub(super) mod shape;
 pub(super) mod stresses;
 pub(super) mod table;
 pub(super) mod vtk;

@@ -4,8 +4,10 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::post::resample::{Gridded, resample, resample_zone};
 use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
+use crate::http::dto::cells::Outlines;
+use crate::http::render::shape::outlines::{outlines, patch_outline};
+use crate::http::render::shape::resample::{Gridded, resample, resample_zone};
 
 /// A file, byte for byte.
 #[derive(Debug, ToSchema)]
@@ -22,6 +24,20 @@ pub(crate) struct Table {
     pub columns: Vec<TableColumn>,
     /// How exactly its numbers are written.
     pub precision: Precision,
+}
+
+impl Outlines {
+    /// The border of a patch, and those of its zones if they are wanted and known.
+    #[must_use]
+    pub(crate) fn of(cells: &PatchCells, point: &PointFields, with_zones: bool) -> Outlines {
+        let zones = point.zone.as_deref().filter(|_| with_zones);
+        let around = |zone| zones.map(|zones| outlines(cells, Some(zones), Some(zone)));
+        Outlines {
+            patch: patch_outline(cells),
+            stick: around(Zone::Stick),
+            slip: around(Zone::Slip),
+        }
+    }
 }
 
 /// How exactly numbers are written.

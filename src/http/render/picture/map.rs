@@ -2,13 +2,13 @@
 
 use std::fmt::Write;
 
-use crate::contact::post::outlines::{outlines, patch_outline};
-use crate::contact::post::smooth::{AtBorder, Sheet};
 use crate::contact::solution::words::answer::{PatchCells, Zone};
 use crate::http::render::picture::colour::{SLIP, STICK, at};
 use crate::http::render::picture::frame::Frame;
 use crate::http::render::picture::scene::{Heat, Scene, extent, zones_present};
 use crate::http::render::picture::svg::{Svg, curves, polyline, px};
+use crate::http::render::shape::outlines::{outlines, patch_outline};
+use crate::http::render::shape::sheet::{AtBorder, Sheet};
 
 /// Where and how finely a patch is drawn.
 pub(super) struct Ground<'a> {

@@ -1,8 +1,8 @@
 //! What a picture shows, and what follows from it: the coloured values, the box around the cells, the zones.
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::post::smooth::AtBorder;
 use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
+use crate::http::render::shape::sheet::AtBorder;
 
 /// What a picture shows.
 #[derive(Debug, Clone)]

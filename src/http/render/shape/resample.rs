@@ -1,17 +1,17 @@
 //! Interpolates cell values onto a regular grid, for pictures and for programs that read arrays.
 
-use crate::contact::post::outlines::{StoredSegment, Strips};
+use super::outlines::{StoredSegment, Strips};
 use crate::contact::solution::words::answer::{PatchCells, Zone};
 
 /// Values on a regular grid; `None` outside the patch.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gridded<T = f64> {
+pub(crate) struct Gridded<T = f64> {
     /// Sample points along x in mm, ascending.
-    pub x_mm: Vec<f64>,
+    pub(crate) x_mm: Vec<f64>,
     /// Sample points across in mm, ascending.
-    pub y_mm: Vec<f64>,
+    pub(crate) y_mm: Vec<f64>,
     /// `values[iy][ix]` at `(x_mm[ix], y_mm[iy])`.
-    pub values: Vec<Vec<Option<T>>>,
+    pub(crate) values: Vec<Vec<Option<T>>>,
 }
 
 /// Interpolates cell values on `nx × ny` points over the bounding box of the patch.
@@ -21,14 +21,14 @@ pub struct Gridded<T = f64> {
 /// linear between the centres of cells, and constant beyond the first and last centre up to the end of the chord. Between
 /// the mid-lines of two strips, the ends of the chord are linear in y, and so is the value between those at
 /// the same relative position in both chords. Beyond the first and last mid-line the chord is extrapolated to the
-/// strip's border as in [`patch_outline`](crate::contact::post::outlines::patch_outline). Where segments branch, every
+/// strip's border as in [`patch_outline`](super::outlines::patch_outline). Where segments branch, every
 /// segment is continued unchanged to its strip's borders. Constants are reproduced everywhere, linear fields between the
 /// outermost centres of a chord and between the outermost mid-lines.
 ///
 /// # Panics
 /// If `nx` or `ny` is less than 2, or the number of `values` differs from that of the cells.
 #[must_use]
-pub fn resample(fields: &PatchCells, values: &[f64], nx: usize, ny: usize) -> Gridded {
+pub(crate) fn resample(fields: &PatchCells, values: &[f64], nx: usize, ny: usize) -> Gridded {
     assert_eq!(
         values.len(),
         fields.x_mm.len(),
@@ -49,7 +49,12 @@ pub fn resample(fields: &PatchCells, values: &[f64], nx: usize, ny: usize) -> Gr
 /// # Panics
 /// If `nx` or `ny` is less than 2, or the number of `zones` differs from that of the cells.
 #[must_use]
-pub fn resample_zone(fields: &PatchCells, zones: &[Zone], nx: usize, ny: usize) -> Gridded<Zone> {
+pub(crate) fn resample_zone(
+    fields: &PatchCells,
+    zones: &[Zone],
+    nx: usize,
+    ny: usize,
+) -> Gridded<Zone> {
     assert_eq!(
         zones.len(),
         fields.x_mm.len(),
@@ -219,8 +224,8 @@ fn along(fields: &PatchCells, values: &[f64], place: &CellPosition) -> f64 {
 mod tests {
     use std::f64::consts::PI;
 
+    use super::super::outlines::samples::{ellipse, push_segment};
     use super::*;
-    use crate::contact::post::outlines::samples::{ellipse, push_segment};
 
     const A: f64 = 2.0;
     const B: f64 = 3.0;

@@ -9,8 +9,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
+use super::outlines::Strips;
 use crate::contact::numerics::interpolation::monotone;
-use crate::contact::post::outlines::Strips;
 use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// SheetNodes of the grid along one axis, at least and at most; between them four per cell or strip.
@@ -20,7 +20,7 @@ const STRIPS_MIN: usize = 3;
 
 /// What a field does at the border of the patch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AtBorder {
+pub(crate) enum AtBorder {
     /// It vanishes like the square root of the distance: pressure, and what friction bounds.
     Vanishes,
     /// It goes on as in the outermost cells.
@@ -37,7 +37,7 @@ pub(crate) struct SheetStrip {
 
 /// A curved grid over a patch.
 #[derive(Debug, Clone)]
-pub struct Sheet {
+pub(crate) struct Sheet {
     pub(crate) strips: Vec<SheetStrip>,
     /// Heights of the strips, between those of the lowest and the highest point of the border.
     heights: Vec<f64>,
@@ -50,15 +50,15 @@ pub struct Sheet {
 
 /// A field at the nodes of a [`Sheet`].
 #[derive(Debug, Clone, PartialEq)]
-pub struct SheetNodes(pub(crate) Vec<f64>);
+pub(crate) struct SheetNodes(pub(crate) Vec<f64>);
 
 impl Sheet {
     /// The grid over a patch; `None` where it has fewer than three strips, or gaps.
     ///
     /// Between the middles of strips the chord's squared half-length and its centre are monotone cubics, so that the border of an
-    /// ellipse is round at few strips too; its ends are those of [`patch_outline`](crate::contact::post::outlines::patch_outline).
+    /// ellipse is round at few strips too; its ends are those of [`patch_outline`](super::outlines::patch_outline).
     #[must_use]
-    pub fn new(cells: &PatchCells) -> Option<Sheet> {
+    pub(crate) fn new(cells: &PatchCells) -> Option<Sheet> {
         let found = Strips::new(cells);
         if !found.is_simple() || found.segments.len() < STRIPS_MIN {
             return None;
@@ -109,7 +109,7 @@ impl Sheet {
 
     /// The border of the patch in mm, counter-clockwise.
     #[must_use]
-    pub fn border(&self) -> Vec<[f64; 2]> {
+    pub(crate) fn border(&self) -> Vec<[f64; 2]> {
         let columns = self.shares.len();
         let leading = (0..self.rows.len()).map(|row| self.places[(row + 1) * columns - 1]);
         let trailing = (0..self.rows.len())
@@ -120,7 +120,7 @@ impl Sheet {
 
     /// Box around the border: x from, x to, y from, y to in mm.
     #[must_use]
-    pub fn extent(&self) -> [f64; 4] {
+    pub(crate) fn extent(&self) -> [f64; 4] {
         let mut shape = [
             f64::INFINITY,
             f64::NEG_INFINITY,
@@ -145,7 +145,7 @@ impl Sheet {
     /// # Panics
     /// If there are fewer values than cells.
     #[must_use]
-    pub fn nodes(&self, values: &[f64], cells: &PatchCells, edge: AtBorder) -> SheetNodes {
+    pub(crate) fn nodes(&self, values: &[f64], cells: &PatchCells, edge: AtBorder) -> SheetNodes {
         let strips = self.strips.iter().map(|strip| {
             let width = strip.right - strip.left;
             let inside = strip.cells.clone();
@@ -201,7 +201,7 @@ impl Sheet {
 
     /// Closed curves around where a field reaches a level, counter-clockwise, holes clockwise; they end at the border of the patch.
     #[must_use]
-    pub fn reaching(&self, nodes: &SheetNodes, level: f64) -> Vec<Vec<[f64; 2]>> {
+    pub(crate) fn reaching(&self, nodes: &SheetNodes, level: f64) -> Vec<Vec<[f64; 2]>> {
         let grid = CurvedGrid {
             columns: self.shares.len(),
             values: &nodes.0,
@@ -222,11 +222,11 @@ fn crowded(of: usize) -> Vec<f64> {
 /// Values at the nodes of a grid, row by row; the grid may be curved.
 pub(crate) struct CurvedGrid<'a> {
     /// Nodes of a row.
-    pub columns: usize,
+    pub(crate) columns: usize,
     /// One value per node.
-    pub values: &'a [f64],
+    pub(crate) values: &'a [f64],
     /// The place of each node in mm.
-    pub places: &'a [[f64; 2]],
+    pub(crate) places: &'a [[f64; 2]],
 }
 
 impl CurvedGrid<'_> {
@@ -336,7 +336,11 @@ impl Sheet {
     /// pressure or traction is not known it is half-way. From strip to strip a function that vanishes there is interpolated, which closes
     /// zones that end between strips. Pieces smaller than the largest cell are left out.
     #[must_use]
-    pub fn stick(&self, cells: &PatchCells, values: &PointFields) -> Option<Vec<Vec<[f64; 2]>>> {
+    pub(crate) fn stick(
+        &self,
+        cells: &PatchCells,
+        values: &PointFields,
+    ) -> Option<Vec<Vec<[f64; 2]>>> {
         let zones = values.zone.as_deref()?;
         let margins = BoundMargins::of(cells, values);
         let strips: Vec<ZoneChanges> = self
@@ -472,9 +476,8 @@ impl ZoneChanges {
 
 #[cfg(test)]
 mod tests {
+    use super::super::outlines::samples::{ellipse, push_segment};
     use super::*;
-    use crate::contact::post::outlines::samples::{ellipse, push_segment};
-    use crate::contact::post::smooth::signed_area;
 
     #[test]
     fn eight_strips_show_an_ellipse_and_hertz_pressure_on_it() {
@@ -563,8 +566,8 @@ mod contour_tests {
 
 #[cfg(test)]
 mod stick_tests {
+    use super::super::outlines::samples::ellipse;
     use super::*;
-    use crate::contact::post::outlines::samples::ellipse;
 
     /// Carter's tractions along every strip of an ellipse: sticks where the second root is not 0.
     fn carter(cells: &PatchCells, a: f64, b: f64, shrink: f64) -> (PatchCells, PointFields) {

@@ -19,7 +19,7 @@ use crate::contact::solution::words::answer::{PatchCells, Zone};
 /// # Panics
 /// If the vectors differ in length.
 #[must_use]
-pub fn outlines(
+pub(crate) fn outlines(
     fields: &PatchCells,
     zones: Option<&[Zone]>,
     which: Option<Zone>,
@@ -61,7 +61,7 @@ pub fn outlines(
 /// ellipse, where it closes in one point). Second order in the strips' width. Any other patch gets the rectilinear
 /// outline of [`outlines`].
 #[must_use]
-pub fn patch_outline(fields: &PatchCells) -> Vec<Vec<[f64; 2]>> {
+pub(crate) fn patch_outline(fields: &PatchCells) -> Vec<Vec<[f64; 2]>> {
     let strips = Strips::new(fields);
     if !strips.is_simple() {
         return outlines(fields, None, None);
@@ -259,32 +259,32 @@ pub(crate) const JOIN: f64 = 1e-9;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StoredSegment {
     /// Its cells, as indices into the fields, from smaller to larger x.
-    pub cells: std::ops::Range<usize>,
+    pub(crate) cells: std::ops::Range<usize>,
     /// Mid-line in mm.
-    pub y: f64,
+    pub(crate) y: f64,
     /// Width of the strip in mm.
-    pub dy: f64,
+    pub(crate) dy: f64,
     /// Trailing end in mm.
-    pub left: f64,
+    pub(crate) left: f64,
     /// Leading end in mm.
-    pub right: f64,
+    pub(crate) right: f64,
     /// The segment that continues it toward smaller y, if each is the only neighbour of the other on that side.
-    pub below: Option<usize>,
+    pub(crate) below: Option<usize>,
     /// The segment that continues it toward larger y, if each is the only neighbour of the other on that side.
-    pub above: Option<usize>,
+    pub(crate) above: Option<usize>,
     /// It touches several segments below, or one that touches other segments above.
-    pub branches_below: bool,
+    pub(crate) branches_below: bool,
     /// It touches several segments above, or one that touches other segments below.
-    pub branches_above: bool,
+    pub(crate) branches_above: bool,
 }
 
 /// The patch as strips, each a range of segments; both from smaller to larger y, then x.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Strips {
     /// All segments.
-    pub segments: Vec<StoredSegment>,
+    pub(crate) segments: Vec<StoredSegment>,
     /// Segments of each strip.
-    pub strips: Vec<std::ops::Range<usize>>,
+    pub(crate) strips: Vec<std::ops::Range<usize>>,
 }
 
 impl Strips {
@@ -476,8 +476,8 @@ mod tests {
 
     use proptest::prelude::*;
 
+    use super::samples::{ellipse, push_segment};
     use super::*;
-    use crate::contact::post::outlines::samples::{ellipse, push_segment};
 
     fn area(polygon: &[[f64; 2]]) -> f64 {
         let next = polygon.iter().cycle().skip(1);

@@ -1,0 +1,7 @@
+//! The shape of a patch from its cells: outlines of patch and zones, values on a regular grid, and a smooth sheet for pictures.
+//!
+//! `benches/figures` compiles this folder too, so that it names only `crate::contact` and its own files.
+
+pub(crate) mod outlines;
+pub(crate) mod resample;
+pub(crate) mod sheet;
