@@ -152,6 +152,7 @@ pub const DOOR: &[&str] = &[
     "contact::evaluate",
     "contact::evolution",
     "contact::monitor",
+    "contact::numerics::interpolation",
     "contact::post",
     "contact::problem",
     "contact::remark",
