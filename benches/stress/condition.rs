@@ -32,7 +32,7 @@ fn condition(a_over_b: f64, strips: u32, cells: u32, rule: Rule) -> f64 {
     )
     .expect("a mesh");
     let operator = level.operator(&Unmonitored).expect("never stopped");
-    let equations = SlipEquations::new(rule, &level.normalised, &operator.influence, None);
+    let equations = SlipEquations::new(rule, &level.normalised, &operator, None);
     let values = equations.dense(&Unmonitored).expect("never stopped");
     let n = 2 * equations.cells();
     let matrix = Mat::from_fn(n, n, |i, j| values[j * n + i]);

@@ -15,13 +15,12 @@ use crate::contact::geometry::wheel_rail::Placement;
 use crate::contact::geometry::wheelset_pose::WheelsetMotion;
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel::WheelTask;
-use crate::contact::numerics::roots::{FRACTION_MAX, PairRoot, RootExit, find_pair, find_root};
+use crate::contact::numerics::roots::{FRACTION_MAX, RootExit, find_searched};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::Run;
 use crate::contact::profile_assessment::trust;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::force_places::CubicLaw;
-use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::task::{Motion, PrescribedForces, RelativeTo};
 use crate::contact::solution::words::answer::{Fields, PatchSolution, Solution};
@@ -93,27 +92,20 @@ struct Reach {
 
 impl FirstEstimate {
     fn of(solution: &Solution, case: &CheckedCase, rolling: FreeRollingState) -> FirstEstimate {
-        let elasticity = &case.problem.elasticity;
-        let modulus = case.problem.interface.reduction * elasticity.shear_modulus;
+        let CheckedCase { problem, .. } = case;
         let (mut limit, mut lateral_normal) = (0.0, 0.0);
-        let mut stiffness = [0.0; 2];
         for patch in &solution.patches {
             limit += patch.friction_limit_n.unwrap_or(0.0);
-            let [x_min, x_max, y_min, y_max] = patch.extent_mm;
-            let c = linear_theory::coefficients(
-                (x_max - x_min) / (y_max - y_min),
-                elasticity.poisson_ratio,
-            );
-            for (stiffness, c) in stiffness.iter_mut().zip(c) {
-                *stiffness += c * modulus * patch.area_mm2 / std::f64::consts::PI;
-            }
             lateral_normal += patch.normal_force_n * angle_of(patch).sin().abs();
         }
+        let shapes = solution.patches.iter().map(|patch| {
+            let [x_min, x_max, y_min, y_max] = patch.extent_mm;
+            ((x_max - x_min) / (y_max - y_min), patch.area_mm2)
+        });
+        let law = CubicLaw::of_patches(&problem.elasticity, problem.interface, shapes, limit);
         FirstEstimate {
             limit,
-            law: CubicLaw {
-                stiffness: stiffness.map(|stiffness| stiffness / limit.max(f64::MIN_POSITIVE)),
-            },
+            law,
             rolling: rolling.of(&solution.patches),
             lateral: solution.total[0].force_y_n,
             lateral_normal,
@@ -307,26 +299,6 @@ impl ForceSearch<'_> {
         }
     }
 
-    /// Finds the places at which the forces are as prescribed, from trials that answer how far they are off and by how much they may be.
-    fn find(
-        &self,
-        start: [f64; 2],
-        mut trial: impl FnMut([f64; 2], &mut f64) -> Result<[f64; 2], SolveError>,
-    ) -> Result<PairRoot, SolveError> {
-        if let [Some(_), Some(_)] = self.forces {
-            return find_pair(start, trial);
-        }
-        let k = usize::from(self.forces[0].is_none());
-        let mut place = start;
-        let root = find_root(start[k], |at, tolerance: &mut f64| {
-            place[k] = at;
-            Ok::<f64, SolveError>(trial(place, tolerance)?[k])
-        })?;
-        place[k] = root.place;
-        let exit = root.exit;
-        Ok(PairRoot { place, exit })
-    }
-
     /// The answer at the forces.
     fn to(&self, first: &FirstEstimate, reach: &Reach) -> Result<(Solution, Fields), SolveError> {
         let target = self.case.run.resolution.target_or_usual();
@@ -342,7 +314,8 @@ impl ForceSearch<'_> {
         let run = self.case.run.for_resultants(0.0);
         let (mut trials, mut nearest) = (0.0, f64::INFINITY);
         let creepages_at = |place: [f64; 2]| [0, 1].map(|k| first.law.creepage(k, place[k]));
-        let root = self.find(reach.start, |place, tolerance| {
+        let searched = self.forces.map(|force| force.is_some());
+        let root = find_searched(searched, reach.start, |place, tolerance: &mut f64| {
             let share = (PROGRESS[1] - PROGRESS[0]) / TRIALS_USUAL;
             let part = MonitorPart {
                 inner: self.monitor,
@@ -361,7 +334,7 @@ impl ForceSearch<'_> {
             let units = reach.units.map(|unit| first.limit / unit);
             let sought = usize::from(self.forces[1].is_some());
             *tolerance = allowed * units[sought];
-            Ok([off[0] * units[0], off[1] * units[1]])
+            Ok::<[f64; 2], SolveError>([off[0] * units[0], off[1] * units[1]])
         })?;
         // Where the trials alternate between two meshes the force jumps by what both are allowed to miss.
         if !root.exit.converged() && (root.exit == RootExit::SignKept || nearest > target) {

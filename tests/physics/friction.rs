@@ -60,7 +60,7 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
     let level = StripMesh::new(&checked.rolling_task(&footprint), size).expect("a mesh");
     let motion: Motion = level.scale.motion(&checked.problem.motions[0]);
     let operator = level.operator(&Unmonitored).expect("never stopped");
-    let equations = SlipEquations::new(rule, &level.normalised, &operator.influence, None);
+    let equations = SlipEquations::new(rule, &level.normalised, &operator, None);
     let padded = equations.padded();
     let resized = |values: &[f64]| {
         let mut values = values.to_vec();

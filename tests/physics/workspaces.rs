@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use railhead::contact::case::solver::Limits;
 use railhead::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
+use railhead::contact::half_space::strip_operator::operator::StripOperator;
 use railhead::contact::mesh::MeshSize;
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::rolling::methods::boundary_element::newton::Newton;
 use railhead::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use railhead::contact::rolling::operator_store::{CaseOperators, LevelOperator, OperatorStore};
+use railhead::contact::rolling::operator_store::{CaseOperators, OperatorStore};
 use railhead::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 use railhead::contact::rolling::slip_rules::Rule;
 use railhead::contact::rolling::strip_mesh::StripMesh;
@@ -26,7 +27,7 @@ fn operators_equations_meshes_and_stores_are_shared_by_threads() {
     fn shared<T: Send + Sync>() {}
     shared::<GridOperator<f32>>();
     shared::<GridOperator<f64>>();
-    shared::<LevelOperator>();
+    shared::<StripOperator>();
     shared::<OperatorStore>();
     shared::<CaseOperators>();
     shared::<SlipEquations>();
@@ -66,7 +67,7 @@ fn with_equations(precision_target: f64, work: impl Fn(&SlipEquations, [&[f64]; 
     let level = StripMesh::new(&task, size).expect("a mesh");
     let operator = level.operator(&Unmonitored).expect("never stopped");
     for rule in [Rule::Upwind, Rule::ThreePoint, Rule::Trapezoid] {
-        let equations = SlipEquations::new(rule, &level.normalised, &operator.influence, None);
+        let equations = SlipEquations::new(rule, &level.normalised, &operator, None);
         let padded = |mut values: Vec<f64>| {
             values.resize(equations.padded(), 0.0);
             values

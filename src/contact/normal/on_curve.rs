@@ -12,7 +12,7 @@ use crate::contact::half_space::unlike_bodies::Elasticity;
 use crate::contact::lazy_field::LazyField;
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::curve_grid::{CurveGrid, FREE, WheelOverGrid, extent_of};
-use crate::contact::normal::gap::cell_sums::{CellWeights, LANES};
+use crate::contact::normal::gap::cell_sums::LANES;
 use crate::contact::normal::gap::conjugate_gradients::{
     PressureInfluence, PressureTask, solve_pressure,
 };
@@ -127,12 +127,9 @@ impl PressureInfluence for WeightedStrips<'_> {
         self.operator.own() / self.weights[0].powi(2)
     }
 
-    fn weights(&self, cells: usize) -> CellWeights {
-        let mut weights = CellWeights {
-            area: vec![1.0; cells.next_multiple_of(LANES)],
-            yielding: vec![1.0; cells.next_multiple_of(LANES)],
-        };
-        let rows = weights.yielding[..cells].chunks_exact_mut(cells / self.weights.len());
+    fn weights(&self, cells: usize) -> Vec<f64> {
+        let mut weights = vec![1.0; cells.next_multiple_of(LANES)];
+        let rows = weights[..cells].chunks_exact_mut(cells / self.weights.len());
         for (row, weight) in rows.zip(self.weights) {
             row.fill((weight / self.weights[0]).powi(2));
         }

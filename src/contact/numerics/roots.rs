@@ -203,13 +203,37 @@ pub(crate) struct PairRoot {
     pub(crate) exit: RootExit,
 }
 
+/// Searches from `start` for those of two arguments that are `searched`, at which their values are 0; the other argument stays. `f` is as in
+/// [`find_pair`].
+///
+/// # Errors
+/// Those of `f`.
+pub(crate) fn find_searched<E>(
+    searched: [bool; 2],
+    start: [f64; 2],
+    mut f: impl FnMut([f64; 2], &mut f64) -> Result<[f64; 2], E>,
+) -> Result<PairRoot, E> {
+    if searched == [true; 2] {
+        return find_pair(start, f);
+    }
+    let k = usize::from(!searched[0]);
+    let mut place = start;
+    let root = find_root(start[k], |at, tolerance| {
+        place[k] = at;
+        Ok::<f64, E>(f(place, tolerance)?[k])
+    })?;
+    place[k] = root.place;
+    let exit = root.exit;
+    Ok(PairRoot { place, exit })
+}
+
 /// Searches from `start` for two arguments at which both values are 0. Each value must grow with its own argument; where their slopes are
 /// about 1, Broyden's iteration needs no others to begin with. `f` returns the values at two arguments and the length below which they
 /// count as 0.
 ///
 /// # Errors
 /// Those of `f`.
-pub(crate) fn find_pair<E>(
+fn find_pair<E>(
     start: [f64; 2],
     mut f: impl FnMut([f64; 2], &mut f64) -> Result<[f64; 2], E>,
 ) -> Result<PairRoot, E> {

@@ -112,8 +112,8 @@ impl SizeInput {
             all.max(operator)
         };
         let solve = match self.method {
-            // Factored blocks of two unknowns per cell (see `StripFactors`).
-            Method::BoundaryElement => 32.0 * cells * cells / segments.max(1.0),
+            // Own blocks of the strips, and factored blocks of two unknowns per cell (see `StripFactors`).
+            Method::BoundaryElement => 48.0 * cells * cells / segments.max(1.0),
             Method::LiuHsu => (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
             Method::Fastsim | Method::Table => 0.0,
         };
@@ -145,8 +145,7 @@ impl SizeInput {
                 && (self.spinning == 0 || matches!(self.resolution, Resolution::Mesh(_))),
             precision: precision_of(self.resolution),
         };
-        let each = (cells / segments.max(1.0)).ceil();
-        kind.bytes(segments.ceil() as usize, each as usize) as f64
+        kind.bytes(segments.ceil() as usize, cells.ceil() as usize) as f64
     }
 
     /// Bytes of all operators of the case that a store keeps, if it has room for them: of the meshes of the method, or of those that lead to a target,

@@ -10,7 +10,7 @@
 use crate::contact::error::SolveError;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
-use crate::contact::numerics::roots::{RootExit, find_pair, find_root};
+use crate::contact::numerics::roots::{RootExit, find_searched};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::{MotionAnswer, Work};
 use crate::contact::rolling::force_places::{ForcePlaces, total};
@@ -157,30 +157,14 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
 
     /// Finds the places at which the forces are as prescribed, or as near to that as can be.
     fn find(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
-        match self.forces {
-            [Some(_), Some(_)] => {
-                let root = find_pair(start, |place, tolerance| {
-                    let off = self.trial(place)?;
-                    *tolerance = self.tolerance();
-                    Ok::<[f64; 2], SolveError>(off)
-                })?;
-                self.end(root.exit);
-                Ok(root.place)
-            }
-            forces => {
-                let k = usize::from(forces[0].is_none());
-                let mut place = start;
-                let root = find_root(start[k], |at, tolerance| {
-                    place[k] = at;
-                    let off = self.trial(place)?[k];
-                    *tolerance = self.tolerance();
-                    Ok::<f64, SolveError>(off)
-                })?;
-                place[k] = root.place;
-                self.end(root.exit);
-                Ok(place)
-            }
-        }
+        let searched = self.forces.map(|force| force.is_some());
+        let root = find_searched(searched, start, |place, tolerance| {
+            let off = self.trial(place)?;
+            *tolerance = self.tolerance();
+            Ok::<[f64; 2], SolveError>(off)
+        })?;
+        self.end(root.exit);
+        Ok(root.place)
     }
 
     fn end(&mut self, exit: RootExit) {

@@ -3,6 +3,8 @@
 //! By Vermeulen and Johnson's cubic law with Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3) the creepage at
 //! place r gives the force r μN, so that the force found is close to r. A search starts where the table of creep forces has the forces.
 
+use crate::contact::friction::path_dependent::Interface;
+use crate::contact::half_space::unlike_bodies::Elasticity;
 use crate::contact::numerics::roots::FRACTION_MAX;
 use crate::contact::rolling::answer::Resultants;
 use crate::contact::rolling::linear_theory;
@@ -119,17 +121,30 @@ pub(crate) struct CubicLaw {
 }
 
 impl CubicLaw {
-    pub(crate) fn new(task: &RollingTask, limit: f64) -> CubicLaw {
-        let mut stiffness = [0.0; 2];
-        for patch in task.footprint.patches() {
+    fn new(task: &RollingTask, limit: f64) -> CubicLaw {
+        let shapes = task.footprint.patches().iter().map(|patch| {
             let extent = patch.extent;
             let box_ratio = (extent[1] - extent[0]) / (extent[3] - extent[2]);
             let a_over_b = patch.semi_axes.map_or(box_ratio, |[a, b]| a / b);
-            let c = linear_theory::coefficients(a_over_b, task.elasticity.poisson_ratio);
-            let modulus = task.interface.reduction * task.elasticity.shear_modulus;
-            let unit = modulus * patch.area / std::f64::consts::PI;
+            (a_over_b, patch.area)
+        });
+        CubicLaw::of_patches(task.elasticity, task.interface, shapes, limit)
+    }
+
+    /// The law of patches with these ratios of length to width and areas in mm²; `limit` is μN of all in N.
+    pub(crate) fn of_patches(
+        elasticity: &Elasticity,
+        interface: Interface,
+        shapes: impl Iterator<Item = (f64, f64)>,
+        limit: f64,
+    ) -> CubicLaw {
+        let modulus = interface.reduction * elasticity.shear_modulus;
+        let mut stiffness = [0.0; 2];
+        for (a_over_b, area) in shapes {
+            let c = linear_theory::coefficients(a_over_b, elasticity.poisson_ratio);
+            let unit = modulus * area / std::f64::consts::PI;
             for (k, stiffness) in stiffness.iter_mut().enumerate() {
-                *stiffness += unit * c[k] / limit;
+                *stiffness += unit * c[k] / limit.max(f64::MIN_POSITIVE);
             }
         }
         CubicLaw { stiffness }

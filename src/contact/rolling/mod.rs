@@ -8,7 +8,7 @@
 //! | how one mesh is solved | [`methods`] |
 //! | which equations they solve | [`slip_equations`], [`slip_rules`] |
 //! | mesh, pressures and bounds of one level | [`strip_mesh`] |
-//! | operators kept for later cases | [`operator_store`], [`own_blocks`] |
+//! | operators kept for later cases | [`operator_store`] |
 //! | rolling that changes, step by step | [`history`], with [`displacement_memory`] |
 //! | what comes out | [`answer`] |
 //! | closed forms | [`linear_theory`], [`load_ellipse`] |
@@ -22,7 +22,6 @@ pub mod linear_theory;
 pub mod load_ellipse;
 pub mod methods;
 pub mod operator_store;
-pub mod own_blocks;
 pub mod refinement;
 pub mod slip_equations;
 pub mod slip_rules;

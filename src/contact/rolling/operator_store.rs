@@ -13,8 +13,6 @@ use crate::contact::half_space::strip_operator::operator;
 use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::mesh::{Mesh, Segment};
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::rolling::own_blocks;
-use crate::contact::rolling::own_blocks::SharedBlocks;
 
 /// Default size of a store in bytes: room for two of the largest operators that targets from 0.0005 on lead to (52 MB each without
 /// mirror symmetry), or for some hundred usual ones. A creep map of 900 motions at fixed spin takes the same time with 0, 64, 128 and
@@ -33,15 +31,6 @@ pub(crate) fn kept_bytes(bytes: u64, bytes_max: u64) -> u64 {
     }
 }
 
-/// What the fast solver prepares for a mesh, whatever the motion, friction and load.
-#[derive(Debug)]
-pub struct LevelOperator {
-    /// The operator of the mesh.
-    pub influence: StripOperator,
-    /// Own blocks of its strips.
-    pub own_blocks: SharedBlocks,
-}
-
 /// What an operator depends on beside its mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatorKind {
@@ -54,16 +43,10 @@ pub struct OperatorKind {
 }
 
 impl OperatorKind {
-    /// Bytes of an operator with all own blocks that it may get, of equal strips with so many cells each.
+    /// Bytes of the operator of a mesh.
     #[must_use]
-    pub fn bytes(self, segments: usize, cells_each: usize) -> u64 {
-        let lengths = std::iter::repeat_n(cells_each, segments);
-        self.bytes_of(segments * cells_each, lengths)
-    }
-
-    fn bytes_of(self, cells: usize, lengths: impl ExactSizeIterator<Item = usize>) -> u64 {
-        operator::bytes(cells, lengths.len(), self.folded, self.precision)
-            + own_blocks::bytes_max(lengths, self.folded)
+    pub fn bytes(self, segments: usize, cells: usize) -> u64 {
+        operator::bytes(cells, segments, self.folded, self.precision)
     }
 }
 
@@ -89,7 +72,7 @@ struct Kept {
     bytes: u64,
     /// When it was used last, counted in uses of the store.
     used: u64,
-    operator: Arc<LevelOperator>,
+    operator: Arc<StripOperator>,
 }
 
 impl Kept {
@@ -124,7 +107,7 @@ impl OperatorStore {
         mesh: &Arc<Mesh>,
         kind: OperatorKind,
         monitor: &dyn Monitor,
-    ) -> Result<Arc<LevelOperator>, Stop> {
+    ) -> Result<Arc<StripOperator>, Stop> {
         let digest = digest(mesh, kind);
         if let Some(found) = self.shelf().find(digest, mesh, kind) {
             return Ok(found);
@@ -134,13 +117,9 @@ impl OperatorStore {
             folded,
             precision,
         } = kind;
-        let influence = StripOperator::new(mesh, poisson_ratio, folded, precision, monitor)?;
-        let operator = Arc::new(LevelOperator {
-            influence,
-            own_blocks: SharedBlocks::default(),
-        });
-        let lengths = mesh.segments.iter().map(|segment| segment.cells.len());
-        let bytes = kind.bytes_of(mesh.cells(), lengths);
+        let operator = StripOperator::new(mesh, poisson_ratio, folded, precision, monitor)?;
+        let operator = Arc::new(operator);
+        let bytes = operator.bytes() as u64;
         if kept_bytes(bytes, self.bytes_max) > 0 {
             let kept = Kept {
                 kind,
@@ -154,7 +133,7 @@ impl OperatorStore {
         Ok(operator)
     }
 
-    /// Bytes of the operators that are kept, counted with all own blocks that they may get.
+    /// Bytes of the operators that are kept.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.shelf().bytes
@@ -166,7 +145,7 @@ impl OperatorStore {
 }
 
 impl Shelf {
-    fn find(&mut self, digest: u64, mesh: &Mesh, kind: OperatorKind) -> Option<Arc<LevelOperator>> {
+    fn find(&mut self, digest: u64, mesh: &Mesh, kind: OperatorKind) -> Option<Arc<StripOperator>> {
         let found = self.operators.get_mut(&digest)?;
         if !found.is_of(mesh, kind) {
             return None;
@@ -210,7 +189,7 @@ pub struct CaseOperators {
 struct Held {
     kind: OperatorKind,
     mesh: Arc<Mesh>,
-    operator: Arc<LevelOperator>,
+    operator: Arc<StripOperator>,
 }
 
 impl CaseOperators {
@@ -232,7 +211,7 @@ impl CaseOperators {
         mesh: &Arc<Mesh>,
         kind: OperatorKind,
         monitor: &dyn Monitor,
-    ) -> Result<Arc<LevelOperator>, Stop> {
+    ) -> Result<Arc<StripOperator>, Stop> {
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         let same = |held: &&Held| held.kind == kind && alike(&held.mesh, mesh);
         if let Some(held) = last.as_ref().filter(same) {
@@ -283,7 +262,6 @@ fn alike(a: &Mesh, b: &Mesh) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::half_space::strip_operator::kind;
     use crate::contact::mesh::samples::mesh_between;
     use crate::contact::monitor::Unmonitored;
 
@@ -297,7 +275,7 @@ mod tests {
         precision: Precision::Single,
     };
 
-    fn get(store: &OperatorStore, half_width: f64, kind: OperatorKind) -> Arc<LevelOperator> {
+    fn get(store: &OperatorStore, half_width: f64, kind: OperatorKind) -> Arc<StripOperator> {
         store.get(&mesh(half_width), kind, &Unmonitored).unwrap()
     }
 
@@ -328,7 +306,7 @@ mod tests {
 
     #[test]
     fn the_bound_holds_and_the_last_used_stay() {
-        let bytes = KIND.bytes(4, 6);
+        let bytes = KIND.bytes(4, 24);
         let store = OperatorStore::new(5 * bytes);
         let first = get(&store, 1.0, KIND);
         for k in 1..20 {
@@ -342,37 +320,19 @@ mod tests {
     }
 
     #[test]
-    fn the_bytes_counted_are_those_of_the_matrix_and_all_its_own_blocks() {
-        use crate::contact::rolling::own_blocks::OwnBlocks;
-        use crate::contact::rolling::slip_equations::SlipEquations;
-        use crate::contact::rolling::slip_rules::Rule;
+    fn the_bytes_counted_are_those_of_the_matrix() {
         for folded in [false, true] {
             let kind = OperatorKind { folded, ..KIND };
-            let (mesh, store) = (mesh(1.0), OperatorStore::default());
-            let operator = store.get(&mesh, kind, &Unmonitored).unwrap();
-            let parities: &[_] = if folded {
-                &[
-                    None,
-                    Some(kind::Parity::Lateral),
-                    Some(kind::Parity::Longitudinal),
-                ]
-            } else {
-                &[None]
-            };
-            let mut blocks = 0;
-            for rule in [Rule::Upwind, Rule::ThreePoint, Rule::Trapezoid] {
-                for parity in parities {
-                    let equations = SlipEquations::new(rule, &mesh, &operator.influence, *parity);
-                    blocks += OwnBlocks::new(&equations).bytes();
-                }
-            }
-            assert_eq!(store.bytes(), operator.influence.bytes() as u64 + blocks);
+            let store = OperatorStore::default();
+            let operator = get(&store, 1.0, kind);
+            assert_eq!(store.bytes(), operator.bytes() as u64);
+            assert_eq!(store.bytes(), kind.bytes(4, 24));
         }
     }
 
     #[test]
     fn threads_share_one_store_within_its_bound() {
-        let bytes = KIND.bytes(4, 6);
+        let bytes = KIND.bytes(4, 24);
         let store = OperatorStore::new(4 * bytes);
         std::thread::scope(|scope| {
             for thread in 0..8_u32 {

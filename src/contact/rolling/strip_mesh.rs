@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::contact::error::SolveError;
 use crate::contact::friction::path_dependent::{PathDependentFriction, PathDependentLaws};
 use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
+use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::half_space::unlike_bodies::{Elasticity, pressure_slips};
 use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips, strips_about};
 use crate::contact::monitor::{Monitor, Stop};
@@ -13,9 +14,7 @@ use crate::contact::normal::footprint::{Footprint, SurfaceSlip};
 use crate::contact::normal::hertz::Ellipse;
 use crate::contact::rolling::load_ellipse;
 use crate::contact::rolling::load_ellipse::StripChord;
-use crate::contact::rolling::operator_store::{
-    CaseOperators, LevelOperator, OperatorKind, OperatorStore,
-};
+use crate::contact::rolling::operator_store::{CaseOperators, OperatorKind, OperatorStore};
 use crate::contact::rolling::task::{MeshPlan, Motion, RollingTask};
 
 /// With an operator in single precision, dimensionless coordinates are rounded to multiples of this, so that patches of one shape get
@@ -213,7 +212,7 @@ impl StripMesh {
     ///
     /// # Errors
     /// The monitor may stop the work.
-    pub fn operator(&self, monitor: &dyn Monitor) -> Result<Arc<LevelOperator>, Stop> {
+    pub fn operator(&self, monitor: &dyn Monitor) -> Result<Arc<StripOperator>, Stop> {
         let kind = OperatorKind {
             poisson_ratio: self.poisson_ratio,
             folded: self.mirrored,

@@ -9,9 +9,6 @@ use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd;
 use crate::contact::numerics::simd::Float;
 
-/// Cells of a strip that are folded at once.
-const RUN: usize = 4;
-
 /// All cell edges of a mesh, as seen from the mid-line of one strip.
 pub(crate) struct CellEdges<T> {
     /// x of every edge, segment by segment.
@@ -254,17 +251,10 @@ fn reverse<T: Float>(mesh: &Mesh, folded: bool, stride: usize, image: &[T], row:
     }
 }
 
-/// Values in reverse order, with their signs changed where asked for; in runs of eight, which the compiler turns round at once.
+/// Values in reverse order, with their signs changed where asked for.
 #[inline(always)]
 fn reverse_cells<T: Float>(from: &[T], to: &mut [T], negate: bool) {
-    let (remaining, runs) = from.as_rchunks::<8>();
-    let (targets, rest) = to.as_chunks_mut::<8>();
-    for (target, run) in targets.iter_mut().zip(runs.iter().rev()) {
-        let mut run = *run;
-        run.reverse();
-        *target = if negate { run.map(|value| -value) } else { run };
-    }
-    for (target, value) in rest.iter_mut().zip(remaining.iter().rev()) {
+    for (target, value) in to.iter_mut().zip(from.iter().rev()) {
         *target = if negate { -*value } else { *value };
     }
 }
@@ -287,24 +277,10 @@ fn fold<T: Float>(mesh: &Mesh, values: &[T], plus: &mut [T], minus: &mut [T]) {
             &mut plus[here.cells.clone()],
             &mut minus[here.cells.clone()],
         );
-        let n = own.len();
-        if n < RUN {
-            for i in 0..n {
-                plus[i] = own[i] + image[i];
-                minus[i] = own[i] - image[i];
-            }
-            continue;
-        }
-        // The last run ends with the strip, so that no cell is left over.
-        for start in (0..n).step_by(RUN) {
-            let start = start.min(n - RUN);
-            let (own, image) = (&own[start..start + RUN], &image[start..start + RUN]);
-            let plus = &mut plus[start..start + RUN];
-            let minus = &mut minus[start..start + RUN];
-            for i in 0..RUN {
-                plus[i] = own[i] + image[i];
-                minus[i] = own[i] - image[i];
-            }
+        let images = own.iter().zip(image);
+        for ((plus, minus), (own, image)) in plus.iter_mut().zip(minus).zip(images) {
+            *plus = *own + *image;
+            *minus = *own - *image;
         }
     }
 }

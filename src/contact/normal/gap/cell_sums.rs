@@ -7,20 +7,14 @@ use crate::contact::numerics::simd;
 /// Arrays over cells go on to a multiple of this: no machine has more lanes.
 pub(crate) const LANES: usize = 8;
 
-/// Areas of cells relative to that of the first one, and how much their distances count in the direction of steepest descent; both go on
-/// with 1 to a multiple of [`LANES`].
-pub(crate) struct CellWeights {
-    pub(crate) area: Vec<f64>,
-    pub(crate) yielding: Vec<f64>,
-}
-
 /// Puts `displacement + gap` into the distances; the answer is their weighted sum over the contact, and that of the weights.
 pub(crate) struct Distances<'a> {
     pub(crate) distance: &'a mut [f64],
     pub(crate) displacement: &'a [f64],
     pub(crate) gap: &'a [f64],
     pub(crate) pressure: &'a [f64],
-    pub(crate) weights: &'a CellWeights,
+    /// How much the distance of each cell counts in the direction of steepest descent.
+    pub(crate) weights: &'a [f64],
 }
 
 /// Subtracts the approach from the distances; the answer is their largest violation, and in the contact the weighted sums of their squares and of
@@ -29,7 +23,8 @@ pub(crate) struct Parting<'a> {
     pub(crate) distance: &'a mut [f64],
     pub(crate) displacement: &'a [f64],
     pub(crate) pressure: &'a [f64],
-    pub(crate) weights: &'a CellWeights,
+    /// How much the distance of each cell counts in the direction of steepest descent.
+    pub(crate) weights: &'a [f64],
     pub(crate) approach: f64,
 }
 
@@ -38,7 +33,8 @@ pub(crate) struct Direction<'a> {
     pub(crate) direction: &'a mut [f64],
     pub(crate) distance: &'a [f64],
     pub(crate) pressure: &'a [f64],
-    pub(crate) weights: &'a CellWeights,
+    /// How much the distance of each cell counts in the direction of steepest descent.
+    pub(crate) weights: &'a [f64],
     pub(crate) factor: f64,
 }
 
@@ -49,7 +45,8 @@ pub(crate) struct StepSums<'a> {
     pub(crate) direction: &'a [f64],
     pub(crate) displacement: &'a [f64],
     pub(crate) pressure: &'a [f64],
-    pub(crate) weights: &'a CellWeights,
+    /// How much the distance of each cell counts in the direction of steepest descent.
+    pub(crate) weights: &'a [f64],
 }
 
 /// Takes a step along a direction in all pressures. Those that are not in contact, or leave it, become 0, or what their overlap gives; `off` is
@@ -59,12 +56,13 @@ pub(crate) struct Advance<'a> {
     pub(crate) off: &'a mut [f64],
     pub(crate) direction: &'a [f64],
     pub(crate) distance: &'a [f64],
-    pub(crate) weights: &'a CellWeights,
+    /// How much the distance of each cell counts in the direction of steepest descent.
+    pub(crate) weights: &'a [f64],
     pub(crate) step: f64,
 }
 
-/// Sum of the products of two numbers of each cell.
-pub(crate) struct CellProduct<'a>(pub(crate) &'a [f64], pub(crate) &'a [f64]);
+/// Sum of the numbers of all cells.
+pub(crate) struct CellSum<'a>(pub(crate) &'a [f64]);
 
 /// Runs a loop in the lanes of this machine.
 pub(crate) fn run<W: WithSimd>(work: W) -> W::Output {
@@ -79,19 +77,12 @@ impl WithSimd for Distances<'_> {
         let zero = simd.splat_f64s(0.0);
         let (mut sum, mut count) = (zero, zero);
         let (g, _) = S::as_mut_simd_f64s(self.distance);
-        let [u, h, p, area, yielding] = [
-            self.displacement,
-            self.gap,
-            self.pressure,
-            &self.weights.area,
-            &self.weights.yielding,
-        ]
-        .map(|values| &S::as_simd_f64s(values).0[..g.len()]);
+        let [u, h, p, weights] = [self.displacement, self.gap, self.pressure, self.weights]
+            .map(|values| &S::as_simd_f64s(values).0[..g.len()]);
         for k in 0..g.len() {
             g[k] = simd.add_f64s(u[k], h[k]);
             let inside = simd.greater_than_f64s(p[k], zero);
-            let weight = simd.mul_f64s(area[k], yielding[k]);
-            let weight = simd.select_f64s(inside, weight, zero);
+            let weight = simd.select_f64s(inside, weights[k], zero);
             // Outside the contact a gap may be infinite.
             let own = simd.select_f64s(inside, g[k], zero);
             sum = simd.mul_add_e_f64s(weight, own, sum);
@@ -110,13 +101,8 @@ impl WithSimd for Parting<'_> {
         let approach = simd.splat_f64s(self.approach);
         let (mut violation, mut square, mut along) = (zero, zero, zero);
         let (g, _) = S::as_mut_simd_f64s(self.distance);
-        let [r, p, area, yielding] = [
-            self.displacement,
-            self.pressure,
-            &self.weights.area,
-            &self.weights.yielding,
-        ]
-        .map(|values| &S::as_simd_f64s(values).0[..g.len()]);
+        let [r, p, weights] = [self.displacement, self.pressure, self.weights]
+            .map(|values| &S::as_simd_f64s(values).0[..g.len()]);
         for k in 0..g.len() {
             let here = simd.sub_f64s(g[k], approach);
             g[k] = here;
@@ -124,7 +110,7 @@ impl WithSimd for Parting<'_> {
             let [apart, over] = [simd.abs_f64s(here), simd.neg_f64s(here)];
             violation = simd.max_f64s(violation, simd.select_f64s(inside, apart, over));
             let own = simd.select_f64s(inside, here, zero);
-            let weighted = simd.mul_f64s(simd.mul_f64s(area[k], yielding[k]), own);
+            let weighted = simd.mul_f64s(weights[k], own);
             square = simd.mul_add_e_f64s(weighted, own, square);
             along = simd.mul_add_e_f64s(weighted, r[k], along);
         }
@@ -144,10 +130,10 @@ impl WithSimd for Direction<'_> {
         let zero = simd.splat_f64s(0.0);
         let factor = simd.splat_f64s(self.factor);
         let (t, _) = S::as_mut_simd_f64s(self.direction);
-        let [g, p, yielding] = [self.distance, self.pressure, &self.weights.yielding]
+        let [g, p, weights] = [self.distance, self.pressure, self.weights]
             .map(|values| &S::as_simd_f64s(values).0[..t.len()]);
         for k in 0..t.len() {
-            let next = simd.mul_add_e_f64s(yielding[k], g[k], simd.mul_f64s(factor, t[k]));
+            let next = simd.mul_add_e_f64s(weights[k], g[k], simd.mul_f64s(factor, t[k]));
             let inside = simd.greater_than_f64s(p[k], zero);
             t[k] = simd.select_f64s(inside, next, zero);
         }
@@ -162,20 +148,18 @@ impl WithSimd for StepSums<'_> {
         let zero = simd.splat_f64s(0.0);
         let mut sums = [zero; 5];
         let (p, _) = S::as_simd_f64s(self.pressure);
-        let [g, t, r, area, yielding] = [
+        let [g, t, r, weights] = [
             self.distance,
             self.direction,
             self.displacement,
-            &self.weights.area,
-            &self.weights.yielding,
+            self.weights,
         ]
         .map(|values| &S::as_simd_f64s(values).0[..p.len()]);
         for k in 0..p.len() {
             let inside = simd.greater_than_f64s(p[k], zero);
-            let area = simd.select_f64s(inside, area[k], zero);
             let own = simd.select_f64s(inside, g[k], zero);
-            let weight = simd.mul_f64s(area, yielding[k]);
-            let along = simd.mul_f64s(area, t[k]);
+            let weight = simd.select_f64s(inside, weights[k], zero);
+            let along = simd.select_f64s(inside, t[k], zero);
             sums = [
                 simd.mul_add_e_f64s(along, own, sums[0]),
                 simd.mul_add_e_f64s(along, r[k], sums[1]),
@@ -197,12 +181,12 @@ impl WithSimd for Advance<'_> {
         let back = simd.splat_f64s(-self.step);
         let (p, _) = S::as_mut_simd_f64s(self.pressure);
         let off = &mut S::as_mut_simd_f64s(self.off).0[..p.len()];
-        let [t, g, yielding] = [self.direction, self.distance, &self.weights.yielding]
+        let [t, g, weights] = [self.direction, self.distance, self.weights]
             .map(|values| &S::as_simd_f64s(values).0[..p.len()]);
         for k in 0..p.len() {
             let stepped = simd.mul_add_e_f64s(back, t[k], p[k]);
             let overlap = simd.min_f64s(g[k], zero);
-            let other = simd.mul_f64s(simd.mul_f64s(back, yielding[k]), overlap);
+            let other = simd.mul_f64s(simd.mul_f64s(back, weights[k]), overlap);
             // Of a cell outside neither the pressure nor the step is more than 0.
             let was = simd.greater_than_f64s(p[k], zero);
             let stepped_in = simd.select_f64s(was, stepped, zero);
@@ -214,18 +198,14 @@ impl WithSimd for Advance<'_> {
     }
 }
 
-impl WithSimd for CellProduct<'_> {
+impl WithSimd for CellSum<'_> {
     type Output = f64;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f64 {
         let mut sum = simd.splat_f64s(0.0);
-        for (a, b) in S::as_simd_f64s(self.0)
-            .0
-            .iter()
-            .zip(S::as_simd_f64s(self.1).0)
-        {
-            sum = simd.mul_add_e_f64s(*a, *b, sum);
+        for values in S::as_simd_f64s(self.0).0 {
+            sum = simd.add_f64s(sum, *values);
         }
         simd.reduce_sum_f64s(sum)
     }

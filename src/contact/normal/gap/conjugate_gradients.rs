@@ -1,18 +1,17 @@
 //! Pressure on a regular grid by conjugate gradients that never leave the contact conditions.
 //!
 //! The unknowns satisfy `p ≥ 0`, `g = u(p) + h − δ ≥ 0` and `p g = 0` at every cell; either the sum of p or the approach δ is
-//! prescribed (Polonsky and Keer 1999). Cells may differ in size: scalar products are weighted with their areas, and
-//! distances are scaled by what a cell's own pressure displaces, so that small cells take no more iterations than large ones.
+//! prescribed (Polonsky and Keer 1999). Distances may be scaled by what a cell's own pressure displaces.
 
 use crate::contact::half_space::grid_operator::{FftFloat, GridOperator, GridWorkspace};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::gap::cell_sums;
 use crate::contact::normal::gap::cell_sums::{
-    Advance, CellProduct, CellWeights, Direction, Distances, LANES, Parting, StepSums,
+    Advance, CellSum, Direction, Distances, LANES, Parting, StepSums,
 };
 use crate::contact::normal::hertz::NormalLoad;
 
-/// Displacements that pressures on cells cause, cells of one size or of several.
+/// Displacements that pressures on equal cells cause.
 pub(crate) trait PressureInfluence {
     /// Up to so many changed pressures are added to the displacement one by one, which costs less than a whole product.
     const CHANGES_MAX: usize;
@@ -24,9 +23,9 @@ pub(crate) trait PressureInfluence {
     fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]);
     /// Displacement in mm/MPa of the first cell by its own pressure.
     fn own(&self) -> f64;
-    /// Areas of the cells relative to that of the first one; and the displacement of the first cell by its own pressure relative to that of
-    /// each: distances times this are the direction of steepest descent for cells of several sizes.
-    fn weights(&self, cells: usize) -> CellWeights;
+    /// Displacement of the first cell by its own pressure relative to that of each, for a multiple of [`LANES`] cells: distances times this are
+    /// the direction of steepest descent.
+    fn weights(&self, cells: usize) -> Vec<f64>;
 }
 
 impl<T: FftFloat> PressureInfluence for GridOperator<T> {
@@ -45,12 +44,8 @@ impl<T: FftFloat> PressureInfluence for GridOperator<T> {
         GridOperator::own(self)
     }
 
-    fn weights(&self, cells: usize) -> CellWeights {
-        let ones = vec![1.0; cells.next_multiple_of(LANES)];
-        CellWeights {
-            area: ones.clone(),
-            yielding: ones,
-        }
+    fn weights(&self, cells: usize) -> Vec<f64> {
+        vec![1.0; cells.next_multiple_of(LANES)]
     }
 }
 
@@ -93,7 +88,7 @@ pub(crate) enum PressureFailure {
 pub(crate) struct PressureTask<'a> {
     /// Gap of the undeformed surfaces at every cell in mm.
     pub(crate) gap: &'a [f64],
-    /// Area of the first cell in mm².
+    /// Area of a cell in mm².
     pub(crate) cell: f64,
     pub(crate) loading: NormalLoad,
     /// Violation of the contact conditions to reach, see [`PressureAnswer::residual`].
@@ -171,7 +166,7 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
 struct PressureIterate {
     /// Gap of the undeformed surfaces.
     h: Vec<f64>,
-    weights: CellWeights,
+    weights: Vec<f64>,
     /// Pressure and displacement.
     p: Vec<f64>,
     u: Vec<f64>,
@@ -187,7 +182,7 @@ struct PressureIterate {
 }
 
 impl PressureIterate {
-    fn new(gap: &[f64], mut start: Vec<f64>, weights: CellWeights) -> PressureIterate {
+    fn new(gap: &[f64], mut start: Vec<f64>, weights: Vec<f64>) -> PressureIterate {
         let padded = gap.len().next_multiple_of(LANES);
         let mut h = gap.to_vec();
         // The surfaces never meet there.
@@ -212,7 +207,7 @@ impl PressureIterate {
         let NormalLoad::Force(force) = loading else {
             return 1.0;
         };
-        let scale = force / (cell * cell_sums::run(CellProduct(&self.weights.area, &self.p)));
+        let scale = force / (cell * cell_sums::run(CellSum(&self.p)));
         self.p.iter_mut().for_each(|p| *p *= scale);
         scale
     }

@@ -33,7 +33,7 @@ const GROWTH: f64 = 0.25;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PressureGrid {
     /// Middle of the box in mm.
-    middle: [f64; 2],
+    pub(crate) middle: [f64; 2],
     /// Size of a cell in mm.
     pub(crate) step: [f64; 2],
     /// Number of cells along x and y.
@@ -120,6 +120,14 @@ impl PressureGrid {
         [self.middle[axis] - half, self.middle[axis] + half]
     }
 
+    /// Whether a place lies in the box.
+    pub(crate) fn holds(&self, place: [f64; 2]) -> bool {
+        (0..2).all(|k| {
+            let [low, high] = self.range(k);
+            (low..high).contains(&place[k])
+        })
+    }
+
     /// The influence of the cells on each other, in single precision, which is enough for the tolerances of the contact conditions.
     pub(crate) fn influence(
         &self,
@@ -171,28 +179,13 @@ impl PressureGrid {
     }
 
     /// Pressures of another grid at the centres of this one: the root of their squares, which fall linearly to 0 at the
-    /// edge and are continued beyond it, interpolated bilinearly.
+    /// edge and are continued beyond it, interpolated bilinearly. If they are 0 everywhere, the largest one at the deepest cell.
     pub(crate) fn interpolate(
         &self,
         other: &PressureGrid,
         pressure: &[f64],
         gap: &[f64],
     ) -> Vec<f64> {
-        let largest = pressure.iter().copied().fold(0.0, f64::max);
-        self.never_empty(self.interpolated(other, pressure), largest, gap)
-    }
-
-    /// Pressures, or the largest one at the deepest cell if they are 0 everywhere.
-    pub(crate) fn never_empty(&self, mut out: Vec<f64>, largest: f64, gap: &[f64]) -> Vec<f64> {
-        if out.iter().all(|p| *p == 0.0) {
-            let deepest = (0..gap.len()).min_by(|a, b| gap[*a].total_cmp(&gap[*b]));
-            out[deepest.unwrap_or(0)] = largest;
-        }
-        out
-    }
-
-    /// The same, 0 everywhere if the other grid presses nothing here.
-    pub(crate) fn interpolated(&self, other: &PressureGrid, pressure: &[f64]) -> Vec<f64> {
         let squares = continued(other.cells[0], squares(other.cells[0], pressure));
         let places = [0, 1].map(|axis| -> Vec<(isize, f64)> {
             let first = other.range(axis)[0] + 0.5 * other.step[axis];
@@ -219,6 +212,10 @@ impl PressureGrid {
                 let square = (1.0 - v) * row(j) + v * row(j + 1);
                 out.push(square.max(0.0).sqrt());
             }
+        }
+        if out.iter().all(|p| *p == 0.0) {
+            let deepest = (0..gap.len()).min_by(|a, b| gap[*a].total_cmp(&gap[*b]));
+            out[deepest.unwrap_or(0)] = pressure.iter().copied().fold(0.0, f64::max);
         }
         out
     }
@@ -510,6 +507,19 @@ pub(crate) struct PatchGrid {
 }
 
 impl PatchGrid {
+    /// A grid over a gap that does not touch at an approach.
+    pub(crate) fn apart(grid: PressureGrid, mut gap: Vec<f64>, approach: f64) -> PatchGrid {
+        gap.iter_mut().for_each(|gap| *gap -= approach);
+        let pressed = PressureAnswer {
+            pressure: vec![0.0; gap.len()],
+            distance: gap,
+            approach,
+            iterations: 0,
+            residual: 0.0,
+        };
+        PatchGrid { grid, pressed }
+    }
+
     /// Load over the area of a cell of 1 mm².
     pub(crate) fn load(&self) -> f64 {
         self.pressed.pressure.iter().sum::<f64>() * self.grid.step[0] * self.grid.step[1]
@@ -527,8 +537,6 @@ pub(crate) enum GridsExit {
     Settled,
     /// The result still changes on the finest grid allowed.
     Rough,
-    /// The patches need more grids, or more cells, than are allowed.
-    CellsUsedUp,
     /// The number of grids that may be tried was used up.
     GridsUsedUp,
 }

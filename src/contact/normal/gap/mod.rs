@@ -2,7 +2,6 @@
 
 pub mod cell_sums;
 pub mod conjugate_gradients;
-pub mod coupling;
 pub mod grid;
 pub mod outcome;
 pub mod patch_grids;

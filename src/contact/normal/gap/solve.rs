@@ -58,22 +58,42 @@ impl GapTask {
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
-        let found = self.solve_on(resolution, workspace, monitor)?;
-        self.found(found)
+        let reach = self.touching_reach()?;
+        let grid = self.first_grid(&reach, resolution);
+        let (whole, capped) = self.refined(grid, None, reach, resolution, workspace, monitor)?;
+        if capped
+            && let Some(found) = self.patch_by_patch(
+                &whole.patch_grids[0],
+                whole.least,
+                resolution,
+                workspace,
+                monitor,
+            )?
+        {
+            return self.found(GapOutcome {
+                iterations: whole.iterations + found.iterations,
+                ..found
+            });
+        }
+        self.found(whole)
     }
 
-    fn solve_on(
+    fn first_grid(&self, reach: &SearchBox, resolution: GridFineness) -> PressureGrid {
+        let cells = [resolution.first; 2];
+        PressureGrid::new(reach.window, cells, self.gap.is_mirrored())
+    }
+
+    /// Goes from grid to grid until one is fine enough, from a solution on another grid where there is one; and whether a patch would want more
+    /// cells than the last grid may have.
+    pub(crate) fn refined(
         &self,
+        mut grid: PressureGrid,
+        mut solved: Option<(PressureGrid, PressureAnswer)>,
+        mut reach: SearchBox,
         resolution: GridFineness,
         workspace: &mut GridWorkspace<f32>,
         monitor: &dyn Monitor,
-    ) -> Result<GapOutcome, NormalError> {
-        let mut reach = self.touching_reach()?;
-        let first = |reach: &SearchBox| {
-            PressureGrid::new(reach.window, [resolution.first; 2], self.gap.is_mirrored())
-        };
-        let mut grid = first(&reach);
-        let mut solved: Option<(PressureGrid, PressureAnswer)> = None;
+    ) -> Result<(GapOutcome, bool), NormalError> {
         let (mut iterations, mut pressure_change) = (0, 0.0);
         let (mut exit, mut capped) = (GridsExit::GridsUsedUp, false);
         for _ in 0..GRIDS_MAX {
@@ -93,7 +113,7 @@ impl GapTask {
                 // The estimate was too small: parts of the gap beyond the box may touch as well.
                 let depth = pressed.approach - reach.least;
                 reach = reach_of_level(&self.gap, pressed.approach + LEVEL_BEYOND * depth);
-                NextStep::PressureGrid(first(&reach))
+                NextStep::PressureGrid(self.first_grid(&reach, resolution))
             } else {
                 let depth = pressed.approach - reach.least;
                 self.next_grid(&grid, &pressed, solved.as_ref(), depth, resolution)?
@@ -110,24 +130,14 @@ impl GapTask {
         let Some((grid, pressed)) = solved else {
             unreachable!("at least one grid is tried")
         };
-        let whole = PatchGrid { grid, pressed };
-        if capped
-            && let Some(found) =
-                self.solve_on_tiles(whole.clone(), reach.least, resolution, workspace, monitor)?
-        {
-            return Ok(GapOutcome {
-                iterations: iterations + found.iterations,
-                least: reach.least,
-                ..found
-            });
-        }
-        Ok(GapOutcome {
-            patch_grids: vec![whole],
+        let outcome = GapOutcome {
+            patch_grids: vec![PatchGrid { grid, pressed }],
             iterations,
             exit,
             pressure_change,
             least: reach.least,
-        })
+        };
+        Ok((outcome, capped))
     }
 
     /// The box of the contact, if the bodies touch.
@@ -141,7 +151,7 @@ impl GapTask {
         }
     }
 
-    pub(crate) fn pressure_on(
+    fn pressure_on(
         &self,
         grid: &PressureGrid,
         GridStart {
@@ -175,7 +185,7 @@ impl GapTask {
     }
 
     /// Whether a grid is to be enlarged, to be refined, or is the last one.
-    pub(crate) fn next_grid(
+    fn next_grid(
         &self,
         grid: &PressureGrid,
         pressed: &PressureAnswer,
@@ -224,17 +234,17 @@ impl GapTask {
 
 /// What a grid is solved from, and how exactly.
 #[derive(Clone, Copy)]
-pub(crate) struct GridStart<'a> {
+struct GridStart<'a> {
     /// An earlier grid; none before the first one.
-    pub(crate) before: Option<&'a (PressureGrid, PressureAnswer)>,
+    before: Option<&'a (PressureGrid, PressureAnswer)>,
     /// The box of the contact.
-    pub(crate) reach: &'a SearchBox,
+    reach: &'a SearchBox,
     /// See [`GridFineness::tolerance`].
-    pub(crate) tolerance: f64,
+    tolerance: f64,
 }
 
 /// What follows a grid.
-pub(crate) enum NextStep {
+enum NextStep {
     PressureGrid(PressureGrid),
     /// It is the last one, and whether a patch would want more cells than a grid may have.
     End(GridsExit, bool),

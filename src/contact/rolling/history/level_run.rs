@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::contact::friction::law::AlongLaw;
 use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::half_space::strip_operator::kind::Parity;
+use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::mesh::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::answer::{LevelFailure, Work};
@@ -20,7 +21,6 @@ use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, NewtonTask, STEPS_MAX,
 };
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -37,7 +37,7 @@ pub struct LevelRun<'a> {
     pub(super) task: &'a RollingTask<'a>,
     pub(super) history: &'a HistoryTask,
     pub(super) level: &'a StripMesh,
-    pub(super) operator: Arc<LevelOperator>,
+    pub(super) operator: Arc<StripOperator>,
     pub(super) parity: Option<Parity>,
     pub(super) edges: LeadingEdges,
     /// Cells with unknowns.
@@ -90,7 +90,7 @@ impl<'a> LevelRun<'a> {
     ) -> Result<LevelRun<'a>, Stop> {
         let operator = level.operator(monitor)?;
         let parity = level.parity(&every_motion(task, history));
-        let padded = operator.influence.padded(parity);
+        let padded = operator.padded(parity);
         let resized = |values: &[f64]| {
             let mut values = values.to_vec();
             values.resize(padded.max(values.len()), 0.0);

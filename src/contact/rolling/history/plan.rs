@@ -13,10 +13,10 @@
 //! kept from step to step.
 
 use crate::contact::half_space::strip_operator::kind::Parity;
+use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::rolling::answer::{Resultants, Work};
 use crate::contact::rolling::displacement_memory::{DisplacementMemory, LeadingEdges};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -209,9 +209,9 @@ pub(super) fn memory(kind: StepKind, edges: &LeadingEdges, unit: f64) -> Displac
 /// Equations of steady rolling by a rule.
 pub(super) fn steady<'e>(
     rule: Rule,
-    (level, operator, parity): (&StripMesh, &'e LevelOperator, Option<Parity>),
+    (level, operator, parity): (&StripMesh, &'e StripOperator, Option<Parity>),
 ) -> SlipEquations<'e> {
-    SlipEquations::new(rule, &level.normalised, &operator.influence, parity)
+    SlipEquations::new(rule, &level.normalised, operator, parity)
         .with_layer(&level.normalised, level.layer)
 }
 

@@ -7,7 +7,6 @@
 //! of that law: see [`FallingRow`].
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::monitor::{Monitor, Stop};
@@ -16,14 +15,13 @@ use crate::contact::numerics::simd::length;
 use crate::contact::rolling::methods::boundary_element::linearisation::{
     FallingRow, Linearisation,
 };
-use crate::contact::rolling::methods::boundary_element::preconditioner::StripFactors;
+use crate::contact::rolling::methods::boundary_element::preconditioner::{OwnBlocks, StripFactors};
 use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, NewtonTask, NewtonTermination, STEPS_MAX,
 };
 use crate::contact::rolling::methods::boundary_element::workspace::{
     NewtonWorkspace, StepVectors, zeroed,
 };
-use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 use crate::contact::rolling::slip_rules::Rule;
 
@@ -57,7 +55,7 @@ const GROWTH_ALLOWED: f64 = 1.5;
 #[derive(Debug)]
 pub struct Newton<'a> {
     equations: &'a SlipEquations<'a>,
-    own: Arc<OwnBlocks>,
+    own: OwnBlocks,
     /// Projection parameter r of every cell.
     parameter: Vec<f64>,
     /// See [`Newton::compliance`].
@@ -70,12 +68,7 @@ impl<'a> Newton<'a> {
     /// Collects the own blocks.
     #[must_use]
     pub fn new(equations: &'a SlipEquations<'a>) -> Newton<'a> {
-        Newton::with_blocks(equations, Arc::new(OwnBlocks::new(equations)))
-    }
-
-    /// A solver with own blocks that exist already; they are those of the equations.
-    #[must_use]
-    pub fn with_blocks(equations: &'a SlipEquations<'a>, own: Arc<OwnBlocks>) -> Newton<'a> {
+        let own = OwnBlocks::new(equations);
         let diagonal = own.diagonal(equations);
         let parameter: Vec<f64> = diagonal.iter().map(|m| PROJECTION / m.abs()).collect();
         let sum: f64 = parameter.iter().sum();

@@ -1,18 +1,14 @@
 //! The preconditioner: every segment's own block of the Newton matrix, factored on its own.
+//!
+//! Own blocks of the strips: the effect of a strip on itself.
 
 use std::ops::Range;
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::lu::partial_pivoting::factor;
-use faer::{MatMut, Par};
-
 use crate::contact::numerics::lu;
-use crate::contact::numerics::lu::SMALL;
 use crate::contact::rolling::methods::boundary_element::linearisation::{
     FallingRow, Linearisation, turn_rows,
 };
 use crate::contact::rolling::methods::boundary_element::strip_blocks::StripBlocks;
-use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::SlipEquations;
 
 /// A segment in which something slips may have a block for each axis, like one where all sticks, if the tangents of its cells are no farther
@@ -22,6 +18,56 @@ use crate::contact::rolling::slip_equations::SlipEquations;
 /// under spin, five of eleven targets then found no solution, one block each misses one.
 const SKEW_MAX: f64 = 0.5;
 
+/// Own blocks of the operator, fixed for a rule and mesh.
+#[derive(Debug)]
+pub struct OwnBlocks {
+    /// `M_xx` of every segment, column by column, one segment after the other.
+    xx: Vec<f64>,
+    /// `M_yy`, likewise.
+    yy: Vec<f64>,
+    /// Start of each segment's block, and one more.
+    starts: Vec<usize>,
+}
+
+impl OwnBlocks {
+    /// Collects the blocks.
+    #[must_use]
+    pub fn new(equations: &SlipEquations) -> OwnBlocks {
+        let mut starts = Vec::with_capacity(equations.segments() + 1);
+        starts.push(0);
+        for j in 0..equations.segments() {
+            starts.push(starts[j] + equations.segment(j).len().pow(2));
+        }
+        let length = starts[equations.segments()];
+        let (mut xx, mut yy) = (vec![0.0; length], vec![0.0; length]);
+        let mut differences = [Vec::new(), Vec::new()];
+        for (j, range) in starts.windows(2).enumerate() {
+            let (xx, yy) = (&mut xx[range[0]..range[1]], &mut yy[range[0]..range[1]]);
+            equations.own_block(j, [xx, yy], &mut differences);
+        }
+        OwnBlocks { xx, yy, starts }
+    }
+
+    /// `M_xx` and `M_yy` of every segment, column by column.
+    pub(crate) fn blocks(&self) -> impl Iterator<Item = (&[f64], &[f64])> {
+        let ranges = self.starts.windows(2).map(|range| range[0]..range[1]);
+        ranges.map(|range| (&self.xx[range.clone()], &self.yy[range]))
+    }
+
+    /// `−(M_xx + M_yy)/2` on the diagonal, cell by cell.
+    #[must_use]
+    pub fn diagonal(&self, equations: &SlipEquations) -> Vec<f64> {
+        let mut diagonal = vec![0.0; equations.cells()];
+        for (j, (xx, yy)) in self.blocks().enumerate() {
+            let n = equations.segment(j).len();
+            for (k, i) in equations.segment(j).enumerate() {
+                diagonal[i] = -0.5 * (xx[k * n + k] + yy[k * n + k]);
+            }
+        }
+        diagonal
+    }
+}
+
 /// Factored blocks of one Newton step.
 #[derive(Debug, Default)]
 pub struct StripFactors {
@@ -30,7 +76,7 @@ pub struct StripFactors {
     /// Cells of the newest block that have two unknowns.
     stick: Vec<usize>,
     gathered_axis: Gathered,
-    scratch: FactorScratch,
+    pivots: Vec<usize>,
 }
 
 /// Unknowns of one axis in a segment.
@@ -42,49 +88,6 @@ struct Gathered {
     units: [Vec<f64>; 2],
     /// One column of the block, of all cells.
     line: Vec<f64>,
-}
-
-/// Buffers of the factorisation.
-#[derive(Default)]
-struct FactorScratch {
-    pivots: Vec<usize>,
-    pivots_inverse: Vec<usize>,
-    stack: Option<(usize, MemBuffer)>,
-}
-
-impl std::fmt::Debug for FactorScratch {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Scratch")
-    }
-}
-
-impl FactorScratch {
-    /// Factors a matrix in place, stored column by column; the order of its rows is left in `pivots`.
-    fn factor(&mut self, matrix: &mut [f64], size: usize) {
-        self.pivots.resize(size, 0);
-        if size <= SMALL {
-            lu::factor_small(matrix, &mut self.pivots);
-            return;
-        }
-        self.pivots_inverse.resize(size, 0);
-        if self.stack.as_ref().is_none_or(|(most, _)| *most < size) {
-            // The buffer of the largest block so far serves all smaller ones.
-            let request =
-                factor::lu_in_place_scratch::<usize, f64>(size, size, Par::Seq, Default::default());
-            self.stack = Some((size, MemBuffer::new(request)));
-        }
-        let Some((_, stack)) = self.stack.as_mut() else {
-            return;
-        };
-        factor::lu_in_place(
-            MatMut::from_column_major_slice_mut(matrix, size, size),
-            &mut self.pivots,
-            &mut self.pivots_inverse,
-            Par::Seq,
-            MemStack::new(stack),
-            Default::default(),
-        );
-    }
 }
 
 impl StripFactors {
@@ -216,13 +219,12 @@ impl StripFactors {
     /// Factors the newest block, whose matrix is complete.
     fn close_block(&mut self, start: usize) {
         let size = self.blocks.places.len() - start;
-        let scratch = &mut self.scratch;
         let offset = self.blocks.offsets[self.blocks.offsets.len() - 1];
-        scratch.factor(&mut self.blocks.factors[offset..], size);
+        self.pivots.resize(size, 0);
+        lu::factor(&mut self.blocks.factors[offset..], &mut self.pivots);
         // The rows are exchanged while values are gathered, so that an application needs no permutation of its own.
         self.blocks.pivot_places.extend(
-            scratch
-                .pivots
+            self.pivots
                 .iter()
                 .map(|row| self.blocks.places[start + row]),
         );

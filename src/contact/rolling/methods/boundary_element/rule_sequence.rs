@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use crate::contact::friction::path_dependent::PathDependentFriction;
 use crate::contact::friction::velocity_weakening::{CONTINUATION, Softening};
 use crate::contact::half_space::strip_operator::kind::Parity;
+use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd::length;
 use crate::contact::rolling::answer::{LevelFailure, Work};
@@ -16,8 +17,6 @@ use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, LevelTask, NewtonTask, STEPS_MAX,
 };
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::operator_store::LevelOperator;
-use crate::contact::rolling::own_blocks::OwnBlocks;
 use crate::contact::rolling::slip_equations::{SlipEquations, SlipSource};
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -62,7 +61,7 @@ pub(super) struct RuleSequence<'a> {
     tolerance: f64,
     /// Newton steps of a rule at most.
     steps_max: u32,
-    operator: &'a LevelOperator,
+    operator: &'a StripOperator,
     pub(super) parity: Option<Parity>,
     /// Bounds of the cells, at rest where they fall with the slip.
     bound: Vec<f64>,
@@ -76,7 +75,7 @@ pub(super) struct RuleSequence<'a> {
 impl<'a> RuleSequence<'a> {
     pub(super) fn new(
         task: LevelTask<'a>,
-        operator: &'a LevelOperator,
+        operator: &'a StripOperator,
         control: Control<'a>,
     ) -> RuleSequence<'a> {
         let LevelTask {
@@ -87,7 +86,7 @@ impl<'a> RuleSequence<'a> {
             tolerance,
         } = task;
         let parity = level.parity(motion);
-        let padded = operator.influence.padded(parity);
+        let padded = operator.padded(parity);
         let padded_with_zeros = |values: &[f64]| {
             let length = padded.max(values.len());
             let mut all = Vec::with_capacity(length);
@@ -113,13 +112,8 @@ impl<'a> RuleSequence<'a> {
     }
 
     fn equations(&self, rule: Rule) -> SlipEquations<'a> {
-        SlipEquations::new(
-            rule,
-            &self.level.normalised,
-            &self.operator.influence,
-            self.parity,
-        )
-        .with_layer(&self.level.normalised, self.level.layer)
+        SlipEquations::new(rule, &self.level.normalised, self.operator, self.parity)
+            .with_layer(&self.level.normalised, self.level.layer)
     }
 
     /// Slips of the motion and of the pressure.
@@ -128,15 +122,8 @@ impl<'a> RuleSequence<'a> {
         equations.given(self.motion, source.map(|[x, y]| SlipSource { x, y }))
     }
 
-    /// A solver that shares its own blocks with the other motions of the level.
     fn newton<'e>(&self, equations: &'e SlipEquations<'e>) -> Newton<'e> {
-        let own =
-            self.operator
-                .own_blocks
-                .get(equations.rule, self.parity, self.level.layer, || {
-                    OwnBlocks::new(equations)
-                });
-        let newton = Newton::with_blocks(equations, own);
+        let newton = Newton::new(equations);
         // The trapezoid rule keeps the bounds that the three-point rule has found: its own slips alternate from cell
         // to cell, and bounds that follow them would do so too.
         match self.fall.filter(|_| equations.rule != Rule::Trapezoid) {
@@ -156,7 +143,7 @@ impl<'a> RuleSequence<'a> {
 
     /// The start brought onto the unknowns, or zero tractions.
     pub(super) fn start(&self, start: Option<&[Vec<f64>; 2]>) -> Vec<f64> {
-        let padded = self.operator.influence.padded(self.parity);
+        let padded = self.operator.padded(self.parity);
         let mut t = vec![0.0; 2 * padded];
         if let Some([x, y]) = start {
             let cells = self.level.mesh.cells();

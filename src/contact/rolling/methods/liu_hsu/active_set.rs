@@ -5,7 +5,8 @@
 use faer::{Mat, MatMut};
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::lu::{DenseLu, check};
+use crate::contact::numerics::lu;
+use crate::contact::numerics::lu::check;
 use crate::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
 };
@@ -458,8 +459,8 @@ pub fn newton_step(
         tau[j] = -(1.0 + radial[j]) * (nx * slip[j] + ny * slip[n + j])
             - (nx * elastic(j) + ny * elastic(n + j));
     }
-    DenseLu::new(matrix, monitor)?
-        .solve(MatMut::from_column_major_slice_mut(&mut tau, n, 1), monitor)?;
+    let unknowns = MatMut::from_column_major_slice_mut(&mut tau, n, 1);
+    lu::solve(&matrix, unknowns, monitor)?;
     for i in 0..n {
         radial_part[i] += tau[i] * across[i].0;
         radial_part[n + i] += tau[i] * across[i].1;

@@ -1,5 +1,6 @@
 //! The method applied to one mesh level of a case.
 
+use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::rolling::answer::{
     LevelAnswer, LevelFailure, LevelOutcome, Work, project_on_bound,
@@ -9,7 +10,6 @@ use crate::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::methods::liu_hsu::solve::{ZonesOutcome, solve_by_upwind};
 use crate::contact::rolling::methods::liu_hsu::stick_block::DenseTask;
-use crate::contact::rolling::operator_store::LevelOperator;
 use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -102,11 +102,11 @@ struct DenseParts<'a> {
 impl<'a> DenseParts<'a> {
     fn new(
         level: &'a StripMesh,
-        operator: &'a LevelOperator,
+        operator: &'a StripOperator,
         rule: Rule,
         motion: &Motion,
     ) -> DenseParts<'a> {
-        let equations = SlipEquations::new(rule, &level.normalised, &operator.influence, None);
+        let equations = SlipEquations::new(rule, &level.normalised, operator, None);
         let padded = equations.padded();
         let resized = |mut values: Vec<f64>| {
             values.resize(padded, 0.0);

@@ -4,7 +4,8 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::lu::{DenseLu, check, subtract_product};
+use crate::contact::numerics::lu;
+use crate::contact::numerics::lu::check;
 use crate::contact::rolling::methods::boundary_element::task::NewtonTask;
 use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
@@ -135,13 +136,17 @@ impl SlipSystem {
                     task.map[(rows[i], stick[j])]
                 })
             };
-            DenseLu::new(part(&stick), monitor)?.solve(on_stick.as_mut(), monitor)?;
-            subtract_product(
+            lu::solve(&part(&stick), on_stick.as_mut(), monitor)?;
+            check(monitor)?;
+            let by_stick = part(&slip);
+            matmul(
                 on_slip.as_mut(),
-                part(&slip).as_ref(),
+                Accum::Add,
+                by_stick.as_ref(),
                 on_stick.as_ref(),
-                monitor,
-            )?;
+                -1.0,
+                Par::Seq,
+            );
         }
         let constant = (0..slip.len()).map(|i| on_slip[(i, slip.len())]).collect();
         on_slip.truncate(slip.len(), slip.len());

@@ -279,8 +279,7 @@ impl EllipseTable<'_> {
         };
         let combined = |rows: &[f32; NEAR], weights: &[f64; 4]| self.combined(rows, weights);
         if SLOPES {
-            let [value, by_pole, by_direction] =
-                simd::dispatch(ValueAndSlopes(&table.spline, near));
+            let [value, by_pole, by_direction] = simd::dispatch(NearSums(&table.spline, near));
             Sums {
                 value: combined(&value, &size.value),
                 by_size: combined(&value, &size.slope),
@@ -288,7 +287,7 @@ impl EllipseTable<'_> {
                 by_direction: combined(&by_direction, &size.value),
             }
         } else {
-            let value = simd::dispatch(Value(&table.spline, near));
+            let [value] = simd::dispatch(NearSums(&table.spline, near));
             Sums {
                 value: combined(&value, &size.value),
                 ..Sums::default()
@@ -368,28 +367,10 @@ impl NearNodes {
         }
     }
 
+    /// The value, and with three sums the derivatives by pole and direction.
     #[inline(always)]
-    fn value(&self, spline: &[i16]) -> [f32; NEAR] {
-        let mut sum = [0.0_f32; NEAR];
-        for i in 0..4 {
-            for j in 0..4 {
-                let outer = self.ratio.value[i] * self.pole.value[j];
-                for k in 0..4 {
-                    let weight = (outer * self.direction.value[k]) as f32;
-                    let row = self.row(spline, [i, j, k]);
-                    for n in 0..NEAR {
-                        sum[n] += weight * f32::from(row[n]);
-                    }
-                }
-            }
-        }
-        sum
-    }
-
-    /// The value, and the derivatives by pole and direction.
-    #[inline(always)]
-    fn with_slopes(&self, spline: &[i16]) -> [[f32; NEAR]; 3] {
-        let mut sums = [[0.0_f32; NEAR]; 3];
+    fn sums<const N: usize>(&self, spline: &[i16]) -> [[f32; NEAR]; N] {
+        let mut sums = [[0.0_f32; NEAR]; N];
         for i in 0..4 {
             for j in 0..4 {
                 let outer = self.ratio.value[i] * self.pole.value[j];
@@ -414,25 +395,13 @@ impl NearNodes {
 }
 
 /// The sums of the table. What is compiled for each level of SIMD: a closure would not be, the compiler does not inline one of this length.
-pub struct Value<'a>(pub &'a [i16], pub NearNodes);
+pub struct NearSums<'a, const N: usize>(pub &'a [i16], pub NearNodes);
 
-impl WithSimd for Value<'_> {
-    type Output = [f32; NEAR];
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> [f32; NEAR] {
-        self.1.value(self.0)
-    }
-}
-
-/// The same with the derivatives.
-pub struct ValueAndSlopes<'a>(pub &'a [i16], pub NearNodes);
-
-impl WithSimd for ValueAndSlopes<'_> {
-    type Output = [[f32; NEAR]; 3];
+impl<const N: usize> WithSimd for NearSums<'_, N> {
+    type Output = [[f32; NEAR]; N];
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> [[f32; NEAR]; 3] {
-        self.1.with_slopes(self.0)
+    fn with_simd<S: Simd>(self, _: S) -> [[f32; NEAR]; N] {
+        self.1.sums(self.0)
     }
 }
