@@ -8,10 +8,10 @@ use serde_json::to_value;
 use thiserror::Error;
 
 use crate::contact::case::solver::Limits;
-use crate::contact::case::words::contact::{
-    Contact, CrossSection, Elastic, FormatName, Friction, InfluenceName, Load, Material, SideName,
-    Smoothing, SurfaceName,
-};
+use crate::contact::case::words::contact::{Contact, InfluenceName, Load, SideName, SurfaceName};
+use crate::contact::case::words::cross_section::{CrossSection, FormatName, Smoothing};
+use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::material::{Elastic, Material};
 use crate::contact::case::words::motion::{AskedMotion, Motions, Wheelset};
 use crate::contact::case::words::solver::{Case, MethodName, Output, Solver};
 use crate::contact::error::{CaseError, Fault, SolveError};

@@ -52,12 +52,13 @@
 pub mod contact;
 
 pub use contact::case::solver::Limits;
-pub use contact::case::words::contact::Friction;
 pub use contact::case::words::contact::{
-    Contact, CrossSection, FormatName as Format, InfluenceName as SurfaceInfluence, Load,
-    SideName as Side, SurfaceName as ReferenceSurface,
+    Contact, InfluenceName as SurfaceInfluence, Load, SideName as Side,
+    SurfaceName as ReferenceSurface,
 };
-pub use contact::case::words::contact::{Elastic, Material};
+pub use contact::case::words::cross_section::{CrossSection, FormatName as Format};
+pub use contact::case::words::friction::Friction;
+pub use contact::case::words::material::{Elastic, Material};
 pub use contact::case::words::motion::{AskedMotion as Motion, Motions, Wheelset};
 pub use contact::case::words::solver::Case;
 pub use contact::case::words::solver::{MethodName as Method, Output, Solver};

@@ -14,7 +14,7 @@
 //!
 //! # The way of a motion
 //!
-//! 1. **Read**: [`case::read::draft`] turns JSON into the words of a [`Case`](case::words::solver::Case) and names every fault of the text.
+//! 1. **Read**: [`case::draft`] turns JSON into the words of a [`Case`](case::words::solver::Case) and names every fault of the text.
 //! 2. **Check**: [`case::checks`] turns each part into numbers and names every fault of them; [`case::check`] puts the parts together.
 //!    From here on there is only the [`CheckedCase`].
 //! 3. **Cut**: [`slices()`] divides a long sweep; [`solve_slice`] starts the clock of the recipe for each slice.
@@ -34,7 +34,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use crate::contact::case::read::draft;
+use crate::contact::case::draft;
 use crate::contact::case::solver::{KnownPair, Limits};
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::monitor::{Monitor, MonitorPart};

@@ -1,39 +1,42 @@
 //! Attributes of the types that are exchanged as JSON, and of the calls of the job table.
 
 use proc_macro::TokenStream;
-use quote::{ToTokens, quote};
+use proc_macro2::TokenStream as Tokens;
+use quote::{ToTokens, format_ident, quote};
+use syn::punctuated::Punctuated;
 use syn::{
-    Attribute, Field, ImplItem, Item, ItemEnum, ItemImpl, LitStr, Type, Variant, parse_macro_input,
-    parse_quote,
+    Attribute, Expr, ExprRange, Field, Fields, GenericArgument, Ident, ImplItem, Item, ItemEnum,
+    ItemImpl, LitStr, Path, PathArguments, Token, Type, Variant, parse_macro_input, parse_quote,
 };
 
 /// Omits the `Option` members of a struct, or of the variants of an enum, from the JSON while they are `None`, and declares them in the
 /// contract as never `null`.
 ///
 /// It adds `#[serde(skip_serializing_if = "Option::is_none")]` and `#[schema(nullable = false)]` to each of them, so it stands above the
-/// derives. A member with a `#[schema(nullable …)]` of its own keeps that; a member with `#[or_null]` is `null` while it is `None`.
+/// derives. A member with a `#[schema(nullable …)]` of its own keeps that; a member with `#[or_null]` is `null` while it is `None`. A member
+/// with `#[member(positive(…))]` is more than 0 in the contract too.
 #[proc_macro_attribute]
 pub fn none_is_absent(_: TokenStream, item: TokenStream) -> TokenStream {
     let mut item = parse_macro_input!(item as Item);
     match &mut item {
-        Item::Struct(item) => item.fields.iter_mut().for_each(omit_none),
+        Item::Struct(item) => item.fields.iter_mut().for_each(declare),
         Item::Enum(item) => {
             let fields = item.variants.iter_mut().flat_map(|it| &mut it.fields);
-            fields.for_each(omit_none);
+            fields.for_each(declare);
         }
         _ => {}
     }
     item.into_token_stream().into()
 }
 
-fn omit_none(field: &mut Field) {
-    let Type::Path(path) = &field.ty else { return };
-    if path
-        .path
-        .segments
-        .last()
-        .is_none_or(|it| it.ident != "Option")
-    {
+fn declare(field: &mut Field) {
+    let positive =
+        |item: &Expr| matches!(item, Expr::Call(call) if name_of(&call.func) == "positive");
+    if items(&field.attrs, "member").iter().any(positive) {
+        let range = parse_quote!(#[schema(exclusive_minimum = 0.0)]);
+        field.attrs.push(range);
+    }
+    if argument(&field.ty, "Option").is_none() {
         return;
     }
     let or_null = |it: &Attribute| it.path().is_ident("or_null");
@@ -83,8 +86,199 @@ pub fn words(item: TokenStream) -> TokenStream {
             /// The words of a request and what they mean.
             pub(crate) const WORDS: &'static [(&'static str, #name)] = &[#((#words, #name::#variants)),*];
         }
+
+        impl crate::contact::case::words::object::Member for #name {
+            fn read(
+                block: &mut crate::contact::case::words::object::Object,
+                name: &str,
+            ) -> Option<#name> {
+                block.word(name, #name::WORDS)
+            }
+        }
     }
     .into()
+}
+
+/// Gives a struct, or an enum of struct variants that `type` tells apart, the function `members`, which reads it from the members of a JSON
+/// object with all of their faults. A member is needed unless its type is an `Option` or it has a default.
+///
+/// `#[member(…)]` of a field takes: the range of a number, as `positive(most, "unit")` or `closed(least, most, "unit")`; that of a count, as
+/// `1..=10`; `default` or `default = value`; `empty`, if an absent member is read as an empty object; `what = "a sentence"` for the fault of a
+/// missing member; `with = function`, which reads the value, or `whole = function`, which reads the member whether it is there or not; `skip`
+/// for a field that is no member. `#[members(rule)]` of a struct or variant names a function that is called with the object and
+/// what was read of it, and refuses members that do not go together.
+#[proc_macro_derive(Members, attributes(member, members))]
+pub fn members(item: TokenStream) -> TokenStream {
+    let object = quote!(crate::contact::case::words::object);
+    match parse_macro_input!(item as Item) {
+        Item::Struct(item) => {
+            let name = &item.ident;
+            let made = reader(&parse_quote!(#name), &item.fields, &item.attrs, &[]);
+            quote! {
+                impl #name {
+                    #[doc = "Reads the members of an object."]
+                    pub(crate) fn members(block: &mut #object::Object) -> Option<#name> {
+                        #made
+                    }
+                }
+
+                impl #object::Member for #name {
+                    fn read(block: &mut #object::Object, name: &str) -> Option<#name> {
+                        #name::members(&mut block.child(name)?)
+                    }
+                }
+            }
+        }
+        Item::Enum(item) => {
+            let name = &item.ident;
+            let words: Vec<String> = item.variants.iter().map(word).collect();
+            let variants: Vec<&Ident> = item.variants.iter().map(|it| &it.ident).collect();
+            let readers: Vec<Ident> = words
+                .iter()
+                .map(|word| format_ident!("read_{word}"))
+                .collect();
+            let made = item.variants.iter().map(|it| {
+                let variant = &it.ident;
+                reader(
+                    &parse_quote!(#name::#variant),
+                    &it.fields,
+                    &it.attrs,
+                    &["type"],
+                )
+            });
+            quote! {
+                impl #name {
+                    /// The word for its `type`.
+                    #[must_use]
+                    pub fn name(&self) -> &'static str {
+                        match self {
+                            #(#name::#variants { .. } => #words,)*
+                        }
+                    }
+
+                    #[doc = "Reads the members of an object."]
+                    pub(crate) fn members(block: &mut #object::Object) -> Option<#name> {
+                        type Reader = fn(&mut #object::Object) -> Option<#name>;
+                        let kinds: &[(&str, Reader)] = &[#((#words, #name::#readers)),*];
+                        block.required("type", &format!("one of {}", #object::names(kinds)))?;
+                        block.word("type", kinds)?(block)
+                    }
+
+                    #(fn #readers(block: &mut #object::Object) -> Option<#name> { #made })*
+                }
+            }
+        }
+        _ => quote!(compile_error! { "a struct or an enum is needed" }),
+    }
+    .into()
+}
+
+/// Reads the fields of a struct or variant from the object `block`.
+fn reader(path: &Path, fields: &Fields, attributes: &[Attribute], before: &[&str]) -> Tokens {
+    let named: Vec<&Ident> = fields.iter().filter_map(|it| it.ident.as_ref()).collect();
+    let read = fields.iter().map(read_field);
+    let skips = |it: &&Field| {
+        let items = items(&it.attrs, "member");
+        items.iter().any(|item| name_of(item) == "skip")
+    };
+    let words = fields.iter().filter(|it| !skips(it));
+    let words = words.filter_map(|it| Some(it.ident.as_ref()?.to_string()));
+    let words = before.iter().map(ToString::to_string).chain(words);
+    let rules = items(attributes, "members");
+    quote! {
+        block.only(&[#(#words),*]);
+        #(let #named = #read;)*
+        let all = move || Some(#path { #(#named: #named?),* });
+        let all = all();
+        #(#rules(block, all.as_ref())?;)*
+        all
+    }
+}
+
+fn read_field(field: &Field) -> Tokens {
+    let object = quote!(crate::contact::case::words::object);
+    let items = items(&field.attrs, "member");
+    let value = |wanted: &str| {
+        items.iter().find_map(|item| match item {
+            Expr::Assign(given) if name_of(&given.left) == wanted => {
+                Some(given.right.to_token_stream())
+            }
+            item if name_of(item) == wanted => Some(quote!(Default::default())),
+            _ => None,
+        })
+    };
+    let range = items.iter().find_map(|item| match item {
+        Expr::Call(call) => Some(quote!(#object::AllowedRange::#call)),
+        Expr::Range(ExprRange { start, end, .. }) => Some(quote!(#start, #end)),
+        _ => None,
+    });
+    let member = field.ident.as_ref().map(ToString::to_string);
+    let member = member.unwrap_or_default();
+    let optional = argument(&field.ty, "Option");
+    let own = optional.unwrap_or(&field.ty);
+    let kind = own.to_token_stream().to_string();
+    let read = match (kind.as_str(), value("with")) {
+        (_, Some(with)) => quote!(#with),
+        ("f64", _) => quote!(|block, name| block.number(name, #range)),
+        ("u32", _) => quote!(|block, name| block.required_count(name, #range)),
+        ("bool", _) => quote!(#object::Object::flag),
+        _ => quote!(<#own as #object::Member>::read),
+    };
+    if let Some(skipped) = value("skip") {
+        quote!(Some(#skipped))
+    } else if let Some(whole) = value("whole") {
+        quote!(#whole(block, #member))
+    } else if value("empty").is_some() {
+        quote!(block.child_or_empty(#member).and_then(|mut block| <#own>::members(&mut block)))
+    } else if optional.is_some() {
+        quote!(block.optional(#member, #read))
+    } else if let Some(default) = value("default") {
+        quote!(block.optional(#member, #read).map(|read| read.unwrap_or(#default)))
+    } else if let Some(what) = value("what") {
+        quote!(block.required(#member, #what).and_then(|_| #read(block, #member)))
+    } else {
+        match kind.as_str() {
+            "f64" => quote!(block.required_number(#member, #range)),
+            "u32" => quote!(block.required_count(#member, #range)),
+            _ => quote!(#read(block, #member)),
+        }
+    }
+}
+
+/// What stands in all attributes of this name.
+fn items(attributes: &[Attribute], name: &str) -> Vec<Expr> {
+    let own = attributes.iter().filter(|it| it.path().is_ident(name));
+    own.filter_map(|it| {
+        it.parse_args_with(Punctuated::<Expr, Token![,]>::parse_terminated)
+            .ok()
+    })
+    .flatten()
+    .collect()
+}
+
+/// A single name, or nothing.
+fn name_of(item: &Expr) -> String {
+    match item {
+        Expr::Path(path) => path
+            .path
+            .get_ident()
+            .map(ToString::to_string)
+            .unwrap_or_default(),
+        _ => String::new(),
+    }
+}
+
+/// The argument of a type with one, such as `Option<T>`.
+fn argument<'a>(of: &'a Type, name: &str) -> Option<&'a Type> {
+    let Type::Path(path) = of else { return None };
+    let last = path.path.segments.last().filter(|it| it.ident == name)?;
+    let PathArguments::AngleBracketed(arguments) = &last.arguments else {
+        return None;
+    };
+    arguments.args.iter().find_map(|it| match it {
+        GenericArgument::Type(own) => Some(own),
+        _ => None,
+    })
 }
 
 fn word(variant: &Variant) -> String {

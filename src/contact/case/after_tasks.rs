@@ -4,7 +4,7 @@
 
 use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::solver::Limits;
-use crate::contact::case::words::contact::{Material, ThermalBodyWords, ThermalWords};
+use crate::contact::case::words::material::{Material, ThermalBodyWords, ThermalWords};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{Case, Output};
 use crate::contact::case::words::subsurface::{

@@ -9,10 +9,10 @@ use serde_json::Value;
 use crate::contact::case::checks::{CheckedParts, PartialCase, missing_load, unusual_friction};
 use crate::contact::case::digest::digest;
 use crate::contact::case::motions::ExpandedMotions;
-use crate::contact::case::read::object::{Faults, Object};
-use crate::contact::case::read::wheel_rail::section_of;
 use crate::contact::case::solver::{KnownPair, Limits, resolution};
 use crate::contact::case::wheel_task::profile;
+use crate::contact::case::words::cross_section::CrossSection;
+use crate::contact::case::words::object::{Faults, Object};
 use crate::contact::case::words::solver::Case;
 use crate::contact::case::{units, wheel_task};
 use crate::contact::error::{CaseError, Fault};
@@ -175,7 +175,7 @@ pub struct SectionReport {
 pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
     let mut faults = Faults::default();
     let read = Object::open(value, String::new(), &mut faults)
-        .and_then(|mut block| section_of(&mut block));
+        .and_then(|mut block| CrossSection::members(&mut block));
     let listed = faults.into_list();
     let Some(section) = read.filter(|_| listed.is_empty()) else {
         return Err(CaseError(listed));

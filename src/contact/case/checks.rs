@@ -5,9 +5,9 @@
 use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::motions::{BesideHistory, ExpandedMotions};
 use crate::contact::case::solver::{KnownPair, Limits, resolution};
-use crate::contact::case::words::contact::{
-    Contact, Elastic, Friction, InfluenceName, Load, Material, SurfaceName, ThermalWords,
-};
+use crate::contact::case::words::contact::{Contact, InfluenceName, Load, SurfaceName};
+use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::material::{Elastic, Material, ThermalWords};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{MethodName, Output, RelativeToName, Solver};
 use crate::contact::case::{contact_task, motions, wheel_task, wheelsets};

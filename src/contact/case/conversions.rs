@@ -1,8 +1,9 @@
 //! Between the words of a case and the types of the numerics: a change of a solver does not change the contract.
 
-use crate::contact::case::words::contact::{
-    FallName, FormatName, Friction, SideName, ThermalWords, UnitName,
-};
+use crate::contact::case::words::contact::SideName;
+use crate::contact::case::words::cross_section::{FormatName, UnitName};
+use crate::contact::case::words::friction::{FallName, Friction};
+use crate::contact::case::words::material::ThermalWords;
 use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::{
     MeshSizeWords, MethodName, Output, RelativeToName, TractionBoundName,

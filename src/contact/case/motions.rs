@@ -3,7 +3,8 @@
 //! What a history goes with: contact, method, material and outputs, and how long it may be.
 
 use crate::contact::case::solver::Limits;
-use crate::contact::case::words::contact::{Contact, Friction};
+use crate::contact::case::words::contact::Contact;
+use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::motion::{
     AskedMotion, Combine, History, HistoryCourse, HistoryStartName, Motions, Sweep, Swept, Wheelset,
 };

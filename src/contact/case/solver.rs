@@ -8,8 +8,8 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::contact::case::words::contact::CrossSection;
-use crate::contact::case::words::solver::{MethodName, Solver};
+use crate::contact::case::words::cross_section::CrossSection;
+use crate::contact::case::words::solver::{MethodName, Solver, TARGET_ERROR_DEFAULT};
 use crate::contact::error::Fault;
 use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 use crate::contact::method::Method;
@@ -17,9 +17,6 @@ use crate::contact::problem::memory::SizeInput;
 use crate::contact::rolling::methods::fastsim;
 use crate::contact::rolling::operator_store::BYTES_DEFAULT;
 use crate::contact::rolling::task::Resolution;
-
-/// Allowed error of the resultants when nothing else is asked for, relative to μN.
-pub(crate) const TARGET_ERROR_DEFAULT: f64 = 0.005;
 
 pub(crate) fn resolution(solver: &Solver) -> Resolution {
     match (solver.mesh, solver.target_error) {

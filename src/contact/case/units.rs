@@ -4,7 +4,8 @@
 //! metals with a shear modulus of 10 to 1000 GPa, angles below 0.05 rad. Lengths of the wheel and the track are looked at in `length_units`.
 
 use crate::contact::case::motions::swept_values;
-use crate::contact::case::words::contact::{Contact, Elastic, Load, Material};
+use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::material::{Elastic, Material};
 use crate::contact::case::words::motion::{AskedMotion, HistoryCourse, Motions, Swept, Wheelset};
 use crate::contact::case::words::solver::Case;
 use crate::contact::normal::hertz::Patch;

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use crate::contact::case::contact_task;
 use crate::contact::case::solver::KnownPair;
-use crate::contact::case::words::contact::{
-    Contact, CrossSection, FormatName, Load, Smoothing, SmoothingWord,
+use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::cross_section::{
+    CrossSection, FormatName, Smoothing, SmoothingWord,
 };
 use crate::contact::case::words::motion::{Motions, Wheelset};
 use crate::contact::error::Fault;

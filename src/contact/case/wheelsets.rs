@@ -8,7 +8,8 @@ use crate::contact::case::solver::Limits;
 use crate::contact::case::wheel_task::{
     both, exchanged, moves, profile_at, reasons, unplaced, with_reasons,
 };
-use crate::contact::case::words::contact::{Contact, CrossSection, Load, Smoothing};
+use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::cross_section::{CrossSection, Smoothing};
 use crate::contact::case::words::motion::{Combine, Motions, Swept};
 use crate::contact::error::Fault;
 use crate::contact::geometry::contact_locus::ContactLocus;

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use serde_json::Value;
 
 use crate::contact::case::contact_task::plausible;
-use crate::contact::case::read::friction::COEFFICIENT_LEAST;
+use crate::contact::case::words::friction::COEFFICIENT_LEAST;
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::error::{CaseError, Fault, FaultCode, SolveError};
 use crate::contact::evaluate::answer::{RowAnswer, RowStatus, RowsAnswer};

@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::contact::CrossSection;
+use crate::contact::case::words::cross_section::CrossSection;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::words::damage::SectionQuality;
 use crate::http::dto::job::rfc3339;

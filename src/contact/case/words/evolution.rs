@@ -1,46 +1,59 @@
 //! Request of an evolution: the bodies that wear, the wear model, the extent, events and limits.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::contact::CrossSection;
+use crate::contact::case::words::cross_section::CrossSection;
+use crate::contact::case::words::object::{AllowedRange, Faults, Object, join, number, shown};
 use crate::contact::case::words::subsurface::DamageModel;
+use crate::contact::error::CaseError;
+use crate::contact::numerics::quadrature::PRIMES;
 
 /// Profiles that wear under a traffic.
-#[derive(Debug, Clone, PartialEq, ToSchema)]
+#[derive(Debug, Clone, PartialEq, ToSchema, Members)]
+#[members(faults_of_extent)]
 #[schema(as = EvolutionRequest)]
 pub struct EvolutionWords {
     /// A case of one motion whose contact is of the type `profiles`. Members that a column holds may be left out; `outputs` is not needed, and
     /// `solver` has a target of 0.02 when left out.
     #[schema(value_type = Object)]
+    #[member(with = template)]
     pub template: Value,
     /// The states of the traffic.
+    #[member(with = traffic)]
     pub traffic: Traffic,
     /// Which bodies wear; `both` when left out.
     #[schema(required = false)]
+    #[member(default)]
     pub wearing: WearingBodies,
     /// Law of wear: `usfd_wear` (when left out) or `archard_wear`. Its figures are those of `damage.parameters` in the template.
     #[schema(required = false)]
+    #[member(with = wear_model, default = DamageModel::UsfdWear)]
     pub wear_model: DamageModel,
     /// Traffic over the rail and distance of the wheel.
     pub extent: EvolutionExtent,
     /// Stored steps after the start, equally spaced over the extent; 10 when left out.
     #[schema(required = false, minimum = 1, maximum = 500)]
+    #[member(1..=500, default = 10)]
     pub records: u32,
     /// Tolerances of the condensed traffic and of the steps.
     #[schema(required = false)]
+    #[member(empty)]
     pub accuracy: EvolutionAccuracy,
     /// Losses for which the time is reported.
     #[schema(required = false)]
+    #[member(default)]
     pub limits: WearLosses,
     /// Maintenance, in any order.
     #[schema(required = false)]
+    #[member(with = events, default)]
     pub events: Vec<EvolutionEvent>,
     /// Uncertainty of a wear coefficient whose scatter is not published: it lies between the value divided and multiplied by this with a
     /// probability of 90 %; 2 when left out.
     #[schema(required = false, minimum = 1.0)]
+    #[member(closed(1.0, 100.0, ""), default = 2.0)]
     pub coefficient_factor: f64,
 }
 
@@ -85,7 +98,7 @@ pub struct TrafficDistribution {
 }
 
 /// The bodies that wear.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ToSchema, Words)]
 #[schema(rename_all = "snake_case")]
 pub enum WearingBodies {
     /// The rail.
@@ -114,68 +127,69 @@ impl WearingBodies {
 }
 
 /// Extent of an evolution. Rail and wheel advance in proportion.
-#[derive(Debug, Clone, Copy, PartialEq, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, ToSchema, Members)]
 pub struct EvolutionExtent {
     /// Traffic over the rail in million gross tonnes; a row of the traffic counts twice its wheel load.
     #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[member(positive(1e12, ""))]
     pub mgt: Option<f64>,
     /// Traffic over the rail as a number of axles, in place of `mgt`.
     #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[member(positive(1e12, ""))]
     pub axle_passes: Option<f64>,
     /// Distance that the wheel rolls under this traffic in km; needed where the wheel wears.
     #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[member(positive(1e12, ""))]
     pub wheel_distance_km: Option<f64>,
 }
 
 /// Tolerances of an evolution.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
 pub struct EvolutionAccuracy {
     /// Largest number of representative states; 100 when left out.
     #[schema(required = false, minimum = 1, maximum = 2000)]
+    #[member(1..=2000, default = 100)]
     pub states_max: u32,
     /// Error of the representative states relative to the worn area, at which no more are added; 0.03 when left out.
     #[schema(required = false, exclusive_minimum = 0.0)]
+    #[member(positive(1.0, ""), default = 0.03)]
     pub states_tolerance: f64,
     /// Change of the distribution of wear over a step, relative to the worn area; 0.1 when left out.
     #[schema(required = false, exclusive_minimum = 0.0)]
+    #[member(positive(1.0, ""), default = 0.1)]
     pub step_tolerance: f64,
     /// Largest depth that one step removes, in mm; 0.03 when left out.
     #[schema(required = false, exclusive_minimum = 0.0)]
+    #[member(positive(1.0, "mm"), default = 0.03)]
     pub step_depth_mm: f64,
     /// Most steps; 1000 when left out.
     #[schema(required = false, minimum = 1)]
+    #[member(1..=100_000, default = 1000)]
     pub steps_max: u32,
     /// Standard deviation in mm of the kernel that smooths the wear of a step along the section; 0.5 when left out.
     #[schema(required = false, minimum = 0.0)]
+    #[member(closed(0.0, 5.0, "mm"), default = 0.5)]
     pub smoothing_mm: f64,
-}
-
-impl Default for EvolutionAccuracy {
-    fn default() -> EvolutionAccuracy {
-        EvolutionAccuracy {
-            states_max: 100,
-            states_tolerance: 0.03,
-            step_tolerance: 0.1,
-            step_depth_mm: 0.03,
-            steps_max: 1000,
-            smoothing_mm: 0.5,
-        }
-    }
 }
 
 /// Losses of the sections in mm, or limits of them; absent where a section has no such place, and where no limit is wanted.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Members)]
 pub struct WearLosses {
     /// W1: height of the rail at y = 0.
+    #[member(with = loss)]
     pub height_mm: Option<f64>,
     /// W2: gauge face of the rail, 14 mm below its top at the start.
+    #[member(with = loss)]
     pub gauge_face_mm: Option<f64>,
     /// W3: gauge corner of the rail, at 45°.
+    #[member(with = loss)]
     pub gauge_corner_mm: Option<f64>,
     /// Tread of the wheel at y = 0.
+    #[member(with = loss)]
     pub tread_mm: Option<f64>,
     /// Flange of the wheel, 10 mm below its tread at the start.
+    #[member(with = loss)]
     pub flange_mm: Option<f64>,
 }
 
@@ -194,10 +208,12 @@ impl WearLosses {
 }
 
 /// Maintenance at one time.
-#[derive(Debug, Clone, PartialEq, ToSchema)]
+#[derive(Debug, Clone, PartialEq, ToSchema, Members)]
+#[members(faults_of_event)]
 pub struct EvolutionEvent {
     /// Time of the event, in the unit of the extent: `mgt` or `axle_passes`, and km where only the wheel wears.
     #[schema(minimum = 0.0)]
+    #[member(closed(0.0, 1e12, ""))]
     pub at: f64,
     /// Grinds the rail to this section, lowered until it lies nowhere above the present one.
     #[schema(nullable = false, inline = false)]
@@ -207,8 +223,187 @@ pub struct EvolutionEvent {
     pub reprofile: Option<Box<CrossSection>>,
     /// Depth in mm by which grinding or turning goes beyond that; 0 when left out.
     #[schema(required = false, minimum = 0.0)]
+    #[member(closed(0.0, 20.0, "mm"), default)]
     pub depth_mm: f64,
     /// Coefficient of friction of all states from then on, as of a lubricator.
     #[schema(nullable = false, minimum = 0.0)]
+    #[member(closed(0.0, 2.0, ""))]
     pub friction_coefficient: Option<f64>,
+}
+
+const MODELS: [(&str, DamageModel); 2] = [
+    ("usfd_wear", DamageModel::UsfdWear),
+    ("archard_wear", DamageModel::ArchardWear),
+];
+const AMOUNT: AllowedRange = AllowedRange::positive(1e12, "");
+const NOT_NEGATIVE: AllowedRange = AllowedRange::closed(0.0, 1e12, "");
+const ANY: AllowedRange = AllowedRange::closed(-1e12, 1e12, "");
+const LOSS: AllowedRange = AllowedRange::positive(100.0, "mm");
+/// Events of one evolution.
+const EVENTS_MAX: usize = 100;
+/// Rows of a traffic.
+const ROWS_MAX: u32 = 200_000;
+/// Samples of a traffic whose columns are distributions.
+const SAMPLES_DEFAULT: u32 = 4096;
+
+impl EvolutionWords {
+    /// Reads an evolution whose columns are named by JSON pointers into the template.
+    ///
+    /// # Errors
+    /// Every fault of the text, with its JSON pointer.
+    pub(crate) fn read(value: &Value) -> Result<EvolutionWords, CaseError> {
+        let mut faults = Faults::default();
+        let words = Object::open(value, String::new(), &mut faults)
+            .and_then(|mut all| EvolutionWords::members(&mut all));
+        let faults = faults.into_list();
+        words.filter(|_| faults.is_empty()).ok_or(CaseError(faults))
+    }
+}
+
+/// The case of the states.
+pub(crate) fn template(all: &mut Object, name: &str) -> Option<Value> {
+    all.required(name, "a case of one motion").cloned()
+}
+
+/// A law of wear.
+pub(crate) fn wear_model(all: &mut Object, name: &str) -> Option<DamageModel> {
+    all.word(name, &MODELS)
+}
+
+/// A limit of a loss.
+pub(crate) fn loss(limits: &mut Object, name: &str) -> Option<f64> {
+    limits.number(name, LOSS)
+}
+
+/// The extent says how far each body that wears goes.
+pub(crate) fn faults_of_extent(all: &mut Object, _: Option<&EvolutionWords>) -> Option<()> {
+    if !all.value("extent")?.is_object() {
+        return None;
+    }
+    let wears = |body| {
+        all.value("wearing")
+            .is_none_or(|word| word == body || word == "both")
+    };
+    let [rail, wheel] = ["rail", "wheel"].map(wears);
+    let mut block = all.child("extent")?;
+    if block.has("mgt") && block.has("axle_passes") {
+        block.fault("axle_passes", "given together with mgt; give one of them");
+    } else if rail && !block.has("axle_passes") {
+        let what = "mgt or axle_passes, how much traffic passes over the rail";
+        block.required("mgt", what);
+    }
+    if wheel {
+        block.required("wheel_distance_km", "the distance that the wheel rolls");
+    }
+    Some(())
+}
+
+/// Maintenance, in any order.
+pub(crate) fn events(all: &mut Object, name: &str) -> Option<Vec<EvolutionEvent>> {
+    let what = format!("an array of at most {EVENTS_MAX} events");
+    let elements = all.array(name, 0..=EVENTS_MAX, &what)?;
+    let pointer = all.pointer_to(name);
+    let event = |(k, element)| {
+        let mut block = Object::open(element, join(&pointer, k), all.faults())?;
+        EvolutionEvent::members(&mut block)
+    };
+    Some(elements.iter().enumerate().filter_map(event).collect())
+}
+
+/// Something happens.
+pub(crate) fn faults_of_event(block: &mut Object, _: Option<&EvolutionEvent>) -> Option<()> {
+    let kinds = ["grind", "reprofile", "friction_coefficient"];
+    if block.given(&kinds).is_empty() {
+        block.fault_here(format!("nothing happens; give one of {}", kinds.join(", ")));
+        return None;
+    }
+    Some(())
+}
+
+/// The states, sampled or listed.
+pub(crate) fn traffic(all: &mut Object, name: &str) -> Option<Traffic> {
+    let mut block = all.child(name)?;
+    block.only(&["columns", "passes", "samples"]);
+    let samples = block.optional("samples", |block, name| {
+        block.required_count(name, 1, ROWS_MAX)
+    })?;
+    let value = block.required("columns", "an object of columns")?;
+    let members = value.as_object().filter(|members| !members.is_empty());
+    let Some(members) = members else {
+        let given = shown(value);
+        let detail = format!("{given} given; an object with at least one column is needed");
+        block.fault("columns", detail);
+        return None;
+    };
+    let first = members.values().find_map(Value::as_array);
+    let rows = samples.or(first.map(|first| first.len() as u32));
+    let samples = rows.unwrap_or(SAMPLES_DEFAULT);
+    if !(1..=ROWS_MAX).contains(&samples) {
+        let detail = format!("{samples} rows given; 1 to {ROWS_MAX} are allowed");
+        block.fault("columns", detail);
+        return None;
+    }
+    let mut block_of_columns = block.child("columns")?;
+    let column = |(name, value): (&String, &Value)| {
+        let column = match value {
+            Value::Object(_) => {
+                distribution(block_of_columns.child(name)?).map(TrafficColumn::Distribution)
+            }
+            _ => numbers(&mut block_of_columns, name, ANY, samples).map(TrafficColumn::Numbers),
+        };
+        Some((name.clone(), column?))
+    };
+    let columns = members.iter().filter_map(column).collect();
+    let (given, most) = (
+        members.values().filter(|of| of.is_object()).count(),
+        PRIMES.len(),
+    );
+    if given > most {
+        let detail = format!("{given} distributions given; at most {most} are allowed");
+        block.fault("columns", detail);
+    }
+    let passes = match block.has("passes") {
+        true => numbers(&mut block, "passes", NOT_NEGATIVE, samples)?,
+        false => vec![1.0; samples as usize],
+    };
+    if passes.iter().sum::<f64>() <= 0.0 {
+        block.fault("passes", "all are 0; at least one more than 0 is needed");
+    }
+    Some(Traffic {
+        columns,
+        passes,
+        samples,
+    })
+}
+
+fn distribution(mut block: Object) -> Option<TrafficDistribution> {
+    block.only(&["min", "max", "mean", "standard_deviation"]);
+    let min = block.required_number("min", ANY);
+    let max = block.required_number("max", AllowedRange::closed(min.unwrap_or(-1e12), 1e12, ""));
+    let (min, max) = (min?, max?);
+    let (mut mean, mut standard_deviation) = (None, None);
+    if block.has("mean") || block.has("standard_deviation") {
+        mean = block.required_number("mean", AllowedRange::closed(min, max, ""));
+        standard_deviation = block.required_number("standard_deviation", AMOUNT);
+    }
+    Some(TrafficDistribution {
+        min,
+        max,
+        mean,
+        standard_deviation,
+    })
+}
+
+/// One number for each row.
+fn numbers(block: &mut Object, name: &str, allowed: AllowedRange, rows: u32) -> Option<Vec<f64>> {
+    let value = block.value(name)?;
+    let Some(elements) = value.as_array().filter(|all| all.len() == rows as usize) else {
+        let given = shown(value);
+        let detail = format!("{given} given; one number for each of {rows} rows is needed");
+        block.fault(name, detail);
+        return None;
+    };
+    let pointer = block.pointer_to(name);
+    let one = |(k, element)| number(element, &join(&pointer, k), allowed, block.faults());
+    Some(elements.iter().enumerate().filter_map(one).collect())
 }

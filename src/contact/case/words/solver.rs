@@ -7,31 +7,40 @@
 //!
 //! A case in the form of which its digest is taken.
 
-use std::collections::BTreeMap;
-
-use railhead_macros::{Words, none_is_absent};
+use railhead_macros::{Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::contact::{Contact, Friction, Load, Material, ThermalWords};
+use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::material::{Material, ThermalWords};
 use crate::contact::case::words::motion::{
     History, HistoryStartName, MotionWords, Motions, Wheelset,
 };
+use crate::contact::case::words::object::{Object, join, names, shown, word};
 use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
-use crate::contact::rolling::task::PrescribedForces;
+use crate::contact::rolling::task::{PrescribedForces, TARGET_LEAST};
+
+/// Allowed error of the resultants when nothing else is asked for, relative to μN.
+pub(crate) const TARGET_ERROR_DEFAULT: f64 = 0.005;
 
 /// How to solve, and how exactly.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema, Members)]
+#[members(mismatches)]
 pub struct Solver {
     /// The method.
     #[schema(required = false)]
+    #[member(default)]
     pub method: MethodName,
     /// Allowed error of the resultants relative to μN (moment: μN√(A/π)), 1e-4 to 0.5. Excludes `mesh`.
     ///
     /// Most cases reach 0.001, few 1e-4. One that ends above its target has `target_met: false` and the remark `target-missed`. 0.005 when
     /// left out, except for `fastsim`: its stated error is fixed, so that it has no target, and no `target_met`, unless one is given.
     #[schema(minimum = 0.0001, maximum = 0.5)]
+    #[member(closed(TARGET_LEAST, 0.5, ""))]
     pub target_error: Option<f64>,
     /// What the allowed error is relative to; `friction_limit` when left out. With `force` a motion is solved again until its error is
     /// `target_error` of its own tangential force, but at most to 1e-4 of μN. Not allowed with `mesh` and for histories.
@@ -41,7 +50,7 @@ pub struct Solver {
     /// The bound of the tractions in `fastsim`; `elliptic` when left out. Not allowed for other methods.
     pub traction_bound: Option<TractionBoundName>,
     /// Give up after this many seconds of solving.
-    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(86_400.0, "s"))]
     pub time_limit_s: Option<f64>,
 }
 
@@ -89,14 +98,16 @@ pub enum TractionBoundName {
 }
 
 /// An explicit mesh: equal strips, cosine-graded cells along x, no clustering.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Members)]
 #[schema(as = MeshSize)]
 pub struct MeshSizeWords {
     /// Strips across each patch.
     #[schema(minimum = 1)]
+    #[member(1..=1000)]
     pub strips: u32,
     /// Cells along x in each strip.
     #[schema(minimum = 1)]
+    #[member(1..=1000)]
     pub cells: u32,
 }
 
@@ -229,4 +240,92 @@ impl<'a> From<&'a Friction> for FrictionForm<'a> {
             None => FrictionForm::Other(friction),
         }
     }
+}
+
+/// Reads the member `solver` of a case; left out, it is `auto` with the default target.
+pub(crate) fn read(case: &mut Object) -> Option<Solver> {
+    let solver = Solver::members(&mut case.child_or_empty("solver")?)?;
+    // The simplified theory has one mesh and a stated error, which no target changes: it has none of its own.
+    let wanted = solver.mesh.is_none() && solver.method != MethodName::Fastsim;
+    let usual = wanted.then_some(TARGET_ERROR_DEFAULT);
+    Some(Solver {
+        target_error: solver.target_error.or(usual),
+        ..solver
+    })
+}
+
+/// Refuses members that do not go together.
+pub(crate) fn mismatches(block: &mut Object, _: Option<&Solver>) -> Option<()> {
+    let method = block.value("method").and_then(Value::as_str);
+    let is = |name: &str| method == Some(name);
+    let (target, mesh) = (block.has("target_error"), block.has("mesh"));
+    let targeted = target || !mesh && !is("fastsim");
+    let mut sound = true;
+    for (wrong, name, detail) in [
+        (
+            block.has("traction_bound") && !is("fastsim"),
+            "traction_bound",
+            "given for a method without a choice of bounds; only \"method\": \"fastsim\" has one",
+        ),
+        (
+            mesh && is("table"),
+            "mesh",
+            "given for \"method\": \"table\", which has no mesh",
+        ),
+        (
+            target && mesh,
+            "mesh",
+            "given together with target_error; exactly one of the two is allowed",
+        ),
+        (
+            block.has("relative_to") && !targeted,
+            "relative_to",
+            "given without a target; give target_error, or leave relative_to out",
+        ),
+    ] {
+        if wrong {
+            block.fault(name, detail);
+            sound = false;
+        }
+    }
+    sound.then_some(())
+}
+
+/// Reads the member `outputs` of a case: sorted, each once; left out, resultants and zones. A method `without_fields` computes
+/// resultants only, and every other output is refused.
+pub(crate) fn read_outputs(
+    case: &mut Object,
+    without_fields: Option<MethodName>,
+) -> Option<Vec<Output>> {
+    if !case.has("outputs") {
+        let mut usual = vec![Output::Resultants, Output::Zones];
+        usual.retain(|output| without_fields.is_none() || !output.needs_fields());
+        return Some(usual);
+    }
+    let what = format!("an array with at least one of {}", names(Output::WORDS));
+    let elements = case.array("outputs", 1..=usize::MAX, &what)?;
+    let pointer = case.pointer_to("outputs");
+    let faults = case.faults();
+    let read: Vec<Option<Output>> = elements
+        .iter()
+        .enumerate()
+        .map(|(k, element)| {
+            let pointer = join(&pointer, k);
+            let output = word(element, &pointer, Output::WORDS, faults)?;
+            let detail = match without_fields {
+                Some(method) if output.needs_fields() => format!(
+                    "{} given; \"method\": \"{}\" computes only \"resultants\", \"gradients\" and \"damage\"",
+                    shown(element),
+                    method.name()
+                ),
+                _ => return Some(output),
+            };
+            faults.add(pointer, detail);
+            None
+        })
+        .collect();
+    let mut outputs: Vec<Output> = read.into_iter().collect::<Option<_>>()?;
+    outputs.sort_unstable();
+    outputs.dedup();
+    Some(outputs)
 }

@@ -2,41 +2,53 @@
 //!
 //! Which damage models a case asks for, and with which figures.
 
-use railhead_macros::{Words, none_is_absent};
+use railhead_macros::{Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use utoipa::ToSchema;
+
+use crate::contact::case::words::object::{
+    AllowedRange, Member, Object, join, names, number, shown, word,
+};
 
 /// Where stresses below the surface are asked for, in the axes of the patch: x along rolling, y to the left, depth positive into the
 /// body. At most one of `points_mm`, `along_depth_at_mm` and `plane`; without any, only the worst point is found.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
+#[members(faults_of_places)]
 #[schema(as = Subsurface)]
 pub struct SubsurfaceWords {
     /// Points `[x, y, depth]` in mm.
+    #[member(with = points)]
     pub points_mm: Option<Vec<[f64; 3]>>,
     /// The line straight down from `[x, y]` in mm, or below the `"worst"` point of the patch; needs `depths_mm`.
+    #[member(with = line_at)]
     pub along_depth_at_mm: Option<DepthLineAt>,
     /// Depths on that line in mm.
+    #[member(with = depths)]
     pub depths_mm: Option<Vec<f64>>,
     /// A grid of points, usually in a plane.
     pub plane: Option<StressGrid>,
     /// The body: `lower` when left out.
     #[schema(required = false)]
+    #[member(default)]
     pub body: BodyName,
     /// Find the point of every patch where von Mises' stress is largest; `true` when left out.
     #[schema(required = false)]
+    #[member(default = true)]
     pub worst: bool,
     /// Judge what a point of the body lives through while the contact rolls over it: Dang Van's criterion and shakedown.
     pub passage: Option<PassageWords>,
 }
 
 /// What is judged of a passage of the contact in steady rolling: shakedown always, Dang Van's criterion with its slope.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
 #[schema(as = Passage)]
 pub struct PassageWords {
     /// Weight of the hydrostatic stress in Dang Van's criterion, a property of the steel; without it the criterion is not evaluated.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false, minimum = 0, maximum = 10)]
+    #[member(closed(0.0, 10.0, ""))]
     pub dang_van_slope: Option<f64>,
 }
 
@@ -59,13 +71,16 @@ pub enum FoundPlace {
 }
 
 /// The product of three axes, x fastest, then y, then depth; for a plane one of them is a single number.
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 pub struct StressGrid {
     /// x in mm.
+    #[member(with = axis)]
     pub x_mm: GridAxis,
     /// y in mm.
+    #[member(with = axis)]
     pub y_mm: GridAxis,
     /// Depths in mm.
+    #[member(with = axis_of_depths)]
     pub depths_mm: GridAxis,
 }
 
@@ -103,16 +118,19 @@ pub enum BodyName {
 
 /// Which damage models are evaluated, and with which figures.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[schema(as = Damage)]
 pub struct DamageWords {
     /// Models to evaluate. When left out: `t_gamma` and `usfd_wear`, the models whose parameters are confirmed.
     #[schema(required = false)]
+    #[member(with = models, default = MODELS_USUAL.to_vec())]
     pub models: Vec<DamageModel>,
     /// The name of a set of figures, or figures in place of some of the default set's.
+    #[member(with = parameters)]
     pub parameters: Option<DamageParameterWords>,
     /// Wear strip by strip across the patch, from the power of every cell, beside that of the patch as a whole; `false` when left out.
     #[schema(required = false)]
+    #[member(default)]
     pub across: bool,
 }
 
@@ -157,16 +175,16 @@ pub enum DamageSetName {
 
 /// Figures of the client's; those left out are the default set's.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema, Members)]
 pub struct OwnDamageFigures {
     /// Density of the worn material in kg/m³.
-    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(1e5, "kg/m³"))]
     pub density_kg_per_m3: Option<f64>,
     /// Yield stress in shear in MPa, of the surface fatigue index and the shakedown map.
-    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(1e6, "MPa"))]
     pub shear_yield_mpa: Option<f64>,
     /// Hardness of the worn material in MPa, of Archard's law.
-    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(1e6, "MPa"))]
     pub hardness_mpa: Option<f64>,
     /// The wear map of the University of Sheffield.
     pub usfd: Option<UsfdFigures>,
@@ -177,42 +195,284 @@ pub struct OwnDamageFigures {
 }
 
 /// Wear rate over power per area x in N/mm²: proportional to x, then constant, then rising again; without steps.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
+#[members(faults_of_usfd)]
 pub struct UsfdFigures {
     /// Rate over x where wear is mild, in µg/(m mm²) per N/mm².
+    #[member(positive(1e12, ""))]
     pub mild_slope: f64,
     /// Mild up to this x in N/mm².
+    #[member(positive(1e12, ""))]
     pub mild_until: f64,
     /// Severe, with the rate reached there, up to this x in N/mm².
+    #[member(positive(1e12, ""))]
     pub severe_until: f64,
     /// Slope of the rate beyond.
+    #[member(positive(1e12, ""))]
     pub catastrophic_slope: f64,
 }
 
 /// Archard's coefficients, each as the range `[low, high]` that measurements leave.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
 pub struct ArchardFigures {
     /// Of mild wear, below the first and above the second sliding speed.
+    #[member(with = pair)]
     pub mild: [f64; 2],
     /// Of severe wear, between them.
+    #[member(with = pair)]
     pub severe: [f64; 2],
     /// Of seizure, where the pressure exceeds its limit.
+    #[member(with = pair)]
     pub seizure: [f64; 2],
     /// The two sliding speeds in mm/s.
+    #[member(with = pair)]
     pub speeds_mm_per_s: [f64; 2],
     /// Seizure from this pressure over hardness on.
+    #[member(positive(1e12, ""))]
     pub seizure_pressure: f64,
 }
 
 /// Damage of one pass over Tγ without spin: 0 up to a threshold, linear to a peak, linear down to 0 and on below it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
+#[members(faults_of_wlrm)]
 pub struct WlrmFigures {
     /// No damage up to this Tγ in N.
+    #[member(positive(1e12, ""))]
     pub threshold_n: f64,
     /// Most damage at this Tγ in N.
+    #[member(positive(1e12, ""))]
     pub peak_at_n: f64,
     /// Wear outweighs fatigue from this Tγ on, in N.
+    #[member(positive(1e12, ""))]
     pub zero_at_n: f64,
     /// Damage of one pass at the peak; 1 is a visible crack.
+    #[member(positive(1e12, ""))]
     pub peak: f64,
+}
+
+/// Evaluated where none is named: those whose figures are confirmed.
+pub(crate) const MODELS_USUAL: [DamageModel; 2] = [DamageModel::TGamma, DamageModel::UsfdWear];
+const FIGURE: AllowedRange = AllowedRange::positive(1e12, "");
+
+/// Reads the member `damage` of a case, which belongs to the output of that name; left out, it has the default models.
+///
+/// The outer `None` says that a fault was found. A method without fields gives no wear across.
+pub(crate) fn read_damage(
+    case: &mut Object,
+    wanted: bool,
+    without_fields: bool,
+) -> Option<Option<DamageWords>> {
+    of_output(case, "damage", wanted, |block| {
+        let read = DamageWords::members(block);
+        if without_fields && block.value("across") == Some(&Value::Bool(true)) {
+            let detail = "true given; the method has no values per cell that wear across the patch is made from";
+            block.fault("across", detail);
+            return None;
+        }
+        read
+    })
+}
+
+/// Models by name, sorted, each once.
+pub(crate) fn models(block: &mut Object, name: &str) -> Option<Vec<DamageModel>> {
+    let what = format!(
+        "an array with at least one of {}",
+        names(DamageModel::WORDS)
+    );
+    let elements = block.array(name, 1..=usize::MAX, &what)?;
+    let pointer = block.pointer_to(name);
+    let faults = block.faults();
+    let one = |(k, element)| word(element, &join(&pointer, k), DamageModel::WORDS, faults);
+    let read: Vec<Option<DamageModel>> = elements.iter().enumerate().map(one).collect();
+    let mut models: Vec<DamageModel> = read.into_iter().collect::<Option<_>>()?;
+    models.sort_unstable();
+    models.dedup();
+    Some(models)
+}
+
+/// The name of a set of figures, or own ones.
+pub(crate) fn parameters(block: &mut Object, name: &str) -> Option<DamageParameterWords> {
+    if matches!(block.value(name)?, Value::Object(_)) {
+        let own = OwnDamageFigures::read(block, name)?;
+        return Some(DamageParameterWords::Own(Box::new(own)));
+    }
+    DamageSetName::read(block, name).map(DamageParameterWords::Named)
+}
+
+/// Wear is mild up to a smaller power than it is severe.
+pub(crate) fn faults_of_usfd(block: &mut Object, read: Option<&UsfdFigures>) -> Option<()> {
+    let read = read?;
+    in_order(block, "severe_until", [read.mild_until, read.severe_until])
+}
+
+/// Threshold, peak and end of fatigue are in order.
+pub(crate) fn faults_of_wlrm(block: &mut Object, read: Option<&WlrmFigures>) -> Option<()> {
+    let read = read?;
+    in_order(block, "peak_at_n", [read.threshold_n, read.peak_at_n])?;
+    in_order(block, "zero_at_n", [read.peak_at_n, read.zero_at_n])
+}
+
+/// `[low, high]`, both more than 0, in order.
+pub(crate) fn pair(block: &mut Object, name: &str) -> Option<[f64; 2]> {
+    let value = block.required(name, "[low, high]")?;
+    let pointer = block.pointer_to(name);
+    let Some([low, high]) = value.as_array().map(Vec::as_slice) else {
+        block.mistaken(name, "[low, high]");
+        return None;
+    };
+    let faults = block.faults();
+    let low = number(low, &join(&pointer, 0), FIGURE, faults);
+    let high = number(high, &join(&pointer, 1), FIGURE, faults);
+    let (low, high) = (low?, high?);
+    if low > high {
+        block.fault(
+            name,
+            format!("[{low}, {high}] given; the first may not be larger"),
+        );
+        return None;
+    }
+    Some([low, high])
+}
+
+fn in_order(block: &mut Object, name: &str, [before, after]: [f64; 2]) -> Option<()> {
+    if before < after {
+        return Some(());
+    }
+    block.fault(name, format!("{after} given; more than {before} is needed"));
+    None
+}
+
+const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
+const DEPTH: AllowedRange = AllowedRange::closed(0.0, 1e6, "mm");
+/// Most points of one list or axis, before the limit of the service.
+const COUNT_MAX: u32 = 1_000_000;
+const PLACES: [&str; 3] = ["points_mm", "along_depth_at_mm", "plane"];
+
+/// Reads the member `subsurface` of a case, which belongs to the output of that name; left out, it asks for the worst point.
+///
+/// The outer `None` says that a fault was found.
+pub(crate) fn read_subsurface(case: &mut Object, wanted: bool) -> Option<Option<SubsurfaceWords>> {
+    of_output(case, "subsurface", wanted, SubsurfaceWords::members)
+}
+
+/// Reads the member that belongs to the output of its name; left out, it is read as an empty object.
+fn of_output<T>(
+    case: &mut Object,
+    name: &str,
+    wanted: bool,
+    read: impl FnOnce(&mut Object) -> Option<T>,
+) -> Option<Option<T>> {
+    if !wanted && !case.has(name) {
+        return Some(None);
+    }
+    if !wanted {
+        let detail =
+            format!("given without \"{name}\" among the outputs; add it there or leave this out");
+        case.fault(name, detail);
+        return None;
+    }
+    read(&mut case.child_or_empty(name)?).map(Some)
+}
+
+/// Refuses more than one kind of places, and a line without depths.
+pub(crate) fn faults_of_places(block: &mut Object, _: Option<&SubsurfaceWords>) -> Option<()> {
+    if let [first, second, ..] = block.given(&PLACES)[..] {
+        let detail = format!("given together with {first}; at most one of the two is allowed");
+        block.fault(second, detail);
+        return None;
+    }
+    match (block.has("along_depth_at_mm"), block.has("depths_mm")) {
+        (true, false) => {
+            block.required("depths_mm", "an array of depths in mm")?;
+        }
+        (false, true) => {
+            let detail = "given without along_depth_at_mm; the depths belong to its line";
+            block.fault("depths_mm", detail);
+            return None;
+        }
+        _ => {}
+    }
+    Some(())
+}
+
+/// Points `[x, y, depth]`.
+pub(crate) fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 3]>> {
+    let what = "an array of points [x, y, depth] in mm";
+    let elements = block.array(name, 1..=usize::MAX, what)?;
+    let pointer = block.pointer_to(name);
+    let faults = block.faults();
+    let mut read = Vec::with_capacity(elements.len());
+    for (k, element) in elements.iter().enumerate() {
+        let pointer = join(&pointer, k);
+        let Some([x, y, depth]) = element.as_array().map(Vec::as_slice) else {
+            faults.add(
+                pointer,
+                format!(
+                    "{} given; three numbers [x, y, depth] in mm are needed",
+                    shown(element)
+                ),
+            );
+            continue;
+        };
+        let x = number(x, &join(&pointer, 0), COORDINATE, faults);
+        let y = number(y, &join(&pointer, 1), COORDINATE, faults);
+        let depth = number(depth, &join(&pointer, 2), DEPTH, faults);
+        if let (Some(x), Some(y), Some(depth)) = (x, y, depth) {
+            read.push([x, y, depth]);
+        }
+    }
+    (read.len() == elements.len()).then_some(read)
+}
+
+/// A place on the surface, or the worst one.
+pub(crate) fn line_at(block: &mut Object, name: &str) -> Option<DepthLineAt> {
+    let value = block.value(name)?;
+    if value.as_str() == Some("worst") {
+        return Some(DepthLineAt::Found(FoundPlace::Worst));
+    }
+    let pointer = block.pointer_to(name);
+    if let Some([x, y]) = value.as_array().map(Vec::as_slice) {
+        let faults = block.faults();
+        let x = number(x, &join(&pointer, 0), COORDINATE, faults);
+        let y = number(y, &join(&pointer, 1), COORDINATE, faults);
+        return Some(DepthLineAt::Place([x?, y?]));
+    }
+    block.mistaken(name, "[x, y] in mm or \"worst\"");
+    None
+}
+
+/// Depths of a line.
+pub(crate) fn depths(block: &mut Object, name: &str) -> Option<Vec<f64>> {
+    list(block, name, DEPTH)
+}
+
+fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
+    let elements = block.array(name, 1..=usize::MAX, "an array of numbers in mm")?;
+    let pointer = block.pointer_to(name);
+    let faults = block.faults();
+    let one = |(k, value)| number(value, &join(&pointer, k), allowed, faults);
+    let read: Vec<Option<f64>> = elements.iter().enumerate().map(one).collect();
+    read.into_iter().collect()
+}
+
+/// Coordinates of a grid.
+pub(crate) fn axis(block: &mut Object, name: &str) -> Option<GridAxis> {
+    coordinates(block, name, COORDINATE)
+}
+
+/// Depths of a grid.
+pub(crate) fn axis_of_depths(block: &mut Object, name: &str) -> Option<GridAxis> {
+    coordinates(block, name, DEPTH)
+}
+
+fn coordinates(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<GridAxis> {
+    let what = "a number, an array of numbers or {\"from\", \"to\", \"points\"}";
+    match block.required(name, what)? {
+        Value::Array(_) => list(block, name, allowed).map(GridAxis::List),
+        Value::Object(_) => {
+            let (from, to, points) = block.child(name)?.range(allowed, 2, COUNT_MAX)?;
+            Some(GridAxis::Spaced { from, to, points })
+        }
+        _ => block.number(name, allowed).map(GridAxis::One),
+    }
 }

@@ -9,13 +9,15 @@ use serde_json::Value;
 
 use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::checks::{PartialCase, faults_of};
-use crate::contact::case::read::object::{Faults, Object, has_controls, join, shown};
-use crate::contact::case::read::{contact, damage, friction, motion, solver, subsurface};
 use crate::contact::case::solver::{KnownPair, Limits};
-use crate::contact::case::words::contact::{Contact, Friction, Load, Material, ThermalWords};
+use crate::contact::case::words::contact::{Contact, Load};
+use crate::contact::case::words::friction::Friction;
+use crate::contact::case::words::material::{Material, ThermalWords};
 use crate::contact::case::words::motion::Motions;
+use crate::contact::case::words::object::{Faults, Object, has_controls, join, shown};
 use crate::contact::case::words::solver::{Case, Output, Solver};
 use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
+use crate::contact::case::words::{contact, friction, material, motion, solver, subsurface};
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::method::Method;
 
@@ -131,7 +133,7 @@ fn read(case: &mut Object) -> CaseDraft {
     ]);
     let name = case.line("name", NAME_LENGTH_MAX);
     let labels = labels(case);
-    let material = contact::read_material(case);
+    let material = material::read_material(case);
     let friction = friction::read(case);
     let contact = contact::read(case);
     let load = contact::read_load(case);
@@ -140,9 +142,19 @@ fn read(case: &mut Object) -> CaseDraft {
     let method = solver.as_ref().map(|solver| solver.method);
     let without_fields = method.filter(|method| !Method::from(*method).has_fields());
     let outputs = solver::read_outputs(case, without_fields);
-    let subsurface = subsurface::read(case, outputs.as_deref());
-    let damage = damage::read(case, outputs.as_deref(), without_fields.is_some());
-    let thermal = damage::read_thermal(case, outputs.as_deref(), friction.as_ref());
+    let asks = |output| outputs.as_ref().map(|outputs| outputs.contains(&output));
+    let wanted = |output| asks(output).unwrap_or(true);
+    let subsurface = subsurface::read_subsurface(case, wanted(Output::Subsurface));
+    let damage = subsurface::read_damage(case, wanted(Output::Damage), without_fields.is_some());
+    let heated = friction
+        .as_ref()
+        .map(|friction| friction.by_temperature.is_some());
+    let thermal = match (heated, asks(Output::Temperature)) {
+        (Some(true), _) | (_, Some(true)) => Some(true),
+        (Some(false), Some(false)) => Some(false),
+        _ => None,
+    };
+    let thermal = material::read_thermal(case, thermal);
     CaseDraft {
         name,
         labels,

@@ -4,6 +4,7 @@
 
 use std::fmt;
 use std::ops::RangeInclusive;
+use std::sync::LazyLock;
 
 use serde_json::{Map, Number, Value};
 
@@ -303,11 +304,31 @@ impl<'v, 'f> Object<'v, 'f> {
         word(value, &pointer, table, self.faults)
     }
 
+    /// A member that has to be an object, opened; an empty one if it is left out.
+    pub(crate) fn child_or_empty(&mut self, name: &str) -> Option<Object<'v, '_>> {
+        static EMPTY: LazyLock<Value> = LazyLock::new(|| Value::Object(Map::new()));
+        let value = self.members.get(name).unwrap_or(&EMPTY);
+        let pointer = self.pointer_to(name);
+        Object::open(value, pointer, self.faults)
+    }
+
     /// A member that has to be an object, opened.
     pub(crate) fn child(&mut self, name: &str) -> Option<Object<'v, '_>> {
         let value = self.required(name, "an object")?;
         let pointer = self.pointer_to(name);
         Object::open(value, pointer, self.faults)
+    }
+}
+
+/// A value that an object has as a member.
+pub(crate) trait Member: Sized {
+    /// Reads the member of this name; `None` if it is absent or faulty.
+    fn read(block: &mut Object, name: &str) -> Option<Self>;
+}
+
+impl<T: Member> Member for Box<T> {
+    fn read(block: &mut Object, name: &str) -> Option<Box<T>> {
+        T::read(block, name).map(Box::new)
     }
 }
 
@@ -583,7 +604,7 @@ fn plain(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::case::read::object::FAULTS_MAX;
+    use crate::contact::case::words::read::object::FAULTS_MAX;
     use serde_json::json;
 
     #[test]

@@ -1,23 +1,172 @@
-//! Reads `friction`: a coefficient, a law that falls with slip or temperature or a coefficient across or along, and what lies between the bodies.
+//! Friction between the bodies, and what lies between them.
 
-use crate::contact::case::read::object::{AllowedRange, Object, join};
-use crate::contact::case::words::contact::{
-    AcrossWords, AlongWords, ByTemperatureWords, FallName, FallTermWords, Friction, LayerWords,
-};
+use railhead_macros::{Members, Words, none_is_absent};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::contact::case::words::object::{AllowedRange, Member, Object, join};
+
+/// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`), `across`, `along` and `by_temperature`. `layer` and
+/// `reduction` make the contact softer to tractions and may stand beside each of them.
+#[none_is_absent]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema)]
+pub struct Friction {
+    /// Friction coefficient: 0 (frictionless), or 1e-12 to 100.
+    #[schema(minimum = 0.0, maximum = 100.0)]
+    pub coefficient: Option<f64>,
+    /// How the coefficient falls with the speed of slip; every motion needs its `speed_mm_per_s`.
+    pub law: Option<FallName>,
+    /// The coefficient that is left at the highest speeds of slip, 0 to 100; with `law`.
+    #[schema(minimum = 0.0, maximum = 100.0)]
+    pub limit: Option<f64>,
+    /// What falls: one or two terms; with `law`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false, min_items = 1, max_items = 2)]
+    pub terms: Vec<FallTermWords>,
+    /// A coefficient that varies across the contact.
+    pub across: Option<AcrossWords>,
+    /// A coefficient that varies along the track; the case needs a `history`, which rolls over it.
+    pub along: Option<AlongWords>,
+    /// A coefficient that falls with the temperature of the contact; the case needs `thermal` and every motion its `speed_mm_per_s`.
+    pub by_temperature: Option<ByTemperatureWords>,
+    /// A layer between the bodies, such as wet leaves, sand or oxides.
+    pub layer: Option<LayerWords>,
+    /// Kalker's reduction factor, more than 0 and at most 1: the initial slope of the creep curves is this part of that of clean bodies.
+    #[schema(exclusive_minimum = 0.0, maximum = 1.0)]
+    pub reduction: Option<f64>,
+}
+
+/// How a coefficient falls with the speed of slip v: with f₀ the `limit`, f₁, f₂ the `coefficient` and v₁, v₂ the
+/// `half_speed_mm_per_s` of the terms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Words)]
+#[serde(rename_all = "snake_case")]
+pub enum FallName {
+    /// f₀ + f₁ exp(−ln 2 v/v₁) + f₂ exp(−ln 2 v/v₂). Polach's μ₀((1 − A) exp(−B v) + A) is f₀ = A μ₀, f₁ = (1 − A) μ₀, v₁ = ln 2/B.
+    Exponential,
+    /// f₀ + f₁/(1 + v/v₁) + f₂/(1 + (v/v₂)²).
+    Rational,
+    /// f₀ + f₁ max(0, 1 − v/(2 v₁)) + f₂ max(0, 1 − v/(2 v₂)).
+    Linear,
+}
+
+/// A part of the coefficient that falls with the speed of slip.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
+#[schema(as = FallTerm)]
+pub struct FallTermWords {
+    /// Its value at rest, 0 to 100.
+    #[schema(minimum = 0.0, maximum = 100.0)]
+    #[member(closed(0.0, 100.0, ""))]
+    pub coefficient: f64,
+    /// Speed of slip in mm/s at which half of it is left, more than 0.
+    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(1e9, "mm/s"))]
+    pub half_speed_mm_per_s: f64,
+}
+
+/// A coefficient across the contact: linear between points, constant outside; two points at the same place are a jump. Exactly one of
+/// `y_mm` and `angle_rad` says where the points are.
+#[none_is_absent]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = FrictionAcross)]
+pub struct AcrossWords {
+    /// Places in mm, in order: y in the axes of the case; with `profiles` the y of the rail's profile.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub y_mm: Option<Vec<f64>>,
+    /// Inclinations of the rail's surface in rad, in order, positive as contact angles are; with `profiles` only.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub angle_rad: Option<Vec<f64>>,
+    /// The coefficient at each of them, 1e-12 to 100.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub coefficient: Vec<f64>,
+}
+
+/// A coefficient along the track, on which it lies still while the contact rolls over it: linear between points, constant outside; two
+/// points at the same place are a jump.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = FrictionAlong)]
+pub struct AlongWords {
+    /// Places in mm, in order: x in the axes of the case when the history begins. After a rolled distance q the contact's x = 0 stands at q.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub x_mm: Vec<f64>,
+    /// The coefficient at each of them, 1e-12 to 100.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub coefficient: Vec<f64>,
+}
+
+/// A coefficient by the temperature of both surfaces in the contact: linear between points, constant outside. Friction heats the contact,
+/// and every place has the coefficient of the temperature it reaches.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = FrictionByTemperature)]
+pub struct ByTemperatureWords {
+    /// Temperatures in °C, rising.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub temperature_c: Vec<f64>,
+    /// The coefficient at each of them, 1e-12 to 100, never rising.
+    #[schema(min_items = 2, max_items = 1000)]
+    pub coefficient: Vec<f64>,
+}
+
+/// An elastic layer between the bodies, so thin that each of its points shears by itself: the surfaces move apart by
+/// thickness/modulus times the traction, beside what the bodies give. With `yield_mpa` it transmits no more than that stress, which grows with
+/// the plastic displacement of the layer.
+#[none_is_absent]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
+#[members(faults_of_layer)]
+#[schema(as = Layer)]
+pub struct LayerWords {
+    /// Shear modulus in MPa, more than 0.
+    #[member(positive(1e12, "MPa"))]
+    pub shear_modulus_mpa: f64,
+    /// Thickness in mm, more than 0.
+    #[member(positive(1e3, "mm"))]
+    pub thickness_mm: f64,
+    /// Shear stress in MPa at which the layer yields, more than 0; left out, it never does.
+    #[member(positive(1e9, "MPa"))]
+    pub yield_mpa: Option<f64>,
+    /// Growth of that stress in MPa per mm of plastic displacement, 0 or more; 0 when left out.
+    #[schema(minimum = 0.0)]
+    #[member(closed(0.0, 1e9, "MPa/mm"))]
+    pub hardening_mpa_per_mm: Option<f64>,
+}
+
+impl Friction {
+    /// The largest coefficient.
+    #[must_use]
+    pub fn largest(&self) -> f64 {
+        let falling = |limit: f64| limit + self.terms.iter().map(|t| t.coefficient).sum::<f64>();
+        let across = self.across.iter().flat_map(|across| &across.coefficient);
+        let given = self.coefficient.or_else(|| self.limit.map(falling));
+        let across = across.chain(self.along.iter().flat_map(|along| &along.coefficient));
+        let across = across.chain(self.by_temperature.iter().flat_map(|law| &law.coefficient));
+        across.fold(given.unwrap_or(0.0), |most, value| most.max(*value))
+    }
+
+    /// What the coefficient falls with, if it falls.
+    #[must_use]
+    pub fn falls_with(&self) -> Option<&'static str> {
+        match (self.law, &self.by_temperature) {
+            (Some(_), _) => Some("slip"),
+            (None, Some(_)) => Some("temperature"),
+            (None, None) => None,
+        }
+    }
+
+    /// The coefficient, if that is all there is.
+    #[must_use]
+    pub fn constant(&self) -> Option<f64> {
+        let softer = self.layer.is_some() || self.reduction.is_some();
+        self.coefficient.filter(|_| !softer)
+    }
+}
 
 const COEFFICIENT: AllowedRange = AllowedRange::closed(0.0, 100.0, "");
 /// A smaller friction coefficient is refused unless it is 0: dimensionless motions would overflow.
 pub(crate) const COEFFICIENT_LEAST: f64 = 1e-12;
 const ACROSS: AllowedRange = AllowedRange::closed(COEFFICIENT_LEAST, 100.0, "");
-const SPEED: AllowedRange = AllowedRange::positive(1e9, "mm/s");
 const PLACE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const ANGLE: AllowedRange = AllowedRange::closed(-1.6, 1.6, "rad");
-const MODULUS: AllowedRange = AllowedRange::positive(1e12, "MPa");
-const THICKNESS: AllowedRange = AllowedRange::positive(1e3, "mm");
 const REDUCTION: AllowedRange = AllowedRange::positive(1.0, "");
 const TEMPERATURE: AllowedRange = AllowedRange::closed(-273.15, 1e5, "°C");
-const YIELD: AllowedRange = AllowedRange::positive(1e9, "MPa");
-const HARDENING: AllowedRange = AllowedRange::closed(0.0, 1e9, "MPa/mm");
 /// Points of a coefficient across, along or by temperature.
 const POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// The ways to give a coefficient.
@@ -56,7 +205,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Friction> {
             }
         }
     }
-    let layer = block.optional("layer", layer);
+    let layer = block.optional("layer", LayerWords::read);
     let reduction = block.optional_number("reduction", REDUCTION);
     let yields = layer
         .flatten()
@@ -103,7 +252,7 @@ fn law(block: &mut Object) -> Option<Friction> {
     let mut terms = Vec::new();
     for (k, element) in elements.iter().enumerate() {
         let term = Object::open(element, join(&pointer, k), block.faults());
-        terms.push(term.and_then(|mut term| fall_term(&mut term)));
+        terms.push(term.and_then(|mut term| FallTermWords::members(&mut term)));
     }
     let friction = Friction {
         law: Some(law?),
@@ -119,16 +268,6 @@ fn law(block: &mut Object) -> Option<Friction> {
         return None;
     }
     Some(friction)
-}
-
-fn fall_term(term: &mut Object) -> Option<FallTermWords> {
-    term.only(&["coefficient", "half_speed_mm_per_s"]);
-    let coefficient = term.required_number("coefficient", COEFFICIENT);
-    let half_speed = term.required_number("half_speed_mm_per_s", SPEED);
-    Some(FallTermWords {
-        coefficient: coefficient?,
-        half_speed_mm_per_s: half_speed?,
-    })
 }
 
 fn across(block: &mut Object) -> Option<AcrossWords> {
@@ -242,27 +381,12 @@ fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64
     block.numbers(name, elements, allowed)
 }
 
-fn layer(block: &mut Object, name: &str) -> Option<LayerWords> {
-    let mut layer = block.child(name)?;
-    let names = [
-        "shear_modulus_mpa",
-        "thickness_mm",
-        "yield_mpa",
-        "hardening_mpa_per_mm",
-    ];
-    layer.only(&names);
-    let modulus = layer.required_number(names[0], MODULUS);
-    let thickness = layer.required_number(names[1], THICKNESS);
-    let stress = layer.optional_number(names[2], YIELD);
-    let hardening = layer.optional_number(names[3], HARDENING);
-    if layer.has(names[3]) && !layer.has(names[2]) {
-        layer.fault(names[3], "given without yield_mpa, to which it belongs");
+/// Hardening belongs to a layer that yields.
+pub(crate) fn faults_of_layer(block: &mut Object, _: Option<&LayerWords>) -> Option<()> {
+    if block.has("hardening_mpa_per_mm") && !block.has("yield_mpa") {
+        let detail = "given without yield_mpa, to which it belongs";
+        block.fault("hardening_mpa_per_mm", detail);
         return None;
     }
-    Some(LayerWords {
-        shear_modulus_mpa: modulus?,
-        thickness_mm: thickness?,
-        yield_mpa: stress?,
-        hardening_mpa_per_mm: hardening?,
-    })
+    Some(())
 }

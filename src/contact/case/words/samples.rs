@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::read::object::{AllowedRange, Object, count_rest, join, numbers};
+use crate::contact::case::words::object::{AllowedRange, Object, count_rest, join, numbers};
 
 const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 /// Points of one axis of a grid.
@@ -57,31 +57,21 @@ pub(crate) fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
     Some(axis)
 }
 
-/// What the samples of a grid or line are called, and the values allowed.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct SampleQuantity {
-    /// The member that holds them.
-    pub(crate) member: &'static str,
-    /// One of them in words.
-    pub(crate) word: &'static str,
-    pub(crate) allowed: AllowedRange,
+const GAP: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
+const PRESSURE: AllowedRange = AllowedRange::closed(0.0, 1e12, "MPa");
+
+/// Number of elements of an array, sound or not.
+fn given(block: &Object, name: &str) -> Option<usize> {
+    block.value(name).and_then(Value::as_array).map(Vec::len)
 }
 
-/// The samples of a line with `n` points, where the axis is known.
-pub(crate) fn line(
-    block: &mut Object,
-    quantity: SampleQuantity,
-    n: Option<usize>,
-) -> Option<Vec<f64>> {
-    let SampleQuantity {
-        member,
-        word,
-        allowed,
-    } = quantity;
-    let what = format!("an array with one {word} per y_mm");
-    let value = block.required(member, &what)?;
+/// A gap at every `y_mm`.
+pub(crate) fn gap_line(block: &mut Object, member: &str) -> Option<Vec<f64>> {
+    let n = given(block, "y_mm");
+    let what = "an array with one gap per y_mm";
+    let value = block.required(member, what)?;
     let Some(elements) = value.as_array() else {
-        block.mistaken(member, &what);
+        block.mistaken(member, what);
         return None;
     };
     let n = n.unwrap_or(elements.len());
@@ -95,21 +85,27 @@ pub(crate) fn line(
         );
         return None;
     }
-    block.numbers(member, elements, allowed)
+    block.numbers(member, elements, GAP)
 }
 
-/// The samples of a grid with `nx` by `ny` points, where the axes are known.
-pub(crate) fn samples(
+/// A gap at every point of a grid.
+pub(crate) fn gap_grid(block: &mut Object, member: &str) -> Option<Vec<Vec<f64>>> {
+    grid(block, member, "gap", GAP)
+}
+
+/// A pressure at every point of a grid.
+pub(crate) fn pressure_grid(block: &mut Object, member: &str) -> Option<Vec<Vec<f64>>> {
+    grid(block, member, "pressure", PRESSURE)
+}
+
+/// The samples of a grid over `x_mm` and `y_mm`; `word` names one of them.
+fn grid(
     block: &mut Object,
-    quantity: SampleQuantity,
-    nx: Option<usize>,
-    ny: Option<usize>,
+    member: &str,
+    word: &str,
+    allowed: AllowedRange,
 ) -> Option<Vec<Vec<f64>>> {
-    let SampleQuantity {
-        member,
-        word,
-        allowed,
-    } = quantity;
+    let (nx, ny) = (given(block, "x_mm"), given(block, "y_mm"));
     let order = format!("{member}[j][i] belongs to (x_mm[i], y_mm[j])");
     let what = format!("an array of rows, one per y_mm, each with one {word} per x_mm ({order})");
     let value = block.required(member, &what)?;

@@ -1,0 +1,187 @@
+//! Cross-sections of rails and wheels.
+
+use railhead_macros::{Members, Words, none_is_absent};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use crate::contact::case::words::object::{
+    AllowedRange, LISTED_MAX, Object, join, names, number, shown,
+};
+use crate::contact::geometry::profile::{POINTS_MAX, POINTS_MIN};
+
+/// A cross-section of a rail or a wheel, as points or as the text of a file; exactly one of the two.
+///
+/// y is positive to the field side and z positive down, unless `mirror_y` and `mirror_z`, the shape or the format specify another sense.
+#[none_is_absent]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
+#[members(faults_of_section)]
+pub struct CrossSection {
+    /// Points `[y, z]` in order along the cross-section, in mm or in `unit`.
+    #[member(with = points)]
+    pub points_mm: Option<Vec<[f64; 2]>>,
+    /// Digest of a cross-section that was kept with `POST /v1/profiles`, in place of points or text.
+    #[member(skip)]
+    pub profile: Option<String>,
+    /// Format of `text`.
+    pub format: Option<FormatName>,
+    /// The content of the file, not its path.
+    #[member(with = text)]
+    pub text: Option<String>,
+    /// Unit of the points or of the text. When left out it is the unit that the file names, else mm. All other lengths of a case are in mm.
+    pub unit: Option<UnitName>,
+    /// `true` if y of the points is positive toward the track centre. When left out, the side of the flange decides for a wheel, and the
+    /// format for a rail (points: `false`, MiniProf: `true`). A wheel without a flange needs it, except in Simpack files.
+    pub mirror_y: Option<bool>,
+    /// `true` if z of the points is positive upward. When left out, the flange of a wheel or the head of a rail decides. Where the shape does
+    /// not show it, the case is refused, except for Simpack files.
+    pub mirror_z: Option<bool>,
+    /// Waves along the cross-section that are shorter than about this are smoothed away, in mm; 0 (no smoothing) when left out. `auto` chooses
+    /// 0, or 2 to 8 mm, by the noise of the points and the pressure; the answer says what was used.
+    #[schema(required = false)]
+    #[member(with = smoothing, default = Smoothing::Length(0.0))]
+    pub smoothing_mm: Smoothing,
+}
+
+/// How a cross-section is smoothed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Smoothing {
+    /// By a cut wavelength in mm; 0 for none.
+    Length(f64),
+    /// By a wavelength that the service chooses.
+    ByNoise(SmoothingWord),
+}
+
+/// A smoothing that the service chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SmoothingWord {
+    /// From the noise of the points and the pressure.
+    Auto,
+}
+
+/// A file format of cross-sections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = Format)]
+pub enum FormatName {
+    /// Columns of numbers, the first two or those with the titles y and z, separated by blanks, commas, semicolons or tabs.
+    Columns,
+    /// Simpack's `.prr` (rail) and `.prw` (wheel).
+    Simpack,
+    /// MiniProf's `.ban` (rail) and `.whl` (wheel).
+    Miniprof,
+}
+
+/// A unit of length of cross-sections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = LengthUnit)]
+pub enum UnitName {
+    /// Millimetre.
+    Mm,
+    /// Centimetre.
+    Cm,
+    /// Metre.
+    M,
+    /// Inch, 25.4 mm.
+    Inch,
+}
+
+const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
+const SMOOTHING: AllowedRange = AllowedRange::closed(0.0, 50.0, "mm");
+/// Characters of a file.
+const TEXT_MAX: usize = 4_000_000;
+
+/// A cross-section is given by points or by the text of a file.
+pub(crate) fn faults_of_section(block: &mut Object, _: Option<&CrossSection>) -> Option<()> {
+    match (block.has("points_mm"), block.has("text")) {
+        (true, false) if block.has("format") => block.fault(
+            "format",
+            "given together with points_mm; a format is only for the text of a file",
+        ),
+        (true, false) => return Some(()),
+        (false, true) => {
+            let what = format!("one of {}", names(FormatName::WORDS));
+            return block.required("format", &what).map(|_| ());
+        }
+        (false, false) => block.fault(
+            "points_mm",
+            "missing; an array of points [y, z] in mm is needed, or text and format of a file instead",
+        ),
+        (true, true) => block.exclude("points_mm", "text"),
+    }
+    None
+}
+
+/// The content of a file.
+pub(crate) fn text(block: &mut Object, name: &str) -> Option<String> {
+    block.text(name, TEXT_MAX)
+}
+
+/// A length, or the word `auto`.
+pub(crate) fn smoothing(block: &mut Object, name: &str) -> Option<Smoothing> {
+    let value = block.value(name)?;
+    if value.as_str() == Some("auto") {
+        return Some(Smoothing::ByNoise(SmoothingWord::Auto));
+    }
+    if !value.is_number() {
+        let given = shown(value);
+        let detail = format!("{given} given; {SMOOTHING} is allowed, or \"auto\"");
+        block.fault(name, detail);
+        return None;
+    }
+    block.number(name, SMOOTHING).map(Smoothing::Length)
+}
+
+/// Points of a cross-section.
+pub(crate) fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 2]>> {
+    let what = format!("an array of {POINTS_MIN} to {POINTS_MAX} points [y, z] in mm");
+    let elements = block.array(name, POINTS_MIN..=POINTS_MAX, &what)?;
+    let pointer = block.pointer_to(name);
+    let mut read = Vec::with_capacity(elements.len());
+    let mut refused = 0;
+    for (k, element) in elements.iter().enumerate() {
+        if let Some(point) = point(element) {
+            read.push(point);
+            continue;
+        }
+        refused += 1;
+        if refused <= LISTED_MAX {
+            fault_of_point(element, &join(&pointer, k), block);
+        }
+    }
+    if refused > LISTED_MAX {
+        block.faults().add(
+            pointer,
+            format!(
+                "{} more points are refused like those before; each has to be a pair [y, z], both {COORDINATE}",
+                refused - LISTED_MAX
+            ),
+        );
+    }
+    (refused == 0).then_some(read)
+}
+
+fn point(element: &Value) -> Option<[f64; 2]> {
+    let [y, z] = element.as_array()?.as_slice() else {
+        return None;
+    };
+    let part = |value: &Value| value.as_f64().filter(|number| COORDINATE.contains(*number));
+    Some([part(y)? + 0.0, part(z)? + 0.0])
+}
+
+fn fault_of_point(element: &Value, pointer: &str, block: &mut Object) {
+    match element.as_array().map(Vec::as_slice) {
+        Some(pair @ [_, _]) => {
+            for (k, value) in pair.iter().enumerate() {
+                number(value, &join(pointer, k), COORDINATE, block.faults());
+            }
+        }
+        _ => block.faults().add(
+            pointer,
+            format!("{} given; a pair [y, z] in mm is needed", shown(element)),
+        ),
+    }
+}

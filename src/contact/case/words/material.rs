@@ -1,0 +1,142 @@
+//! Elastic and thermal constants of the bodies.
+
+use railhead_macros::{Members, none_is_absent};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::contact::case::words::object::{AllowedRange, Object};
+
+/// Elastic constants: one set for both bodies, or one for each.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+pub enum Material {
+    /// Both bodies are of the same material.
+    Same(Elastic),
+    /// The bodies differ; they are combined as in quasi-identical contact.
+    Pair {
+        /// The lower body (body 2, the rail).
+        lower: Elastic,
+        /// The upper body (body 1, the wheel).
+        upper: Elastic,
+    },
+}
+
+/// Isotropic linear elasticity. Exactly one of the two moduli is given.
+#[none_is_absent]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
+#[members(faults_of_elastic)]
+pub struct Elastic {
+    /// Shear modulus G in MPa, more than 0.
+    #[member(positive(1e12, "MPa"))]
+    pub shear_modulus_mpa: Option<f64>,
+    /// Young's modulus E in MPa, more than 0.
+    #[member(positive(1e12, "MPa"))]
+    pub young_modulus_mpa: Option<f64>,
+    /// Poisson's ratio, 0 to 0.5.
+    #[schema(minimum = 0.0, maximum = 0.5)]
+    #[member(closed(0.0, 0.5, ""))]
+    pub poisson_ratio: f64,
+}
+
+/// Thermal constants: one set for both bodies, or one for each.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[serde(untagged)]
+#[schema(as = Thermal)]
+pub enum ThermalWords {
+    /// Both bodies alike.
+    Same(ThermalBodyWords),
+    /// One set for each.
+    Pair {
+        /// The lower body (body 2, the rail).
+        lower: ThermalBodyWords,
+        /// The upper body (body 1, the wheel).
+        upper: ThermalBodyWords,
+    },
+}
+
+/// Thermal constants of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
+#[schema(as = ThermalBody)]
+pub struct ThermalBodyWords {
+    /// Heat conductivity in W/(m K); steel has about 50.
+    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(1e6, "W/(m K)"))]
+    pub conductivity_w_per_mk: f64,
+    /// Density in kg/m³; steel has about 7850.
+    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(1e6, "kg/m³"))]
+    pub density_kg_per_m3: f64,
+    /// Specific heat in J/(kg K); steel has about 450.
+    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(1e6, "J/(kg K)"))]
+    pub specific_heat_j_per_kgk: f64,
+    /// Temperature before the contact in °C.
+    #[schema(minimum = -273.15)]
+    #[member(closed(-273.15, 1e5, "°C"))]
+    pub bulk_c: f64,
+}
+
+/// Reads the required member `material` of a case.
+pub(crate) fn read_material(case: &mut Object) -> Option<Material> {
+    let mut block = case.child("material")?;
+    Some(match one_or_pair(&mut block, Elastic::members)? {
+        [Some(lower), Some(upper)] => Material::Pair { lower, upper },
+        [both, _] => Material::Same(both?),
+    })
+}
+
+/// One set of constants for both bodies, or one for each.
+pub(crate) fn one_or_pair<T>(
+    block: &mut Object,
+    read: fn(&mut Object) -> Option<T>,
+) -> Option<[Option<T>; 2]> {
+    if !block.has("lower") && !block.has("upper") {
+        return read(block).map(|both| [Some(both), None]);
+    }
+    block.only(&["lower", "upper"]);
+    let [lower, upper] = ["lower", "upper"].map(|name| read(&mut block.child(name)?));
+    Some([Some(lower?), Some(upper?)])
+}
+
+/// Exactly one of the moduli is given.
+pub(crate) fn faults_of_elastic(block: &mut Object, _: Option<&Elastic>) -> Option<()> {
+    match block.given(&["shear_modulus_mpa", "young_modulus_mpa"])[..] {
+        [_] => return Some(()),
+        [] => {
+            let modulus = AllowedRange::positive(1e12, "MPa");
+            let detail = format!("missing; {modulus} is needed, or young_modulus_mpa instead");
+            block.fault("shear_modulus_mpa", detail);
+        }
+        [first, second, ..] => block.exclude(first, second),
+    }
+    None
+}
+
+/// Reads the member `thermal` of a case, which belongs to the output `temperature` and to friction that falls with temperature.
+///
+/// The outer `None` says that a fault was found.
+pub(crate) fn read_thermal(
+    case: &mut Object,
+    wanted: Option<bool>,
+) -> Option<Option<ThermalWords>> {
+    if !case.has("thermal") {
+        if wanted == Some(true) {
+            let what = "an object with the thermal constants of the bodies";
+            case.required("thermal", what)?;
+        }
+        return Some(None);
+    }
+    if wanted == Some(false) {
+        let detail =
+            "given without \"temperature\" among the outputs; add it there or leave this out";
+        case.fault("thermal", detail);
+        return None;
+    }
+    let mut block = case.child("thermal")?;
+    Some(Some(
+        match one_or_pair(&mut block, ThermalBodyWords::members)? {
+            [Some(lower), Some(upper)] => ThermalWords::Pair { lower, upper },
+            [both, _] => ThermalWords::Same(both?),
+        },
+    ))
+}
