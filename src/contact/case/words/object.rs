@@ -604,7 +604,6 @@ fn plain(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::case::words::read::object::FAULTS_MAX;
     use serde_json::json;
 
     #[test]
