@@ -4,12 +4,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use railhead::jobs::codec::result::EncodedResult;
-use railhead::jobs::model::kind::{Kind, Queue};
-use railhead::jobs::store::Store;
-use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease};
-use railhead::jobs::store::ending::{Ending, StoredResult};
+use railhead::jobs::model::{Kind, Queue};
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
+use railhead::jobs::store::{ClaimKind, ClaimRequest, Ending, Lease, Store, StoredResult};
 
 use crate::Row;
 use crate::table::{TENANT, fill};

@@ -8,13 +8,12 @@ use std::time::Instant;
 
 use bytes::Bytes;
 use railhead::jobs::State;
-use railhead::jobs::model::kind::{Kind, Queue};
-use railhead::jobs::model::submit_options::SubmitOptions;
-use railhead::jobs::store::Store;
-use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, ReleaseReason};
-use railhead::jobs::store::list::{Filter, Membership};
+use railhead::jobs::model::{Kind, Queue, SubmitOptions};
 use railhead::jobs::store::sqlite::database::SqliteStore;
-use railhead::jobs::store::submission::{NewBatch, NewJob, QueueBounds};
+use railhead::jobs::store::{
+    ClaimKind, ClaimRequest, Filter, Lease, Membership, NewBatch, NewJob, QueueBounds,
+    ReleaseReason, Store,
+};
 use uuid::Uuid;
 
 use crate::Row;

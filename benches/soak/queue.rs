@@ -6,14 +6,12 @@ use std::time::{Duration, Instant};
 
 use railhead::jobs::State;
 use railhead::jobs::codec::result::EncodedResult;
-use railhead::jobs::model::kind::{Kind, Queue};
-use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease};
-use railhead::jobs::store::cluster::Cluster;
-use railhead::jobs::store::ending::{Ending, StoredResult};
-use railhead::jobs::store::list::Filter;
+use railhead::jobs::model::{Kind, Queue};
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
-use railhead::jobs::store::{Claims, Ends, Store};
+use railhead::jobs::store::{
+    ClaimKind, ClaimRequest, Claims, Cluster, Ending, Ends, Filter, Lease, Store, StoredResult,
+};
 use sqlx::{Connection, PgConnection, PgPool};
 use tokio::task::JoinSet;
 

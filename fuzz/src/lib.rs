@@ -3,14 +3,12 @@
 
 use railhead::contact;
 use railhead::contact::case::solver::Limits;
-use railhead::contact::geometry::formats;
-use railhead::contact::geometry::formats::Format;
+use railhead::contact::geometry::formats::{self, Format};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
-use railhead::http::extract::batch::splitter::{Element, Layout, Splitter};
-use railhead::http::extract::batch::table::{columns_of, row_of};
+use railhead::http::extract::batch::{Element, Layout, Splitter, columns_of, row_of};
 use railhead::http::extract::json::read_strict;
 use railhead::http::extract::tables::CsvRows;
-use railhead::jobs::batch::template::{fill_in_place, restore};
+use railhead::jobs::batch::upload::{fill_in_place, restore};
 use serde_json::{Value, json};
 
 /// A case in small, so that a table can fill every kind of member.

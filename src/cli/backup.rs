@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use crate::cli::commands::BackupArgs;
 use crate::cli::output::print;
-use crate::cli::runtime::block_on;
+use crate::cli::serve::block_on;
 use crate::jobs::backup::backup;
 
 /// Makes the copy and prints its path.

@@ -1,17 +1,396 @@
-//! The command line: every command, and the settings of those beside `serve`.
-
+//! Every command with its flags and environment variables.
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::thread::available_parallelism;
+use std::time::Duration;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 
-use crate::cli::case_args::CaseArgs;
-use crate::cli::database_args::{
-    DATA_DIR_DEFAULT, DATA_DIR_VARIABLE, DataFolderArgs, DatabaseArgs, DatabaseUrlArgs, DoctorArgs,
-    ResultsArgs,
-};
-use crate::cli::serve_args::ServeArgs;
-use crate::cli::values::{address, bound_label};
+use crate::contact::case::solver::Limits;
+use crate::contact::rolling::operator_store::{BYTES_DEFAULT, OperatorStore};
+use crate::http::extract::query::{self, ReadTexts};
+use crate::http::{AddressRange, HttpOptions};
+use crate::jobs::Options;
+use crate::jobs::options::{Database, NotifyMode};
+use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
+use crate::telemetry::{Endpoint, LogFormat};
+
+/// How long ended jobs are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Retention(pub Option<Duration>);
+
+/// Reads a time such as `30d`, `1w` or `90m`, or `forever`.
+pub(super) fn retention(text: &str) -> Result<Retention, String> {
+    if text == "forever" {
+        return Ok(Retention(None));
+    }
+    let wrong = "allowed are `forever` or a time of at least 1 s such as `12h`, `30d`, `8w`";
+    let span: jiff::Span = text.parse().map_err(|_| wrong.to_owned())?;
+    let seconds = span
+        .total((
+            jiff::Unit::Second,
+            jiff::SpanRelativeTo::days_are_24_hours(),
+        ))
+        .map_err(|_| wrong.to_owned())?;
+    match Duration::try_from_secs_f64(seconds) {
+        Ok(time) if time >= Duration::from_secs(1) => Ok(Retention(Some(time))),
+        _ => Err(wrong.to_owned()),
+    }
+}
+
+/// When requests without an API key are answered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Anonymous {
+    /// While the service listens on a loopback address.
+    Loopback,
+    /// On every address: whoever reaches the port may use the service.
+    Always,
+    /// Not at all.
+    Never,
+}
+
+impl Anonymous {
+    /// Are requests without a key answered on this address?
+    #[must_use]
+    pub(super) fn on(self, address: SocketAddr) -> bool {
+        match self {
+            Anonymous::Loopback => address.ip().is_loopback(),
+            Anonymous::Always => true,
+            Anonymous::Never => false,
+        }
+    }
+}
+
+/// Reads an origin: scheme and authority, nothing else.
+pub(super) fn origin(text: &str) -> Result<String, String> {
+    let rest = text
+        .strip_prefix("https://")
+        .or_else(|| text.strip_prefix("http://"));
+    let plain = |rest: &str| {
+        !rest.is_empty()
+            && rest
+                .bytes()
+                .all(|byte| byte.is_ascii_graphic() && !b"/*?#@".contains(&byte))
+    };
+    if rest.is_some_and(plain) {
+        return Ok(text.to_owned());
+    }
+    Err(
+        "an origin is `http://` or `https://` and a host, perhaps with a port, and no path"
+            .to_owned(),
+    )
+}
+
+/// Reads an address to listen on.
+pub(super) fn address(text: &str) -> Result<SocketAddr, String> {
+    text.parse().map_err(|_| {
+        "allowed is an IP address with a port, such as `127.0.0.1:8080`, `0.0.0.0:8080` or `[::1]:8080`; names are not looked up"
+            .to_owned()
+    })
+}
+
+/// Reads a label of a key, by the rule for labels of cases.
+pub(super) fn bound_label(text: &str) -> Result<(String, String), String> {
+    let label = query::new_label();
+    label
+        .read(&[text])
+        .map_err(|(_, allowed)| allowed.to_owned())
+}
+
+/// What one case may use.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct CaseArgs {
+    /// Estimated memory beyond which a case is refused, in MiB.
+    #[arg(long, env = "RAILHEAD_MEMORY_LIMIT_MB", default_value_t = 2048, value_name = "MIB",
+          value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
+    pub memory_limit_mb: u64,
+    /// Memory for operators of meshes, in MiB, kept for the next cases of the same shape and shared by all workers; 0: none are kept.
+    #[arg(long, env = "RAILHEAD_OPERATOR_STORE_MB", default_value_t = BYTES_DEFAULT >> 20, value_name = "MIB",
+          value_parser = clap::value_parser!(u64).range(..=1 << 30))]
+    pub operator_store_mb: u64,
+}
+
+impl CaseArgs {
+    /// The limits that cases are checked against.
+    #[must_use]
+    pub(super) fn limits(self) -> Limits {
+        Limits {
+            memory_bytes: self.memory_limit_mb << 20,
+            operator_store_bytes: self.operator_store_mb << 20,
+            ..Limits::default()
+        }
+    }
+
+    /// The store of operators that all solves share.
+    #[must_use]
+    pub(super) fn operators(self) -> OperatorStore {
+        OperatorStore::new(self.operator_store_mb << 20)
+    }
+}
+
+/// The variable of the data folder.
+pub(super) const DATA_DIR_VARIABLE: &str = "RAILHEAD_DATA_DIR";
+/// The data folder where none is named.
+pub(super) const DATA_DIR_DEFAULT: &str = "./railhead-data";
+
+/// The data folder of a command that works beside the service.
+#[derive(Debug, Clone, Args)]
+pub(super) struct DataFolderArgs {
+    /// Data folder of the service.
+    #[arg(
+        long,
+        env = DATA_DIR_VARIABLE,
+        default_value = DATA_DIR_DEFAULT,
+        value_name = "FOLDER"
+    )]
+    pub(crate) data_dir: PathBuf,
+}
+
+/// The database of several nodes.
+#[derive(Debug, Clone, Args)]
+pub(super) struct DatabaseArgs {
+    /// PostgreSQL 15 or later, in which jobs and results are kept and which any number of nodes share, such as
+    /// `postgres://user:password@host/database`; without it they are kept in the data folder. Needs a build with the feature `cluster`.
+    #[arg(
+        long,
+        env = "RAILHEAD_DATABASE_URL",
+        hide_env_values = true,
+        value_name = "URL"
+    )]
+    pub database_url: Option<String>,
+    /// Most connections of this process to the database, one more aside on which it listens.
+    #[arg(long, env = "RAILHEAD_DATABASE_CONNECTIONS", default_value_t = 10, value_name = "N",
+          value_parser = clap::value_parser!(u32).range(2..))]
+    pub database_connections: u32,
+    /// The same database past a pooler that gives each transaction another session (PgBouncer in transaction mode), where nodes hear
+    /// each other; `none`: they do not, and notice what others did up to a second later. Without it at `--database-url`.
+    #[arg(
+        long,
+        env = "RAILHEAD_DATABASE_DIRECT_URL",
+        hide_env_values = true,
+        value_name = "URL"
+    )]
+    pub database_direct_url: Option<String>,
+    #[command(flatten)]
+    pub results: ResultsArgs,
+}
+
+/// The place of large results beside a database.
+#[derive(Debug, Clone, Args)]
+pub(super) struct ResultsArgs {
+    /// Where results above 32 KiB are kept beside a database: `s3://bucket/prefix` (keys, region and address by the usual `AWS_…`
+    /// variables) or `file:///folder`; without it in the database. Buckets need the feature `cluster`. Every node of a database names the same place.
+    #[arg(long, env = "RAILHEAD_RESULTS_URL", value_name = "URL")]
+    pub results_url: Option<ResultsUrl>,
+    /// The folder that `--results-url` names is the same one on every node (a network file system).
+    #[arg(
+        long,
+        env = "RAILHEAD_RESULTS_SHARED",
+        default_value_t = false,
+        action = ArgAction::Set,
+        num_args = 0..=1,
+        default_missing_value = "true",
+        value_name = "BOOL"
+    )]
+    pub results_shared: bool,
+}
+
+impl ResultsArgs {
+    /// The place, if one is named.
+    #[must_use]
+    pub(super) fn place(&self) -> Option<ResultsPlace> {
+        Some(ResultsPlace {
+            url: self.results_url.clone()?,
+            shared: self.results_shared,
+        })
+    }
+}
+
+impl DatabaseArgs {
+    /// The database, if one is named.
+    #[must_use]
+    pub(super) fn database(&self) -> Option<Database> {
+        Some(Database {
+            url: self.database_url.clone()?,
+            connections: self.database_connections,
+            notify_mode: match self.database_direct_url.as_deref() {
+                None => NotifyMode::Database,
+                Some("none") => NotifyMode::Off,
+                Some(url) => NotifyMode::Direct(url.to_owned()),
+            },
+        })
+    }
+}
+
+/// The database that a command is about.
+#[derive(Debug, Clone, Args)]
+pub(super) struct DatabaseUrlArgs {
+    /// PostgreSQL 15 or later, such as `postgres://user:password@host/database`.
+    #[arg(
+        long,
+        env = "RAILHEAD_DATABASE_URL",
+        hide_env_values = true,
+        value_name = "URL"
+    )]
+    pub database_url: String,
+}
+
+/// What `doctor` looks at.
+#[derive(Debug, Clone, Args)]
+pub(super) struct DoctorArgs {
+    #[command(flatten)]
+    pub database: DatabaseUrlArgs,
+    #[command(flatten)]
+    pub results: ResultsArgs,
+}
+
+/// Settings of `serve`.
+#[derive(Debug, Clone, Args)]
+pub(super) struct ServeArgs {
+    /// Address and port to listen on; port 0 takes a free one, which the log event `listening` names.
+    #[arg(
+        long,
+        env = "RAILHEAD_LISTEN",
+        default_value = "127.0.0.1:8080",
+        value_name = "ADDRESS:PORT",
+        value_parser = address
+    )]
+    pub listen: SocketAddr,
+    /// Folder of the job table and the results; with a database only of batches that are being received. Created if it is
+    /// not there. One process at a time.
+    #[arg(
+        long,
+        env = DATA_DIR_VARIABLE,
+        default_value = DATA_DIR_DEFAULT,
+        value_name = "FOLDER"
+    )]
+    pub data_dir: PathBuf,
+    #[command(flatten)]
+    pub database: DatabaseArgs,
+    /// Number of jobs solved at the same time, each on a thread of its own; 0, with a database: other nodes solve
+    /// [default: cores − 1, at least 1].
+    #[arg(long, env = "RAILHEAD_WORKERS", value_name = "N")]
+    pub workers: Option<u16>,
+    #[command(flatten)]
+    pub case: CaseArgs,
+    /// How long ended jobs and their results are kept, such as `30d`, `30days` or `12h`; `forever`: until they are deleted.
+    #[arg(long, env = "RAILHEAD_RETENTION", default_value = "forever", value_name = "TIME", value_parser = retention)]
+    pub retention: Retention,
+    /// Seconds a running job may go on after the service was told to stop; then it goes back to the queue.
+    #[arg(
+        long,
+        env = "RAILHEAD_SHUTDOWN_GRACE_S",
+        default_value_t = 10,
+        value_name = "SECONDS"
+    )]
+    pub shutdown_grace_s: u32,
+    /// Seconds between SIGTERM, when `/readyz` turns 503, and the closing of the port; connections are accepted
+    /// meanwhile. None after SIGINT.
+    #[arg(
+        long,
+        env = "RAILHEAD_DRAIN_DELAY_S",
+        default_value_t = 2,
+        value_name = "SECONDS"
+    )]
+    pub drain_delay_s: u32,
+    /// Whether requests without an API key are answered. Without keys and without anonymous use the service does not
+    /// start.
+    #[arg(
+        long,
+        env = "RAILHEAD_ANONYMOUS",
+        value_enum,
+        default_value = "loopback"
+    )]
+    pub anonymous: Anonymous,
+    /// Requests per second of one API key, twice as many at once; 0: any number. Requests without a key are counted by
+    /// address, those from this machine itself not at all.
+    #[arg(
+        long,
+        env = "RAILHEAD_RATE_LIMIT",
+        default_value_t = 200,
+        value_name = "N"
+    )]
+    pub rate_limit: u32,
+    /// Origins of web pages that may read answers, such as `https://dashboard.example`, separated by commas.
+    #[arg(long, env = "RAILHEAD_CORS_ORIGIN", value_delimiter = ',', value_name = "ORIGIN", value_parser = origin)]
+    pub cors_origin: Vec<String>,
+    /// Collector that gets the spans of requests and jobs by OTLP over HTTP, such as `http://127.0.0.1:4318`; without it
+    /// none are made. Needs a build with the feature `otlp`.
+    #[arg(long, env = "RAILHEAD_OTLP_ENDPOINT", value_name = "URL")]
+    pub otlp_endpoint: Option<Endpoint>,
+    #[command(flatten)]
+    pub jobs: Options,
+    /// Address and port of a second listener that answers `/healthz`, `/readyz` and `/metrics` only; without it they are
+    /// answered on the first one alone, where a few places are kept for them.
+    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]
+    pub probe_listen: Option<SocketAddr>,
+    #[command(flatten)]
+    pub http: HttpOptions,
+    /// Addresses of proxies, separated by commas, such as `10.0.0.0/8`, that are believed when they name the addresses of their clients
+    /// in `Forwarded` or `X-Forwarded-For`. Wrong keys and requests without a key are then counted by these addresses, and
+    /// `--address-connections-max` does not hold for the proxies.
+    #[arg(
+        long,
+        env = "RAILHEAD_TRUSTED_PROXIES",
+        value_delimiter = ',',
+        value_name = "ADDRESSES"
+    )]
+    pub trusted_proxies: Vec<AddressRange>,
+    /// Names of the service, separated by commas, by which it may be asked without a key; addresses and `localhost` always
+    /// may. Others are refused, as a web page could make its own name lead here.
+    #[arg(
+        long,
+        env = "RAILHEAD_ALLOWED_HOST",
+        value_delimiter = ',',
+        value_name = "NAME"
+    )]
+    pub allowed_host: Vec<String>,
+    #[command(flatten)]
+    pub log: LogArgs,
+}
+
+/// How to log.
+#[derive(Debug, Clone, Args)]
+pub(super) struct LogArgs {
+    /// How a log line looks.
+    #[arg(long, env = "RAILHEAD_LOG_FORMAT", value_enum, default_value = "text")]
+    pub log_format: LogFormat,
+    /// What is logged, for example `info,railhead::jobs=debug`.
+    #[arg(
+        long,
+        env = "RAILHEAD_LOG",
+        default_value = "info",
+        value_name = "FILTER"
+    )]
+    pub log: String,
+}
+
+impl ServeArgs {
+    /// Workers as asked for, or one less than there are cores.
+    #[must_use]
+    pub(super) fn worker_count(&self) -> usize {
+        self.workers.map_or_else(
+            || available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).max(1)),
+            usize::from,
+        )
+    }
+
+    /// How long running jobs may go on after the signal.
+    #[must_use]
+    pub(super) fn shutdown_grace(&self) -> Duration {
+        Duration::from_secs(u64::from(self.shutdown_grace_s))
+    }
+
+    /// How long connections are still accepted after a signal: whoever stops a service at a terminal does not want to
+    /// wait for a load balancer.
+    #[must_use]
+    pub(super) fn drain_delay(&self, signal: &str) -> Duration {
+        match signal {
+            "SIGTERM" => Duration::from_secs(u64::from(self.drain_delay_s)),
+            _ => Duration::ZERO,
+        }
+    }
+}
 
 /// Rolling-contact stress service: tractions, stick and slip zones and forces between wheel and rail.
 #[derive(Debug, Parser)]
@@ -186,7 +565,36 @@ pub(super) fn unknown_variables() -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser;
+
     use super::*;
+
+    #[test]
+    fn a_retention_is_a_time_with_its_unit_or_forever() {
+        let days = |days: u64| Ok(Retention(Some(Duration::from_secs(days * 24 * 3600))));
+        assert_eq!(retention("forever"), Ok(Retention(None)));
+        assert_eq!(retention("30d"), days(30));
+        assert_eq!(retention("2w"), days(14));
+        assert_eq!(retention("24h"), days(1));
+        for wrong in ["", "30", "0s", "-1d", "1 month", "soon"] {
+            assert!(retention(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: ServeArgs,
+    }
+
+    #[test]
+    fn a_balancer_is_waited_for_and_somebody_at_a_terminal_is_not() {
+        let args = |line: &[&str]| Line::parse_from([&["serve"], line].concat()).args;
+        assert_eq!(args(&[]).drain_delay("SIGTERM"), Duration::from_secs(2));
+        assert_eq!(args(&[]).drain_delay("SIGINT"), Duration::ZERO);
+        let asked = args(&["--drain-delay-s", "7"]);
+        assert_eq!(asked.drain_delay("SIGTERM"), Duration::from_secs(7));
+    }
 
     #[test]
     fn the_command_line_is_consistent() {

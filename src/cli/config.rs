@@ -4,7 +4,7 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
 use serde_json::{Map, Value, json};
 
-use crate::cli::serve_args::ServeArgs;
+use crate::cli::commands::ServeArgs;
 
 /// Printed instead of a secret.
 const MASK: &str = "***";

@@ -6,10 +6,9 @@ use anyhow::bail;
 
 use crate::cli::commands::{KeysAction, KeysArgs};
 use crate::cli::output::{print, print_error};
-use crate::cli::runtime::block_on;
-use crate::jobs::keys::keyring::Keyring;
-use crate::jobs::model::key::Key;
-use crate::jobs::model::labels::{BOUND_MAX, Labels};
+use crate::cli::serve::block_on;
+use crate::jobs::keys::Keyring;
+use crate::jobs::model::{BOUND_MAX, Key, Labels};
 
 /// Runs the action on the keys.
 pub(super) fn run(args: &KeysArgs) -> anyhow::Result<ExitCode> {

@@ -2,9 +2,9 @@
 
 use std::process::ExitCode;
 
-use crate::cli::database_args::{DatabaseUrlArgs, DoctorArgs};
+use crate::cli::commands::{DatabaseUrlArgs, DoctorArgs};
 use crate::cli::output::print;
-use crate::cli::runtime::block_on;
+use crate::cli::serve::block_on;
 use crate::jobs::result_place::examine_results;
 use crate::jobs::store::postgres::doctor::examine;
 use crate::jobs::store::postgres::schema::{Migrated, migrate};

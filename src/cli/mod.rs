@@ -7,10 +7,8 @@
 //! | in which order a service starts and stops | [`serve`], [`stop`] |
 
 mod backup;
-mod case_args;
 mod commands;
 mod config;
-mod database_args;
 mod healthcheck;
 mod keys;
 #[cfg(feature = "cluster")]
@@ -18,12 +16,8 @@ mod migrate;
 mod output;
 #[cfg(feature = "cluster")]
 mod relocate;
-mod runtime;
 mod serve;
-mod serve_args;
 mod solve;
-mod stop;
-mod values;
 
 use std::process::ExitCode;
 

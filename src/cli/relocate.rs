@@ -6,7 +6,7 @@ use anyhow::Context;
 
 use crate::cli::commands::{MoveArgs, MoveResultsArgs};
 use crate::cli::output::print;
-use crate::cli::runtime::block_on;
+use crate::cli::serve::block_on;
 use crate::jobs::relocate::relocate;
 use crate::jobs::result_place::change::move_results;
 

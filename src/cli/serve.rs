@@ -1,34 +1,118 @@
-//! `railhead serve`: the HTTP API with workers in the same process; the order of start and stop.
-//!
-//! Start: logs, data folder (locked, jobs of a dead process taken back), workers, listener. The event
-//! `listening` with the bound address says that requests are answered.
-//!
-//! Stop, on SIGTERM or SIGINT: not ready and nobody waits any more, connections are still accepted for
-//! `--drain-delay-s` (SIGTERM only); no new connections; open requests end; running jobs get their grace period, then go
-//! back to the queue uncounted; the data folder is closed; the last spans are sent. A second signal ends the process at
-//! once, which loses nothing either: the next start takes the running jobs back.
-
+//! The runtime of commands that end by themselves.
 use std::net::SocketAddr;
-use std::process::ExitCode;
+use std::process::{ExitCode, exit};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use axum::http::HeaderValue;
 use tokio::net::TcpListener;
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep_until, timeout_at};
 use tokio_util::sync::CancellationToken;
 
-use crate::cli::commands::unknown_variables;
-use crate::cli::serve_args::ServeArgs;
-use crate::cli::stop::{Schedule, Signals};
-use crate::cli::values::Anonymous;
+use crate::cli::commands::{Anonymous, ServeArgs, unknown_variables};
 use crate::http::{self, HttpOptions};
-use crate::jobs::attempts::heap;
+use crate::jobs::attempts::attempt;
 use crate::jobs::engine::Engine;
 use crate::jobs::{Jobs, Options};
 use crate::otlp::Traces;
 use crate::telemetry;
+
+/// Runs `work` to its end on this thread.
+pub(super) fn block_on<T>(work: impl Future<Output = T>) -> anyhow::Result<T> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .context("the async runtime could not be started")?;
+    Ok(runtime.block_on(work))
+}
+
+/// How long open requests may take to end once the port is closed, at least and at most.
+const REQUESTS_END_WITHIN: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(5)];
+/// What the steps may take beyond the grace period.
+const BEYOND_GRACE: Duration = Duration::from_secs(5);
+/// What the steps need at least after the port is closed.
+const BEYOND_DRAIN: Duration = Duration::from_secs(3);
+/// Kept for the last step: the exit itself.
+const LAST_STEP: Duration = Duration::from_millis(500);
+/// Exit code of a process that was told to stop twice, as shells count a SIGINT.
+const STOPPED_AT_ONCE: i32 = 130;
+
+/// When which step of a stop is over.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Schedule {
+    /// The port closes.
+    pub port_closes: Instant,
+    /// Open requests are cut off.
+    pub requests_end: Instant,
+    /// Running jobs go back to the queue.
+    pub grace_ends: Instant,
+    /// Waiting for the data folder to close ends.
+    pub folder_closed: Instant,
+    last_moment: Instant,
+}
+
+impl Schedule {
+    /// The schedule of a stop that begins now.
+    pub(super) fn new(drain: Duration, grace: Duration) -> Schedule {
+        let now = Instant::now();
+        let [least, most] = REQUESTS_END_WITHIN;
+        let last_moment = now + (grace + BEYOND_GRACE).max(drain + BEYOND_DRAIN);
+        let folder_closed = last_moment - LAST_STEP;
+        Schedule {
+            port_closes: now + drain,
+            requests_end: (now + drain + grace.clamp(least, most)).min(folder_closed - LAST_STEP),
+            grace_ends: now + grace,
+            folder_closed,
+            last_moment,
+        }
+    }
+
+    /// Ends the process with this exit code at the last moment, from a thread that needs nothing of the async runtime.
+    pub(super) fn enforce(self, code: u8) {
+        let enforced = std::thread::Builder::new().name("railhead-stop".to_owned());
+        let enforced = enforced.spawn(move || {
+            std::thread::sleep(self.last_moment.saturating_duration_since(Instant::now()));
+            exit(code.into());
+        });
+        if let Err(error) = enforced {
+            tracing::warn!(%error, "the time of the stop is not limited");
+        }
+    }
+}
+
+/// The signals that stop a service.
+pub(super) struct Signals {
+    terminate: Signal,
+    interrupt: Signal,
+}
+
+impl Signals {
+    pub(super) fn listen() -> anyhow::Result<Signals> {
+        Ok(Signals {
+            terminate: signal(SignalKind::terminate()).context("SIGTERM cannot be received")?,
+            interrupt: signal(SignalKind::interrupt()).context("SIGINT cannot be received")?,
+        })
+    }
+
+    /// The name of the next one.
+    pub(super) async fn next(&mut self) -> &'static str {
+        tokio::select! {
+            _ = self.terminate.recv() => "SIGTERM",
+            _ = self.interrupt.recv() => "SIGINT",
+        }
+    }
+
+    /// Ends the process at the next one.
+    pub(super) fn end_at_next(mut self) {
+        tokio::spawn(async move {
+            let name = self.next().await;
+            tracing::warn!(signal = name, "stopping at once");
+            exit(STOPPED_AT_ONCE);
+        });
+    }
+}
 
 const REQUEST_THREADS_MIN: usize = 4;
 /// Files that the process opens besides connections: job table, results, logs.
@@ -70,7 +154,7 @@ impl Role {
 
 /// Serves until a signal says stop.
 pub(super) fn run(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
-    heap::bound_heap();
+    attempt::bound_heap();
     let log = telemetry::start(args.log.log_format, &args.log.log)?;
     for name in unknown_variables() {
         tracing::warn!(
@@ -290,4 +374,26 @@ fn http_options(
         Err(error) => tracing::warn!(%error, "the number of files that may be open is not known"),
     }
     Ok((options, origins))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_ends_five_seconds_after_the_grace_period_or_three_after_the_drain() {
+        let seconds = Duration::from_secs;
+        for (drain, grace, last) in [(0, 0, 5), (2, 0, 5), (2, 10, 15), (30, 10, 33)] {
+            let schedule = Schedule::new(seconds(drain), seconds(grace));
+            let begun = schedule.port_closes.checked_sub(seconds(drain)).unwrap();
+            assert_eq!(
+                schedule.last_moment - begun,
+                seconds(last),
+                "{drain} {grace}"
+            );
+            assert!(schedule.port_closes < schedule.requests_end);
+            assert!(schedule.requests_end < schedule.last_moment);
+            assert!(schedule.grace_ends < schedule.folder_closed);
+        }
+    }
 }

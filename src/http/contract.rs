@@ -1,23 +1,22 @@
 //! The contract: an OpenAPI 3.1 document made from the handlers and their types, with the examples of `api/examples`.
+use std::collections::{BTreeMap, BTreeSet};
 
 use axum::extract::State;
-use axum::http::header;
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde_json::Value;
+use serde_json::{Map, Value, json};
 use utoipa::OpenApi;
-use utoipa::openapi::RefOr;
 use utoipa::openapi::example::ExampleBuilder;
 use utoipa::openapi::path::{ParameterBuilder, ParameterIn};
-use utoipa::openapi::schema::Type;
+use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, Components, Type};
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
-use utoipa::openapi::{HeaderBuilder, ObjectBuilder, Required, ResponseBuilder};
+use utoipa::openapi::{
+    Discriminator, HeaderBuilder, ObjectBuilder, Ref, RefOr, Required, ResponseBuilder, Schema,
+};
 use utoipa_axum::router::OpenApiRouter;
 
-use crate::http::examples::EXAMPLES;
-use crate::http::problem::body::ProblemBody;
-use crate::http::problem::catalogue::{describe, describe_together};
-use crate::http::problem::kinds::ProblemKind;
-use crate::http::{contract_forms, contract_shared};
+use crate::http::contract;
+use crate::http::problem::{ProblemBody, ProblemKind, describe, describe_together};
 
 #[derive(OpenApi)]
 #[openapi(
@@ -85,11 +84,11 @@ pub(super) fn text(mut document: utoipa::openapi::OpenApi) -> String {
     }
     add_batches(&mut document);
     require_keys(&mut document);
-    contract_forms::complete(&mut document);
+    contract::complete(&mut document);
     // Only a map with keys that are not strings cannot be written; the document has none.
     let mut document = serde_json::to_value(&document).unwrap_or_default();
-    contract_shared::share(&mut document);
-    contract_shared::lines(&document)
+    contract::share(&mut document);
+    contract::lines(&document)
 }
 
 /// Returns the text of the contract, which is built on the first request for it.
@@ -211,4 +210,534 @@ pub(super) async fn contract(State(Document(text)): State<Document>) -> Response
     // The newline at the end is that of every answer.
     let text = text().trim_end();
     ([(header::CONTENT_TYPE, "application/json")], text).into_response()
+}
+
+macro_rules! examples {
+    ($($name:literal: $summary:literal;)*) => {
+        [$((
+            $name,
+            $summary,
+            include_str!(concat!("../../api/examples/", $name, ".case.json")),
+        )),*]
+    };
+}
+
+/// Name, summary and text of each.
+pub(super) const EXAMPLES: [(&str, &str, &str); 17] = examples! {
+    "hertz-steel": "A wheel on a rail by its radii, with both creepages and spin";
+    "spin": "An ellipse with lateral creepage and spin";
+    "uic60-crown": "A wheel on a UIC60-like crown of arcs, as a measured gap: region and pressure are found";
+    "area-132re-crown": "A coned wheel on an AREA-132RE-like crown, touching beside the middle";
+    "two-patches": "A gap on a grid with two contact patches";
+    "wheel-rail": "A wheel on a rail by their cross-sections, under a vertical force, with the motion of the wheelset";
+    "wheel-rail-flange": "A wheel on a rail by their cross-sections, touching at the gauge corner and at the flange";
+    "wheelset": "A wheelset on both rails at three shifts, rolling freely, with its equivalent conicity";
+    "maintenance": "What one wheel does to a rail: stresses below the worst point, wear and fatigue, temperatures";
+    "friction": "A creep curve of a wet rail: friction that falls with slip, and a layer between the bodies";
+    "unlike-bodies": "A soft roller driving on steel: bodies whose pressure and tractions depend on each other";
+    "rolling": "Rolling that changes: a shift, driving, then braking, each with what the contact remembers";
+    "pressure-grid": "A given pressure over a patch of any shape";
+    "sweep": "A creep curve: many motions on the same patch";
+    "paper-figure-3": "Slip and stick under longitudinal creepage and several spins, as figure 3 of Liu and Hsu, on a patch without symmetry";
+    "paper-figure-4": "Slip and stick under pure spin, down to separate poles, as their figure 4";
+    "paper-figure-5": "Force and moment against longitudinal creepage, as their figure 5";
+};
+
+/// Schemas that requests are made of; what they lead to belongs to them.
+const REQUESTS: [&str; 4] = ["Case", "CaseWithOptions", "EvaluateRequest", "TableUpload"];
+
+/// Names for the forms of a choice that have none, in their order.
+const FORMS: [(&str, &[&str]); 6] = [
+    (
+        "Contact",
+        &[
+            "RadiiContact",
+            "EllipseContact",
+            "GapProfileContact",
+            "GapGridContact",
+            "PressureGridContact",
+            "ProfilesContact",
+            "WheelsetContact",
+        ],
+    ),
+    (
+        "Motions",
+        &[
+            "SweepMotions",
+            "HistoryMotion",
+            "WheelsetMotion",
+            "WheelsetMotions",
+        ],
+    ),
+    ("Material", &["TwoMaterials"]),
+    ("Field", &["CellField"]),
+    ("GridAxis", &["AxisRange"]),
+    ("Thermal", &["ThermalOfTwo"]),
+];
+
+/// Choices whose forms are told apart by a word in this member.
+const TOLD_BY: [(&str, &str); 1] = [("Contact", "type")];
+
+/// Least and largest number of members.
+const MEMBERS: [(&str, usize, Option<usize>); 3] = [
+    ("AskedMotion", 1, None),
+    ("Load", 1, Some(2)),
+    ("Sweep", 1, None),
+];
+
+/// Members that are lists of so many numbers, or lists of those.
+const TUPLES: [(&str, &str, usize); 37] = [
+    ("ArchardFigures", "speeds_mm_per_s", 2),
+    ("CrossSection", "points_mm", 2),
+    ("EquivalentConicity", "turns_mm", 2),
+    ("FirstTouch", "rail_mm", 2),
+    ("FirstTouch", "track_mm", 3),
+    ("FirstTouch", "wheel_mm", 2),
+    ("GradientErrors", "by_normal_force", 3),
+    ("GradientErrors", "force_x_n", 3),
+    ("GradientErrors", "force_y_n", 3),
+    ("GradientErrors", "moment_z_n_mm", 3),
+    ("Gradients", "by_normal_force", 3),
+    ("Gradients", "force_x_n", 3),
+    ("Gradients", "force_y_n", 3),
+    ("Gradients", "moment_z_n_mm", 3),
+    ("KnownPatch", "extent_mm", 4),
+    ("KnownPatch", "semi_axes_mm", 2),
+    ("Outlines", "patch", 2),
+    ("Outlines", "slip", 2),
+    ("Outlines", "stick", 2),
+    ("MotionRegion", "extent_mm", 4),
+    ("PatchSolution", "extent_mm", 4),
+    ("PatchSolution", "semi_axes_mm", 2),
+    ("PlacedProfiles", "rail_mm", 2),
+    ("PlacedProfiles", "wheel_mm", 2),
+    ("Position", "origin_track_mm", 3),
+    ("Position", "rail_mm", 2),
+    ("Position", "track_mm", 3),
+    ("Position", "wheel_mm", 2),
+    ("ProfileQuality", "y_mm", 2),
+    ("RemarkEntry", "also_at_points", 2),
+    ("SectionQuality", "y_mm", 2),
+    ("StressPoint", "at_mm", 3),
+    ("StressPoint", "principal_mpa", 3),
+    ("StressPoint", "shear_direction", 3),
+    ("StressPoint", "shear_plane_normal", 3),
+    ("Subsurface", "points_mm", 3),
+    ("TemperatureSummary", "at_mm", 2),
+];
+
+/// Says all of it.
+pub(super) fn complete(document: &mut utoipa::openapi::OpenApi) {
+    let components = document.components.get_or_insert_default();
+    name_forms(components);
+    for (name, member) in TOLD_BY {
+        tell_by(components, name, member);
+    }
+    for name in reached(components) {
+        if let Some(schema) = components.schemas.get_mut(&name) {
+            close(schema);
+        }
+    }
+    for (name, least, most) in MEMBERS {
+        if let Some(RefOr::T(Schema::Object(object))) = components.schemas.get_mut(name) {
+            object.min_properties = Some(least);
+            object.max_properties = most;
+        }
+    }
+    for (name, member, length) in TUPLES {
+        if let Some(RefOr::T(Schema::Object(object))) = components.schemas.get_mut(name)
+            && let Some(RefOr::T(schema)) = object.properties.get_mut(member)
+        {
+            fix_length(schema, length);
+        }
+    }
+}
+
+fn forms<'a>(components: &'a mut Components, name: &str) -> Option<&'a mut Vec<RefOr<Schema>>> {
+    match components.schemas.get_mut(name) {
+        Some(RefOr::T(Schema::OneOf(choice))) => Some(&mut choice.items),
+        _ => None,
+    }
+}
+
+/// Says that a schema has no members but its own, nor has what is written inside it.
+fn close(schema: &mut RefOr<Schema>) {
+    match schema {
+        RefOr::T(Schema::Object(object)) => {
+            if !object.properties.is_empty() && object.additional_properties.is_none() {
+                let none = AdditionalProperties::FreeForm(false);
+                object.additional_properties = Some(Box::new(none));
+            }
+            object.properties.values_mut().for_each(close);
+        }
+        RefOr::T(Schema::OneOf(choice)) => choice.items.iter_mut().for_each(close),
+        RefOr::T(Schema::Array(array)) => {
+            if let ArrayItems::RefOrSchema(items) = &mut array.items {
+                close(items);
+            }
+        }
+        RefOr::T(_) | RefOr::Ref(_) => {}
+    }
+}
+
+/// Makes schemas of the forms of choices, which lead to them.
+fn name_forms(components: &mut Components) {
+    for (choice, names) in FORMS {
+        let mut names = names.iter();
+        let mut named = BTreeMap::new();
+        let Some(forms) = forms(components, choice) else {
+            continue;
+        };
+        // Some clients take the first form that lacks nothing, whatever else is there.
+        forms.sort_by_key(|form| !requires(form));
+        for form in forms {
+            if matches!(form, RefOr::T(Schema::Object(object)) if !object.properties.is_empty())
+                && let Some(name) = names.next()
+            {
+                let leading = RefOr::Ref(Ref::from_schema_name(*name));
+                named.insert((*name).to_owned(), std::mem::replace(form, leading));
+            }
+        }
+        components.schemas.extend(named);
+    }
+}
+
+/// Does this form have members that must be there?
+fn requires(form: &RefOr<Schema>) -> bool {
+    matches!(form, RefOr::T(Schema::Object(object)) if !object.required.is_empty())
+}
+
+/// Says which word of a member stands for which form of a choice.
+fn tell_by(components: &mut Components, choice: &str, member: &str) {
+    let leading = forms(components, choice).map(|forms| references(forms.iter()));
+    let mut told = Discriminator::new(member);
+    for form in leading.unwrap_or_default() {
+        if let Some(RefOr::T(Schema::Object(object))) = components.schemas.get(&form)
+            && let Some(RefOr::T(Schema::Object(words))) = object.properties.get(member)
+            && let Some([word]) = words.enum_values.as_deref()
+            && let Some(word) = word.as_str()
+        {
+            let place = format!("#/components/schemas/{form}");
+            told.mapping.insert(word.to_owned(), place);
+        }
+    }
+    if let Some(RefOr::T(Schema::OneOf(choice))) = components.schemas.get_mut(choice) {
+        choice.discriminator = Some(told);
+    }
+}
+
+/// The schemas of requests and all that they lead to.
+fn reached(components: &Components) -> BTreeSet<String> {
+    let mut seen = BTreeSet::new();
+    let mut next: Vec<String> = REQUESTS.map(str::to_owned).into();
+    while let Some(name) = next.pop() {
+        if let Some(schema) = components.schemas.get(&name)
+            && seen.insert(name)
+        {
+            next.extend(references([schema]));
+        }
+    }
+    seen
+}
+
+/// Names of the schemas that these lead to at once.
+fn references<'a>(schemas: impl IntoIterator<Item = &'a RefOr<Schema>>) -> Vec<String> {
+    let mut found = Vec::new();
+    for schema in schemas {
+        match schema {
+            RefOr::Ref(leading) => {
+                found.extend(leading.ref_location.rsplit('/').next().map(str::to_owned));
+            }
+            RefOr::T(Schema::Object(object)) => {
+                found.extend(references(object.properties.values()));
+            }
+            RefOr::T(Schema::OneOf(choice)) => found.extend(references(&choice.items)),
+            RefOr::T(Schema::Array(array)) => {
+                if let ArrayItems::RefOrSchema(items) = &array.items {
+                    found.extend(references([&**items]));
+                }
+            }
+            RefOr::T(_) => {}
+        }
+    }
+    found
+}
+
+/// Says how many numbers the innermost list has.
+fn fix_length(schema: &mut Schema, length: usize) {
+    let Schema::Array(array) = schema else {
+        return;
+    };
+    let ArrayItems::RefOrSchema(items) = &mut array.items else {
+        return;
+    };
+    match &mut **items {
+        RefOr::T(inner @ Schema::Array(_)) => fix_length(inner, length),
+        RefOr::T(number @ Schema::Object(_)) => {
+            array.prefix_items = vec![number.clone(); length];
+            array.min_items = Some(length);
+            // `items: false` would say the same; some makers of clients cannot read it.
+            array.max_items = Some(length);
+        }
+        _ => {}
+    }
+}
+
+/// Moves headers, responses, parameters and examples that several operations have into `components`.
+pub(super) fn share(document: &mut Value) {
+    leave_out_double(document);
+    for kind in [
+        Kind::Headers,
+        Kind::Responses,
+        Kind::Parameters,
+        Kind::Examples,
+    ] {
+        let mut uses: BTreeMap<String, usize> = BTreeMap::new();
+        visit(document, kind, &mut |_, value| {
+            *uses.entry(value.to_string()).or_default() += 1;
+        });
+        let mut names: BTreeMap<String, String> = BTreeMap::new();
+        let mut shared = Map::new();
+        visit(document, kind, &mut |key, value| {
+            let text = value.to_string();
+            if uses[&text] < 2 {
+                return;
+            }
+            let name = names.entry(text).or_insert_with(|| {
+                let stem = kind.stem(key, value);
+                let mut name = stem.clone();
+                let mut number = 1;
+                while shared.contains_key(&name) {
+                    number += 1;
+                    name = format!("{stem}{number}");
+                }
+                shared.insert(name.clone(), value.clone());
+                name
+            });
+            let reference = format!("#/components/{}/{name}", kind.name());
+            *value = json!({ "$ref": reference });
+        });
+        if !shared.is_empty() {
+            document["components"][kind.name()] = shared.into();
+        }
+    }
+}
+
+/// Leaves out that numbers are of double precision: all are, as the head of the document says.
+fn leave_out_double(value: &mut Value) {
+    match value {
+        Value::Object(members) => {
+            if members
+                .get("format")
+                .is_some_and(|format| format == "double")
+            {
+                members.remove("format");
+            }
+            members.values_mut().for_each(leave_out_double);
+        }
+        Value::Array(items) => items.iter_mut().for_each(leave_out_double),
+        _ => {}
+    }
+}
+
+/// The contract as text: one line for each operation and each component.
+pub(super) fn lines(document: &Value) -> String {
+    let mut text = String::new();
+    write(document, &[], &mut text);
+    text.push('\n');
+    text
+}
+
+fn write(value: &Value, path: &[&str], text: &mut String) {
+    let opened = matches!(
+        path,
+        [] | ["paths" | "components"] | ["paths" | "components", _]
+    );
+    match value {
+        Value::Object(members) if opened && !members.is_empty() => {
+            text.push('{');
+            for (place, (key, member)) in members.iter().enumerate() {
+                text.push_str(if place == 0 { "\n" } else { ",\n" });
+                text.push_str(&Value::from(key.as_str()).to_string());
+                text.push_str(": ");
+                write(member, &[path, &[key]].concat(), text);
+            }
+            text.push_str("\n}");
+        }
+        _ => text.push_str(&value.to_string()),
+    }
+}
+
+/// A kind of component that operations share.
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    Headers,
+    Responses,
+    Parameters,
+    Examples,
+}
+
+impl Kind {
+    /// The member of `components`.
+    fn name(self) -> &'static str {
+        match self {
+            Kind::Headers => "headers",
+            Kind::Responses => "responses",
+            Kind::Parameters => "parameters",
+            Kind::Examples => "examples",
+        }
+    }
+
+    /// The name of a component, which may get a number.
+    fn stem(self, key: &str, value: &Value) -> String {
+        let words = match self {
+            Kind::Responses => {
+                let status = key.parse().ok();
+                let status = status.and_then(|code: u16| StatusCode::from_u16(code).ok());
+                status
+                    .and_then(|status| status.canonical_reason())
+                    .unwrap_or(key)
+            }
+            Kind::Parameters => value["name"].as_str().unwrap_or(key),
+            Kind::Headers | Kind::Examples => key,
+        };
+        let words = words.split(|letter: char| !letter.is_ascii_alphanumeric());
+        let words = words.filter(|word| !word.is_empty());
+        words
+            .map(|word| word[..1].to_ascii_uppercase() + &word[1..])
+            .collect()
+    }
+}
+
+/// Calls `with` for everything of this kind in the operations, with its key.
+fn visit(document: &mut Value, kind: Kind, with: &mut impl FnMut(&str, &mut Value)) {
+    let paths = document["paths"].as_object_mut().into_iter().flatten();
+    let operations = paths.flat_map(|(_, item)| item.as_object_mut().into_iter().flatten());
+    for (_, operation) in operations {
+        match kind {
+            Kind::Responses => {
+                for (status, response) in members(operation, "responses") {
+                    with(status, response);
+                }
+            }
+            Kind::Headers => {
+                for (_, response) in members(operation, "responses") {
+                    for (name, header) in members(response, "headers") {
+                        with(name, header);
+                    }
+                }
+            }
+            Kind::Parameters => {
+                let parameters = operation.get_mut("parameters");
+                let parameters = parameters.and_then(Value::as_array_mut).into_iter();
+                for parameter in parameters.flatten() {
+                    with("parameter", parameter);
+                }
+            }
+            Kind::Examples => {
+                let body = operation.get_mut("requestBody");
+                for (_, content) in body.into_iter().flat_map(|body| members(body, "content")) {
+                    for (name, example) in members(content, "examples") {
+                        with(name, example);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The members of the member `name` of an object; empty if there is no such member.
+fn members<'v>(
+    value: &'v mut Value,
+    name: &str,
+) -> impl Iterator<Item = (&'v String, &'v mut Value)> {
+    let member = value.get_mut(name).and_then(Value::as_object_mut);
+    member.into_iter().flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use super::*;
+
+    fn document() -> Value {
+        serde_json::from_str(crate::http::DOCUMENT.0()).unwrap()
+    }
+
+    #[test]
+    fn every_entry_of_the_tables_is_there() {
+        let document = document();
+        let schemas = &document["components"]["schemas"];
+        for name in FORMS.iter().flat_map(|(_, names)| *names) {
+            assert!(schemas[name].is_object(), "{name}");
+        }
+        for (name, member, length) in TUPLES {
+            let text = schemas[name]["properties"][member].to_string();
+            assert!(
+                text.contains(&format!("\"minItems\":{length}")),
+                "{name}.{member}: {text}"
+            );
+        }
+        for (choice, member) in TOLD_BY {
+            let schema = &schemas[choice];
+            let told = &schema["discriminator"];
+            assert_eq!(told["propertyName"], member);
+            let forms = schema["oneOf"].as_array().unwrap().len();
+            assert_eq!(told["mapping"].as_object().unwrap().len(), forms);
+        }
+    }
+
+    /// Every object below a schema that has members but lets others in.
+    fn open(schema: &Value, found: &mut Vec<Value>) {
+        match schema {
+            Value::Object(members) => {
+                if members.contains_key("properties")
+                    && members.get("additionalProperties") != Some(&Value::Bool(false))
+                {
+                    found.push(schema.clone());
+                }
+                members.values().for_each(|member| open(member, found));
+            }
+            Value::Array(items) => items.iter().for_each(|item| open(item, found)),
+            _ => {}
+        }
+    }
+
+    /// The schemas that a part of the document leads to at once.
+    fn leads(part: &Value, found: &mut Vec<String>) {
+        match part {
+            Value::Object(members) => {
+                let target = members.get("$ref").and_then(Value::as_str);
+                found.extend(target.and_then(|target| Some(target.rsplit_once('/')?.1.to_owned())));
+                members.values().for_each(|member| leads(member, found));
+            }
+            Value::Array(items) => items.iter().for_each(|item| leads(item, found)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn requests_say_that_they_have_no_unknown_members() {
+        let document = document();
+        let schemas = &document["components"]["schemas"];
+        let (mut seen, mut next) = (BTreeSet::new(), Vec::new());
+        for operation in [
+            &document["paths"]["/v1/jobs"],
+            &document["paths"]["/v1/batches"],
+        ] {
+            leads(&operation["post"]["requestBody"], &mut next);
+        }
+        while let Some(name) = next.pop() {
+            if seen.insert(name.clone()) {
+                leads(&schemas[&name], &mut next);
+            }
+        }
+        assert!(seen.len() > 20, "{seen:?}");
+        for name in seen {
+            let mut found = Vec::new();
+            open(&schemas[&name], &mut found);
+            assert!(found.is_empty(), "{name}: {found:?}");
+        }
+    }
 }

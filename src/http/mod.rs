@@ -7,7 +7,7 @@
 //!    and closes those whose client sends no request or does not read its answer.
 //! 2. The [`layers`] around all routes, from the outside inward: [`security_headers`], the client behind a trusted proxy
 //!    ([`client_address`]), [`drain_body`], [`request_id`], [`request_log`], `otel` (feature `otlp`), [`metrics`], [`etag::complete`], [`compression`], [`final_newline`], the path in problems
-//!    ([`error::name_instance`]), [`origin_guard`], what is left of the rate ([`rate_limit::add_rate_limit_headers`]), what the request holds
+//!    ([`problem::name_instance`]), [`origin_guard`], what is left of the rate ([`auth::add_rate_limit_headers`]), what the request holds
 //!    until its answer is sent ([`holding_body`]), [`catch_panic`], [`admission`] of compressed bodies and their decompression.
 //! 3. The layers of a group of routes: whether JSON is accepted ([`accept::require_json`]) and what clients may keep
 //!    ([`etag::immutable`], [`etag::revalidate`]).
@@ -19,10 +19,7 @@
 //! 8. Whatever fails becomes a [`problem`] with a kind, a status and what to do.
 
 mod contract;
-mod contract_forms;
-mod contract_shared;
 mod dto;
-mod examples;
 pub mod extract;
 mod layers;
 mod limits;
@@ -48,32 +45,22 @@ use utoipa_swagger_ui::{Config, SwaggerUi};
 
 use crate::http::contract::Document;
 use crate::http::extract::{accept, query};
-use crate::http::layers::metrics::Metrics;
-#[cfg(feature = "otlp")]
-use crate::http::layers::otel;
-use crate::http::layers::{
-    admission, catch_panic, client_address, compression, etag, final_newline, metrics,
-    origin_guard, rate_limit, request_id, request_log, security_headers,
-};
-use crate::http::limits::holding_body;
-use crate::http::page::answers;
-use crate::http::problem::error::{self, ApiError};
-use crate::http::problem::kinds::ProblemKind;
-use crate::http::routes::service::metrics as service_metrics;
-use crate::http::routes::service::{
-    examples as service_examples, health, methods, problems, remarks,
-};
+use crate::http::layers::metrics::{self, Metrics};
+use crate::http::layers::{admission, auth, client_address, etag, request_log, response};
+use crate::http::problem::{ApiError, ProblemKind};
 use crate::http::routes::{
-    batch_results, batches, cases, damage, evaluate, evolutions, fields, jobs, lists, me, plots,
-    point_fields, profiles, resultants, results, run_results, run_row, run_totals, runs,
-    subsurface, tenant_events, work, zones,
+    batches, cases, evaluate, evolutions, fields, jobs, lists, plots, profiles, results, runs,
+    service, work,
 };
 use crate::http::server::drain_body;
 use crate::http::state::AppState;
 use crate::jobs::Jobs;
-use crate::jobs::model::kind::Kind;
+use crate::jobs::model::Kind;
 
-pub use crate::http::layers::cors::allow_origins;
+#[cfg(feature = "otlp")]
+use crate::http::layers::otel;
+
+pub use crate::http::layers::response::allow_origins;
 pub use crate::http::options::{AddressRange, HttpOptions};
 pub use crate::http::server::connections::Peer;
 pub use crate::http::server::serve;
@@ -111,18 +98,15 @@ pub fn routers(
     alone.anonymous = probes_anonymous;
     let (probes, _) = probes().split_for_parts();
     let probes = probes
-        .fallback(|uri: Uri| async move { error::unknown_route(uri.path()) })
-        .layer(from_fn(error::name_instance))
+        .fallback(|uri: Uri| async move { problem::unknown_route(uri.path()) })
+        .layer(from_fn(problem::name_instance))
         .with_state(AppState::new(
             jobs.clone(),
             alone,
             metrics.clone(),
             DOCUMENT,
         ));
-    [
-        api(jobs, options, metrics),
-        security_headers::secure(probes),
-    ]
+    [api(jobs, options, metrics), response::secure(probes)]
 }
 
 fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
@@ -135,33 +119,33 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
     );
     let router = resources
         .merge(contract)
-        .merge(answers::routes(options.page_dir.clone()))
-        .fallback(|uri: Uri| async move { error::unknown_route(uri.path()) })
+        .merge(page::routes(options.page_dir.clone()))
+        .fallback(|uri: Uri| async move { problem::unknown_route(uri.path()) })
         .method_not_allowed_fallback(method_not_allowed)
         .layer(DefaultBodyLimit::max(options.body_max_bytes))
         .layer(RequestDecompressionLayer::new().gzip(true).zstd(true))
         .layer(from_fn_with_state(options.clone(), admission::limit_packed))
-        .layer(CatchPanicLayer::custom(catch_panic::answer_panic))
-        .layer(from_fn(holding_body::hold))
+        .layer(CatchPanicLayer::custom(response::answer_panic))
+        .layer(from_fn(limits::hold))
         .layer(from_fn({
             let per_second = options.requests_per_second;
-            move |request, next| rate_limit::add_rate_limit_headers(per_second, request, next)
+            move |request, next| auth::add_rate_limit_headers(per_second, request, next)
         }))
-        .layer(from_fn(origin_guard::admit))
-        .layer(from_fn(error::name_instance))
-        .layer(from_fn(final_newline::end_line))
-        .layer(compression::compression_layer())
+        .layer(from_fn(auth::admit))
+        .layer(from_fn(problem::name_instance))
+        .layer(from_fn(response::end_line))
+        .layer(response::compression_layer())
         .layer(from_fn(etag::complete))
         .layer(from_fn_with_state(metrics.clone(), metrics::count));
     #[cfg(feature = "otlp")]
     let router = otel::trace(router, jobs.tracer());
     let router = router
         .layer(request_log::span_layer())
-        .layer(from_fn(request_id::carry_request_id))
+        .layer(from_fn(request_log::carry_request_id))
         .layer(from_fn(drain_body::drain_body))
         .layer(from_fn_with_state(options.clone(), client_address::resolve))
         .with_state(AppState::new(jobs, options, metrics, DOCUMENT));
-    security_headers::secure(router)
+    response::secure(router)
 }
 
 /// Every documented route, in the order of the contract.
@@ -171,9 +155,9 @@ fn resources() -> OpenApiRouter<AppState> {
         routes.fold(OpenApiRouter::new(), OpenApiRouter::merge)
     };
     let changing = OpenApiRouter::with_openapi(contract::head())
-        .routes(routes!(methods::methods))
-        .routes(routes!(remarks::remarks))
-        .routes(routes!(service_examples::examples))
+        .routes(routes!(service::methods))
+        .routes(routes!(service::remarks))
+        .routes(routes!(service::examples))
         .route_layer(from_fn(query::refuse_parameters));
     let one = every(work::one).route_layer(from_fn(query::refuse_all_but_wait));
     let changing = changing.merge(one).route_layer(from_fn(etag::revalidate));
@@ -201,31 +185,31 @@ fn resources() -> OpenApiRouter<AppState> {
     let plain = every(work::cancel)
         .routes(routes!(profiles::keep))
         .routes(routes!(profiles::get, profiles::delete))
-        .routes(routes!(run_results::manifest))
-        .routes(routes!(run_row::row))
+        .routes(routes!(runs::manifest))
+        .routes(routes!(runs::row))
         .routes(routes!(cases::check))
-        .routes(routes!(problems::list))
-        .routes(routes!(problems::explain))
+        .routes(routes!(service::list_problems))
+        .routes(routes!(service::explain))
         .route_layer(from_fn(query::refuse_parameters));
     let v1 = changing
         .merge(finished)
         .merge(plain)
-        .routes(routes!(me::me))
+        .routes(routes!(service::me))
         .routes(routes!(profiles::list))
-        .routes(routes!(run_totals::totals))
+        .routes(routes!(runs::totals))
         .merge(lists)
         .route_layer(from_fn(accept::require_json));
     // These choose among several forms themselves.
     let parts = OpenApiRouter::new()
-        .routes(routes!(resultants::resultants))
-        .routes(routes!(zones::zones))
-        .routes(routes!(point_fields::fields))
+        .routes(routes!(results::resultants))
+        .routes(routes!(fields::zones))
+        .routes(routes!(fields::fields))
         .routes(routes!(fields::tractions))
         .routes(routes!(fields::pressure))
         .routes(routes!(fields::slip))
         .routes(routes!(fields::temperature))
-        .routes(routes!(subsurface::subsurface))
-        .routes(routes!(damage::damage))
+        .routes(routes!(results::subsurface))
+        .routes(routes!(results::damage))
         .routes(routes!(plots::svg))
         .routes(routes!(plots::png))
         .routes(routes!(evolutions::table))
@@ -237,11 +221,11 @@ fn resources() -> OpenApiRouter<AppState> {
         .route_layer(from_fn(etag::revalidate));
     let contract = contract::conditional(contract);
     let events = every(work::events)
-        .routes(routes!(tenant_events::follow))
+        .routes(routes!(work::follow_all))
         .route_layer(from_fn(query::refuse_parameters));
     v1.merge(parts)
-        .routes(routes!(run_results::results))
-        .routes(routes!(batch_results::results))
+        .routes(routes!(runs::results))
+        .routes(routes!(batches::results))
         .routes(routes!(evaluate::evaluate))
         .merge(events)
         .merge(probes())
@@ -251,9 +235,9 @@ fn resources() -> OpenApiRouter<AppState> {
 /// What is asked every few seconds, of a port of its own if there is one.
 fn probes() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
-        .routes(routes!(health::alive))
-        .routes(routes!(health::ready))
-        .routes(routes!(service_metrics::metrics))
+        .routes(routes!(service::alive))
+        .routes(routes!(service::ready))
+        .routes(routes!(service::metrics))
 }
 
 async fn method_not_allowed(method: axum::http::Method, uri: Uri) -> ApiError {

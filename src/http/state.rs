@@ -6,8 +6,7 @@ use crate::http::contract::Document;
 use crate::http::extract::caller::AnyTenant;
 use crate::http::layers::auth::Access;
 use crate::http::layers::metrics::Metrics;
-use crate::http::limits::concurrency::ConcurrencyLimits;
-use crate::http::limits::memory::Memory;
+use crate::http::limits::{ConcurrencyLimits, Memory};
 use crate::http::options::HttpOptions;
 use crate::jobs::Jobs;
 

@@ -1,9 +1,10 @@
 //! The clocks of the service: those of the system, or those that a test sets.
-
 use std::fmt;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
+
+use crate::jobs::sync::lock;
 
 /// A wall clock, and beside it a steady clock, which is never set. Clones show the same times.
 #[derive(Clone)]
@@ -70,5 +71,95 @@ impl Clock {
 impl fmt::Debug for Clock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Clock")
+    }
+}
+
+/// A smaller difference between the clocks, in ms, is no leap.
+const LEAP_MS: i64 = 60_000;
+
+/// The steps of the wall clock, as seen so far.
+#[derive(Debug, Default)]
+pub(crate) struct ClockSteps(Mutex<Seen>);
+
+#[derive(Debug, Default)]
+struct Seen {
+    /// Wall clock less steady clock when they were read last.
+    offset: Option<i64>,
+    leap: ClockStep,
+}
+
+/// How far the wall clock is ahead.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct ClockStep {
+    /// All leaps together, in ms; 0: there was none, or it was undone.
+    pub(crate) ms: i64,
+    /// The wall clock after the last of them.
+    pub(crate) at: i64,
+}
+
+impl ClockStep {
+    /// The present for something that began at a time, both in epoch milliseconds.
+    pub(crate) fn now_for(self, began: i64, now: i64) -> i64 {
+        if began < self.at {
+            now.saturating_sub(self.ms)
+        } else {
+            now
+        }
+    }
+}
+
+impl ClockSteps {
+    /// Reads the clocks and notes whether the wall clock was set.
+    pub(crate) fn measure(&self, clock: &Clock) -> ClockStep {
+        let mut seen = lock(&self.0);
+        let wall = clock.now_ms();
+        let offset = wall - clock.steady_ms();
+        let moved = offset - seen.offset.unwrap_or(offset);
+        if moved.abs() >= LEAP_MS {
+            tracing::warn!(seconds = moved / 1000, "the clock of this machine was set");
+            let ms = (seen.leap.ms + moved).max(0);
+            seen.leap = if ms < LEAP_MS {
+                ClockStep::default()
+            } else {
+                ClockStep { ms, at: wall }
+            };
+        }
+        seen.offset = Some(offset);
+        seen.leap
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicI64, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn a_leap_is_seen_kept_and_undone() {
+        let set = Arc::new(AtomicI64::new(0));
+        let clock = {
+            let (set, system) = (set.clone(), Clock::system());
+            Clock::that_is_set(move || system.now_ms() + set.load(Ordering::SeqCst))
+        };
+        let leaps = ClockSteps::default();
+        let before = clock.now_ms();
+        assert_eq!(leaps.measure(&clock).ms, 0);
+        set.store(3_600_000, Ordering::SeqCst);
+        let leap = leaps.measure(&clock);
+        assert!((leap.ms - 3_600_000).abs() < 1000, "{leap:?}");
+        let now = clock.now_ms();
+        assert!(leap.now_for(before, now) - before < 10_000);
+        assert_eq!(
+            leap.now_for(now, now),
+            now,
+            "what begins afterwards is judged by the clock"
+        );
+        set.store(0, Ordering::SeqCst);
+        assert_eq!(leaps.measure(&clock), ClockStep::default());
+        // A clock that falls back harms nothing.
+        set.store(-3_600_000, Ordering::SeqCst);
+        assert_eq!(leaps.measure(&clock), ClockStep::default());
     }
 }

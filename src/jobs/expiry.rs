@@ -4,7 +4,7 @@ use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::job::Job;
+use crate::jobs::model::Job;
 
 impl Jobs {
     /// The job with the time at which it will expire.

@@ -9,11 +9,11 @@ use opentelemetry::trace::{TraceContextExt, Tracer as _};
 use opentelemetry_sdk::propagation::TraceContextPropagator;
 use uuid::Uuid;
 
-use crate::jobs::attempts::outcome::Outcome;
+use crate::jobs::attempts::slices::Outcome;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::job::created_at;
+use crate::jobs::model::created_at;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::claim::Claim;
+use crate::jobs::store::Claim;
 use crate::jobs::trace::{KeyValue, SubmitSpan, TRACEPARENT, Tracer};
 
 impl Jobs {

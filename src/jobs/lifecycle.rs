@@ -15,20 +15,17 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Uuid};
 
+use crate::jobs::attempts::attempt::{AllLeases, RunningAttempts};
 use crate::jobs::attempts::fair_scheduler::FairScheduler;
-use crate::jobs::attempts::lease::AllLeases;
-use crate::jobs::attempts::running::RunningAttempts;
 use crate::jobs::blobs::Blobs;
-use crate::jobs::clock_steps::ClockSteps;
-use crate::jobs::disk_reserve;
-use crate::jobs::disk_reserve::make_private_folder;
+use crate::jobs::clock::ClockSteps;
+use crate::jobs::disk_reserve::{self, make_private_folder};
 use crate::jobs::engine::Engine;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::maintenance::{blob_collector, deadlines, nodes, reaper, recovery, retention};
+use crate::jobs::maintenance::{self, nodes};
 use crate::jobs::metrics::Metrics;
-use crate::jobs::model::key::ANONYMOUS;
-use crate::jobs::model::kind::Kind;
+use crate::jobs::model::{ANONYMOUS, Kind};
 use crate::jobs::open_store::{note_closed, open_for_service};
 use crate::jobs::options::Options;
 use crate::jobs::recent_reads::RecentReads;
@@ -36,8 +33,7 @@ use crate::jobs::result_place::settle::settle;
 use crate::jobs::shared::{Shared, UnfinishedBatches};
 use crate::jobs::staged_bytes::StagedBytes;
 use crate::jobs::storage_fault::StorageFaults;
-use crate::jobs::store::Store;
-use crate::jobs::store::cluster::Node;
+use crate::jobs::store::{Node, Store};
 use crate::jobs::sync::lock;
 use crate::jobs::worker::pool::Worker;
 
@@ -157,19 +153,19 @@ impl Jobs {
         }
         self.shared
             .tasks
-            .spawn(reaper::reap_expired(self.shared.clone()));
+            .spawn(maintenance::reap_expired(self.shared.clone()));
         self.shared
             .tasks
-            .spawn(blob_collector::sweep_orphans(self.shared.clone()));
+            .spawn(maintenance::sweep_orphans(self.shared.clone()));
         self.shared
             .tasks
-            .spawn(recovery::recover(self.shared.clone()));
+            .spawn(maintenance::recover(self.shared.clone()));
         self.shared
             .tasks
-            .spawn(retention::sweep(self.shared.clone()));
+            .spawn(maintenance::expire_jobs(self.shared.clone()));
         self.shared
             .tasks
-            .spawn(deadlines::watch_deadlines(self.shared.clone()));
+            .spawn(maintenance::watch_deadlines(self.shared.clone()));
         nodes::start(&self.shared);
         Ok(())
     }

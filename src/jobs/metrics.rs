@@ -11,8 +11,8 @@ use prometheus_client::registry::{Metric, Registry};
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::solution::words::answer::Solution;
-use crate::jobs::model::job::{FailureKind, State};
-use crate::jobs::store::ending::Ending;
+use crate::jobs::model::{FailureKind, State};
+use crate::jobs::store::Ending;
 
 /// Upper bounds of solve times in s.
 const SOLVE_SECONDS: [f64; 14] = [

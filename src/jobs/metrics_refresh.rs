@@ -7,7 +7,7 @@ use prometheus_client::registry::Registry;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::metrics::state_label;
-use crate::jobs::model::job::State;
+use crate::jobs::model::State;
 use crate::jobs::storage_fault::StoragePlace;
 
 impl Jobs {

@@ -2,10 +2,10 @@
 
 use std::time::SystemTime;
 
-use crate::jobs::attempts::outcome::Outcome;
+use crate::jobs::attempts::slices::Outcome;
 use crate::jobs::handle::Jobs;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::claim::Claim;
+use crate::jobs::store::Claim;
 use crate::jobs::trace::SubmitSpan;
 
 impl Jobs {

@@ -13,7 +13,7 @@ use crate::jobs::clock::Clock;
 use crate::jobs::result_place::url::ResultsPlace;
 use crate::jobs::trace::Tracer;
 
-pub use crate::jobs::store::cluster::NotifyMode;
+pub use crate::jobs::store::NotifyMode;
 
 /// A database that several processes share.
 #[derive(Clone, PartialEq, Eq)]

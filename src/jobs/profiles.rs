@@ -1,8 +1,7 @@
 //! Cross-sections kept for a tenant, and cases that name them.
 //!
 //! A name is replaced by what it stands for when a case is submitted, so that a job never depends on what is deleted later.
-
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use bytes::Bytes;
 use serde_json::Value;
@@ -10,12 +9,17 @@ use tokio::runtime::Handle;
 
 use crate::contact::case::check::{SectionReport, check_section};
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::varied::{named_and_given, named_sections, put_section};
+use crate::contact::evaluate::answer::RowsAnswer;
+use crate::contact::evaluate::many::{ManyTask, NotAtOnce, evaluate_at_once};
+use crate::contact::evaluate::varied::{
+    Values, VariedColumn, column_pointer, named_and_given, named_sections, put_section,
+};
+use crate::contact::monitor::Monitor;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::{Jobs, PAGE_MAX};
 use crate::jobs::idempotency;
-use crate::jobs::store::list::Page;
-use crate::jobs::store::profile::{ProfileCursor, ProfileEntry, ProfileKept, StoredProfile};
+use crate::jobs::store::{Page, ProfileCursor, ProfileEntry, ProfileKept, StoredProfile};
 use crate::jobs::sync::blocking;
 
 /// Cross-sections that were read a moment ago, by their digests.
@@ -159,4 +163,61 @@ pub(crate) fn unknown(pointer: String, digest: &str) -> Fault {
         "`{digest}` given, which is no profile of this tenant; `POST /v1/profiles` keeps one and answers its digest"
     );
     Fault::new(pointer, detail)
+}
+
+impl Jobs {
+    /// The stored profiles that columns name. Blocks.
+    ///
+    /// # Errors
+    /// The tenant has no such profile, or a failed database.
+    pub fn profiles_of(
+        &self,
+        columns: &[VariedColumn],
+    ) -> Result<BTreeMap<String, Value>, JobsError> {
+        let mut known = HashMap::new();
+        for column in columns {
+            let Values::Texts(names) = &column.values else {
+                continue;
+            };
+            if !column.pointer.ends_with("/profile") {
+                continue;
+            }
+            for (row, name) in names.iter().enumerate() {
+                let Some(name) = name else { continue };
+                let found = Handle::current().block_on(self.known_section(name, &mut known))?;
+                if found.is_none() {
+                    let pointer = format!("{}/{row}", column_pointer(&column.pointer));
+                    return Err(CaseError(vec![unknown(pointer, name)]).into());
+                }
+            }
+        }
+        Ok(known.into_iter().collect())
+    }
+
+    /// Answers rows at once, without a job, on this thread, which may block. `checked` is the checked case of the first row, `case`.
+    ///
+    /// # Errors
+    /// The rows exceed what one evaluation may take, or it was ended by the monitor or by `step`.
+    pub fn evaluate<E>(
+        &self,
+        (case, checked): (&Value, &CheckedCase),
+        columns: &[VariedColumn],
+        profiles: &BTreeMap<String, Value>,
+        monitor: &dyn Monitor,
+        step: impl FnMut() -> Result<(), E>,
+    ) -> Result<RowsAnswer, NotAtOnce<E>> {
+        let options = &self.shared.options;
+        let task = ManyTask {
+            case,
+            columns,
+            profiles,
+            known: self.known_pairs(),
+            limits: &options.limits,
+            time_limit: options.time_limit,
+        };
+        let solve = |checked: &CheckedCase, monitor: &dyn Monitor| {
+            self.shared.engine.solve_whole(checked, monitor)
+        };
+        evaluate_at_once(&task, checked, &solve, monitor, step)
+    }
 }

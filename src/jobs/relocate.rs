@@ -10,10 +10,9 @@ use crate::jobs::open_store::table_file;
 use crate::jobs::options::Options;
 use crate::jobs::result_place::settle::settle;
 use crate::jobs::result_place::url::ResultsPlace;
-use crate::jobs::store::Upkeep;
-use crate::jobs::store::claim::Reap;
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::jobs::store::{Reap, Upkeep};
 
 /// What the job table is called once its rows are elsewhere, so that no service starts on it.
 const MOVED: &str = "jobs.db.moved";

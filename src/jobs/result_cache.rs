@@ -4,9 +4,9 @@ use uuid::Uuid;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::job::State;
+use crate::jobs::model::State;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::submission::{CacheKey, NewJob};
+use crate::jobs::store::{CacheKey, NewJob};
 
 impl Jobs {
     /// The key of a case with this digest; `None` if results are not to be used again.

@@ -9,8 +9,8 @@ use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::{PatchFields, Solution};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::job::Job;
-use crate::jobs::store::ending::{ResultRef, StoredResult};
+use crate::jobs::model::Job;
+use crate::jobs::store::{ResultRef, StoredResult};
 use crate::jobs::sync::blocking;
 
 /// Solutions from this size on are read off the threads that answer requests.

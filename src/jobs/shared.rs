@@ -12,23 +12,18 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Timestamp, Uuid};
 
+use crate::jobs::attempts::attempt::{AllLeases, RunningAttempts};
 use crate::jobs::attempts::fair_scheduler::FairScheduler;
-use crate::jobs::attempts::lease::AllLeases;
-use crate::jobs::attempts::running::RunningAttempts;
 use crate::jobs::blobs::Blobs;
-use crate::jobs::clock_steps::{ClockStep, ClockSteps};
+use crate::jobs::clock::{ClockStep, ClockSteps};
 use crate::jobs::engine::Engine;
 use crate::jobs::metrics::Metrics;
-use crate::jobs::model::batch::Batch;
-use crate::jobs::model::job::Job;
-use crate::jobs::model::key::Trusted;
+use crate::jobs::model::{Batch, Job, Trusted};
 use crate::jobs::options::Options;
 use crate::jobs::recent_reads::RecentReads;
 use crate::jobs::staged_bytes::StagedBytes;
 use crate::jobs::storage_fault::StorageFaults;
-use crate::jobs::store::Store;
-use crate::jobs::store::claim::Lease;
-use crate::jobs::store::cluster::{Node, Notification};
+use crate::jobs::store::{Lease, Node, Notification, Store};
 use crate::jobs::sync::lock;
 
 /// How often a waiting caller reads again although nothing was announced.

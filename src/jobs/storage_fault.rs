@@ -4,8 +4,7 @@ use std::error::Error;
 use std::io;
 use std::sync::{Mutex, MutexGuard};
 
-use crate::jobs::error::JobsError;
-use crate::jobs::store_error::StorageFault;
+use crate::jobs::error::{JobsError, StorageFault};
 use crate::jobs::sync::lock;
 
 /// What a folder is called in errors.

@@ -9,11 +9,10 @@ use std::future::Future;
 use std::time::Duration;
 
 use crate::jobs::disk_reserve;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, StorageFault, StoreError};
 use crate::jobs::handle::Jobs;
 use crate::jobs::shared::Shared;
 use crate::jobs::storage_fault::{FaultChange, StoragePlace};
-use crate::jobs::store_error::{StorageFault, StoreError};
 use crate::jobs::sync::blocking;
 
 /// Tries to write where the cause is not the disk, with pauses that double from [`FIRST_PAUSE`].

@@ -14,10 +14,8 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
-use crate::jobs::model::job::{Job, created_at};
-use crate::jobs::model::kind::Kind;
-use crate::jobs::model::submit_options::SubmitOptions;
-use crate::jobs::store::submission::{Enqueued, NewJob, QueueBounds, Refusal};
+use crate::jobs::model::{Job, Kind, SubmitOptions, created_at};
+use crate::jobs::store::{Enqueued, NewJob, QueueBounds, Refusal};
 use crate::jobs::sync::blocking;
 use crate::jobs::trace::KeyValue;
 

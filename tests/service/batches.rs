@@ -4,11 +4,10 @@ use std::time::Duration;
 
 use railhead::contact::solve;
 use railhead::jobs::Options;
-use railhead::jobs::model::kind::Kind;
+use railhead::jobs::model::Kind;
+use railhead::jobs::store::QueueBounds;
 use reqwest::Method;
 use serde_json::{Value, json};
-
-use railhead::jobs::store::submission::QueueBounds;
 
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
@@ -373,7 +372,7 @@ async fn a_batch_outlives_two_kills_and_every_case_is_answered_once() {
 
 #[tokio::test]
 async fn an_incomplete_batch_is_gone_after_a_restart() {
-    use railhead::jobs::store::submission::{BatchBegun, NewBatch};
+    use railhead::jobs::store::{BatchBegun, NewBatch};
     let folder = tempfile::tempdir().unwrap();
     let store = open_beside(folder.path()).await;
     let new = NewBatch {

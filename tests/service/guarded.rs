@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use railhead::jobs::Options;
-use railhead::jobs::keys::keyring::Keyring;
+use railhead::jobs::keys::Keyring;
 use reqwest::Method;
 use serde_json::{Value, json};
 

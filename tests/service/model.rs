@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use railhead::jobs::State;
-use railhead::jobs::store::submission::{CacheKey, Refusal};
+use railhead::jobs::store::{CacheKey, Refusal};
 use uuid::Uuid;
 
 /// Attempts at a job before it fails.

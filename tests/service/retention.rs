@@ -7,17 +7,14 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::clock::Clock;
-use railhead::jobs::store::submission::NewJob;
+use railhead::jobs::store::{NewJob, QueueBounds};
 use railhead::jobs::{Jobs, JobsError, Options};
 use serde_json::{Value, json};
-
-use railhead::jobs::store::submission::QueueBounds;
 
 use crate::errors::assert_problem;
 use crate::results::path_of;
 use crate::server::{Server, Setup};
-use crate::store::open_beside;
-use crate::store::{claim_up_to, finish_one, new_job, success};
+use crate::store::{claim_up_to, finish_one, new_job, open_beside, success};
 use crate::support::{case, endless_case, pause};
 
 const DAY_MS: i64 = 24 * 3600 * 1000;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use axum::body::Body;
 use http_body_util::BodyExt;
 use railhead::http::{HttpOptions, router};
-use railhead::jobs::keys::keyring::Keyring;
+use railhead::jobs::keys::Keyring;
 use reqwest::Method;
 use serde_json::json;
 use tower::ServiceExt;

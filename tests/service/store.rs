@@ -10,17 +10,17 @@ use std::sync::Arc;
 use bytes::Bytes;
 use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::remark::list::Remark;
-use railhead::jobs::model::kind::{Kind, Queue};
-use railhead::jobs::model::submit_options::SubmitOptions;
-use railhead::jobs::store::Store;
-use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, ReleaseReason, Renewal};
-use railhead::jobs::store::ending::{Ending, StoredResult};
-#[cfg(feature = "cluster")]
-use railhead::jobs::store::postgres::database::PostgresStore;
-use railhead::jobs::store::submission::{Enqueued, NewBatch, NewJob, QueueBounds};
+use railhead::jobs::model::{Kind, Queue, SubmitOptions};
+use railhead::jobs::store::{
+    Claim, ClaimKind, ClaimRequest, Ending, Enqueued, Lease, NewBatch, NewJob, QueueBounds,
+    ReleaseReason, Renewal, Store, StoredResult,
+};
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
 use uuid::Uuid;
+
+#[cfg(feature = "cluster")]
+use railhead::jobs::store::postgres::database::PostgresStore;
 
 pub const LEASE: i64 = 1_000;
 

@@ -1,9 +1,7 @@
 //! What is removed together once its time is over?
 
-use railhead::jobs::model::kind::Kind;
-use railhead::jobs::store::claim::Claim;
-use railhead::jobs::store::retention::RetentionRule;
-use railhead::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds};
+use railhead::jobs::model::Kind;
+use railhead::jobs::store::{BatchBegun, Claim, NewBatch, NewJob, QueueBounds, RetentionRule};
 
 use crate::store::{
     LEASE, StoreKind, Table, claim_up_to, conformance, new_batch, new_job, success,

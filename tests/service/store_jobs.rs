@@ -1,17 +1,15 @@
 //! Does a store keep its promises about single jobs, claims and leases?
 
-use crate::store_keys::keyed;
 use bytes::Bytes;
-use railhead::jobs::store::Orphans;
-use railhead::jobs::store::claim::{Lease, Reap, ReleaseReason, Renewal};
-use railhead::jobs::store::ending::Ending;
-use railhead::jobs::store::list::Filter;
-use railhead::jobs::store::retention::Deleted;
-use railhead::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
+use railhead::jobs::store::{
+    Deleted, Ending, Enqueued, Filter, Lease, NewJob, Orphans, QueueBounds, Reap, ReleaseReason,
+    Renewal,
+};
 use railhead::jobs::{FailureKind, State};
 use uuid::Uuid;
 
 use crate::store::*;
+use crate::store_keys::keyed;
 
 async fn a_job_comes_back_as_it_was_queued(kind: StoreKind) {
     let table = Table::new(kind).await;

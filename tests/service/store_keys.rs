@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use railhead::jobs::State;
-use railhead::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
+use railhead::jobs::store::{Enqueued, NewJob, QueueBounds};
 
 use crate::store::{StoreKind, Table, conformance, new_job};
 

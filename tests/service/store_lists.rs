@@ -1,8 +1,7 @@
 //! Do lists of jobs show every job once, whatever the filter and whatever happens meanwhile?
 
 use railhead::jobs::State;
-use railhead::jobs::store::list::Filter;
-use railhead::jobs::store::submission::NewJob;
+use railhead::jobs::store::{Filter, NewJob};
 use serde_json::{Value, json};
 use uuid::Uuid;
 

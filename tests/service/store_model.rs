@@ -5,10 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use proptest::prelude::*;
 use proptest::sample::Index;
-use railhead::jobs::model::kind::Kind;
-use railhead::jobs::store::claim::Claim;
-use railhead::jobs::store::list::Filter;
-use railhead::jobs::store::submission::{BatchBegun, NewBatch, QueueBounds};
+use railhead::jobs::model::Kind;
+use railhead::jobs::store::{BatchBegun, Claim, Filter, NewBatch, QueueBounds};
 use uuid::Uuid;
 
 use crate::model::{BOUNDS, BatchRow, Model, Row};

@@ -6,14 +6,11 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
-use railhead::jobs::model::submit_options::{Priority, SubmitOptions};
-use railhead::jobs::store::Store;
-use railhead::jobs::store::claim::{
-    Claim, ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason, Renewal,
+use railhead::jobs::model::{Priority, SubmitOptions};
+use railhead::jobs::store::{
+    Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, Lease, Moment, NewJob, NewSlice,
+    QueueBounds, Reap, ReleaseReason, Renewal, RetentionRule, SliceRecord, Store, StoredResult,
 };
-use railhead::jobs::store::ending::{Ending, NewSlice, SliceRecord, StoredResult};
-use railhead::jobs::store::retention::{Deleted, Moment, RetentionRule};
-use railhead::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
 use railhead::jobs::{Failure, FailureKind, State};
 use uuid::Uuid;
 

@@ -3,8 +3,7 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use railhead::jobs::store::Store;
-use railhead::jobs::store::submission::{BatchBegun, Enqueued, NewJob, QueueBounds};
+use railhead::jobs::store::{BatchBegun, Enqueued, NewJob, QueueBounds, Store};
 use uuid::Uuid;
 
 use crate::store::{

@@ -1,10 +1,10 @@
 //! Are jobs and batches found by several states, labels and words, and told when they change?
 
 use railhead::jobs::State;
-use railhead::jobs::model::kind::Kind;
-use railhead::jobs::store::list::{Change, Filter, Membership, Total};
-use railhead::jobs::store::retention::Usage;
-use railhead::jobs::store::submission::{BatchBegun, NewBatch, NewJob, QueueBounds};
+use railhead::jobs::model::Kind;
+use railhead::jobs::store::{
+    BatchBegun, Change, Filter, Membership, NewBatch, NewJob, QueueBounds, Total, Usage,
+};
 use uuid::Uuid;
 
 use crate::store::{StoreKind, Table, conformance, failure, new_batch, new_job, success};

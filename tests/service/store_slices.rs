@@ -4,14 +4,11 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
-use railhead::jobs::model::submit_options::SubmitOptions;
-use railhead::jobs::store::Store;
-use railhead::jobs::store::claim::Reap;
-use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, ReleaseReason};
-use railhead::jobs::store::ending::SliceRecord;
-use railhead::jobs::store::ending::{Ending, NewSlice, StoredResult};
-use railhead::jobs::store::retention::Moment;
-use railhead::jobs::store::submission::NewJob;
+use railhead::jobs::model::SubmitOptions;
+use railhead::jobs::store::{
+    Claim, ClaimKind, ClaimRequest, Ending, Lease, Moment, NewJob, NewSlice, Reap, ReleaseReason,
+    SliceRecord, Store, StoredResult,
+};
 use railhead::jobs::{Failure, State};
 use uuid::Uuid;
 

@@ -1,10 +1,9 @@
 //! In which order are jobs claimed, and what is held against them when their process dies?
 
-use railhead::jobs::model::kind::{Kind, Queue};
-use railhead::jobs::model::submit_options::{Priority, SubmitOptions};
-use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason};
-use railhead::jobs::store::submission::{
-    BatchBegun, Enqueued, NewBatch, NewJob, QueueBounds, Refusal,
+use railhead::jobs::model::{Kind, Priority, Queue, SubmitOptions};
+use railhead::jobs::store::{
+    BatchBegun, ClaimKind, ClaimRequest, Enqueued, Lease, NewBatch, NewJob, QueueBounds, Reap,
+    Refusal, ReleaseReason,
 };
 use railhead::jobs::{Filter, State, Total};
 

@@ -1,5 +1,6 @@
 //! Is what a tenant stores counted, bounded where the operator says so, and are templates stored once?
 
+use railhead::jobs::store::{BatchBegun, NewBatch, QueueBounds};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -8,8 +9,6 @@ use crate::guarded::Guarded;
 use crate::server::{Answer, Setup, example};
 use crate::store::{StoreKind, Table, conformance, new_batch};
 use crate::support::case;
-
-use railhead::jobs::store::submission::{BatchBegun, NewBatch, QueueBounds};
 
 /// A case of about this many bytes, most of them the points of its gap.
 fn large(bytes: u32) -> Value {

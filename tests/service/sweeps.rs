@@ -179,7 +179,7 @@ async fn a_sweep_that_ends_before_its_time_leaves_no_parts() {
     let jobs = shop.open(|_| {}).await;
     jobs.start().unwrap();
     for ends_by_itself in [false, true] {
-        let options = railhead::jobs::model::submit_options::SubmitOptions {
+        let options = railhead::jobs::model::SubmitOptions {
             ends_within: ends_by_itself.then_some(Duration::from_secs(1)),
             ..Default::default()
         };

@@ -5,13 +5,12 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use railhead::contact::solve;
-use railhead::jobs::store::claim::Reap;
+use railhead::jobs::store::Reap;
 use railhead::jobs::{Jobs, Options, State};
 use serde_json::json;
 
 use crate::batches::small;
-use crate::store::claim_up_to;
-use crate::store::open_beside;
+use crate::store::{claim_up_to, open_beside};
 use crate::support::{case, open};
 
 const AT_MOST: Duration = Duration::from_secs(60);
@@ -257,7 +256,7 @@ async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
         jobs.wait(old, AT_MOST).await.unwrap().state,
         State::Succeeded
     );
-    let options = railhead::jobs::model::submit_options::SubmitOptions {
+    let options = railhead::jobs::model::SubmitOptions {
         ends_within: Some(Duration::from_secs(1800)),
         ..Default::default()
     };

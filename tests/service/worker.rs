@@ -6,7 +6,7 @@ use std::time::Duration;
 use railhead::contact::error::SolveError;
 use railhead::contact::method::Method;
 use railhead::contact::solve;
-use railhead::jobs::model::submit_options::SubmitOptions;
+use railhead::jobs::model::SubmitOptions;
 use railhead::jobs::{FailureKind, JobsError, Options, State};
 use serde_json::json;
 use tokio::sync::mpsc::unbounded_channel;

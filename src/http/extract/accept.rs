@@ -6,8 +6,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::http::extract::query::{Reader, reader};
-use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
+use crate::http::problem::{ApiError, ProblemKind};
 use crate::http::render::format::Format;
 
 /// Refuses requests that want something else than JSON, by `format` or because `Accept` excludes `application/json`.

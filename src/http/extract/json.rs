@@ -1,23 +1,21 @@
-//! Reads a JSON body: declared as JSON, not too large, well-formed, no member written twice.
-
+//! Reads bodies: as they arrive, within limits of size and time, and as JSON that is declared as such and names no member twice.
 use std::fmt;
+use std::time::Duration;
 
-use axum::body::{Bytes, HttpBody};
+use axum::body::{Body, BodyDataStream, Bytes, HttpBody};
 use axum::extract::{FromRef, FromRequest, Request};
 use axum::http::{HeaderMap, header};
+use futures_util::StreamExt;
 use http_body_util::{BodyExt, Limited};
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
+use tokio::time::{Instant, timeout_at};
 
-use crate::http::extract::body_reader::unreadable;
 use crate::http::extract::caller::Tenant;
-use crate::http::extract::json_weight::{MEMBERS_MAX, weigh};
-use crate::http::layers::admission::too_long;
-use crate::http::limits::memory::{Memory, MemoryPermit, SMALL_BYTES};
-use crate::http::limits::tenant_semaphore::Permit;
+use crate::http::layers::admission::{PackedLength, too_long};
+use crate::http::limits::{Memory, MemoryPermit, Permit, SMALL_BYTES};
 use crate::http::options::HttpOptions;
-use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
+use crate::http::problem::{ApiError, ProblemKind};
 use crate::jobs::sync::blocking;
 
 /// The JSON body of a request. What it means is for others to judge.
@@ -313,6 +311,168 @@ impl<'de> Visitor<'de> for StrictVisitor {
     }
 }
 
+/// Most members of all objects together. The longest list of motions has less than half as many.
+pub const MEMBERS_MAX: usize = 200_000;
+
+/// A node of the tree that holds an object's members takes this much, also if there is only one of them.
+const OBJECT_BYTES: usize = 640;
+/// What a member takes besides its value: the text of its name, and its part of further nodes.
+const MEMBER_BYTES: usize = 112;
+/// The smallest array that is not empty.
+const ARRAY_BYTES: usize = 4 * size_of::<Value>();
+
+/// What a text holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Weight {
+    /// Memory of the parsed value in bytes, rather too much than too little.
+    pub bytes: usize,
+    /// Members of all objects.
+    pub members: usize,
+}
+
+/// Weighs a text, be it JSON or not.
+#[must_use]
+pub fn weigh(text: &[u8]) -> Weight {
+    let (mut values, mut arrays, mut objects, mut members) = (1_usize, 0_usize, 0_usize, 0_usize);
+    let (mut in_string, mut escaped) = (false, false);
+    for byte in text {
+        if in_string {
+            match byte {
+                _ if escaped => escaped = false,
+                b'\\' => escaped = true,
+                b'"' => in_string = false,
+                _ => {}
+            }
+            continue;
+        }
+        match byte {
+            b'"' => in_string = true,
+            b',' => values += 1,
+            b'[' => arrays += 1,
+            b'{' => objects += 1,
+            b':' => members += 1,
+            _ => {}
+        }
+    }
+    // Arrays grow by doubling.
+    let values = 2 * (values + arrays + objects) * size_of::<Value>();
+    Weight {
+        bytes: text.len()
+            + values
+            + arrays * ARRAY_BYTES
+            + objects * OBJECT_BYTES
+            + members * MEMBER_BYTES,
+        members,
+    }
+}
+
+/// Bytes per second of a body at least, on average and after a head start of the time that a piece may take: otherwise
+/// one byte at a time could keep a connection and a file open for ever.
+const LOWEST_RATE: f64 = 1024.0;
+
+/// A body on its way, held to its limits of size and time.
+pub struct BodyReader {
+    timeout: Duration,
+    max_bytes: u64,
+    what: &'static str,
+    pieces: BodyDataStream,
+    packed: Option<PackedLength>,
+    total: u64,
+    begun: Instant,
+}
+
+impl BodyReader {
+    /// The body of a request: `what` it is, the time that a piece of it may take, and its largest size.
+    ///
+    /// # Errors
+    /// The body says itself that it is too large.
+    pub fn new(
+        timeout: Duration,
+        max_bytes: u64,
+        what: &'static str,
+        request: Request<Body>,
+    ) -> Result<BodyReader, ApiError> {
+        let declared = request.headers().get(header::CONTENT_LENGTH);
+        let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+        let packed = request.extensions().get::<PackedLength>().cloned();
+        let reader = BodyReader {
+            timeout,
+            max_bytes,
+            what,
+            pieces: request.into_body().into_data_stream(),
+            packed,
+            total: 0,
+            begun: Instant::now(),
+        };
+        if declared.is_some_and(|length| length > max_bytes) {
+            return Err(reader.too_large());
+        }
+        Ok(reader)
+    }
+
+    /// The next piece, or nothing at the end.
+    ///
+    /// # Errors
+    /// It is too large, too slow, or breaks off.
+    pub async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
+        #[expect(clippy::cast_precision_loss, reason = "far fewer bytes than 2^53")]
+        let owed = Duration::from_secs_f64(self.total as f64 / LOWEST_RATE);
+        let latest = self.begun + self.timeout + owed;
+        let piece = timeout_at(
+            latest.min(Instant::now() + self.timeout),
+            self.pieces.next(),
+        );
+        let piece = piece.await.map_err(|_| {
+            ApiError::new(
+                ProblemKind::BodyTimeout,
+                format!(
+                    "nothing of the body arrived for {} s, or all of it at less than {LOWEST_RATE} bytes per second",
+                    self.timeout.as_secs_f64()
+                ),
+            )
+        })?;
+        let Some(piece) = piece else { return Ok(None) };
+        let piece = piece.map_err(|error| {
+            if too_long(&error) {
+                self.too_large()
+            } else {
+                unreadable(&error)
+            }
+        })?;
+        self.total += piece.len() as u64;
+        if self.total > self.max_bytes {
+            return Err(self.too_large());
+        }
+        let packed = self.packed.as_ref();
+        if packed.is_some_and(|packed| packed.is_bomb(self.total)) {
+            return Err(PackedLength::refusal());
+        }
+        Ok(Some(piece))
+    }
+
+    fn too_large(&self) -> ApiError {
+        ApiError::new(
+            ProblemKind::BodyTooLarge,
+            format!(
+                "the body is larger than the {} bytes that are allowed for {}",
+                self.max_bytes, self.what
+            ),
+        )
+    }
+}
+
+/// A body that broke off or could not be unpacked.
+pub fn unreadable(error: &(dyn std::error::Error + 'static)) -> ApiError {
+    let mut deepest = error;
+    while let Some(next) = deepest.source() {
+        deepest = next;
+    }
+    ApiError::new(
+        ProblemKind::UnreadableBody,
+        format!("the body broke off or cannot be unpacked: {deepest}"),
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -344,5 +504,16 @@ mod tests {
             read_json(b"\"\xff\"").is_err(),
             "bytes that are not UTF-8 were accepted"
         );
+    }
+
+    #[test]
+    fn texts_are_weighed_by_what_they_become() {
+        let of = |text: &str| weigh(text.as_bytes());
+        assert_eq!(of(r#"{"a":1,"b":[{"c":",:{[\""}]}"#).members, 3);
+        assert!(of(r#"{"a":"[,,,,,,,,,,,,,,,,,,,,,,,,,,,,,,"}"#).bytes < 2000);
+        let bomb = format!("[{}]", vec![r#"{"":1}"#; 1000].join(","));
+        assert!(of(&bomb).bytes > 1000 * (OBJECT_BYTES + size_of::<Value>()));
+        let samples = format!("[{}]", vec!["0"; 1000].join(","));
+        assert!((32_000..80_000).contains(&of(&samples).bytes));
     }
 }

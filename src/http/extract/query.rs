@@ -1,16 +1,16 @@
 //! Query parameters: each is one entry of a table, which gives its reader, its place in the contract and its fault. Unknown, repeated and
 //! unreadable parameters are refused together.
-
 use std::borrow::Cow;
+use std::time::Duration;
 
 use axum::extract::{Query as Pairs, Request};
-use axum::http::{Method, Uri};
+use axum::http::{HeaderMap, Method, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
 
-use crate::http::problem::body::Fault;
-use crate::http::problem::error::ApiError;
+use crate::http::problem::{ApiError, Fault};
+use crate::jobs::model::{Priority, SubmitOptions};
 
 /// Parameters that belong together; [`query`] makes such types.
 pub trait Parameters: Sized {
@@ -367,6 +367,95 @@ pub fn require_index(name: &str, index: Option<usize>, count: usize) -> Result<(
 fn quoted(names: &[&str]) -> String {
     let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
     quoted.join(", ")
+}
+
+/// Characters of a name, a key and a value of a label at most, as in a case.
+const NAME_MAX: usize = 200;
+const KEY_MAX: usize = 64;
+const VALUE_MAX: usize = 256;
+/// Labels at most, as in a case.
+pub const LABELS_MAX: usize = 32;
+
+/// A label to be looked for.
+pub fn label() -> Reader<(String, String)> {
+    reader("`key:value`", |text| {
+        let (key, value) = text.split_once(':')?;
+        Some((key.to_owned(), value.to_owned()))
+    })
+}
+
+/// A label that something is to carry.
+pub fn new_label() -> Reader<(String, String)> {
+    let allowed = format!(
+        "`key:value`, the key of 1 to {KEY_MAX} characters, the value of at most {VALUE_MAX}, without control characters"
+    );
+    reader(allowed, |text| {
+        let (key, value) = text.split_once(':')?;
+        let fits =
+            (1..=KEY_MAX).contains(&key.chars().count()) && value.chars().count() <= VALUE_MAX;
+        (fits && is_line(text)).then(|| (key.to_owned(), value.to_owned()))
+    })
+}
+
+/// A name to be given, or a part of one to be looked for.
+pub fn name() -> Reader<String> {
+    let allowed = format!("1 to {NAME_MAX} characters without control characters");
+    reader(allowed, |text| {
+        let fits = (1..=NAME_MAX).contains(&text.chars().count());
+        (fits && is_line(text)).then(|| text.to_owned())
+    })
+}
+
+/// A time, as milliseconds since 1970.
+pub fn time() -> Reader<i64> {
+    let allowed = "a time in RFC 3339 such as `2026-01-31T09:30:00Z` (write `+` as `%2B`)";
+    reader(allowed, |text| {
+        let time = text.parse::<jiff::Timestamp>();
+        time.ok().map(jiff::Timestamp::as_millisecond)
+    })
+}
+
+fn is_line(text: &str) -> bool {
+    !text.chars().any(char::is_control)
+}
+
+/// Longest deadline in s: 30 days.
+pub const DEADLINE_MAX_SECONDS: u32 = 30 * 24 * 3600;
+
+query! {
+    /// Options of a submission.
+    SubmitQuery(() => ()) {
+        /// Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs
+        #[param(example = "high")]
+        priority: Priority as Priority = reader(Priority::ALL.map(Priority::name).join(", "), Priority::from_name);
+        /// Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`
+        #[param(minimum = 1, maximum = 2_592_000, example = 600)]
+        deadline_s: u32 as u32 = seconds(1, DEADLINE_MAX_SECONDS);
+    }
+}
+
+impl SubmitQuery {
+    /// The options of a submission with these headers.
+    #[must_use]
+    pub(crate) fn options(self, headers: &HeaderMap) -> SubmitOptions {
+        SubmitOptions {
+            priority: self.priority.unwrap_or_default(),
+            ends_within: self
+                .deadline_s
+                .map(|seconds| Duration::from_secs(seconds.into())),
+            bypass_cache: wants_fresh(headers),
+        }
+    }
+}
+
+/// Does the client refuse the result of an earlier identical case?
+fn wants_fresh(headers: &HeaderMap) -> bool {
+    let values = headers.get_all(header::CACHE_CONTROL);
+    let mut directives = values
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','));
+    directives.any(|directive| directive.trim().eq_ignore_ascii_case("no-cache"))
 }
 
 #[cfg(test)]

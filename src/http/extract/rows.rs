@@ -1,22 +1,31 @@
-//! Reads rows in JSON: a template case and columns of numbers or texts, straight into columns.
-
+//! Reads the bodies of runs and evaluations: a template with columns in JSON, or with a table.
 use std::collections::HashSet;
 use std::fmt;
+use std::fs::File;
+use std::io::{Seek, SeekFrom, Write};
 
-use axum::body::Bytes;
+use axum::body::{Body, Bytes};
 use axum::extract::Request;
-use axum::http::header;
+use axum::http::{HeaderMap, HeaderValue, header};
+use multer::{Field, Multipart};
 use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
+use tokio::time::timeout;
+use utoipa::ToSchema;
+use uuid::Uuid;
 
+use crate::contact::case::words::solver::Case;
 use crate::contact::evaluate::varied::Values;
-use crate::http::extract::body_reader::BodyReader;
-use crate::http::extract::json::Strict;
-use crate::http::extract::titles::require_few;
+use crate::http::extract::json::{BodyReader, Strict, essence, read_json, unreadable, weigh_case};
+use crate::http::extract::tables::{TableForm, TableRows, TableSource, unsupported};
+use crate::http::extract::titles::{NamedColumns, faulty, require_few};
+use crate::http::limits::{Memory, Permit};
 use crate::http::options::HttpOptions;
-use crate::http::problem::error::ApiError;
+use crate::http::problem::{ApiError, ProblemKind};
+use crate::jobs::Jobs;
 use crate::jobs::codec::table::COLUMNS_MAX;
+use crate::jobs::run::draft::RunDraft;
 
 /// The bytes that a request's body may have, or has as far as it says.
 #[must_use]
@@ -172,6 +181,278 @@ impl RowValues<'_> {
 enum First {
     Number(f64),
     Text(String),
+}
+
+/// The part that holds the case.
+const TEMPLATE: &str = "template";
+/// The part that holds the table.
+const TABLE: &str = "table";
+
+/// The case whose members the columns of a table replace.
+#[derive(Debug)]
+pub enum Template {
+    /// The case of a job.
+    Job(Uuid),
+    /// A case of this request, with the memory that it takes.
+    Case(Value, Option<Permit>),
+}
+
+impl Template {
+    /// The case, and the memory that it takes.
+    ///
+    /// # Errors
+    /// The job does not exist or has expired.
+    pub async fn case(self, jobs: &Jobs) -> Result<(Value, Option<Permit>), ApiError> {
+        match self {
+            Template::Case(case, share) => Ok((case, share)),
+            Template::Job(id) => {
+                let case = jobs.case(id).await;
+                let case = case.map_err(|error| ApiError::from(error).about(TEMPLATE))?;
+                Ok((read_json(&case)?, None))
+            }
+        }
+    }
+}
+
+/// The fault of a table without a template.
+pub fn template_missing() -> ApiError {
+    ApiError::bad_parameter(
+        TEMPLATE,
+        "a table needs a template, the case whose members its columns replace: send both as `multipart/form-data` with the parts `template` (JSON) and \
+         `table`, or name a job with `?template=`",
+    )
+}
+
+/// Separates the template from the table, if the request is `multipart/form-data`. The request returned has the table as its body, with the content
+/// type of its part; other requests are returned as they are. `job` is the job that the query names as template.
+///
+/// # Errors
+/// The parts are not `template` and then `table`, the template is not JSON or too large, or the query names a template as well.
+pub async fn separate_template(
+    jobs: &Jobs,
+    memory: &Memory,
+    options: &HttpOptions,
+    job: Option<Uuid>,
+    request: Request,
+) -> Result<(Request, Option<Template>), ApiError> {
+    if essence(request.headers()) != "multipart/form-data" {
+        return Ok((request, job.map(Template::Job)));
+    }
+    if job.is_some() {
+        return Err(ApiError::bad_parameter(
+            TEMPLATE,
+            "the template is a part of the body; leave `?template=` out",
+        ));
+    }
+    let content_type = request.headers().get(header::CONTENT_TYPE);
+    let content_type = content_type.and_then(|value| value.to_str().ok());
+    let boundary = multer::parse_boundary(content_type.unwrap_or_default()).map_err(|error| {
+        ApiError::new(
+            ProblemKind::UnsupportedMediaType,
+            format!("`multipart/form-data` without a readable `boundary`: {error}"),
+        )
+    })?;
+    let (mut head, body) = request.into_parts();
+    head.headers.remove(header::CONTENT_LENGTH);
+    let mut parts = Multipart::new(body.into_data_stream(), boundary);
+    let template = next_part(&mut parts, options, TEMPLATE).await?;
+    let mut reader = BodyReader::new(
+        options.body_timeout,
+        options.body_max_bytes as u64,
+        "one case",
+        Request::new(Body::from_stream(template)),
+    )?;
+    let mut text = Vec::new();
+    while let Some(piece) = reader.next().await? {
+        text.extend_from_slice(&piece);
+    }
+    // The next part can be read once this one is gone.
+    drop(reader);
+    let weight = weigh_case(&text, options.parsed_max_bytes)?;
+    let share = memory.parsed(jobs.tenant(), weight).await?;
+    let template = Template::Case(read_json(&text)?, share);
+    let table = next_part(&mut parts, options, TABLE).await?;
+    head.headers
+        .insert(header::CONTENT_TYPE, content_type_of(&table));
+    let request = Request::from_parts(head, Body::from_stream(table));
+    Ok((request, Some(template)))
+}
+
+/// The next part, which must have this name.
+async fn next_part(
+    parts: &mut Multipart<'static>,
+    options: &HttpOptions,
+    name: &str,
+) -> Result<Field<'static>, ApiError> {
+    let part = timeout(options.body_timeout, parts.next_field()).await;
+    let part = part.map_err(|_| {
+        let detail = format!("the part `{name}` did not arrive in time");
+        ApiError::new(ProblemKind::BodyTimeout, detail)
+    })?;
+    match part.map_err(|error| unreadable(&error))? {
+        Some(part) if part.name() == Some(name) => Ok(part),
+        other => {
+            let found = other.map(|part| part.name().unwrap_or_default().to_owned());
+            let found = found.map_or("nothing".to_owned(), |found| format!("`{found}`"));
+            Err(faulty(format!(
+                "the body has {found} where the part `{name}` is expected; send the parts `template` (the case, JSON) and `table`, in this order"
+            )))
+        }
+    }
+}
+
+/// The content type of a part. Clients that do not know the form of a file send none or `application/octet-stream`; the extension of its name tells it.
+fn content_type_of(part: &Field<'_>) -> HeaderValue {
+    let mut headers = HeaderMap::new();
+    if let Some(value) = part.headers().get(header::CONTENT_TYPE) {
+        headers.insert(header::CONTENT_TYPE, value.clone());
+    }
+    let declared = essence(&headers);
+    let name = part.file_name().unwrap_or_default();
+    let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
+    let found = match extension.to_ascii_lowercase().as_str() {
+        "csv" | "tsv" | "txt" => "text/csv",
+        "ndjson" | "jsonl" => "application/x-ndjson",
+        "arrow" | "arrows" | "feather" | "ipc" => "application/vnd.apache.arrow.stream",
+        "parquet" => "application/vnd.apache.parquet",
+        "npz" => "application/x-npz",
+        _ => "text/csv",
+    };
+    match declared.as_str() {
+        "" | "application/octet-stream" | "text/plain" | "application/vnd.ms-excel" => {
+            HeaderValue::from_static(found)
+        }
+        _ => headers
+            .remove(header::CONTENT_TYPE)
+            .unwrap_or(HeaderValue::from_static("text/csv")),
+    }
+}
+
+/// A table with its template, as `multipart/form-data`.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "describes the parts in the contract")]
+pub(crate) struct TableUpload {
+    /// The case whose members the columns of the table replace; the first part.
+    template: Case,
+    /// The table; its content type, or else the extension of its file name, tells its form.
+    #[schema(content_media_type = "application/octet-stream")]
+    table: String,
+}
+
+/// Memory that a table takes while a piece of it is read.
+const PIECE_BYTES: usize = 64 << 20;
+
+/// A table with its template; nothing for JSON with `template` and `columns`.
+///
+/// # Errors
+/// The content type is none of these, or the template is missing or not wanted.
+pub fn form(
+    headers: &HeaderMap,
+    template: Option<Template>,
+) -> Result<Option<(TableForm, Template)>, ApiError> {
+    let essence = essence(headers);
+    match (TableForm::of(&essence), template) {
+        (Some(form), Some(template)) => Ok(Some((form, template))),
+        (Some(_), None) => Err(template_missing()),
+        (None, _) if essence != "application/json" => Err(unsupported(
+            &essence,
+            "`application/json` with `template` and `columns`",
+        )),
+        (None, None) => Ok(None),
+        (None, Some(_)) => Err(ApiError::bad_parameter(
+            "template",
+            "`template` belongs to a table; JSON has a `template` of its own",
+        )),
+    }
+}
+
+/// Reads the rows into a draft. A table is spooled into a nameless file while it arrives, so that a large one takes little memory.
+///
+/// # Errors
+/// The body is too large, too slow, broken or not of its form; or what the draft says of its rows.
+pub async fn read_run(
+    jobs: &Jobs,
+    memory: &Memory,
+    options: &HttpOptions,
+    (table, named): (Option<(TableForm, Template)>, NamedColumns),
+    request: Request<Body>,
+) -> Result<RunDraft, ApiError> {
+    let rows_max = options.run_max_rows;
+    let jobs = jobs.clone();
+    let Some((form, template)) = table else {
+        return from_json(jobs, memory, options, named, request).await;
+    };
+    let (template, template_share) = template.case(&jobs).await?;
+    let (timeout, most) = (options.body_timeout, options.run_max_bytes);
+    let reader = BodyReader::new(timeout, most, "one run", request)?;
+    let file = spool(&jobs, reader).await?;
+    let bytes_max = options.evaluate_max_bytes;
+    // An archive is read as a whole, once packed and once as numbers.
+    let bytes = match form {
+        TableForm::Npz => 2 * bytes_max,
+        _ => PIECE_BYTES,
+    };
+    let share = memory.rows(jobs.tenant(), bytes).await?;
+    let mut computation = memory.computation(jobs.tenant());
+    let read = computation.run(move |pace| {
+        let _held = (share, template_share);
+        let rows = TableRows::new(form, TableSource::File(file), bytes_max)?;
+        let mut draft = jobs.draft_run(template, rows.named(&named)?, rows_max)?;
+        for chunk in rows {
+            pace.step()?;
+            draft.push(chunk?)?;
+        }
+        draft.cut_all()?;
+        Ok(draft)
+    });
+    read.await
+}
+
+/// Rows in JSON, which has a template of its own and is held in memory.
+async fn from_json(
+    jobs: Jobs,
+    memory: &Memory,
+    options: &HttpOptions,
+    named: NamedColumns,
+    request: Request<Body>,
+) -> Result<RunDraft, ApiError> {
+    let rows_max = options.run_max_rows;
+    let bytes = 2 * declared_bytes(&request, options).min(options.evaluate_max_bytes);
+    let share = memory.rows(jobs.tenant(), bytes).await?;
+    let text = read_body(request, options).await?;
+    let mut computation = memory.computation(jobs.tenant());
+    let read = computation.run(move |_| {
+        let _held = share;
+        let (template, columns) = read_json_columns(&text)?;
+        drop(text);
+        let (titles, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
+        let kinds = titles.iter().zip(&values);
+        let kinds = kinds.map(|(title, values): (&String, _)| {
+            (&**title, None, matches!(values, Values::Texts(_)))
+        });
+        let mut draft = jobs.draft_run(template, named.columns(kinds)?, rows_max)?;
+        draft.push(values)?;
+        draft.cut_all()?;
+        Ok(draft)
+    });
+    read.await
+}
+
+/// A body in a nameless file, which is at its beginning.
+///
+/// # Errors
+/// The body is too large, too slow or broken, or the file cannot be written.
+pub async fn spool(jobs: &Jobs, mut reader: BodyReader) -> Result<File, ApiError> {
+    let file = jobs.spool_file()?;
+    let mut file = tokio::fs::File::from_std(file);
+    while let Some(piece) = reader.next().await? {
+        let written = tokio::io::AsyncWriteExt::write_all(&mut file, &piece).await;
+        written.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
+    }
+    let mut file = file.into_std().await;
+    let ready = file.flush().and_then(|()| file.seek(SeekFrom::Start(0)));
+    ready.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
+    Ok(file)
 }
 
 #[cfg(test)]

@@ -6,11 +6,9 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
 
 use crate::contact::evaluate::varied::column_pointer;
-use crate::http::problem::body::Fault;
-use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
+use crate::http::problem::{ApiError, Fault, ProblemKind};
 use crate::jobs::codec::table::COLUMNS_MAX;
-use crate::jobs::run::head::RunColumn;
+use crate::jobs::run::model::RunColumn;
 
 /// Faulty columns and recognised columns that the sentence of a refusal names; `errors` has all faulty ones.
 const NAMED_MAX: usize = 20;

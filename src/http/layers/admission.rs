@@ -14,8 +14,7 @@ use axum::response::{IntoResponse, Response};
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 
 use crate::http::options::HttpOptions;
-use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
+use crate::http::problem::{ApiError, ProblemKind};
 
 /// Bytes that a packed batch may unpack to for each of its own; tables of numbers reach some 30.
 const UNPACKED_PER_BYTE: u64 = 200;

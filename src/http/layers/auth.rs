@@ -1,17 +1,29 @@
-//! Whose request is it? API keys and their tenants.
+//! Whose request is answered: keys, requests without one, pages of other origins, and requests per second.
+use std::collections::HashMap;
+use std::net::IpAddr;
+use std::num::NonZeroU32;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
+use axum::extract::Request;
 use axum::http::request::Parts;
-use axum::http::{Method, header};
+use axum::http::uri::Authority;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, Version, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use governor::clock::{Clock, DefaultClock};
+use governor::middleware::StateInformationMiddleware;
+use governor::state::keyed::HashMapStateStore;
+use governor::{Quota, RateLimiter};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tracing::field::display;
 
-use crate::http::layers::origin_guard::Guard;
-use crate::http::layers::rate_limit::{RateKey, RateLeft, RateLimit};
 use crate::http::options::HttpOptions;
-use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
-use crate::http::server::connections::Peer;
+use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::server::connections::{Peer, ProbesOnly, network};
 use crate::jobs::Jobs;
-use crate::jobs::model::key::Key;
+use crate::jobs::model::Key;
+use crate::jobs::sync::lock;
 
 /// Paths where a body is sent and nothing is changed.
 const QUESTIONS: [&str; 2] = ["/v1/cases/check", "/v1/evaluate"];
@@ -112,6 +124,372 @@ pub(crate) fn bearer(header: &str) -> Option<&str> {
     (scheme.eq_ignore_ascii_case("bearer") && !key.is_empty()).then_some(key)
 }
 
+/// Headers that proxies add, about their clients or about themselves.
+static FORWARDED: [HeaderName; 6] = [
+    header::FORWARDED,
+    header::VIA,
+    HeaderName::from_static("x-forwarded-for"),
+    HeaderName::from_static("x-forwarded-host"),
+    HeaderName::from_static("x-forwarded-proto"),
+    HeaderName::from_static("x-real-ip"),
+];
+/// Header in which a browser describes the page that sends the request.
+const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
+
+/// Routes that are answered even if every connection is busy.
+const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
+
+/// Conditions for requests without a key.
+#[derive(Debug, Clone)]
+pub(crate) struct Guard {
+    hosts: Arc<[String]>,
+    origins: Arc<[String]>,
+    proxied: bool,
+}
+
+impl Guard {
+    /// The rules of these options.
+    #[must_use]
+    pub(crate) fn new(options: &HttpOptions) -> Guard {
+        Guard {
+            hosts: options.allowed_hosts.clone(),
+            origins: options.origins.clone(),
+            proxied: options.anonymous_proxied,
+        }
+    }
+
+    /// May a request without a key be answered?
+    ///
+    /// # Errors
+    /// `host-not-allowed`, `cross-site` or `unauthorized`, with what to do.
+    pub(crate) fn require_direct(&self, parts: &Parts) -> Result<(), ApiError> {
+        self.require_host(parts)?;
+        self.require_own_page(parts)?;
+        let told = FORWARDED
+            .iter()
+            .find(|name| parts.headers.contains_key(*name));
+        match told {
+            Some(name) if !self.proxied => Err(ApiError::new(
+                ProblemKind::Unauthorized,
+                format!(
+                    "the request came through a proxy (`{name}`), so it needs a key: send `Authorization: Bearer` with one. \
+                     Without a key only direct requests of this machine are answered (`--anonymous loopback`); keys are made with \
+                     `railhead keys create`"
+                ),
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Is the service asked by a name that is its own? An address cannot be made to lead elsewhere, a name can.
+    fn require_host(&self, parts: &Parts) -> Result<(), ApiError> {
+        let Some(host) = host(parts) else {
+            return Ok(());
+        };
+        let name = host.trim_matches(['[', ']']);
+        let allowed = name.parse::<IpAddr>().is_ok()
+            || name.eq_ignore_ascii_case("localhost")
+            || self.hosts.iter().any(|own| own.eq_ignore_ascii_case(name));
+        if allowed {
+            return Ok(());
+        }
+        Err(ApiError::new(
+            ProblemKind::HostNotAllowed,
+            format!(
+                "the service is asked as `{name}`; without a key it answers to addresses, to `localhost` and to names given by `--allowed-host`"
+            ),
+        ))
+    }
+
+    /// Does a request that changes something come from a page of this service, or from no page at all?
+    fn require_own_page(&self, parts: &Parts) -> Result<(), ApiError> {
+        if matches!(parts.method, Method::GET | Method::HEAD | Method::OPTIONS) {
+            return Ok(());
+        }
+        let text = |name: &HeaderName| single(&parts.headers, name);
+        let origin = text(&header::ORIGIN);
+        let known = |origin: &str| {
+            let own = origin.split_once("://").map(|(_, authority)| authority);
+            // HTTP/2 has the name in the address of the request.
+            let asked = parts.uri.authority().map(Authority::as_str);
+            let asked = asked.or_else(|| text(&header::HOST));
+            self.origins.iter().any(|allowed| allowed == origin) || (own.is_some() && own == asked)
+        };
+        let foreign = match (origin, text(&FETCH_SITE)) {
+            (Some(origin), _) => !known(origin),
+            (None, Some(site)) => !matches!(site, "same-origin" | "none"),
+            (None, None) => false,
+        };
+        if !foreign {
+            return Ok(());
+        }
+        Err(ApiError::new(
+            ProblemKind::CrossSite,
+            format!(
+                "a page of another origin ({}) may not change anything here without a key; `--cors-origin` names the origins that may",
+                origin.unwrap_or("not named")
+            ),
+        ))
+    }
+}
+
+/// The host that a request is for, without its port; `None` if an old client does not say it.
+fn host(parts: &Parts) -> Option<String> {
+    let named = parts.uri.authority().cloned().or_else(|| {
+        let text = single(&parts.headers, &header::HOST)?;
+        text.parse::<Authority>().ok()
+    });
+    named.map(|authority| authority.host().to_owned())
+}
+
+fn single<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
+    headers.get(name).map(|value| value.to_str().unwrap_or("?"))
+}
+
+/// Layer around everything: a request of HTTP/1.1 says its host once (RFC 9112, section 3.2), and a connection without a
+/// place of its own may ask for the probes only.
+pub(crate) async fn admit(request: Request, next: Next) -> Response {
+    let mut hosts = request.headers().get_all(header::HOST).iter();
+    let readable = |value: &axum::http::HeaderValue| {
+        let text = value.to_str().ok();
+        text.is_some_and(|text| text.is_empty() || text.parse::<Authority>().is_ok())
+    };
+    let named = match (hosts.next(), hosts.next()) {
+        (None, _) => request.version() != Version::HTTP_11,
+        (Some(host), None) => readable(host),
+        (Some(_), Some(_)) => false,
+    };
+    if !named {
+        let detail =
+            "a request of HTTP/1.1 has one header `Host` with the name and port of the service";
+        return ApiError::bad_header("Host", detail).into_response();
+    }
+    let crowded = request.extensions().get::<ProbesOnly>().is_some();
+    if crowded && !PROBES.contains(&request.uri().path()) {
+        let detail = "every connection of the service, or of this address, has a request under way";
+        let mut refusal = ApiError::new(ProblemKind::Overloaded, detail).into_response();
+        let close = axum::http::HeaderValue::from_static("close");
+        refusal.headers_mut().insert(header::CONNECTION, close);
+        return refusal;
+    }
+    next.run(request).await
+}
+
+/// Size of a burst: the requests of so many seconds.
+const BURST_SECONDS: u32 = 2;
+
+/// Senders that are remembered; beyond this number, those without recent requests are forgotten.
+const SENDERS_KEPT: usize = 10_000;
+/// Shortest time between two clean-ups, which visit all senders.
+const FORGET_EVERY: Duration = Duration::from_secs(10);
+
+/// Wrong keys of one address within [`FAILURES_WITHIN`] that are answered `401`, further ones `429`. Chosen by judgement: more than
+/// anybody mistypes.
+const FAILURES_MAX: u32 = 20;
+const FAILURES_WITHIN: Duration = Duration::from_secs(10);
+
+/// Requests with the same value are counted together.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(crate) enum RateKey {
+    Key(String),
+    Address(IpAddr),
+}
+
+impl RateKey {
+    /// The sender of a request without a key. Requests over loopback are not counted: they may come from a proxy on behalf of many
+    /// clients.
+    pub(crate) fn at(peer: Peer) -> Option<RateKey> {
+        let address = network(peer.0);
+        (!address.is_loopback()).then_some(RateKey::Address(address))
+    }
+}
+
+type Limiter =
+    RateLimiter<RateKey, HashMapStateStore<RateKey>, DefaultClock, StateInformationMiddleware>;
+
+/// What is left of the rate of the sender of a request; in its extensions, so that its answer can say so.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct RateLeft(Arc<Mutex<Option<u32>>>);
+
+impl RateLeft {
+    fn note(&self, requests: u32) {
+        *lock(&self.0) = Some(requests);
+    }
+}
+
+const POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
+const LEFT: HeaderName = HeaderName::from_static("ratelimit");
+
+/// Layer in which answers say how many requests the sender may still make, as the fields `RateLimit-Policy` and `RateLimit` of
+/// draft-ietf-httpapi-ratelimit-headers-10 do. Without a limit, or for senders that are not counted, they are absent.
+pub(crate) async fn add_rate_limit_headers(
+    per_second: u32,
+    mut request: Request,
+    next: Next,
+) -> Response {
+    let left = RateLeft::default();
+    request.extensions_mut().insert(left.clone());
+    let mut response = next.run(request).await;
+    let left = *lock(&left.0);
+    if let Some(left) = left {
+        let burst = per_second.saturating_mul(BURST_SECONDS);
+        // Until everything is there again.
+        let seconds = burst.saturating_sub(left).div_ceil(per_second.max(1));
+        let fields = [
+            (POLICY, format!("\"requests\";q={burst};w={BURST_SECONDS}")),
+            (LEFT, format!("\"requests\";r={left};t={seconds}")),
+        ];
+        for (name, text) in fields {
+            if let Ok(value) = HeaderValue::from_str(&text) {
+                response.headers_mut().insert(name, value);
+            }
+        }
+    }
+    response
+}
+
+/// How often senders may ask; clones share it.
+#[derive(Debug, Clone)]
+pub(crate) struct RateLimit {
+    per_second: u32,
+    limiter: Option<Arc<Limiter>>,
+    forgotten: Arc<Mutex<Instant>>,
+    failures: Arc<Mutex<HashMap<IpAddr, Failures>>>,
+    /// One turn, for look-ups of addresses that sent many wrong keys.
+    lookups: Arc<Semaphore>,
+}
+
+/// Wrong keys from one address.
+#[derive(Debug, Clone, Copy)]
+struct Failures {
+    since: Instant,
+    count: u32,
+}
+
+impl RateLimit {
+    /// The limits of these options.
+    #[must_use]
+    pub(crate) fn new(options: &HttpOptions) -> RateLimit {
+        let per_second = NonZeroU32::new(options.requests_per_second);
+        let limiter = per_second.map(|rate| {
+            let burst = rate.saturating_mul(BURST_SECONDS.try_into().unwrap_or(NonZeroU32::MIN));
+            let limiter = RateLimiter::hashmap(Quota::per_second(rate).allow_burst(burst));
+            Arc::new(limiter.with_middleware::<StateInformationMiddleware>())
+        });
+        RateLimit {
+            per_second: options.requests_per_second,
+            limiter,
+            forgotten: Arc::new(Mutex::new(Instant::now())),
+            failures: Arc::default(),
+            lookups: Arc::new(Semaphore::new(1)),
+        }
+    }
+
+    /// Counts a request of a sender, and notes in `left` how many more it may make.
+    ///
+    /// # Errors
+    /// `too-many-requests`, with the seconds after which to try again.
+    pub(crate) fn require_turn(
+        &self,
+        sender: RateKey,
+        who: &str,
+        left: Option<&RateLeft>,
+    ) -> Result<(), ApiError> {
+        let Some(limiter) = &self.limiter else {
+            return Ok(());
+        };
+        if limiter.len() > SENDERS_KEPT && self.may_forget() {
+            limiter.retain_recent();
+        }
+        let note = |requests| left.inspect(|left| left.note(requests));
+        let early = match limiter.check_key(&sender) {
+            Ok(state) => {
+                note(state.remaining_burst_capacity());
+                return Ok(());
+            }
+            Err(early) => early,
+        };
+        note(0);
+        let wait = early.wait_time_from(DefaultClock::default().now());
+        let seconds = u32::try_from(wait.as_secs_f64().ceil() as u64).unwrap_or(u32::MAX);
+        Err(ApiError::new(
+            ProblemKind::TooManyRequests,
+            format!(
+                "{who} sends more requests than it may: {} per second, and {} at once",
+                self.per_second,
+                self.per_second.saturating_mul(BURST_SECONDS)
+            ),
+        )
+        .after(seconds.max(1)))
+    }
+
+    /// Is it time for another clean-up?
+    fn may_forget(&self) -> bool {
+        let mut last = lock(&self.forgotten);
+        let due = last.elapsed() > FORGET_EVERY;
+        if due {
+            *last = Instant::now();
+        }
+        due
+    }
+
+    /// Waits for the turn of an address to look a key up that is not remembered. Addresses that sent many wrong keys take turns, so that
+    /// together they keep one connection of the database busy at most.
+    pub(crate) async fn lookup_turn(
+        &self,
+        address: Option<IpAddr>,
+    ) -> Option<OwnedSemaphorePermit> {
+        let many = {
+            let failures = lock(&self.failures);
+            let of_address = address.and_then(|address| failures.get(&address));
+            of_address.is_some_and(|failures| {
+                failures.count >= FAILURES_MAX && failures.since.elapsed() < FAILURES_WITHIN
+            })
+        };
+        match many {
+            // It is never closed.
+            true => self.lookups.clone().acquire_owned().await.ok(),
+            false => None,
+        }
+    }
+
+    /// Counts a wrong key.
+    ///
+    /// # Errors
+    /// `too-many-requests`, with the seconds after which to try again: the address has sent too many of them.
+    pub(crate) fn count_failure(&self, address: Option<IpAddr>) -> Result<(), ApiError> {
+        let Some(address) = address else {
+            return Ok(());
+        };
+        let mut failures = lock(&self.failures);
+        if failures.len() > SENDERS_KEPT {
+            failures.retain(|_, failures| failures.since.elapsed() < FAILURES_WITHIN);
+        }
+        let new = Failures {
+            since: Instant::now(),
+            count: 0,
+        };
+        let own = failures.entry(address).or_insert(new);
+        if own.since.elapsed() >= FAILURES_WITHIN {
+            *own = new;
+        }
+        own.count = own.count.saturating_add(1);
+        if own.count <= FAILURES_MAX {
+            return Ok(());
+        }
+        let left = FAILURES_WITHIN.saturating_sub(own.since.elapsed());
+        let seconds = u32::try_from(left.as_secs()).unwrap_or(u32::MAX);
+        Err(ApiError::new(
+            ProblemKind::TooManyRequests,
+            format!(
+                "the key is not known, and this address sent more than {FAILURES_MAX} wrong keys within {} s",
+                FAILURES_WITHIN.as_secs()
+            ),
+        )
+        .after(seconds.saturating_add(1)))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -123,5 +501,87 @@ mod tests {
         for other in ["Bearer", "Bearer ", "Basic YTpi", "rh_a_b"] {
             assert_eq!(bearer(other), None, "{other}");
         }
+    }
+
+    fn allowed(method: Method, headers: &[(&str, &str)]) -> bool {
+        let guard = Guard {
+            hosts: ["rail.example".to_owned()].into(),
+            origins: ["https://dash.example".to_owned()].into(),
+            proxied: false,
+        };
+        let mut request = Request::builder().method(method).uri("/v1/jobs");
+        for (name, value) in headers {
+            request = request.header(*name, *value);
+        }
+        let (parts, ()) = request.body(()).unwrap().into_parts();
+        guard.require_direct(&parts).is_ok()
+    }
+
+    #[test]
+    fn names_that_lead_here_are_not_the_services_own() {
+        for host in [
+            "localhost",
+            "localhost:8080",
+            "127.0.0.1:1",
+            "[::1]:80",
+            "192.0.2.7",
+            "Rail.Example:9",
+        ] {
+            assert!(allowed(Method::GET, &[("host", host)]), "{host}");
+        }
+        for host in [
+            "evil.example",
+            "evil.example:8080",
+            "localhost.evil.example",
+            "127.0.0.1.evil.example",
+        ] {
+            assert!(!allowed(Method::GET, &[("host", host)]), "{host}");
+        }
+    }
+
+    #[test]
+    fn pages_of_other_origins_change_nothing() {
+        let host = ("host", "localhost:8080");
+        for header in [
+            ("origin", "http://localhost:8080"),
+            ("origin", "https://dash.example"),
+            ("sec-fetch-site", "same-origin"),
+            ("sec-fetch-site", "none"),
+        ] {
+            assert!(allowed(Method::POST, &[host, header]), "{header:?}");
+        }
+        for header in [
+            ("origin", "null"),
+            ("origin", "http://localhost:3000"),
+            ("origin", "https://evil.example"),
+            ("sec-fetch-site", "cross-site"),
+            ("sec-fetch-site", "same-site"),
+        ] {
+            assert!(!allowed(Method::POST, &[host, header]), "{header:?}");
+            assert!(!allowed(Method::DELETE, &[host, header]), "{header:?}");
+            assert!(allowed(Method::GET, &[host, header]), "{header:?}");
+        }
+    }
+
+    #[test]
+    fn what_a_proxy_passes_on_needs_a_key() {
+        for name in &FORWARDED {
+            assert!(!allowed(
+                Method::GET,
+                &[("host", "localhost"), (name.as_str(), "x")]
+            ));
+        }
+    }
+
+    #[test]
+    fn senders_without_a_key_are_their_addresses() {
+        let sender = |text: &str| RateKey::at(Peer(text.parse().unwrap()));
+        for here in ["127.0.0.1", "127.9.9.9", "::1", "::ffff:127.0.0.1"] {
+            assert_eq!(sender(here), None, "{here}");
+        }
+        assert_eq!(sender("192.0.2.1"), sender("::ffff:192.0.2.1"));
+        assert_ne!(sender("192.0.2.1"), sender("192.0.2.2"));
+        assert_eq!(sender("2001:db8:1:2::3"), sender("2001:db8:1:2:ffff::4"));
+        assert_ne!(sender("2001:db8:1:2::3"), sender("2001:db8:1:3::3"));
     }
 }

@@ -17,10 +17,10 @@ use http_body_util::BodyExt;
 use tokio::sync::OnceCell;
 use uuid::Uuid;
 
-use crate::http::problem::error::ApiError;
+use crate::http::problem::ApiError;
 use crate::http::render::format::Format;
 use crate::jobs::Jobs;
-use crate::jobs::model::job::State;
+use crate::jobs::model::State;
 
 /// For results: they never change, but they can be deleted.
 const IMMUTABLE: HeaderValue = HeaderValue::from_static("private, max-age=3600");

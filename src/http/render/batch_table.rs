@@ -6,7 +6,7 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
 use crate::http::render::forces::Forces;
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
-use crate::jobs::model::batch::BatchItem;
+use crate::jobs::model::BatchItem;
 
 /// Columns of a table for which none are named: these, [`Forces::COLUMNS`] and the rest.
 const FIRST: [&str; 5] = ["index", "id", "name", "state", "point"];

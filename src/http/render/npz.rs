@@ -11,7 +11,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use crate::contact::evaluate::answer::RowsAnswer;
-use crate::http::dto::cells::Outlines;
+use crate::http::dto::Outlines;
 use crate::http::render::csv::single;
 use crate::http::render::table::{ArrayData, Precision, Rows, Table, zone_code};
 

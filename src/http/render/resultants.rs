@@ -1,7 +1,7 @@
 //! Forces and moments as a table.
 
 use crate::contact::solution::words::answer::HistoryPoint;
-use crate::http::dto::resultants::{Resultants, Sum};
+use crate::http::dto::{Resultants, Sum};
 use crate::http::render::csv::{finish, number};
 use crate::http::render::forces::Forces;
 
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
     use crate::contact::case::words::motion::MotionWords;
     use crate::contact::solution::words::answer::{Origin, Total};
-    use crate::http::dto::resultants::{PatchResultants, PointResultants};
+    use crate::http::dto::{PatchResultants, PointResultants};
 
     fn resultants(patches: usize, points: usize) -> Resultants {
         let point = |point: usize| PointResultants {

@@ -5,7 +5,7 @@ use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
-use crate::http::dto::cells::Outlines;
+use crate::http::dto::Outlines;
 use crate::http::render::shape::outlines::{outlines, patch_outline};
 use crate::http::render::shape::resample::{Gridded, resample, resample_zone};
 

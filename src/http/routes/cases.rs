@@ -13,10 +13,9 @@ use crate::contact::solution::words::answer::{FoundBy, Understanding};
 use crate::contact::solution::words::damage::PairQuality;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
-use crate::http::limits::memory::{Memory, MemoryPermit};
+use crate::http::limits::{Memory, MemoryPermit};
 use crate::http::options::HttpOptions;
-use crate::http::problem::catalogue::problems;
-use crate::http::problem::error::ApiError;
+use crate::http::problem::{ApiError, problems};
 use crate::jobs::sync::blocking;
 
 /// A case that can be solved, and its expected cost.

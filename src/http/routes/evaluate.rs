@@ -22,27 +22,23 @@ use crate::contact::evaluate::varied::{
     Values, VariedColumn, case_of_row, column_pointer, of_first_row, of_values,
 };
 use crate::contact::monitor::{Monitor, Stop};
-use crate::http::dto::run::CellValue;
+use crate::http::dto::CellValue;
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::Caller;
-use crate::http::extract::multipart::{TableUpload, separate_template};
 use crate::http::extract::query::{Parameters, id, query};
-use crate::http::extract::rows::{declared_bytes, read_body, read_json_columns};
-use crate::http::extract::run_body::form;
+use crate::http::extract::rows::{
+    TableUpload, declared_bytes, form, read_body, read_json_columns, separate_template,
+};
 use crate::http::extract::tables::{Chunk, TableForm, TableRows, TableSource, too_large};
 use crate::http::extract::titles::{NamedColumns, faulty};
-use crate::http::limits::holding_body::hold_while_sent;
-use crate::http::limits::memory::Memory;
-use crate::http::limits::turns::Pace;
+use crate::http::limits::{Memory, Pace, hold_while_sent};
 use crate::http::options::HttpOptions;
-use crate::http::problem::catalogue::problems;
-use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
+use crate::http::problem::{ApiError, ProblemKind, problems};
 use crate::http::render::format::Format;
 use crate::http::render::npz;
 use crate::http::render::rows::{json_body, table_body};
 use crate::jobs::Jobs;
-use crate::jobs::run::head::RunColumn;
+use crate::jobs::run::model::RunColumn;
 
 /// The forms of an answer.
 const FORMATS: &[Format] = &[

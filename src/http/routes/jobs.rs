@@ -5,12 +5,10 @@ use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
 use crate::contact::case::words::solver::Case;
-use crate::http::extract::caller::Caller;
-use crate::http::extract::ids::JobId;
+use crate::http::extract::caller::{Caller, JobId};
 use crate::http::extract::json::JsonBody;
-use crate::http::limits::memory::Memory;
-use crate::http::problem::catalogue::problems;
-use crate::http::problem::error::ApiError;
+use crate::http::limits::Memory;
+use crate::http::problem::{ApiError, problems};
 use crate::http::routes::submission::{JobAccepted, Submission, SubmitParameters};
 
 problems! {

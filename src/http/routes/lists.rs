@@ -15,18 +15,16 @@ use utoipa::{IntoParams, PartialSchema};
 use utoipa_axum::router::OpenApiRouter;
 use uuid::Uuid;
 
-use crate::http::dto::job::JobAnswer;
+use crate::http::dto::JobAnswer;
 use crate::http::extract::caller::Caller;
-use crate::http::extract::labels::{label, name, time};
-use crate::http::extract::query::{Parameters, Query, Reader, Repeated, count, query, reader};
-use crate::http::problem::catalogue::describe;
-use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
+use crate::http::extract::query::{
+    Parameters, Query, Reader, Repeated, count, label, name, query, reader, time,
+};
+use crate::http::problem::{ApiError, ProblemKind, describe};
 use crate::http::render::format::Format;
 use crate::http::routes::work::{WorkAnswer, answer_name, route, text_header};
 use crate::http::state::AppState;
-use crate::jobs::model::job::State as JobState;
-use crate::jobs::model::kind::Kind;
+use crate::jobs::model::{Kind, State as JobState};
 use crate::jobs::{Filter, Membership, PAGE_MAX, Total};
 
 /// Entries of a page for which no number is given.

@@ -1,34 +1,18 @@
 //! The resources of the API, one file each. Handlers read a request, call `jobs` and answer.
 
-pub(super) mod batch_lines;
-pub(super) mod batch_results;
 pub(super) mod batches;
 pub(super) mod cases;
-pub(super) mod damage;
 pub(super) mod evaluate;
-pub(super) mod event_stream;
 pub(super) mod evolutions;
 pub(super) mod fields;
 pub(super) mod jobs;
 pub(super) mod lists;
-pub(super) mod me;
-pub(super) mod part_request;
-pub(super) mod plot_views;
-pub(super) mod plot_words;
+pub(super) mod parts;
 pub(super) mod plots;
-pub(super) mod point_fields;
 pub(super) mod profiles;
-pub(super) mod resultants;
 pub(super) mod results;
-pub(super) mod run_results;
-pub(super) mod run_row;
-pub(super) mod run_totals;
 pub(super) mod runs;
 pub(super) mod service;
-pub(super) mod stored_fields;
 pub(super) mod submission;
-pub(super) mod subsurface;
-pub(super) mod tenant_events;
 pub(super) mod wait;
 pub(super) mod work;
-pub(super) mod zones;

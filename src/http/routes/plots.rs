@@ -1,21 +1,335 @@
-//! `/v1/jobs/{id}/plot.svg` and `/plot.png`: a picture of one patch for one motion.
-
+//! `/v1/jobs/{id}/plot.svg` and `plot.png`: pictures of a result.
 use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
+use crate::contact::solution::words::answer::{PatchCells, PointSolution, Solution, Total};
 use crate::http::extract::query::{Parameters, count, index, query, reader, require_index, word};
-use crate::http::limits::holding_body::hold_while_sent;
-use crate::http::problem::error::ApiError;
+use crate::http::limits::hold_while_sent;
+use crate::http::problem::ApiError;
 use crate::http::render::format::Format;
+use crate::http::render::picture::curve::{self, Curve, CurveLine};
 use crate::http::render::picture::draw::draw;
+use crate::http::render::picture::profile_view::{self, ProfileView, ProfileViewPatch};
 use crate::http::render::picture::raster;
 use crate::http::render::picture::scene::Scene;
+use crate::http::render::picture::section::{self, Sections};
 use crate::http::render::table::File;
-use crate::http::routes::part_request::PartRequest;
-use crate::http::routes::plot_views::{Drawing, drawing};
-use crate::http::routes::plot_words::{PlotOptions, View, counted, remarks};
-use crate::http::routes::stored_fields::{FieldProblems, stored};
+use crate::http::routes::parts::{FieldProblems, PartRequest, stored};
+use crate::jobs::Jobs;
+use crate::jobs::error::JobsError;
+use crate::jobs::model::names;
+
+/// What a picture shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum View {
+    /// One patch from above.
+    Patch,
+    /// Forces over the motions.
+    Curve,
+    /// Traction and friction's bound along and across, through the largest traction of a patch.
+    Section,
+    /// The patches on wheel and rail; of `profiles`.
+    Profiles,
+}
+
+names! {
+    pub(crate) View {
+        Patch = "patch",
+        Curve = "curve",
+        Section = "section",
+        Profiles = "profiles",
+    }
+}
+
+/// What a picture shows, and how wide it is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PlotOptions {
+    /// What is drawn.
+    pub view: View,
+    /// The field.
+    pub shown: Output,
+    /// Number of the patch.
+    pub patch: usize,
+    /// Number of the motion.
+    pub point: usize,
+    /// Width in pixels.
+    pub width: u32,
+    /// Both ends of the scale, if they are given.
+    pub range: Option<[f64; 2]>,
+}
+
+/// Which patch and motion this is, where there are several.
+pub(crate) fn counted(wish: PlotOptions, patches: usize, points: usize) -> String {
+    let mut text = String::new();
+    if patches > 1 {
+        text += &format!(", patch {} of 0 to {}", wish.patch, patches - 1);
+    }
+    if points > 1 {
+        text += &format!(", point {} of 0 to {}", wish.point, points - 1);
+    }
+    text
+}
+
+/// Motion and forces in two lines.
+pub(crate) fn remarks(point: &PointSolution, normal: f64, counted: &str) -> Vec<String> {
+    let motion = point.motion;
+    // What rounding leaves of a force that is nothing.
+    let force = |value: f64| {
+        let lost = value.abs() < 1e-9 * normal;
+        short(if lost { 0.0 } else { value })
+    };
+    vec![
+        format!(
+            "creepage x {}, y {}, spin {} 1/mm{counted}",
+            short(motion.creepage_x),
+            short(motion.creepage_y),
+            short(motion.spin_per_mm),
+        ),
+        format!(
+            "normal force {} N; on the lower body: force x {} N, y {} N, moment {} N·mm",
+            short(normal),
+            force(point.force_x_n),
+            force(point.force_y_n),
+            force(point.moment_z_n_mm)
+        ),
+    ]
+}
+
+/// A number with four digits that count.
+pub(crate) fn short(value: f64) -> String {
+    let size = value.abs();
+    let text = if size == 0.0 {
+        "0".to_owned()
+    } else if (1e-3..1e4).contains(&size) {
+        let digits = (3.0 - size.log10().floor()).clamp(0.0, 6.0);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "from 0 to 6"
+        )]
+        let text = format!("{value:.*}", digits as usize);
+        if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
+        }
+    } else if (1e4..1e9).contains(&size) {
+        format!("{value:.0}")
+    } else {
+        let text = format!("{value:.3e}");
+        let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        let digits = digits.trim_end_matches('0').trim_end_matches('.');
+        format!("{digits}e{exponent}")
+    };
+    text.replace('-', "−")
+}
+
+/// Draws when its turn has come.
+pub(crate) type Drawing = Box<dyn FnOnce(u32) -> Result<String, ApiError> + Send>;
+
+/// What draws this view.
+///
+/// # Errors
+/// There is nothing of it to be drawn, or there is no result.
+pub(crate) async fn drawing(
+    request: &PartRequest,
+    title: String,
+    wish: PlotOptions,
+) -> Result<Drawing, ApiError> {
+    let (jobs, id) = (&request.jobs, request.id);
+    let solution = jobs.solution(id).await?;
+    match wish.view {
+        View::Curve => of_curve(title, &solution),
+        View::Profiles => of_profiles(jobs, id, title, solution).await,
+        View::Section | View::Patch => of_section(jobs, id, title, wish, &solution).await,
+    }
+}
+
+fn of_curve(title: String, solution: &Solution) -> Result<Drawing, ApiError> {
+    let points = solution
+        .patches
+        .first()
+        .map_or(&[][..], |patch| &patch.points);
+    if points.len() < 2 {
+        return Err(ApiError::bad_parameter(
+            "view",
+            "the case has one motion; a curve needs several, as of a sweep",
+        ));
+    }
+    let (x_name, x) = varying(points);
+    let line = |name, force: fn(&Total) -> [Option<f64>; 2]| CurveLine {
+        name,
+        y: solution
+            .total
+            .iter()
+            .filter_map(|total| force(total)[0])
+            .collect(),
+        error: solution.total.iter().map(|total| force(total)[1]).collect(),
+    };
+    let bounds = solution.patches.iter().map(|patch| patch.friction_limit_n);
+    let normal: f64 = solution
+        .patches
+        .iter()
+        .map(|patch| patch.normal_force_n)
+        .sum();
+    let curve = Curve {
+        title,
+        remarks: vec![format!(
+            "{} motions, normal force {} N",
+            points.len(),
+            short(normal)
+        )],
+        x_name: x_name.to_owned(),
+        x,
+        lines: vec![
+            line("force x (along rolling)", |total| {
+                [
+                    Some(total.force_x_n),
+                    total.error_estimate.map(|error| error.force_x_n),
+                ]
+            }),
+            line("force y (across)", |total| {
+                [
+                    Some(total.force_y_n),
+                    total.error_estimate.map(|error| error.force_y_n),
+                ]
+            }),
+        ],
+        bound: bounds.sum(),
+    };
+    Ok(Box::new(move |width| Ok(curve::draw(&curve, width))))
+}
+
+/// The component that varies most from motion to motion, measured by what it does to the patch, and its values; of a history the distance.
+fn varying(points: &[PointSolution]) -> (&'static str, Vec<f64>) {
+    type Component = fn(&PointSolution) -> f64;
+    let distance = |point: &PointSolution| Some(point.history?.distance_mm);
+    if let Some(distances) = points.iter().map(distance).collect() {
+        return ("distance rolled in mm", distances);
+    }
+    let length = points
+        .first()
+        .map_or(1.0, |point| point.normalised.length_mm);
+    let components: [(&str, f64, Component); 3] = [
+        ("creepage x", 1.0, |point| point.motion.creepage_x),
+        ("creepage y", 1.0, |point| point.motion.creepage_y),
+        ("spin in 1/mm", length, |point| point.motion.spin_per_mm),
+    ];
+    let spread = |weight: f64, of: Component| {
+        let values = points.iter().map(of);
+        let most = values.clone().fold(f64::NEG_INFINITY, f64::max);
+        weight * (most - values.fold(f64::INFINITY, f64::min))
+    };
+    let most = components
+        .into_iter()
+        .max_by(|a, b| spread(a.1, a.2).total_cmp(&spread(b.1, b.2)));
+    let (name, _, of) = most.unwrap_or(components[0]);
+    (name, points.iter().map(of).collect())
+}
+
+async fn of_section(
+    jobs: &Jobs,
+    id: Uuid,
+    title: String,
+    wish: PlotOptions,
+    solution: &Solution,
+) -> Result<Drawing, ApiError> {
+    let patches = solution.patches.len();
+    require_index("patch", Some(wish.patch), patches)?;
+    let patch = &solution.patches[wish.patch];
+    require_index("point", Some(wish.point), patch.points.len())?;
+    let (cells, values) = stored(jobs, id, wish.patch, wish.point, Output::Tractions).await?;
+    let counted = counted(wish, patches, patch.points.len());
+    let sections = Sections {
+        title,
+        remarks: remarks(&patch.points[wish.point], patch.normal_force_n, &counted),
+        cells,
+        values,
+        friction: solution
+            .asked
+            .as_ref()
+            .filter(|asked| !asked.friction_varies)
+            .map(|asked| asked.friction_coefficient),
+    };
+    Ok(Box::new(move |width| Ok(section::draw(&sections, width))))
+}
+
+async fn of_profiles(
+    jobs: &Jobs,
+    id: Uuid,
+    title: String,
+    solution: Solution,
+) -> Result<Drawing, ApiError> {
+    let mut patches = Vec::new();
+    for (number, patch) in solution.patches.iter().enumerate() {
+        // The wheelset has two wheels in every position.
+        let Some(position) = patch.position.filter(|_| solution.wheelset.is_none()) else {
+            return Err(ApiError::bad_parameter(
+                "view",
+                "only contacts of the type `profiles` have one wheel and one rail",
+            ));
+        };
+        let cells = match jobs.point_fields(id, number, 0).await {
+            Err(JobsError::NoSuchPatch { .. }) => PatchCells::default(),
+            fields => fields?.meshes.pop().unwrap_or_default(),
+        };
+        patches.push(ProfileViewPatch { position, cells });
+    }
+    let case = jobs.case(id).await?;
+    let jobs = jobs.clone();
+    Ok(Box::new(move |width| {
+        let case: Value =
+            serde_json::from_slice(&case).map_err(|error| ApiError::internal(&error))?;
+        // It was sound when it was submitted.
+        let checked = jobs.check(&case).map_err(ApiError::from)?;
+        let understood = checked
+            .understood()
+            .map_err(|error| ApiError::internal(&error))?;
+        let placed = understood
+            .placement
+            .ok_or_else(|| ApiError::internal(&"a case of profiles without a placement"))?;
+        let pressed = match patches
+            .iter()
+            .any(|patch| patch.cells.pressure_mpa.is_some())
+        {
+            true => "pressure stands on the rail",
+            false => "without `pressure` among its outputs",
+        };
+        let count = patches.len();
+        let view = ProfileView {
+            title,
+            remarks: vec![
+                format!(
+                    "{count} {}; {pressed}",
+                    if count == 1 { "patch" } else { "patches" }
+                ),
+                solution
+                    .patches
+                    .iter()
+                    .enumerate()
+                    .map(|(number, patch)| {
+                        format!(
+                            "{number}: {} N, {} MPa",
+                            short(patch.normal_force_n),
+                            short(patch.pressure_max_mpa)
+                        )
+                    })
+                    .collect::<Vec<_>>()
+                    .join("; "),
+            ],
+            placed,
+            lowering: solution.wheel_lowering_mm.unwrap_or(0.0),
+            patches,
+        };
+        Ok(profile_view::draw(&view, width))
+    }))
+}
 
 /// Width of a picture in pixels when nothing is said.
 pub(crate) const WIDTH_DEFAULT: u32 = 800;
@@ -204,4 +518,25 @@ async fn of_patch(
         values,
     };
     Ok(Box::new(move |width| Ok(draw(&scene, width))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.001, "0.001"),
+            (-0.0004, "−4e−4"),
+            (1.25e-12, "1.25e−12"),
+            (100_000.0, "100000"),
+            (1234.56, "1235"),
+            (12.3456, "12.35"),
+            (-3.0, "−3"),
+        ] {
+            assert_eq!(short(value), text);
+        }
+    }
 }

@@ -12,13 +12,11 @@ use utoipa::ToSchema;
 use crate::contact::case::words::cross_section::CrossSection;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::words::damage::SectionQuality;
-use crate::http::dto::job::rfc3339;
+use crate::http::dto::rfc3339;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
 use crate::http::extract::query::Parameters;
-use crate::http::problem::catalogue::problems;
-use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
+use crate::http::problem::{ApiError, ProblemKind, problems};
 use crate::http::routes::lists::{LIMIT_DEFAULT, PageQuery, answer};
 
 /// The digest in the path.

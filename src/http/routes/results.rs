@@ -1,22 +1,31 @@
-//! `/v1/jobs/{id}/result`: everything small about the answer of a job.
-
+//! `/v1/jobs/{id}/result` and its small parts: forces, stresses below the surface, and damage.
+use axum::Json;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::{StreamExt, TryStreamExt, stream};
+use railhead_macros::none_is_absent;
+use serde::Serialize;
+use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::http::dto::result::JobResult;
-use crate::http::extract::caller::Caller;
-use crate::http::extract::ids::JobId;
+use crate::contact::case::words::solver::Output;
+use crate::contact::case::words::subsurface::BodyName;
+use crate::contact::post::subsurface::states::{STORED, points};
+use crate::contact::solution::words::answer::Solution;
+use crate::contact::solution::words::damage::{Damage, DamageFiguresUsed};
+use crate::contact::solution::words::evolution::{PassageSummary, StressPoint};
+use crate::http::dto::{JobResult, Resultants, sums};
+use crate::http::extract::accept::{choose, one_of};
+use crate::http::extract::caller::{Caller, JobId};
+use crate::http::extract::query::{Parameters, index, query, require_index};
 use crate::http::layers::etag::{Precondition, tagged};
-use crate::http::limits::holding_body::hold_while_sent;
-use crate::http::limits::memory::{Memory, SMALL_BYTES};
-use crate::http::limits::tenant_semaphore::Permit;
-use crate::http::problem::catalogue::problems;
-use crate::http::problem::error::ApiError;
+use crate::http::limits::{Memory, Permit, SMALL_BYTES, hold_while_sent};
+use crate::http::problem::{ApiError, problems};
 use crate::http::render::format::Format;
+use crate::http::render::{resultants, stresses};
+use crate::http::routes::parts::{FieldProblems, PartRequest, not_asked, stored};
 use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::http::routes::work::await_end;
 use crate::jobs::Jobs;
@@ -87,4 +96,239 @@ pub(crate) async fn result_text(
         Body::from_stream(pieces)
     };
     Ok((body, share))
+}
+
+problems! {
+    /// What parts of a result can fail with.
+    PartProblems: BadQuery, JobNotFound, ResultNotReady, JobFailed, JobCancelled
+}
+
+/// The forms that resultants come in.
+const FORMS: &[Format] = &[Format::Json, Format::Csv];
+
+query! {
+    /// Parameters of resultants.
+    ResultantsQuery(() => ()) {
+        /// Only this motion, counted from 0
+        point: usize as u32 = index();
+        /// Only this patch, counted from 0; `total` stays the sum over all
+        patch: usize as u32 = index();
+        /// `json` or `csv`; overrides `Accept`
+        #[param(pattern = "^(json|csv)$", example = "csv")]
+        format: Format as String = one_of(FORMS);
+    }
+}
+
+/// Forces and moments of a succeeded job. They are always computed, whatever the case asked for.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/resultants",
+    tag = "results",
+    operation_id = "get_resultants",
+    params(
+        ("id" = String, Path, description = "Id of the job", format = "uuid"),
+        ResultantsQuery
+    ),
+    responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` as its patch", content((Resultants = "application/json"), (String = "text/csv"))), PartProblems)
+)]
+pub(crate) async fn resultants(request: PartRequest) -> Result<Response, ApiError> {
+    let query = ResultantsQuery::read(&request.uri, &())?;
+    let format = choose(&request.headers, query.format, FORMS)?;
+    let answer = write_resultants(&request, query.point, query.patch, format);
+    request.unless_known(format, answer).await
+}
+
+async fn write_resultants(
+    request: &PartRequest,
+    point: Option<usize>,
+    patch: Option<usize>,
+    format: Format,
+) -> Result<Response, ApiError> {
+    let (jobs, id) = (&request.jobs, request.id);
+    // The stored text is read whole and cut to what was asked for.
+    let turn = request.rendering(2 * jobs.answer_bytes(id).await?).await?;
+    let text = jobs.answer(id).await?;
+    let read = move || {
+        let solution: Solution =
+            serde_json::from_slice(&text).map_err(|error| ApiError::internal(&error))?;
+        drop(text);
+        require_index("point", point, solution.total.len())?;
+        require_index("patch", patch, solution.patches.len())?;
+        let sums = sums(&solution);
+        let resultants = Resultants::select(solution, point, patch);
+        match format {
+            Format::Csv => {
+                resultants::csv(&resultants, &sums).map_err(|error| ApiError::internal(&error))
+            }
+            _ => serde_json::to_vec(&resultants).map_err(|error| ApiError::internal(&error)),
+        }
+    };
+    let (body, share) = turn.run(read, Vec::len).await?;
+    let response = format.answer("resultants", body);
+    Ok(hold_while_sent(response, share))
+}
+
+/// The forms that stresses come in.
+/// What a point takes as text, in bytes.
+const POINT_BYTES: usize = 900;
+
+query! {
+    /// Parameters of stresses below the surface.
+    SubsurfaceQuery(() => ()) {
+        /// The motion, counted from 0; 0 when left out
+        point: usize as u32 = index();
+        /// The patch, counted from 0; 0 when left out
+        patch: usize as u32 = index();
+        /// `json` or `csv`; overrides `Accept`
+        #[param(pattern = "^(json|csv)$", example = "csv")]
+        format: Format as String = one_of(FORMS);
+    }
+}
+
+/// Stresses below one patch for one motion.
+#[none_is_absent]
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Stresses)]
+pub(crate) struct SubsurfaceAnswer {
+    /// Number of the patch, counted from 0.
+    patch: usize,
+    /// Number of the motion, counted from 0.
+    point: usize,
+    /// The body.
+    body: BodyName,
+    /// Points asked for above this depth in mm are answered at it.
+    least_depth_mm: f64,
+    /// The requested points, in the order of the case.
+    points: Vec<StressPoint>,
+    /// Where von Mises' stress is largest; absent if the case did not want it.
+    worst: Option<StressPoint>,
+    /// What a point of the body lives through while the contact rolls over it; absent if the case did not want it.
+    passage: Option<PassageSummary>,
+}
+
+/// Stresses below the surface of a succeeded job.
+///
+/// Axes of the patch: x along rolling, y to the left, z up; depth is positive into the body, tension is positive.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/subsurface",
+    tag = "results",
+    operation_id = "get_subsurface",
+    params(
+        ("id" = String, Path, description = "Id of the job", format = "uuid"),
+        SubsurfaceQuery
+    ),
+    responses((status = 200, description = "Stresses at the requested points in the order of the case, and the worst point. CSV: one line per requested point", content((SubsurfaceAnswer = "application/json"), (String = "text/csv"))), FieldProblems)
+)]
+pub(crate) async fn subsurface(request: PartRequest) -> Result<Response, ApiError> {
+    let query = SubsurfaceQuery::read(&request.uri, &())?;
+    let (patch, point) = (query.patch.unwrap_or(0), query.point.unwrap_or(0));
+    let format = choose(&request.headers, query.format, FORMS)?;
+    let answer = write_stresses(&request, patch, point, format);
+    request.unless_known(format, answer).await
+}
+
+async fn write_stresses(
+    request: &PartRequest,
+    patch: usize,
+    point: usize,
+    format: Format,
+) -> Result<Response, ApiError> {
+    let (jobs, id) = (&request.jobs, request.id);
+    let output = Output::Subsurface;
+    let (_, values) = stored(jobs, id, patch, point, output).await?;
+    let solution = jobs.solution(id).await?;
+    require_index("patch", Some(patch), solution.patches.len())?;
+    let motions = &solution.patches[patch].points;
+    require_index("point", Some(point), motions.len())?;
+    let Some(summary) = motions[point].subsurface else {
+        return not_asked(jobs, id, output).await;
+    };
+    let kept = values.subsurface.unwrap_or_default();
+    let turn = request.rendering(POINT_BYTES * (kept.len() / STORED + 1));
+    let write = move || {
+        let points = points(&kept);
+        if format == Format::Csv {
+            return stresses::csv(&points).map_err(|error| ApiError::internal(&error));
+        }
+        let answer = SubsurfaceAnswer {
+            patch,
+            point,
+            body: summary.body,
+            least_depth_mm: summary.least_depth_mm,
+            points,
+            worst: summary.worst,
+            passage: summary.passage,
+        };
+        serde_json::to_vec(&answer).map_err(|error| ApiError::internal(&error))
+    };
+    let (text, share) = turn.await?.run(write, Vec::len).await?;
+    let response = format.answer("subsurface", text);
+    Ok(hold_while_sent(response, share))
+}
+
+query! {
+    /// Parameters of damage.
+    DamageQuery(() => ()) {
+        /// The motion, counted from 0; 0 when left out
+        point: usize as u32 = index();
+        /// The patch, counted from 0; 0 when left out
+        patch: usize as u32 = index();
+    }
+}
+
+/// Damage of one pass over one patch for one motion.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct PatchDamage {
+    /// Number of the patch, counted from 0.
+    patch: usize,
+    /// Number of the motion, counted from 0.
+    point: usize,
+    /// The models that the case asked for.
+    #[serde(flatten)]
+    damage: Damage,
+    /// The figures they were evaluated with.
+    parameters: DamageFiguresUsed,
+}
+
+/// Damage of a succeeded job.
+#[utoipa::path(
+    get,
+    path = "/v1/jobs/{id}/damage",
+    tag = "results",
+    operation_id = "get_damage",
+    params(
+        ("id" = String, Path, description = "Id of the job", format = "uuid"),
+        DamageQuery
+    ),
+    responses((status = 200, description = "The models that the case asked for", body = PatchDamage), FieldProblems)
+)]
+pub(crate) async fn damage(request: PartRequest) -> Result<Response, ApiError> {
+    let query = DamageQuery::read(&request.uri, &())?;
+    let (patch, point) = (query.patch.unwrap_or(0), query.point.unwrap_or(0));
+    let answer = write_damage(&request, patch, point);
+    request.unless_known(Format::Json, answer).await
+}
+
+async fn write_damage(
+    request: &PartRequest,
+    patch: usize,
+    point: usize,
+) -> Result<Response, ApiError> {
+    let (jobs, id) = (&request.jobs, request.id);
+    let solution = jobs.solution(id).await?;
+    require_index("patch", Some(patch), solution.patches.len())?;
+    let motions = &solution.patches[patch].points;
+    require_index("point", Some(point), motions.len())?;
+    let damage = motions[point].damage.as_deref();
+    let (Some(damage), Some(parameters)) = (damage, &solution.damage_parameters) else {
+        return not_asked(jobs, id, Output::Damage).await;
+    };
+    let answer = PatchDamage {
+        patch,
+        point,
+        damage: damage.clone(),
+        parameters: parameters.as_ref().clone(),
+    };
+    Ok(Json(answer).into_response())
 }

@@ -1,20 +1,40 @@
-//! `POST /v1/runs`: many rows over one case, followed and cancelled as one.
+//! `/v1/runs`: many rows over one case, their answers and totals.
+use std::collections::{BTreeMap, VecDeque};
+use std::ops::Range;
 
+use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
+use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
+use axum::{Extension, Json};
+use futures_util::stream::{self, StreamExt, try_unfold};
+use railhead_macros::none_is_absent;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::http::dto::run::RunRequest;
-use crate::http::extract::multipart::{TableUpload, separate_template};
-use crate::http::extract::query::{Repeated, id, query, reader};
-use crate::http::extract::run_body::{form, read_run};
+use crate::http::dto::{AnswerColumn, RunRequest, answer_columns};
+use crate::http::extract::accept::{choose, one_of};
+use crate::http::extract::caller::{Caller, Credential, RunId, RunRowId, revoked, until_revoked};
+use crate::http::extract::query::{Parameters, Repeated, id, query, reader};
+use crate::http::extract::rows::{TableUpload, form, read_run, separate_template};
 use crate::http::extract::titles::{NamedColumns, named_column};
-use crate::http::limits::memory::Memory;
+use crate::http::limits::{Memory, hold_while_sent};
 use crate::http::options::HttpOptions;
-use crate::http::problem::catalogue::problems;
-use crate::http::problem::error::ApiError;
+use crate::http::problem::{ApiError, ProblemKind, problems};
+use crate::http::render::format::Format;
+use crate::http::render::row_tables::{RowWriter, WriteError};
 use crate::http::routes::submission::{NamedQuery, RunAccepted, Submission, SubmitParameters};
+use crate::http::routes::wait::{Wait, WaitQuery};
+use crate::http::routes::work::await_end;
+use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+use crate::jobs::model::Kind;
 use crate::jobs::run::draft::RunOptions;
+use crate::jobs::run::model::Run;
+use crate::jobs::run::results::ChunkRef;
+use crate::jobs::sync::blocking;
+use crate::jobs::{Jobs, JobsError};
 
 problems! {
     /// What `POST /v1/runs` can fail with.
@@ -95,4 +115,772 @@ pub(crate) async fn submit(
     reply
         .send(&jobs, &memory, (run.into(), replayed), None)
         .await
+}
+
+/// What a reader of answers holds: a chunk as columns and as text.
+const STREAM_BYTES: usize = 12 << 20;
+
+/// The forms that answers come in.
+const FORMATS: &[Format] = &[Format::Ndjson, Format::Csv, Format::Arrow, Format::Parquet];
+
+query! {
+    /// Parameters of the results of a run.
+    RunResultsQuery(() => ()) {
+        /// Only these columns, with commas between, such as `row,force_y_n,status`
+        #[param(example = "row,status,force_y_n")]
+        columns: Vec<String> as String = reader("names of columns with commas between", |text| {
+            Some(text.split(',').map(|name| name.trim().to_owned()).collect())
+        });
+        /// Only the rows from the first number on and before the second, such as `1000:2000`; either may be left out
+        #[param(pattern = "^[0-9]*:[0-9]*$", example = "1000:2000")]
+        rows: Range<u64> as String = reader("two row numbers with a colon between, such as `1000:2000`; either may be left out", row_range);
+        /// `ndjson`, `csv`, `arrow` or `parquet`; overrides `Accept`
+        #[param(pattern = "^(ndjson|csv|arrow|parquet)$", example = "parquet")]
+        format: Format as String = one_of(FORMATS);
+    }
+}
+
+fn row_range(text: &str) -> Option<Range<u64>> {
+    let (begin, end) = text.split_once(':')?;
+    let number = |text: &str, none| match text {
+        "" => Some(none),
+        digits => digits.parse().ok(),
+    };
+    let range = number(begin, 0)?..number(end, u64::MAX)?;
+    (range.start <= range.end).then_some(range)
+}
+
+problems! {
+    /// What the results of a run can fail with.
+    RunResultProblems: BadQuery, RunNotFound, ResultNotReady, Overloaded
+}
+
+/// One row of the results, in NDJSON. The other columns are those that `answers` of the run lists.
+#[derive(Debug, Serialize, ToSchema)]
+#[allow(dead_code, reason = "the contract; rows are written column by column")]
+pub(crate) struct RunRow {
+    /// Number of the row in what was sent, counted from 0.
+    row: u64,
+    /// What became of the row: `ok`; `target_missed`, the estimated error is above the target; `refused`, its case has faults; `not_covered`,
+    /// `not_converged`, `unsolvable`, `out_of_time`, `solver_failed`; or why its piece of the run was not solved, such as `cancelled`.
+    status: String,
+    /// The method that answered it; null without an answer.
+    method: Option<String>,
+    /// Why it has no answer, such as the first fault of its case; null with an answer.
+    reason: Option<String>,
+}
+
+/// The answers of an ended run in the order of its rows.
+///
+/// One line, or one row of a table, for each row that was sent, whatever became of it. Columns: `row`, the columns that were passed through unchanged,
+/// `status`, `method`, then numbers and `reason`: forces and moment are sums over the patches about the origin of the case, `error_estimate` is that of
+/// the less certain force, and `reason` tells why a row has no answer. A cancelled run keeps the answers it had computed.
+#[utoipa::path(
+    get,
+    path = "/v1/runs/{id}/results",
+    tag = "runs",
+    operation_id = "get_run_results",
+    params(
+        ("id" = String, Path, description = "Id of the run", format = "uuid"),
+        RunResultsQuery,
+        WaitQuery,
+        ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
+    ),
+    responses((status = 200, description = "One line or row for each row", content(
+        (RunRow = "application/x-ndjson"),
+        (String = "text/csv"),
+        (Vec<u8> = "application/vnd.apache.arrow.stream"),
+        (Vec<u8> = "application/vnd.apache.parquet")
+    )), RunResultProblems)
+)]
+pub(crate) async fn results(
+    Caller(jobs): Caller,
+    RunId(id): RunId,
+    wait: Wait,
+    uri: Uri,
+    State(memory): State<Memory>,
+    key: Option<Extension<Credential>>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    let (query, _) = <(RunResultsQuery, WaitQuery)>::read(&uri, &())?;
+    let format = choose(&headers, query.format, FORMATS)?;
+    await_end(&jobs.of_kind(Kind::Rows), id, &wait).await?;
+    let run = jobs.run(id).await?;
+    require_ended(&run)?;
+    let columns = selected(&run, query.columns)?;
+    let share = memory.ready_answer(jobs.tenant(), STREAM_BYTES)?;
+    let mut writer =
+        RowWriter::new(format, &columns).map_err(|error| ApiError::internal(&error))?;
+    let head = writer.head().map_err(|error| ApiError::internal(&error))?;
+    let rows = query.rows.unwrap_or(0..u64::MAX);
+    let mut answers = Answers {
+        rows: rows.start..rows.end.min(run.head.rows),
+        wanted: columns.into_iter().map(|(name, _)| name).collect(),
+        source: ChunkSource::new(jobs.clone(), run),
+    };
+    // Answers that cannot be read are an error as long as the head has not been sent.
+    let (first, writer) = answers.next(writer).await.map_err(unreadable)?;
+    let rest = writer.map(|writer| (answers, writer));
+    let rest = try_unfold(rest, |state| async move {
+        let Some((mut answers, writer)) = state else {
+            return Ok(None);
+        };
+        let next = answers.next(writer).await.inspect_err(|error| {
+            tracing::error!(%error, run = %answers.source.run.chunks.id, "answers of a run cannot be read");
+        });
+        let (piece, writer) = next?;
+        Ok(Some((piece, writer.map(|writer| (answers, writer)))))
+    });
+    let begin = stream::iter([Ok::<_, WriteError>(Bytes::from(head)), Ok(first)]);
+    let revoked = revoked(jobs, key.map(|Extension(key)| key));
+    let body = Body::from_stream(until_revoked(begin.chain(rest), revoked));
+    let response = format.answer(&format!("run-{id}"), body);
+    Ok(hold_while_sent(wait.tell_applied(response), share))
+}
+
+/// Why answers cannot be read.
+fn unreadable(error: WriteError) -> ApiError {
+    match error.downcast::<JobsError>() {
+        Ok(error) => ApiError::from(*error),
+        Err(error) => ApiError::internal(&error),
+    }
+}
+
+/// A run has answers once it has ended.
+pub(crate) fn require_ended(run: &Run) -> Result<(), ApiError> {
+    match run.state() {
+        state if state.ended() => Ok(()),
+        state => Err(ApiError::new(
+            ProblemKind::ResultNotReady,
+            format!(
+                "the run is {}; {} of {} rows are over",
+                state.name(),
+                run.rows_done(),
+                run.head.rows
+            ),
+        )),
+    }
+}
+
+/// The columns that are wanted, in the order of the answers.
+pub(crate) fn selected(
+    run: &Run,
+    wanted: Option<Vec<String>>,
+) -> Result<Vec<(String, TableKind)>, ApiError> {
+    let mut columns = run.head.answers();
+    let Some(wanted) = wanted else {
+        return Ok(columns);
+    };
+    if let Some(unknown) = wanted
+        .iter()
+        .find(|name| !columns.iter().any(|(known, _)| known == *name))
+    {
+        let known: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+        return Err(ApiError::bad_parameter(
+            "columns",
+            format!(
+                "`{unknown}` is no column of this run; allowed: {}",
+                known.join(", ")
+            ),
+        ));
+    }
+    columns.retain(|(name, _)| wanted.contains(name));
+    Ok(columns)
+}
+
+/// The chunks of a run, one after the other.
+pub(crate) struct ChunkSource {
+    jobs: Jobs,
+    /// The run.
+    pub run: Run,
+    read: VecDeque<ChunkRef>,
+    last: Option<Uuid>,
+    over: bool,
+}
+
+impl ChunkSource {
+    /// The chunks of a run from the first on.
+    pub(crate) fn new(jobs: Jobs, run: Run) -> ChunkSource {
+        ChunkSource {
+            jobs,
+            run,
+            read: VecDeque::new(),
+            last: None,
+            over: false,
+        }
+    }
+
+    /// The next chunk.
+    pub(crate) async fn next(&mut self) -> Result<Option<ChunkRef>, JobsError> {
+        if self.read.is_empty() && !self.over {
+            let more = self.jobs.run_chunks(self.run.chunks.id, self.last).await?;
+            self.last = more.last().map(|chunk| chunk.job);
+            self.over = more.is_empty();
+            self.read.extend(more);
+        }
+        Ok(self.read.pop_front())
+    }
+
+    /// The answers of a chunk.
+    pub(crate) async fn answers(
+        &self,
+        chunk: &ChunkRef,
+        wanted: Vec<String>,
+    ) -> Result<RowTable, JobsError> {
+        self.jobs
+            .chunk_answers(&self.run.head, chunk, Some(wanted))
+            .await
+    }
+}
+
+/// Answers under way to a client.
+struct Answers {
+    source: ChunkSource,
+    rows: Range<u64>,
+    wanted: Vec<String>,
+}
+
+impl Answers {
+    /// The next piece, and the writer if there is more to come.
+    async fn next(
+        &mut self,
+        mut writer: RowWriter,
+    ) -> Result<(Bytes, Option<RowWriter>), WriteError> {
+        while let Some(chunk) = self.source.next().await? {
+            let own = self.source.run.head.rows_of(chunk.index);
+            let common = own.start.max(self.rows.start)..own.end.min(self.rows.end);
+            if common.is_empty() {
+                continue;
+            }
+            let table = self.source.answers(&chunk, self.wanted.clone()).await?;
+            let place = |row: u64| usize::try_from(row - own.start).unwrap_or(usize::MAX);
+            let cut = place(common.start)..place(common.end);
+            let written = blocking(move || {
+                let piece = writer.write(table.cut(&cut));
+                (piece, writer)
+            });
+            let (piece, writer) = written.await?;
+            return Ok((Bytes::from(piece?), Some(writer)));
+        }
+        Ok((Bytes::from(writer.finish()?), None))
+    }
+}
+
+/// The files of an ended run, for programs that read them in place.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct RunManifest {
+    /// Identifier of the run.
+    #[schema(format = "uuid")]
+    id: String,
+    /// Number of rows.
+    rows: u64,
+    /// The columns of every file, in their order.
+    columns: Vec<AnswerColumn>,
+    /// The files in the order of their rows.
+    files: Vec<RunFile>,
+}
+
+/// A file of answers.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct RunFile {
+    /// Number of its first row.
+    first_row: u64,
+    /// Number of its rows.
+    rows: u64,
+    /// Key of the Parquet file below `--results-url`, or below the data folder; null where these rows were not solved.
+    key: Option<String>,
+    /// Where these rows are answered as Parquet.
+    url: String,
+}
+
+/// Where the answers of an ended run lie: a Parquet file for each piece of it.
+#[utoipa::path(
+    get,
+    path = "/v1/runs/{id}/manifest",
+    tag = "runs",
+    operation_id = "get_run_manifest",
+    params(("id" = String, Path, description = "Id of the run", format = "uuid")),
+    responses((status = 200, description = "The files", body = RunManifest), RunResultProblems)
+)]
+pub(crate) async fn manifest(
+    Caller(jobs): Caller,
+    RunId(id): RunId,
+) -> Result<Json<RunManifest>, ApiError> {
+    let run = jobs.run(id).await?;
+    require_ended(&run)?;
+    let (rows, columns) = (run.head.rows, answer_columns(&run));
+    let mut source = ChunkSource::new(jobs, run);
+    let mut files = Vec::new();
+    while let Some(chunk) = source.next().await? {
+        let rows = source.run.head.rows_of(chunk.index);
+        files.push(RunFile {
+            url: format!(
+                "/v1/runs/{id}/results?format=parquet&rows={}:{}",
+                rows.start, rows.end
+            ),
+            first_row: rows.start,
+            rows: rows.end - rows.start,
+            key: chunk.key.map(|folder| format!("{folder}/rows.parquet")),
+        });
+    }
+    Ok(Json(RunManifest {
+        id: id.to_string(),
+        rows,
+        columns,
+        files,
+    }))
+}
+
+problems! {
+    /// What one row of a run can fail with.
+    RunRowProblems: BadQuery, RunNotFound, RowNotFound, Expired
+}
+
+/// A row of a run by itself.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct RunRowAlone {
+    /// Number of the row in what was sent, counted from 0.
+    row: u64,
+    /// The case that the row stands for: the template with the values of the row in their places. Submitted as a job it has the values per cell
+    /// that a run leaves out.
+    #[schema(value_type = Object)]
+    case: Value,
+    /// The row of the results, by the names of their columns; null while it is not solved.
+    #[schema(value_type = Option<Object>)]
+    answer: Option<Map<String, Value>>,
+}
+
+/// One row of a run: the case that it stands for, and its answer as soon as it is there.
+#[utoipa::path(
+    get,
+    path = "/v1/runs/{id}/rows/{row}",
+    tag = "runs",
+    operation_id = "get_run_row",
+    params(
+        ("id" = String, Path, description = "Id of the run", format = "uuid"),
+        ("row" = u64, Path, description = "Number of the row, counted from 0", minimum = 0)
+    ),
+    responses((status = 200, description = "The row", body = RunRowAlone), RunRowProblems)
+)]
+pub(crate) async fn row(
+    Caller(jobs): Caller,
+    RunRowId(id, row): RunRowId,
+) -> Result<Json<RunRowAlone>, ApiError> {
+    let run = jobs.run(id).await?;
+    if row >= run.head.rows {
+        return Err(ApiError::new(
+            ProblemKind::RowNotFound,
+            format!("the run has {} rows, counted from 0", run.head.rows),
+        ));
+    }
+    let (case, answer) = jobs.run_row(&run, row).await?;
+    let answer = answer.map(members).transpose()?;
+    Ok(Json(RunRowAlone { row, case, answer }))
+}
+
+/// The only row of a table as the lines of the results have it.
+fn members(table: RowTable) -> Result<Map<String, Value>, ApiError> {
+    let line = RowWriter::Ndjson.write(table);
+    let line = line.map_err(|error| ApiError::internal(&error))?;
+    serde_json::from_slice(&line).map_err(|error| ApiError::internal(&error))
+}
+
+/// Columns whose totals are made when none are named.
+const COLUMNS: [&str; 4] = [
+    "force_x_n",
+    "force_y_n",
+    "friction_power_n",
+    "pressure_max_mpa",
+];
+/// Percentiles when none are named.
+const PERCENTILES: [f64; 4] = [50.0, 90.0, 99.0, 100.0];
+/// Most sections.
+const SECTIONS_MAX: usize = 10_000;
+
+query! {
+    /// Parameters of the totals of a run.
+    RunTotalsQuery(() => ()) {
+        /// Columns of numbers, with commas between; forces, power and pressure when left out
+        #[param(example = "force_y_n,friction_power_n")]
+        columns: Vec<String> as String = reader("names of columns with commas between", |text| {
+            Some(text.split(',').map(|name| name.trim().to_owned()).collect())
+        });
+        /// Percentiles from 0 to 100, with commas between; 50, 90, 99 and 100 when left out
+        #[param(example = "50,95,99.9")]
+        percentiles: Vec<f64> as String = reader("numbers from 0 to 100 with commas between", |text| {
+            numbers(text).filter(|all| all.iter().all(|percent| (0.0..=100.0).contains(percent)))
+        });
+        /// Comma-separated thresholds: counts the rows whose absolute value is at least each threshold
+        #[param(example = "20000,30000")]
+        above: Vec<f64> as String = reader("numbers with commas between", numbers);
+        /// A column that was passed through unchanged: totals for each of its values, or of its intervals if it holds numbers
+        #[param(example = "section")]
+        by: String as String = reader("the name of a column", |text| Some(text.to_owned()));
+        /// With `by`, and needed there if it holds numbers: the length of an interval
+        #[param(exclusive_minimum = 0.0, example = 100)]
+        width: f64 as f64 = reader("a number above 0", |text| {
+            text.parse().ok().filter(|width: &f64| *width > 0.0 && width.is_finite())
+        });
+    }
+}
+
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    let number = |text: &str| {
+        text.trim()
+            .parse()
+            .ok()
+            .filter(|number: &f64| number.is_finite())
+    };
+    text.split(',').map(number).collect()
+}
+
+/// What the answers of a run come to.
+#[none_is_absent]
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct RunTotals {
+    /// All rows.
+    all: SectionTotals,
+    /// Sections in the order of their values; only with `by`.
+    sections: Option<Vec<SectionTotals>>,
+}
+
+/// What the answers to some rows come to.
+#[none_is_absent]
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct SectionTotals {
+    /// The value of `by`; only for texts.
+    value: Option<String>,
+    /// Where the interval begins; only for numbers.
+    from: Option<f64>,
+    /// Number of rows.
+    rows: u64,
+    /// Number of rows by what became of them.
+    statuses: BTreeMap<String, u64>,
+    /// Totals by column; of the rows that have a number there.
+    columns: BTreeMap<String, ColumnTotals>,
+}
+
+/// What the numbers of a column come to.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct ColumnTotals {
+    /// Rows that have a number.
+    count: u64,
+    /// The least number; null if there is none.
+    min: Option<f64>,
+    /// The largest number.
+    max: Option<f64>,
+    /// The mean.
+    mean: Option<f64>,
+    /// Percentiles of the absolute values.
+    percentiles: BTreeMap<String, f64>,
+    /// How many are at least this large, whatever their signs.
+    above: BTreeMap<String, u64>,
+}
+
+/// Totals of the answers of an ended run: percentiles, exceedances, in all and per section of the line.
+#[utoipa::path(
+    get,
+    path = "/v1/runs/{id}/totals",
+    tag = "runs",
+    operation_id = "get_run_totals",
+    params(
+        ("id" = String, Path, description = "Id of the run", format = "uuid"),
+        RunTotalsQuery
+    ),
+    responses((status = 200, description = "The totals", body = RunTotals), RunResultProblems)
+)]
+pub(crate) async fn totals(
+    Caller(jobs): Caller,
+    RunId(id): RunId,
+    uri: Uri,
+    State(memory): State<Memory>,
+) -> Result<Json<RunTotals>, ApiError> {
+    let query = RunTotalsQuery::read(&uri, &())?;
+    let run = jobs.run(id).await?;
+    require_ended(&run)?;
+    let named = query.columns;
+    let names = named.unwrap_or_else(|| COLUMNS.map(str::to_owned).to_vec());
+    for (name, kind) in selected(&run, Some(names.clone()))? {
+        if kind != TableKind::Numbers {
+            let detail = format!("`{name}` holds no numbers");
+            return Err(ApiError::bad_parameter("columns", detail));
+        }
+    }
+    let section = section_of(&run.head.answers(), query.by, query.width)?;
+    let rows = usize::try_from(run.head.rows).unwrap_or(usize::MAX);
+    // Every number is kept once for all rows and once for its section.
+    let bytes = rows.saturating_mul(16 * names.len());
+    let share = memory.rows(jobs.tenant(), bytes).await?;
+    let mut wanted = names.clone();
+    wanted.push("status".to_owned());
+    wanted.extend(section.iter().map(|section| section.name.clone()));
+    let mut gathered = Gathered::new(names, section);
+    let mut source = ChunkSource::new(jobs, run);
+    while let Some(chunk) = source.next().await? {
+        let table = source.answers(&chunk, wanted.clone()).await?;
+        gathered.add(&table)?;
+    }
+    let percentiles = query.percentiles.unwrap_or_else(|| PERCENTILES.to_vec());
+    let above = query.above.unwrap_or_default();
+    let totals = blocking(move || {
+        let _share = share;
+        gathered.totals(&percentiles, &above)
+    });
+    Ok(Json(totals.await?))
+}
+
+/// How rows are told apart.
+struct RowSection {
+    name: String,
+    /// Length of an interval; texts have none.
+    width: Option<f64>,
+}
+
+fn section_of(
+    columns: &[(String, TableKind)],
+    by: Option<String>,
+    width: Option<f64>,
+) -> Result<Option<RowSection>, ApiError> {
+    let Some(name) = by else {
+        return match width {
+            None => Ok(None),
+            Some(_) => Err(ApiError::bad_parameter("width", "`width` belongs to `by`")),
+        };
+    };
+    let kind = columns.iter().find(|(known, _)| *known == name);
+    match (kind, width) {
+        (None, _) => {
+            let detail = format!("`{name}` is no column of this run");
+            Err(ApiError::bad_parameter("by", detail))
+        }
+        (Some((_, TableKind::Texts)), None) => Ok(Some(RowSection { name, width })),
+        (Some((_, TableKind::Texts)), Some(_)) => Err(ApiError::bad_parameter(
+            "width",
+            format!("`{name}` holds texts, which have no intervals"),
+        )),
+        (Some(_), None) => Err(ApiError::bad_parameter(
+            "width",
+            format!("`{name}` holds numbers; `width` says how long an interval is"),
+        )),
+        (Some(_), Some(_)) => Ok(Some(RowSection { name, width })),
+    }
+}
+
+/// What tells a section from others: the number of its interval, or its text.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum SectionKey {
+    Interval(i64),
+    Text(String),
+}
+
+struct Gathered {
+    names: Vec<String>,
+    section: Option<RowSection>,
+    all: Numbers,
+    sections: BTreeMap<SectionKey, Numbers>,
+}
+
+/// The numbers of some rows.
+struct Numbers {
+    rows: u64,
+    statuses: BTreeMap<String, u64>,
+    columns: Vec<Vec<f64>>,
+}
+
+impl Numbers {
+    fn new(columns: usize) -> Numbers {
+        Numbers {
+            rows: 0,
+            statuses: BTreeMap::new(),
+            columns: vec![Vec::new(); columns],
+        }
+    }
+}
+
+impl Gathered {
+    fn new(names: Vec<String>, section: Option<RowSection>) -> Gathered {
+        Gathered {
+            all: Numbers::new(names.len()),
+            names,
+            section,
+            sections: BTreeMap::new(),
+        }
+    }
+
+    fn add(&mut self, table: &RowTable) -> Result<(), ApiError> {
+        let Some(TableColumn::Texts(statuses)) = table.column("status") else {
+            return Err(ApiError::internal(&"answers without a status"));
+        };
+        let columns: Vec<&[f64]> = self
+            .names
+            .iter()
+            .filter_map(|name| match table.column(name)? {
+                TableColumn::Numbers(numbers) => Some(numbers.as_slice()),
+                _ => None,
+            })
+            .collect();
+        for (row, status) in statuses.iter().enumerate() {
+            let status = status.as_deref().unwrap_or_default();
+            note(&mut self.all, status, &columns, row);
+            let Some(section) = &self.section else {
+                continue;
+            };
+            let Some(key) = section.key(table, row) else {
+                continue;
+            };
+            let width = self.names.len();
+            let numbers = self.sections.entry(key);
+            note(
+                numbers.or_insert_with(|| Numbers::new(width)),
+                status,
+                &columns,
+                row,
+            );
+            if self.sections.len() > SECTIONS_MAX {
+                let detail = format!("there are more than {SECTIONS_MAX} sections");
+                return Err(ApiError::bad_parameter("by", detail));
+            }
+        }
+        Ok(())
+    }
+
+    fn totals(self, percentiles: &[f64], above: &[f64]) -> RunTotals {
+        let names = &self.names;
+        let width = self.section.as_ref().and_then(|section| section.width);
+        let sections = self.sections.into_iter().map(|(key, numbers)| {
+            let mut totals = totals_of(names, numbers, percentiles, above);
+            match key {
+                SectionKey::Text(text) => totals.value = Some(text),
+                #[expect(clippy::cast_precision_loss, reason = "from a number")]
+                SectionKey::Interval(place) => {
+                    totals.from = width.map(|width| place as f64 * width);
+                }
+            }
+            totals
+        });
+        RunTotals {
+            sections: self.section.is_some().then(|| sections.collect()),
+            all: totals_of(names, self.all, percentiles, above),
+        }
+    }
+}
+
+impl RowSection {
+    fn key(&self, table: &RowTable, row: usize) -> Option<SectionKey> {
+        match table.column(&self.name)? {
+            TableColumn::Texts(texts) => {
+                Some(SectionKey::Text(texts[row].clone().unwrap_or_default()))
+            }
+            TableColumn::Numbers(numbers) => self.interval(numbers[row]),
+            #[expect(clippy::cast_precision_loss, reason = "for an interval")]
+            TableColumn::Integers(numbers) => self.interval(numbers[row] as f64),
+        }
+    }
+
+    fn interval(&self, number: f64) -> Option<SectionKey> {
+        let place = (number / self.width?).floor();
+        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+        (!place.is_nan()).then_some(SectionKey::Interval(place as i64))
+    }
+}
+
+fn note(numbers: &mut Numbers, status: &str, columns: &[&[f64]], row: usize) {
+    numbers.rows += 1;
+    match numbers.statuses.get_mut(status) {
+        Some(count) => *count += 1,
+        None => drop(numbers.statuses.insert(status.to_owned(), 1)),
+    }
+    for (kept, column) in numbers.columns.iter_mut().zip(columns) {
+        if !column[row].is_nan() {
+            kept.push(column[row]);
+        }
+    }
+}
+
+fn totals_of(
+    names: &[String],
+    numbers: Numbers,
+    percentiles: &[f64],
+    above: &[f64],
+) -> SectionTotals {
+    let columns = names.iter().cloned().zip(numbers.columns);
+    SectionTotals {
+        value: None,
+        from: None,
+        rows: numbers.rows,
+        statuses: numbers.statuses,
+        columns: columns
+            .map(|(name, values)| (name, column_totals(values, percentiles, above)))
+            .collect(),
+    }
+}
+
+fn column_totals(values: Vec<f64>, percentiles: &[f64], above: &[f64]) -> ColumnTotals {
+    let count = values.len();
+    let found = |value: f64| (count > 0).then_some(value);
+    let min = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
+    let mean = values.iter().sum::<f64>() / count.max(1) as f64;
+    let mut sizes: Vec<f64> = values.into_iter().map(f64::abs).collect();
+    sizes.sort_unstable_by(f64::total_cmp);
+    let percentile = |percent: f64| {
+        #[expect(
+            clippy::cast_precision_loss,
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a place among the rows"
+        )]
+        let place = (percent / 100.0 * count as f64).ceil() as usize;
+        sizes.get(place.max(1) - 1).copied()
+    };
+    let percentiles = percentiles.iter();
+    ColumnTotals {
+        count: count as u64,
+        min: found(min),
+        max: found(max),
+        mean: found(mean),
+        percentiles: percentiles
+            .filter_map(|percent| Some((percent.to_string(), percentile(*percent)?)))
+            .collect(),
+        above: above
+            .iter()
+            .map(|limit| {
+                let below = sizes.partition_point(|size| size < limit);
+                (limit.to_string(), (count - below) as u64)
+            })
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_of_rows_are_open_where_a_number_is_left_out() {
+        assert_eq!(row_range("5:9"), Some(5..9));
+        assert_eq!(row_range(":9"), Some(0..9));
+        assert_eq!(row_range("5:"), Some(5..u64::MAX));
+        for bad in ["", "5", "9:5", "a:b", "-1:2"] {
+            assert_eq!(row_range(bad), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn percentiles_and_exceedances_are_of_sizes() {
+        let values: Vec<f64> = (1..=100)
+            .map(|k| f64::from(k) * if k % 2 == 0 { -1.0 } else { 1.0 })
+            .collect();
+        let totals = column_totals(values, &[0.0, 50.0, 99.0, 100.0], &[90.0, 90.5]);
+        let percentiles: Vec<f64> = ["0", "50", "99", "100"]
+            .map(|p| totals.percentiles[p])
+            .to_vec();
+        assert_eq!(percentiles, [1.0, 50.0, 99.0, 100.0]);
+        assert_eq!((totals.above["90"], totals.above["90.5"]), (11, 10));
+        assert_eq!((totals.min, totals.max), (Some(-100.0), Some(99.0)));
+        let none = column_totals(Vec::new(), &[50.0], &[1.0]);
+        assert_eq!((none.count, none.mean, none.above["1"]), (0, None, 0));
+        assert!(none.percentiles.is_empty());
+    }
 }

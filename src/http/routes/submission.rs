@@ -14,24 +14,18 @@ use utoipa::openapi::{Content, ObjectBuilder, Ref, RefOr, ResponseBuilder};
 use utoipa::{IntoParams, IntoResponses};
 
 use crate::http::extract::caller::Caller;
-use crate::http::extract::labels::{LABELS_MAX, name, new_label};
-use crate::http::extract::query::{Parameters, Repeated, query};
-use crate::http::extract::submit_options::SubmitQuery;
+use crate::http::extract::query::{
+    LABELS_MAX, Parameters, Repeated, SubmitQuery, name, new_label, query,
+};
 use crate::http::layers::auth::Access;
-use crate::http::limits::concurrency::ConcurrencyLimits;
-use crate::http::limits::holding_body::hold_while_sent;
-use crate::http::limits::memory::Memory;
-use crate::http::limits::tenant_semaphore::Permit;
-use crate::http::problem::body::Fault;
-use crate::http::problem::error::ApiError;
+use crate::http::limits::{ConcurrencyLimits, Memory, Permit, hold_while_sent};
+use crate::http::problem::{ApiError, Fault};
 use crate::http::render::format::Format;
 use crate::http::routes::results::result_text;
 use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::http::routes::work::{WorkAnswer, header_parameter, prefer, text_header};
 use crate::jobs::Jobs;
-use crate::jobs::model::job::State as JobState;
-use crate::jobs::model::kind::Kind;
-use crate::jobs::model::submit_options::SubmitOptions;
+use crate::jobs::model::{Kind, State as JobState, SubmitOptions};
 use crate::jobs::work::Work;
 
 /// Longest idempotency key in characters.

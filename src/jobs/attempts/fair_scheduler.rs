@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use crate::jobs::model::kind::{Kind, Queue};
+use crate::jobs::model::{Kind, Queue};
 use crate::jobs::sync::lock;
 
 /// Time after which a solver second counts half.

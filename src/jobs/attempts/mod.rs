@@ -4,11 +4,5 @@
 //! attempt, and those that wait for their turn ([`fair_scheduler`]) are shared by the workers.
 
 pub mod attempt;
-pub mod attempt_control;
 pub mod fair_scheduler;
-pub mod heap;
-pub mod lease;
-pub mod outcome;
-pub mod running;
 pub mod slices;
-pub mod solver_thread;

@@ -1,13 +1,22 @@
-//! Batches and runs as a whole: read, listed, cancelled, deleted.
+//! Batches in the job table: filled, read, cancelled, deleted, and given up.
+use std::sync::Arc;
+use std::time::Duration;
 
+use bytes::Bytes;
+use futures_util::stream::BoxStream;
+use tokio::time::{Instant, timeout_at};
 use uuid::Uuid;
 
-use crate::jobs::attempts::attempt_control::StopReason;
+use crate::jobs::attempts::attempt::StopReason;
+use crate::jobs::batch::upload::{BatchUpload, StagedCase};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::batch::Batch;
-use crate::jobs::model::kind::Kind;
-use crate::jobs::store::cluster::Notification;
+use crate::jobs::model::{Batch, BatchItem, ItemFault, Kind, State, SubmitOptions};
+use crate::jobs::shared::{POLL_INTERVAL, Shared};
+use crate::jobs::storage_fault::StoragePlace;
+use crate::jobs::store::{BatchBegun, NewBatch, NewJob, Notification};
+use crate::jobs::sync::blocking;
+use crate::jobs::trace::KeyValue;
 
 /// Jobs removed in one transaction.
 pub(crate) const DELETED_AT_ONCE: u32 = 500;
@@ -89,5 +98,325 @@ impl Jobs {
         self.shared.collect_blobs().await;
         tracing::info!(batch = %id, jobs = all, "batch deleted");
         Ok(())
+    }
+}
+
+impl Shared {
+    /// From now on this batch is not filled, its jobs are not shown, and no worker takes one.
+    pub(crate) fn abandon(&self, id: Uuid) {
+        let mut batches = self.unfinished_batches();
+        batches.forget(id);
+        batches.abandoned.insert(id);
+    }
+
+    /// Removes what is left of batches that were given up; what cannot be removed now is tried again later.
+    pub(crate) async fn drop_abandoned(&self) {
+        let abandoned: Vec<Uuid> = self
+            .unfinished_batches()
+            .abandoned
+            .iter()
+            .copied()
+            .collect();
+        for id in abandoned {
+            let dropped = self.drop_batch(id).await;
+            self.observe_storage(StoragePlace::Table, &dropped);
+            match dropped {
+                Ok(()) => {
+                    self.unfinished_batches().abandoned.remove(&id);
+                    tracing::info!(batch = %id, "batch that was never acknowledged removed");
+                }
+                Err(error) => {
+                    tracing::warn!(batch = %id, %error, "batch that was never acknowledged cannot be removed yet");
+                }
+            }
+        }
+        self.collect_blobs().await;
+    }
+
+    async fn drop_batch(&self, id: Uuid) -> Result<(), JobsError> {
+        while !self.store.drop_batch(id, DELETED_AT_ONCE).await? {}
+        Ok(())
+    }
+}
+
+/// Jobs queued in one transaction.
+const CHUNK_JOBS: usize = 1000;
+
+/// Bytes of cases queued in one transaction, the last case beyond them included.
+const CHUNK_BYTES: usize = 4 << 20;
+
+/// Shortest and longest pause between two reads of a batch that another request is filling.
+const FILLING_PAUSE: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
+
+impl Jobs {
+    /// Queues the good cases of an upload. Once this returns all of them survive the death of the process; if it fails,
+    /// none of them will be there. Workers begin once all are there. Also says whether the batch is that of an
+    /// earlier submission with the same idempotency key.
+    ///
+    /// # Errors
+    /// [`JobsError::QueueFull`], [`JobsError::QuotaExceeded`], [`JobsError::IdempotencyConflict`], [`JobsError::Draining`],
+    /// or a failed database.
+    pub async fn submit_batch(
+        &self,
+        draft: BatchUpload,
+        idempotency_key: Option<String>,
+    ) -> Result<(Batch, bool), JobsError> {
+        let span = self.submit_span();
+        let traceparent = span.traceparent();
+        let submitted = self.store_batch(draft, idempotency_key, traceparent);
+        span.end(submitted.await, |(batch, _)| {
+            vec![
+                KeyValue::new("railhead.batch.id", batch.id.to_string()),
+                KeyValue::new("railhead.batch.jobs", i64::from(batch.count)),
+            ]
+        })
+    }
+
+    async fn store_batch(
+        &self,
+        mut draft: BatchUpload,
+        idempotency_key: Option<String>,
+        traceparent: Option<Arc<str>>,
+    ) -> Result<(Batch, bool), JobsError> {
+        let (kind, id) = (draft.kind, draft.id);
+        let new = draft.as_new(idempotency_key);
+        let filled_here = |id| self.shared.unfinished_batches().living.contains(&id);
+        let mut pause = FILLING_PAUSE.0;
+        loop {
+            if self.shared.draining.is_cancelled() {
+                return Err(JobsError::Draining);
+            }
+            let known = self.shared.store.batch_by_key(&new, &filled_here).await?;
+            let begun = match known {
+                Some(begun) => begun,
+                None => {
+                    draft.in_table = true;
+                    let bounds = self.queue_bounds();
+                    let store = &self.shared.store;
+                    let begun = store.begin_batch(&new, &filled_here, bounds).await;
+                    self.observe_write(begun)?
+                }
+            };
+            match begun {
+                BatchBegun::Created => break,
+                BatchBegun::Existing(id) => return Ok((self.batch(new.kind, id).await?, true)),
+                BatchBegun::Conflict => return Err(JobsError::IdempotencyConflict),
+                BatchBegun::Refused(refusal) => {
+                    self.give_up(draft).await;
+                    return Err(self.refused(refusal));
+                }
+                BatchBegun::Unfinished => tokio::time::sleep(pause).await,
+            }
+            pause = (2 * pause).min(FILLING_PAUSE.1);
+        }
+        // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
+        let jobs = self.clone();
+        let filled = self.shared.tasks.spawn(async move {
+            let filled = jobs.fill(&new, &mut draft, traceparent).await;
+            match &filled {
+                Ok(()) => {
+                    draft.settle();
+                    // Opens the batch to the workers.
+                    drop(draft);
+                    jobs.shared.wake_workers();
+                }
+                Err(_) => jobs.give_up(draft).await,
+            }
+            filled
+        });
+        let filled = filled
+            .await
+            .map_err(|error| JobsError::Damaged(error.to_string()))?;
+        self.observe_write(filled)?;
+        Ok((self.batch(kind, id).await?, false))
+    }
+
+    async fn fill(
+        &self,
+        new: &NewBatch,
+        draft: &mut BatchUpload,
+        traceparent: Option<Arc<str>>,
+    ) -> Result<(), JobsError> {
+        let options = draft.options;
+        let Some(staging) = draft.staging.take() else {
+            return Ok(());
+        };
+        let mut reader = staging
+            .into_reader()
+            .map_err(|source| self.staging_failed(source))?;
+        loop {
+            if self.shared.stopping.is_cancelled() {
+                return Err(JobsError::Draining);
+            }
+            let taken = blocking(move || {
+                let cases = reader.take(CHUNK_JOBS, CHUNK_BYTES);
+                (reader, cases)
+            });
+            let (back, cases) = taken.await?;
+            reader = back;
+            let cases = cases.map_err(|source| self.staging_failed(source))?;
+            if cases.is_empty() {
+                break;
+            }
+            let mut some: Vec<_> = cases
+                .into_iter()
+                .map(|(staged, case)| {
+                    let traceparent = traceparent.clone();
+                    (
+                        staged.index,
+                        NewJob {
+                            kind: new.kind.of_job(),
+                            ..self.staged_job(staged, case, options, traceparent)
+                        },
+                    )
+                })
+                .collect();
+            if !options.bypass_cache {
+                self.find_sources(some.iter_mut().map(|(_, job)| job))
+                    .await?;
+            }
+            let ended = self.shared.store.fill_batch(new.id, &some).await?;
+            self.shared.ended_cached(&ended);
+        }
+        self.shared.store.complete_batch(new.id).await?;
+        tracing::info!(batch = %new.id, jobs = new.count, rejected = new.rejected, "batch queued");
+        Ok(())
+    }
+
+    /// Removes what is left of a failed upload, at once if the disk allows it.
+    async fn give_up(&self, mut draft: BatchUpload) {
+        if draft.in_table {
+            self.shared.abandon(draft.id);
+            draft.settle();
+            self.shared.drop_abandoned().await;
+        }
+    }
+
+    fn staged_job(
+        &self,
+        staged: StagedCase,
+        case: Vec<u8>,
+        options: SubmitOptions,
+        traceparent: Option<Arc<str>>,
+    ) -> NewJob {
+        NewJob {
+            name: staged.name,
+            labels: staged.labels,
+            method: staged.method,
+            outputs: staged.outputs,
+            cost_us: staged.cost_us,
+            slice_us: staged.slice_us,
+            body: Bytes::from(case),
+            row: staged.row,
+            // A chunk of rows has none.
+            cache_key: Some(staged.digest)
+                .filter(|digest| !digest.is_empty())
+                .and_then(|digest| self.cache_key(&digest)),
+            traceparent,
+            options: options.of_case(staged.own),
+            ..self.blank_job()
+        }
+    }
+}
+
+/// Small solutions read at once: once they are this large together, the rest is left for the next page.
+pub const PAGE_BYTES: usize = 256 << 10;
+
+/// Pause between two reads of a job that a reader of results waits for.
+const REREAD_PAUSE: Duration = Duration::from_millis(10);
+
+/// Size of a solution, and its text without the closing brace.
+pub type OpenedItem = (usize, BoxStream<'static, Result<Bytes, JobsError>>);
+
+impl Jobs {
+    /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`, fewer once
+    /// the small results, which are read with them, come to [`PAGE_BYTES`]; large ones are left to [`Jobs::open_item`]. With `until`, only jobs that have ended are returned as long as that time is not reached, and at
+    /// least one is waited for. Of these, the ones in one of `states` are returned (all if there is none), with the job after which to go on;
+    /// nothing at the end of the batch.
+    ///
+    /// # Errors
+    /// A failed database.
+    pub async fn batch_items(
+        &self,
+        id: Uuid,
+        after: Option<Uuid>,
+        limit: u32,
+        until: Option<Instant>,
+        states: &[State],
+    ) -> Result<(Vec<BatchItem>, Option<Uuid>), JobsError> {
+        let until = until.unwrap_or_else(Instant::now);
+        loop {
+            // Subscribe first, then read: what ends in between is announced.
+            let mut ended = self.shared.ended.subscribe();
+            let mut lines = self
+                .shared
+                .store
+                .batch_items(&self.tenant, id, after, limit, PAGE_BYTES)
+                .await?;
+            lines.retain(|line| *line.job.tenant == *self.tenant);
+            let waiting = Instant::now() < until && !self.shared.draining.is_cancelled();
+            if waiting {
+                let done = lines
+                    .iter()
+                    .take_while(|line| line.job.state.ended())
+                    .count();
+                if done == 0
+                    && let Some(first) = lines.first().map(|line| line.job.id)
+                {
+                    while Instant::now() < until
+                        && !self.shared.draining.is_cancelled()
+                        && self
+                            .recent(first, REREAD_PAUSE)
+                            .await
+                            .is_ok_and(|job| !job.state.ended())
+                    {
+                        let poll_at = until.min(Instant::now() + POLL_INTERVAL);
+                        // A lagging receiver may have missed the announcement, so it reads again as well.
+                        let announced =
+                            async { while ended.recv().await.is_ok_and(|ended| ended != first) {} };
+                        tokio::select! {
+                            _ = timeout_at(poll_at, announced) => {}
+                            () = self.shared.draining.cancelled() => {}
+                        }
+                        // Many jobs end in the same moment; one read serves all of them.
+                        tokio::time::sleep(REREAD_PAUSE).await;
+                        ended = ended.resubscribe();
+                    }
+                    continue;
+                }
+                lines.truncate(done);
+            }
+            let last = lines.last().map(|line| line.job.id);
+            if !states.is_empty() {
+                lines.retain(|line| states.contains(&line.job.state));
+            }
+            return Ok((lines, last));
+        }
+    }
+
+    /// The keys of the labels of the jobs of a batch, sorted, the first `limit`.
+    ///
+    /// # Errors
+    /// A failed database.
+    pub async fn batch_label_keys(&self, id: Uuid, limit: u32) -> Result<Vec<String>, JobsError> {
+        let store = &self.shared.store;
+        Ok(store.batch_label_keys(&self.tenant, id, limit).await?)
+    }
+
+    /// The result of a line that lies outside the table: its size, and its text without the closing brace, read while it is taken. What cannot be
+    /// read costs its own line and no other.
+    ///
+    /// # Errors
+    /// It went in between, or cannot be read.
+    pub async fn open_item(&self, id: Uuid, key: &str) -> Result<OpenedItem, ItemFault> {
+        let error = match self.shared.blobs.open_solution(key).await {
+            Ok(opened) => return Ok(opened),
+            Err(error) => self.gone_meanwhile(id, error).await,
+        };
+        if matches!(error, JobsError::Expired) {
+            return Err(ItemFault::Gone);
+        }
+        tracing::error!(job = %id, %error, "a stored result cannot be read");
+        Err(ItemFault::Unreadable)
     }
 }

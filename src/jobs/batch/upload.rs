@@ -1,27 +1,182 @@
-//! Batches that are being received: cases are checked and staged while they arrive, on places reserved in the queue.
-
+//! A batch under way: its cases are checked, counted and staged in a file, and rows fill a template.
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::Path;
 
 use bytes::Bytes;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tokio::runtime::Handle;
 use uuid::Uuid;
 
 use crate::contact::case::solver::KnownPair;
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::varied::named_sections;
+use crate::contact::evaluate::varied::{self, Replaced, named_sections, put};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::batch::staging::{StagedCase, Staging};
-use crate::jobs::batch::template::{self, Cell};
+use crate::jobs::disk_reserve::nameless;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
-use crate::jobs::model::job::created_at;
-use crate::jobs::model::kind::Kind;
-use crate::jobs::model::submit_options::{CaseOptions, SubmitOptions};
+use crate::jobs::model::{CaseOptions, Kind, SubmitOptions, created_at};
 use crate::jobs::profiles::KnownSections;
-use crate::jobs::store::submission::NewBatch;
+use crate::jobs::store::{NewBatch, StoredCase};
 use crate::jobs::submit::{cost_us, outputs_text};
+
+/// What the job table needs to know of a case besides its text.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StagedCase {
+    pub(crate) index: u32,
+    /// The text is what a row of a table puts into the template.
+    pub(crate) row: bool,
+    pub(crate) name: Option<String>,
+    pub(crate) labels: BTreeMap<String, String>,
+    pub(crate) method: String,
+    pub(crate) outputs: String,
+    pub(crate) cost_us: u32,
+    pub(crate) slice_us: u32,
+    pub(crate) digest: String,
+    pub(crate) own: CaseOptions,
+}
+
+/// Staged cases, first in, first out.
+#[derive(Debug)]
+pub(crate) struct Staging(BufWriter<File>);
+
+impl Staging {
+    /// Makes an empty staging file in a folder.
+    pub(crate) fn new(folder: &Path) -> io::Result<Staging> {
+        Ok(Staging(BufWriter::with_capacity(
+            1 << 18,
+            nameless(folder)?,
+        )))
+    }
+
+    /// Appends a case.
+    pub(crate) fn push(&mut self, staged: &StagedCase, case: &[u8]) -> io::Result<()> {
+        for part in [serde_json::to_vec(staged)?.as_slice(), case] {
+            self.0.write_all(&(part.len() as u64).to_le_bytes())?;
+            self.0.write_all(part)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the writing and reads from the beginning.
+    pub(crate) fn into_reader(self) -> io::Result<StagingReader> {
+        let mut file = self.0.into_inner()?;
+        file.seek(SeekFrom::Start(0))?;
+        Ok(StagingReader(BufReader::with_capacity(1 << 18, file)))
+    }
+}
+
+/// A staging file that is being read.
+#[derive(Debug)]
+pub(crate) struct StagingReader(BufReader<File>);
+
+impl StagingReader {
+    /// The next cases: at most `jobs`, and no further one once `bytes` are reached.
+    pub(crate) fn take(
+        &mut self,
+        jobs: usize,
+        bytes: usize,
+    ) -> io::Result<Vec<(StagedCase, Vec<u8>)>> {
+        let mut taken = Vec::new();
+        let mut size = 0;
+        while taken.len() < jobs && size < bytes {
+            let Some(staged) = self.part()? else { break };
+            let case = self.part()?.unwrap_or_default();
+            size += case.len();
+            taken.push((serde_json::from_slice(&staged)?, case));
+        }
+        Ok(taken)
+    }
+
+    fn part(&mut self) -> io::Result<Option<Vec<u8>>> {
+        let mut length = [0; 8];
+        match self.0.read_exact(&mut length) {
+            Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => return Ok(None),
+            read => read?,
+        }
+        let mut part = vec![0; usize::try_from(u64::from_le_bytes(length)).unwrap_or(0)];
+        self.0.read_exact(&mut part)?;
+        Ok(Some(part))
+    }
+}
+
+/// A value and the members that lead to its place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Cell(pub Vec<String>, pub Value);
+
+impl Cell {
+    /// The place as a JSON pointer.
+    #[must_use]
+    pub fn pointer(&self) -> String {
+        let escaped = |part: &String| format!("/{}", part.replace('~', "~0").replace('/', "~1"));
+        self.0.iter().map(escaped).collect()
+    }
+}
+
+/// Digest of the cells of a row, whatever their order.
+#[must_use]
+pub fn digest(cells: &[Cell]) -> [u8; 32] {
+    let places = cells.iter().map(|cell| (cell.pointer(), cell.1.clone()));
+    idempotency::digest(&Value::Object(places.collect()))
+}
+
+/// As [`fill`], in the template itself; [`restore`] takes the values of the row away again.
+///
+/// # Errors
+/// As [`fill`]; the template is then unchanged.
+pub fn fill_in_place(template: &mut Value, row: &[Cell]) -> Result<Vec<Replaced>, (usize, String)> {
+    let mut filled = Vec::with_capacity(row.len());
+    for (number, Cell(path, value)) in row.iter().enumerate() {
+        match varied::replace(template, path, value.clone()) {
+            Ok(replaced) => filled.push(replaced),
+            Err(reason) => {
+                restore(template, row, filled);
+                return Err((number, reason));
+            }
+        }
+    }
+    Ok(filled)
+}
+
+/// Undoes [`fill_in_place`].
+pub fn restore(template: &mut Value, row: &[Cell], filled: Vec<Replaced>) {
+    for (Cell(path, _), replaced) in row.iter().zip(filled).rev() {
+        varied::restore(template, path, replaced);
+    }
+}
+
+/// The template with the values of a row in their places.
+///
+/// # Errors
+/// The number of the first cell that leads nowhere, and why.
+pub fn fill(template: &Value, row: &[Cell]) -> Result<Value, (usize, String)> {
+    let mut case = template.clone();
+    for (number, Cell(path, value)) in row.iter().enumerate() {
+        put(&mut case, path, value.clone()).map_err(|reason| (number, reason))?;
+    }
+    Ok(case)
+}
+
+impl StoredCase {
+    /// The case as JSON.
+    ///
+    /// # Errors
+    /// What is stored cannot be read.
+    pub fn value(&self) -> Result<Value, JobsError> {
+        let damaged = |reason: String| JobsError::Damaged(format!("a stored case: {reason}"));
+        let Some(template) = &self.template else {
+            return serde_json::from_slice(&self.body).map_err(|error| damaged(error.to_string()));
+        };
+        let template = serde_json::from_slice(template);
+        let template: Value = template.map_err(|error| damaged(error.to_string()))?;
+        let row: Vec<Cell> =
+            serde_json::from_slice(&self.body).map_err(|error| damaged(error.to_string()))?;
+        fill(&template, &row).map_err(|(_, reason)| damaged(reason))
+    }
+}
 
 /// Faulty cases whose faults are kept; further ones are only counted.
 const FAULTY_KEPT: usize = 1000;
@@ -189,9 +344,9 @@ impl BatchUpload {
         template: &mut RowTemplate,
         BatchRow { cells, own }: BatchRow,
     ) -> Result<(), JobsError> {
-        self.digest.update(&template::digest(&cells));
+        self.digest.update(&digest(&cells));
         let RowTemplate { case, known } = template;
-        let filled = match template::fill_in_place(case, &cells) {
+        let filled = match fill_in_place(case, &cells) {
             Ok(filled) => filled,
             Err((number, reason)) => {
                 let detail = format!("the column `{}` {reason}", cells[number].pointer());
@@ -209,7 +364,7 @@ impl BatchUpload {
             // A profile that the row names is kept with it.
             false => self.add_with_profiles(line, case.clone(), own),
         };
-        template::restore(case, &cells, filled);
+        restore(case, &cells, filled);
         added
     }
 
@@ -479,5 +634,69 @@ impl Jobs {
             profiles: KnownSections::new(),
             in_table: false,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use crate::jobs::model::Kind;
+
+    #[test]
+    fn what_goes_in_comes_out_in_order_and_no_file_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut staging = Staging::new(folder.path()).unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        let staged = |index| StagedCase {
+            index,
+            row: false,
+            name: Some("a\nb".to_owned()),
+            labels: BTreeMap::new(),
+            method: "auto".to_owned(),
+            outputs: "[]".to_owned(),
+            cost_us: 7,
+            slice_us: 7,
+            digest: "d".to_owned(),
+            own: CaseOptions::default(),
+        };
+        for index in 0..5 {
+            staging
+                .push(&staged(index), &vec![b'x'; index as usize])
+                .unwrap();
+        }
+        let mut reader = staging.into_reader().unwrap();
+        let first = reader.take(2, usize::MAX).unwrap();
+        let second = reader.take(9, 3).unwrap();
+        let rest = reader.take(9, usize::MAX).unwrap();
+        assert_eq!([first.len(), second.len(), rest.len()], [2, 2, 1]);
+        let all = [first, second, rest].concat();
+        for (index, (read, case)) in (0..).zip(all) {
+            assert_eq!((read, case.len()), (staged(index), index as usize));
+        }
+        assert!(reader.take(1, 1).unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_stored_row_is_the_case_that_was_checked() {
+        let template = json!({ "load": { "normal_force_n": 1 }, "y_mm": [0, 1] });
+        let row = vec![
+            Cell(vec!["load".into(), "normal_force_n".into()], json!(8e4)),
+            Cell(vec!["labels".into(), "km".into()], json!("37.2")),
+            Cell(vec!["y_mm".into(), "1".into()], json!(-2)),
+        ];
+        let checked = fill(&template, &row).unwrap();
+        let stored = StoredCase {
+            kind: Kind::Case,
+            template: Some(template.to_string().into()),
+            head: None,
+            body: serde_json::to_vec(&row).unwrap().into(),
+        };
+        assert_eq!(stored.value().unwrap(), checked);
+        assert_eq!(
+            checked,
+            json!({ "load": { "normal_force_n": 8e4 }, "labels": { "km": "37.2" }, "y_mm": [0, -2] })
+        );
     }
 }

@@ -1,8 +1,398 @@
 //! What runs beside the workers: leases, deadlines, retention, blobs.
+use std::sync::Arc;
+use std::time::Duration;
 
-pub mod blob_collector;
-pub mod deadlines;
+use futures_util::TryStreamExt;
+use uuid::Uuid;
+
+use crate::jobs::attempts::attempt::StopReason;
+use crate::jobs::disk_reserve;
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::model::{FailureKind, Job, State, too_late};
+use crate::jobs::shared::{Shared, heartbeat};
+use crate::jobs::storage_fault::StoragePlace;
+use crate::jobs::store::{Moment, Reap, RetentionRule};
+
 pub mod nodes;
-pub mod reaper;
-pub mod recovery;
-pub mod retention;
+
+/// Results checked in one call by the sweep for orphans.
+const SWEEP_CHUNK: usize = 500;
+
+/// Time between two looks at results whose jobs were running.
+const UNDECIDED_EVERY: Duration = Duration::from_secs(1);
+
+/// Results taken from the outbox at once.
+const COLLECT_CHUNK: u32 = 500;
+
+impl Shared {
+    /// Removes large results that no job refers to any more. What cannot be removed now is tried again later.
+    pub(crate) async fn collect_blobs(&self) {
+        let mut done = Vec::new();
+        loop {
+            let released = match self.store.released_blobs(&done, COLLECT_CHUNK).await {
+                Ok(released) => released,
+                Err(error) => {
+                    tracing::warn!(%error, "results without a job could not be looked for");
+                    return;
+                }
+            };
+            done.clear();
+            for key in released {
+                match self.blobs.remove(&key).await {
+                    Ok(()) => done.push(key),
+                    Err(error) => {
+                        tracing::warn!(key, %error, "a result without a job could not be removed yet");
+                    }
+                }
+            }
+            if done.is_empty() {
+                return;
+            }
+        }
+    }
+}
+
+/// Removes results that no job refers to and that are not on their way to one: what a process left behind that was
+/// killed between the two. Runs once, beside everything else, and ends when the last job has ended that was running meanwhile and
+/// has such a result.
+pub(crate) async fn sweep_orphans(shared: Arc<Shared>) {
+    if shared.store.cluster().is_some() {
+        // There may be very many, and other nodes: the database looks for them itself, once in a while.
+        return;
+    }
+    let draining = &shared.draining;
+    match draining.run_until_cancelled(sweep_results(&shared)).await {
+        Some(Ok(0)) | None => {}
+        Some(Ok(removed)) => tracing::info!(removed, "orphaned results removed"),
+        Some(Err(error)) => tracing::warn!(%error, "orphaned results could not be swept"),
+    }
+}
+
+async fn sweep_results(shared: &Shared) -> Result<usize, JobsError> {
+    shared.collect_blobs().await;
+    let (mut removed, mut undecided) = (0, Vec::new());
+    for month in shared.blobs.months().await? {
+        for some in shared.blobs.keys(&month).await?.chunks(SWEEP_CHUNK) {
+            let orphans = shared.store.orphans(some).await?;
+            undecided.extend(orphans.undecided);
+            removed += remove(shared, &orphans.certain).await?;
+        }
+    }
+    // A job whose process was killed may have been claimed anew before its earlier result was looked at.
+    while !undecided.is_empty() {
+        tokio::time::sleep(UNDECIDED_EVERY).await;
+        let orphans = shared.store.orphans(&undecided).await?;
+        undecided = orphans.undecided;
+        removed += remove(shared, &orphans.certain).await?;
+    }
+    Ok(removed)
+}
+
+async fn remove(shared: &Shared, keys: &[String]) -> Result<usize, JobsError> {
+    for key in keys {
+        shared.blobs.remove(key).await?;
+    }
+    Ok(keys.len())
+}
+
+/// Results written less long ago may be on their way to their job, in ms.
+const YOUNG: i64 = 24 * 3600 * 1000;
+
+impl Jobs {
+    /// Removes results outside the database that no job refers to and that were written more than a day ago; returns their number.
+    /// The nodes of a database do so by themselves, one of them once a day.
+    ///
+    /// # Errors
+    /// The database or the place of the results failed; the next sweep will go on.
+    pub async fn sweep_old_results(&self) -> Result<u64, JobsError> {
+        self.shared.sweep_old_results().await
+    }
+}
+
+impl Shared {
+    /// Removes results outside the database that no job refers to and that were written more than a day ago; returns their number.
+    /// Several nodes may do so at once.
+    pub(crate) async fn sweep_old_results(&self) -> Result<u64, JobsError> {
+        let before = self.now_ms() - YOUNG;
+        let mut listed = self.blobs.listed();
+        let (mut some, mut removed) = (Vec::new(), 0);
+        loop {
+            let next = listed.try_next().await?;
+            let last = next.is_none();
+            if let Some((job, key, written)) = next
+                && written < before
+                && some.last().is_none_or(|(_, known)| *known != key)
+            {
+                some.push((job, key));
+            }
+            if some.len() >= SWEEP_CHUNK || last {
+                for key in self.store.orphans(&some).await?.certain {
+                    self.blobs.remove(&key).await?;
+                    self.metrics.results_swept.inc();
+                    removed += 1;
+                }
+                some.clear();
+            }
+            if last {
+                return Ok(removed);
+            }
+        }
+    }
+}
+
+/// Time between two checks for jobs whose deadline has passed.
+const DEADLINE_INTERVAL: Duration = Duration::from_secs(1);
+
+/// Ends jobs whose deadline has passed, once a second until the service drains: queued ones at once, running ones at
+/// the next tick of their solvers.
+pub(crate) async fn watch_deadlines(shared: Arc<Shared>) {
+    let mut beat = tokio::time::interval(DEADLINE_INTERVAL);
+    let draining = shared.draining.clone();
+    while draining.run_until_cancelled(beat.tick()).await.is_some() {
+        if let Err(error) = enforce_deadlines(&shared).await {
+            tracing::warn!(%error, "deadlines could not be checked");
+        }
+    }
+}
+
+async fn enforce_deadlines(shared: &Shared) -> Result<(), JobsError> {
+    let (now, leap) = (shared.now_ms(), shared.clock_step());
+    let moment = Moment {
+        now,
+        set_at: leap.at,
+        unset: now.saturating_sub(leap.ms),
+    };
+    let failure = too_late();
+    loop {
+        let overdue = shared.store.pass_deadlines(&failure, moment).await?;
+        for id in &overdue.ended {
+            tracing::info!(job = %id, "deadline passed, job ended");
+            shared.metrics.failed(FailureKind::DeadlinePassed);
+            shared.announce(*id);
+        }
+        if overdue.ended.is_empty() {
+            for id in overdue.running {
+                stop(shared, id);
+            }
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn stop(shared: &Shared, id: Uuid) {
+    if let Some(control) = shared.running.get(id) {
+        control.stop(StopReason::Deadline);
+    }
+}
+
+/// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
+pub(crate) async fn reap_expired(shared: Arc<Shared>) {
+    let mut beat = tokio::time::interval(heartbeat(&shared));
+    beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    let recovered = shared.recovered.wait();
+    let _ = shared.draining.run_until_cancelled(recovered).await;
+    let mut quiet_until = i64::MIN;
+    let mut checked_at = shared.steady_ms();
+    while shared
+        .draining
+        .run_until_cancelled(beat.tick())
+        .await
+        .is_some()
+    {
+        // While nothing can be written no lease can be renewed either, which is no silence of the workers.
+        if shared.storage.fault(StoragePlace::Table).is_some() {
+            quiet_until = shared.lease_until();
+        }
+        let now = shared.steady_ms();
+        // If the table has held up this loop, it has held up the heartbeats of the workers as well.
+        if now.saturating_sub(checked_at) > shared.lease_ms() * 2 / 3 {
+            quiet_until = shared.lease_until();
+        }
+        checked_at = now;
+        if now < quiet_until {
+            continue;
+        }
+        let reaped = shared.store.reap(
+            Reap::Expired { now },
+            shared.now_ms(),
+            shared.options.attempts_max,
+        );
+        match reaped.await {
+            Ok(taken) => {
+                for (id, state) in taken {
+                    tracing::warn!(job = %id, state = state.name(), "lease ran out, job taken back");
+                    if state.ended() {
+                        count_taken(&shared, state);
+                        shared.announce(id);
+                    } else {
+                        shared.wake_workers();
+                    }
+                }
+            }
+            Err(error) => tracing::warn!(%error, "expired leases could not be looked for"),
+        }
+    }
+}
+
+fn count_taken(shared: &Shared, state: State) {
+    match state {
+        State::Failed => shared.metrics.failed(FailureKind::WorkerLost),
+        state => shared.metrics.ended(state, 1),
+    }
+}
+
+/// Time between two tries to do what a full disk did not allow.
+const RECOVER_EVERY: Duration = Duration::from_secs(1);
+
+/// Time between two checks of the disk reserve.
+const RESERVE_EVERY: Duration = Duration::from_secs(60);
+
+/// Takes back what a dead process left, and removes what is left of batches that were given up, again and again for as
+/// long as the disk does not allow it.
+pub(crate) async fn recover(shared: Arc<Shared>) {
+    let mut beat = tokio::time::interval(RECOVER_EVERY);
+    let mut reserved = tokio::time::Instant::now();
+    while shared
+        .draining
+        .run_until_cancelled(beat.tick())
+        .await
+        .is_some()
+    {
+        if shared.recovered.get().is_none()
+            && let Err(error) = shared.recover().await
+        {
+            tracing::warn!(%error, "jobs of a dead process cannot be taken back yet");
+        }
+        if !shared.unfinished_batches().abandoned.is_empty() {
+            shared.drop_abandoned().await;
+        }
+        if shared.storage.any() {
+            // The outcome is noted; what fails is tried again at the next time.
+            let tried = shared.require_storage();
+            let _ = shared.draining.run_until_cancelled(tried).await;
+        } else if reserved.elapsed() >= RESERVE_EVERY {
+            reserved = tokio::time::Instant::now();
+            let data_dir = shared.options.data_dir.clone();
+            // It is tried again at the next time.
+            let _ = tokio::task::spawn_blocking(move || disk_reserve::keep(&data_dir)).await;
+        }
+    }
+}
+
+impl Shared {
+    /// Takes back the jobs that a dead process was running.
+    pub(crate) async fn recover(&self) -> Result<(), JobsError> {
+        if self.recovered.get().is_some() {
+            return Ok(());
+        }
+        if self.store.cluster().is_some() {
+            // What runs is of other processes, as long as their leases last.
+            let _ = self.recovered.set(());
+            return Ok(());
+        }
+        let attempts_max = self.options.attempts_max;
+        let taken = self
+            .store
+            .reap(Reap::Dead, self.now_ms(), attempts_max)
+            .await;
+        let taken = taken.map_err(JobsError::from);
+        self.observe_storage(StoragePlace::Table, &taken);
+        for (id, state) in taken? {
+            tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");
+        }
+        // Set once; whoever was first is right.
+        let _ = self.recovered.set(());
+        if !self.unfinished_batches().abandoned.is_empty() {
+            self.drop_abandoned().await;
+        }
+        Ok(())
+    }
+}
+
+/// How long the ids of expired jobs and batches are remembered.
+pub const REMEMBERED_FOR: Duration = Duration::from_secs(30 * 24 * 3600);
+
+/// Jobs removed in one transaction.
+const SWEEP_JOBS: u32 = 500;
+
+/// Free pages of the database given back to the file system in one step.
+const SHRINK_PAGES: u32 = 2000;
+
+/// Free pages that stay in the database file for what comes next.
+const SPARE_PAGES: i64 = 4000;
+
+/// Pause between two steps, in which others may write.
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// Longest and shortest time between two sweeps.
+const SWEEP_EVERY: (Duration, Duration) = (Duration::from_secs(60), Duration::from_secs(1));
+
+impl Jobs {
+    /// Removes every ended job whose time is over, batches of which nothing is left, and ids remembered long enough;
+    /// gives free space of the database back. Returns the number of jobs removed. A running service does this by
+    /// itself.
+    ///
+    /// # Errors
+    /// The database failed; the next sweep will go on.
+    pub async fn sweep_expired(&self) -> Result<u64, JobsError> {
+        self.shared.sweep_expired().await
+    }
+}
+
+impl Shared {
+    pub(crate) fn expires_at(&self, job: &Job) -> Option<i64> {
+        let kept = millis(self.options.retention?);
+        job.ended_at.map(|ended| ended.saturating_add(kept))
+    }
+
+    async fn sweep_expired(&self) -> Result<u64, JobsError> {
+        let now = self.now_ms();
+        let mut removed = 0;
+        let clock_leapt = self.clock_step().ms > 0;
+        if clock_leapt {
+            tracing::warn!("the clock was set forward; nothing is removed before the next start");
+        }
+        if let Some(retention) = self.options.retention.filter(|_| !clock_leapt) {
+            let expiry = RetentionRule {
+                now,
+                ended_before: now.saturating_sub(millis(retention)),
+                forget_before: now.saturating_sub(millis(REMEMBERED_FOR)),
+                jobs: SWEEP_JOBS,
+            };
+            loop {
+                let expired = self.store.expire(expiry).await?;
+                removed += expired;
+                if expired < u64::from(SWEEP_JOBS) {
+                    break;
+                }
+                tokio::time::sleep(PAUSE).await;
+            }
+        }
+        self.collect_blobs().await;
+        while self.store.compact(SPARE_PAGES, SHRINK_PAGES).await? {
+            tokio::time::sleep(PAUSE).await;
+        }
+        Ok(removed)
+    }
+}
+
+/// Sweeps until the service drains.
+pub(crate) async fn expire_jobs(shared: Arc<Shared>) {
+    let (longest, shortest) = SWEEP_EVERY;
+    let retention = shared.options.retention.unwrap_or(longest);
+    let mut beat = tokio::time::interval((retention / 10).clamp(shortest, longest));
+    let draining = shared.draining.clone();
+    while draining.run_until_cancelled(beat.tick()).await.is_some() {
+        match draining.run_until_cancelled(shared.sweep_expired()).await {
+            Some(Ok(0)) | None => {}
+            Some(Ok(removed)) => tracing::info!(removed, "expired jobs removed"),
+            Some(Err(error)) => tracing::warn!(%error, "expired jobs could not be removed"),
+        }
+    }
+}
+
+fn millis(duration: Duration) -> i64 {
+    i64::try_from(duration.as_millis()).unwrap_or(i64::MAX)
+}

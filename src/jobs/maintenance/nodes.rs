@@ -8,11 +8,10 @@ use std::time::Duration;
 use tokio::time::{MissedTickBehavior, interval, sleep};
 use uuid::Uuid;
 
-use crate::jobs::attempts::attempt_control::StopReason;
-use crate::jobs::error::JobsError;
+use crate::jobs::attempts::attempt::StopReason;
+use crate::jobs::error::{JobsError, StoreError};
 use crate::jobs::shared::Shared;
-use crate::jobs::store::cluster::{Cluster, ClusterView, Notification};
-use crate::jobs::store_error::StoreError;
+use crate::jobs::store::{Cluster, ClusterView, Notification};
 
 /// Time between two signs of life; the store counts a node as dead after four.
 const BEAT_EVERY: Duration = Duration::from_secs(5);

@@ -8,8 +8,8 @@ use crate::jobs::error::JobsError;
 use crate::jobs::metrics::StoreRequests;
 use crate::jobs::result_place::settle::{IN_DATABASE, decide, mark, marker, on_this_machine_alone};
 use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
-use crate::jobs::store::cluster::{Cluster, Deployment};
 use crate::jobs::store::postgres::database::PostgresStore;
+use crate::jobs::store::{Cluster, Deployment};
 
 /// Results that are copied at once: each waits for its requests most of the time. Chosen by judgement, below the usual 10 connections to
 /// the database.

@@ -14,7 +14,7 @@ use crate::jobs::blobs::Blobs;
 use crate::jobs::error::JobsError;
 use crate::jobs::metrics::StoreRequests;
 use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
-use crate::jobs::store::cluster::{Cluster, Deployment};
+use crate::jobs::store::{Cluster, Deployment};
 
 /// The object that says whose results these are.
 const MARKER: &str = "railhead.json";

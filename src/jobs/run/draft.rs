@@ -19,12 +19,9 @@ use crate::jobs::codec::table::COLUMNS_MAX;
 use crate::jobs::disk_reserve::nameless;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::kind::Kind;
-use crate::jobs::model::submit_options::SubmitOptions;
+use crate::jobs::model::{Kind, SubmitOptions};
 use crate::jobs::profiles::{KnownSections, unknown};
-use crate::jobs::run::chunk::RunChunk;
-use crate::jobs::run::head::{REASON, RunColumn, RunHead};
-use crate::jobs::run::model::Run;
+use crate::jobs::run::model::{REASON, Run, RunChunk, RunColumn, RunHead};
 use crate::jobs::submit::microseconds;
 use crate::jobs::sync::blocking;
 

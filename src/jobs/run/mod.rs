@@ -1,11 +1,8 @@
 //! Runs: one case with columns of values, many rows as one piece of work.
 //!
-//! A run is a batch of the kind [`Rows`](crate::jobs::model::kind::Kind::Rows), whose jobs are chunks of rows. Claims, leases, retries,
+//! A run is a batch of the kind [`Rows`](crate::jobs::model::Kind::Rows), whose jobs are chunks of rows. Claims, leases, retries,
 //! cancellation and retention are those of all batches.
 
-pub mod chunk;
-pub mod control;
 pub mod draft;
-pub mod head;
 pub mod model;
 pub mod results;

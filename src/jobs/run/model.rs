@@ -1,8 +1,334 @@
-//! A run as clients read it.
+//! A run: its head, its chunks, and how far it is.
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::Read;
 
-use crate::jobs::model::batch::{Batch, RunRecord};
-use crate::jobs::model::job::State;
-use crate::jobs::run::head::RunHead;
+use bytes::Bytes;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use crate::jobs::codec::table::{TableColumn, TableKind};
+use crate::jobs::error::JobsError;
+use crate::jobs::model::{Batch, RunRecord, State};
+
+/// The form of heads and chunks that is written.
+const FORM: u32 = 1;
+
+/// The column with the reason why a row has no answer.
+pub const REASON: &str = "reason";
+
+/// A column of the rows of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunColumn {
+    /// As the client names it, and as it is answered.
+    pub name: String,
+    /// The place in the case that it stands for; a column without one is carried along to the answers.
+    pub pointer: Option<String>,
+    /// What makes a number that was sent one of the case, in its unit.
+    #[serde(default = "unchanged")]
+    pub factor: f64,
+    /// The unit that its title or a line of units names.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// It holds texts; otherwise numbers.
+    pub text: bool,
+}
+
+/// A number times the factor of its unit, to 15 digits, so that 64.1 kN are 64100 N.
+#[must_use]
+pub fn converted(number: f64, factor: f64) -> f64 {
+    if factor == 1.0 {
+        return number;
+    }
+    let number = factor * number;
+    format!("{number:.14e}").parse().unwrap_or(number)
+}
+
+/// The factor of a column in the unit of the case.
+fn unchanged() -> f64 {
+    1.0
+}
+
+impl RunColumn {
+    /// A number that was sent, in the unit of the case.
+    #[must_use]
+    pub fn in_case(&self, number: f64) -> f64 {
+        converted(number, self.factor)
+    }
+
+    /// What it holds.
+    #[must_use]
+    pub fn kind(&self) -> TableKind {
+        match self.text {
+            true => TableKind::Texts,
+            false => TableKind::Numbers,
+        }
+    }
+}
+
+/// The values of a column of rows as a column of a table.
+#[must_use]
+pub fn table_column(values: Values) -> TableColumn {
+    match values {
+        Values::Numbers(numbers) => TableColumn::Numbers(numbers),
+        Values::Texts(texts) => TableColumn::Texts(texts),
+    }
+}
+
+/// What all chunks of a run share.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunHead {
+    form: u32,
+    /// The case of the first row.
+    pub case: Value,
+    /// The columns that were sent, in their order.
+    pub columns: Vec<RunColumn>,
+    /// Names of the columns of numbers of the answers.
+    pub numbers: Vec<String>,
+    /// Kept cross-sections that rows name.
+    #[serde(default)]
+    pub profiles: BTreeMap<String, Value>,
+    /// The method asked for.
+    pub method: String,
+    /// Always false. Stored runs have the member, and a repeated submission is recognised by the bytes of its head.
+    #[serde(default)]
+    from_neighbours: bool,
+    /// Answers have the column of reasons; those of older runs do not.
+    #[serde(default)]
+    pub with_reasons: bool,
+    /// Number of rows.
+    pub rows: u64,
+    /// Rows of each chunk but the last.
+    pub chunk_rows: u32,
+    /// Places and values that the first row puts into the template; none where `case` is stored itself.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    first_row: Vec<(String, Value)>,
+}
+
+/// The part of what the chunks of a run share that runs over the same template have in common.
+#[derive(Debug, Serialize, Deserialize)]
+struct CommonPart<'a> {
+    template: Cow<'a, Value>,
+    profiles: Cow<'a, BTreeMap<String, Value>>,
+}
+
+impl RunHead {
+    /// A head of the present form, without rows.
+    #[must_use]
+    pub fn new(case: Value, columns: Vec<RunColumn>, numbers: Vec<String>, method: String) -> Self {
+        RunHead {
+            form: FORM,
+            case,
+            columns,
+            numbers,
+            profiles: BTreeMap::new(),
+            method,
+            from_neighbours: false,
+            with_reasons: true,
+            rows: 0,
+            chunk_rows: 0,
+            first_row: Vec::new(),
+        }
+    }
+
+    /// The text of all of it, by which a submission is known again.
+    #[must_use]
+    pub fn whole(&self) -> Vec<u8> {
+        serde_json::to_vec(self).unwrap_or_default()
+    }
+
+    /// As it is stored: the part in common with other runs over this template, and the rest. `first_row` is what makes the case of the
+    /// template.
+    #[must_use]
+    pub fn into_parts(self, template: &Value, first_row: Vec<(String, Value)>) -> (Bytes, Bytes) {
+        let common = CommonPart {
+            template: Cow::Borrowed(template),
+            profiles: Cow::Borrowed(&self.profiles),
+        };
+        let common = serde_json::to_vec(&common).unwrap_or_default();
+        let own = RunHead {
+            case: Value::Null,
+            profiles: BTreeMap::new(),
+            first_row,
+            ..self
+        };
+        (common.into(), own.whole().into())
+    }
+
+    /// Reads a stored head: the common part and the rest. Runs of earlier versions have all in the first.
+    ///
+    /// # Errors
+    /// It is damaged, or of another form.
+    pub fn read(common: &[u8], own: Option<&[u8]>) -> Result<RunHead, JobsError> {
+        let damaged = |reason: String| JobsError::Damaged(format!("the head of a run: {reason}"));
+        let text = own.unwrap_or(common);
+        let mut head: RunHead =
+            serde_json::from_slice(text).map_err(|error| damaged(error.to_string()))?;
+        if head.form != FORM {
+            return Err(damaged(format!("it is of form {}", head.form)));
+        }
+        if own.is_some() {
+            let common: CommonPart<'_> =
+                serde_json::from_slice(common).map_err(|error| damaged(error.to_string()))?;
+            head.profiles = common.profiles.into_owned();
+            let first_row: Vec<VariedColumn> = std::mem::take(&mut head.first_row)
+                .into_iter()
+                .map(|(pointer, value)| VariedColumn {
+                    pointer,
+                    values: match value {
+                        Value::Number(number) => {
+                            Values::Numbers(vec![number.as_f64().unwrap_or(f64::NAN)])
+                        }
+                        text => Values::Texts(vec![text.as_str().map(str::to_owned)]),
+                    },
+                })
+                .collect();
+            let case = case_of_row(&common.template, &first_row, &head.profiles, 0);
+            head.case =
+                case.map_err(|(pointer, reason)| damaged(format!("{pointer}: {reason}")))?;
+        }
+        Ok(head)
+    }
+
+    /// Names and kinds of the columns of the answers, in their order: the row, what was carried along, what became of it, its numbers,
+    /// and why it has none.
+    #[must_use]
+    pub fn answers(&self) -> Vec<(String, TableKind)> {
+        let carried = self
+            .columns
+            .iter()
+            .filter(|column| column.pointer.is_none());
+        let carried = carried.map(|column| (column.name.clone(), column.kind()));
+        let words = ["status", "method"].map(|name| (name.to_owned(), TableKind::Texts));
+        let numbers = self.numbers.iter();
+        let numbers = numbers.map(|name| (name.clone(), TableKind::Numbers));
+        let row = ("row".to_owned(), TableKind::Integers);
+        let reason = (REASON.to_owned(), TableKind::Texts);
+        std::iter::once(row)
+            .chain(carried)
+            .chain(words)
+            .chain(numbers)
+            .chain(self.with_reasons.then_some(reason))
+            .collect()
+    }
+
+    /// The rows of a chunk.
+    #[must_use]
+    pub fn rows_of(&self, chunk: u64) -> std::ops::Range<u64> {
+        let each = u64::from(self.chunk_rows);
+        let begin = (chunk * each).min(self.rows);
+        begin..(begin + each).min(self.rows)
+    }
+}
+
+/// What a chunk begins with.
+const MAGIC: &[u8] = b"RHROWS1\n";
+/// Cheap compression; chunks are unpacked before every solve.
+const ZSTD_LEVEL: i32 = 1;
+/// In the place of the length of a text: the row has none.
+const NO_TEXT: u64 = u64::MAX;
+
+/// Rows of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunChunk {
+    /// The number of its first row in the run.
+    pub first_row: u64,
+    /// Its columns, as the head of the run names them.
+    pub columns: Vec<Values>,
+}
+
+impl RunChunk {
+    /// As it is stored.
+    ///
+    /// # Errors
+    /// There is no memory to pack it.
+    pub fn to_bytes(&self) -> std::io::Result<Vec<u8>> {
+        let rows = self.columns.first().map_or(0, Values::len);
+        let mut plain = Vec::with_capacity(16 + 8 * rows * self.columns.len());
+        plain.extend(self.first_row.to_le_bytes());
+        plain.extend((rows as u64).to_le_bytes());
+        for column in &self.columns {
+            match column {
+                Values::Numbers(numbers) => {
+                    plain.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+                }
+                Values::Texts(texts) => {
+                    for text in texts {
+                        let length = text.as_ref().map_or(NO_TEXT, |text| text.len() as u64);
+                        plain.extend(length.to_le_bytes());
+                        plain.extend(text.as_deref().unwrap_or_default().as_bytes());
+                    }
+                }
+            }
+        }
+        let mut body = MAGIC.to_vec();
+        body.extend(zstd::encode_all(plain.as_slice(), ZSTD_LEVEL)?);
+        Ok(body)
+    }
+
+    /// Reads a stored chunk of a run with these columns.
+    ///
+    /// # Errors
+    /// It is damaged.
+    pub fn read(body: &[u8], columns: &[RunColumn]) -> Result<RunChunk, JobsError> {
+        let damaged = |what: String| JobsError::Damaged(format!("rows of a run: {what}"));
+        let packed = body.strip_prefix(MAGIC);
+        let packed = packed.ok_or_else(|| damaged("not the body of a chunk".to_owned()))?;
+        let mut plain = Vec::new();
+        let read = zstd::Decoder::new(packed).and_then(|mut text| text.read_to_end(&mut plain));
+        read.map_err(|error| damaged(error.to_string()))?;
+        let mut rest = plain.as_slice();
+        let cut = || damaged("cut short".to_owned());
+        let first_row = number(&mut rest).ok_or_else(cut)?;
+        let rows = number(&mut rest).ok_or_else(cut)?;
+        let column = |column: &RunColumn| {
+            if !column.text {
+                let values = (0..rows).map(|_| number(&mut rest).map(f64::from_bits));
+                return values.collect::<Option<_>>().map(Values::Numbers);
+            }
+            let texts = (0..rows).map(|_| {
+                let length = number(&mut rest)?;
+                if length == NO_TEXT {
+                    return Some(None);
+                }
+                let (text, after) = rest.split_at_checked(usize::try_from(length).ok()?)?;
+                rest = after;
+                String::from_utf8(text.to_vec()).ok().map(Some)
+            });
+            texts.collect::<Option<_>>().map(Values::Texts)
+        };
+        let columns = columns.iter().map(column).collect::<Option<Vec<Values>>>();
+        Ok(RunChunk {
+            first_row,
+            columns: columns.ok_or_else(cut)?,
+        })
+    }
+}
+
+fn number(rest: &mut &[u8]) -> Option<u64> {
+    let (head, after) = rest.split_first_chunk::<8>()?;
+    *rest = after;
+    Some(u64::from_le_bytes(*head))
+}
+
+/// What varies the case, and what is carried along.
+pub(crate) fn parted(
+    head: &RunHead,
+    chunk: RunChunk,
+) -> (Vec<VariedColumn>, Vec<(String, TableColumn)>) {
+    let (mut varied, mut carried) = (Vec::new(), Vec::new());
+    for (column, values) in head.columns.iter().zip(chunk.columns) {
+        match &column.pointer {
+            Some(pointer) => varied.push(VariedColumn {
+                pointer: pointer.clone(),
+                values,
+            }),
+            None => carried.push((column.name.clone(), table_column(values))),
+        }
+    }
+    (varied, carried)
+}
 
 /// A run.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,5 +383,49 @@ impl Run {
     pub fn rows_done(&self) -> u64 {
         let (ended, _) = self.chunks.ended();
         (ended * u64::from(self.head.chunk_rows)).min(self.head.rows)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_in_another_unit_are_converted_to_15_digits() {
+        let column = |factor| RunColumn {
+            name: "Q [kN]".to_owned(),
+            pointer: None,
+            factor,
+            unit: None,
+            text: false,
+        };
+        assert_ne!(64.1 * 1e3, 64_100.0, "what the digits are for");
+        assert_eq!(column(1e3).in_case(64.1), 64_100.0);
+        assert_eq!(column(1e-3).in_case(-0.3), -3e-4);
+        assert_eq!(column(1.0).in_case(0.1 + 0.2), 0.1 + 0.2);
+        assert!(column(1e3).in_case(f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn a_chunk_comes_back_as_it_was_and_a_broken_one_is_refused() {
+        let column = |text| RunColumn {
+            factor: 1.0,
+            unit: None,
+            name: "c".to_owned(),
+            pointer: None,
+            text,
+        };
+        let columns = [column(false), column(true)];
+        let chunk = RunChunk {
+            first_row: 70_000,
+            columns: vec![
+                Values::Numbers(vec![0.1, -0.0, 1e300]),
+                Values::Texts(vec![Some("km 3".to_owned()), None, Some(String::new())]),
+            ],
+        };
+        let body = chunk.to_bytes().unwrap();
+        assert_eq!(RunChunk::read(&body, &columns).unwrap(), chunk);
+        assert!(RunChunk::read(&body[..body.len() - 4], &columns).is_err());
+        assert!(RunChunk::read(&body, &[column(false), column(true), column(true)]).is_err());
     }
 }

@@ -1,5 +1,4 @@
-//! The answers of a run, chunk by chunk in the order of its rows.
-
+//! The answers of a run.
 use bytes::Bytes;
 use serde_json::Value;
 use uuid::Uuid;
@@ -9,12 +8,36 @@ use crate::jobs::codec::parquet::TableReader;
 use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::batch::ItemResult;
-use crate::jobs::model::job::State;
-use crate::jobs::run::chunk::{RunChunk, parted};
-use crate::jobs::run::head::{RunHead, table_column};
-use crate::jobs::run::model::Run;
+use crate::jobs::model::{Batch, ItemResult, Kind, State};
+use crate::jobs::run::model::{Run, RunChunk, RunHead, parted, table_column};
 use crate::jobs::sync::blocking;
+
+impl Jobs {
+    /// A run.
+    ///
+    /// # Errors
+    /// [`JobsError::BatchNotFound`], [`JobsError::Expired`], or a failed database.
+    pub async fn run(&self, id: Uuid) -> Result<Run, JobsError> {
+        let batch = self.batch(Kind::Rows, id).await?;
+        self.with_head(batch).await
+    }
+
+    /// The run that a batch of rows is.
+    ///
+    /// # Errors
+    /// As [`Jobs::run`].
+    pub async fn with_head(&self, batch: Batch) -> Result<Run, JobsError> {
+        let (_, there) = batch.ended();
+        if there < u64::from(batch.count) {
+            // Its first chunks have expired, or it is being deleted.
+            return Err(JobsError::Expired);
+        }
+        let record = self.shared.store.run(&self.tenant, batch.id).await?;
+        let record = record.ok_or(JobsError::BatchNotFound(Kind::Rows))?;
+        let head = RunHead::read(&record.template, record.head.as_deref())?;
+        Ok(Run::new(batch, head, &record))
+    }
+}
 
 /// Chunks that are read from the table of jobs at once. Chosen by judgement: one statement for so many files, which take far longer.
 const AT_ONCE: u32 = 64;

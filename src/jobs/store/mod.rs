@@ -15,44 +15,29 @@
 //! - Errors are [`StoreError`], sorted by what the caller can do.
 //!
 //! `tests/service/store*.rs` hold every store to this.
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fmt::Debug;
+use std::sync::Arc;
+use std::time::Duration;
 
-pub mod claim;
-pub mod cluster;
-pub mod ending;
-pub mod list;
+use async_trait::async_trait;
+use bytes::Bytes;
+use object_store::ObjectStore;
+use uuid::Uuid;
+
+use crate::contact::remark::entry::RemarkEntry;
+use crate::jobs::codec::result::EncodedResult;
+use crate::jobs::error::StoreError;
+use crate::jobs::model::{
+    Batch, BatchItem, Failure, Job, Key, Kind, Queue, RunRecord, State, SubmitOptions,
+};
+
 #[cfg(feature = "cluster")]
 pub(crate) mod portion;
 #[cfg(feature = "cluster")]
 pub mod postgres;
-pub mod profile;
-pub mod retention;
 mod sql_errors;
 pub mod sqlite;
-pub mod submission;
-
-use std::collections::{HashMap, HashSet};
-use std::fmt::Debug;
-
-use async_trait::async_trait;
-use uuid::Uuid;
-
-use crate::jobs::model::batch::{Batch, BatchItem, RunRecord};
-use crate::jobs::model::job::{Failure, Job, State};
-use crate::jobs::model::key::Key;
-use crate::jobs::model::kind::{Kind, Queue};
-use crate::jobs::store::claim::{
-    Claim, ClaimRequest, Lease, QueueAhead, Reap, ReleaseReason, Renewal,
-};
-use crate::jobs::store::cluster::Cluster;
-use crate::jobs::store::ending::{Ending, NewSlice, ResultRef, SliceRecord, StoredResult};
-use crate::jobs::store::list::{Change, Filter, Page};
-use crate::jobs::store::profile::{ProfileCursor, ProfileEntry, ProfileKept, StoredProfile};
-use crate::jobs::store::retention::{Deleted, Moment, Overdue, RetentionRule, Stats, Usage};
-use crate::jobs::store::submission::{
-    BatchBegun, CacheKey, ClaimedCase, Enqueued, FilledHere, NewBatch, NewJob, QueueBounds,
-    Refusal, StoredCase,
-};
-use crate::jobs::store_error::StoreError;
 
 /// A job table, which also keeps API keys.
 #[async_trait]
@@ -420,4 +405,841 @@ pub struct Orphans {
     /// Those whose job is running, with its id: this attempt may have written them and refer to them when it ends, or an earlier
     /// one may have left them behind.
     pub undecided: Vec<(Uuid, String)>,
+}
+
+/// The right to work on a job, until the lease runs out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Claim {
+    /// The job.
+    pub id: Uuid,
+    /// Attempts counted so far, this one included.
+    pub attempt: u32,
+    /// The fencing token: random, the same for all jobs that were claimed together.
+    pub lease_token: u64,
+    /// The method asked for.
+    pub method: String,
+    /// W3C trace context of its submission, if its trace is collected.
+    pub traceparent: Option<String>,
+    /// What tells identical cases; `None` for a job that must be solved.
+    pub cache_key: Option<CacheKey>,
+    /// It ran together with others when their process died: it comes alone.
+    pub suspect: bool,
+    /// Slices that are solved and stored.
+    pub slices: u32,
+}
+
+/// How long a job is a worker's from now on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Lease {
+    /// The present by the steady clock of this process, in ms. A store that several processes share has a clock of its own
+    /// and takes that one.
+    pub now: i64,
+    /// Length in ms.
+    pub ms: i64,
+}
+
+/// Which of the queued jobs a worker asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ClaimKind {
+    /// Those of which nothing is solved.
+    New,
+    /// One of which some slices are solved.
+    Begun,
+}
+
+/// What a worker asks for.
+#[derive(Debug, Clone, Copy)]
+pub struct ClaimRequest<'a> {
+    /// Name of the worker.
+    pub worker: &'a str,
+    /// The queue whose turn it is.
+    pub queue: &'a Queue,
+    /// Which of its jobs.
+    pub kind: ClaimKind,
+    /// Most jobs; of begun ones there is one.
+    pub jobs: usize,
+    /// Largest sum of the expected solve times in µs; one job may be above it.
+    pub cost_us: u64,
+    /// Largest expected solve time of one slice of each job in µs, if there is such a bound.
+    pub each_slice_us: Option<u64>,
+    /// Also jobs that may have killed a process.
+    pub suspects: bool,
+    /// Jobs in the queue, when that was asked last.
+    pub waiting: u64,
+    /// The lease that begins.
+    pub lease: Lease,
+    /// The present, epoch milliseconds.
+    pub now: i64,
+    /// Jobs with a deadline before this time are left to whoever ends them.
+    pub late_before: i64,
+}
+
+/// Why jobs go back to the queue; none of these counts as an attempt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReleaseReason {
+    /// They were not begun, they had their slice, or the service stops.
+    NotBegun,
+    /// They were to share an answer that did not come: solved next time.
+    SolveItself,
+    /// A slice of them takes longer than was thought, at least this long.
+    Long {
+        /// Its expected solve time from now on, in µs.
+        slice_us: u64,
+    },
+}
+
+/// The answer to a heartbeat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Renewal {
+    /// The lease is extended.
+    Held {
+        /// The client asked to cancel.
+        cancel_requested: bool,
+    },
+    /// The job was given away or has ended: stop and discard.
+    Lost,
+}
+
+/// Which running jobs are taken from their workers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reap {
+    /// Those whose lease has run out.
+    Expired {
+        /// The present, as [`Lease::now`].
+        now: i64,
+    },
+    /// All of them: the one process that runs jobs of this table has died.
+    Dead,
+}
+
+/// What comes before a queued job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueueAhead {
+    /// Jobs of its tenant.
+    pub jobs: u64,
+    /// Their expected solve time in µs.
+    pub cost_us: u64,
+    /// Tenants with queued jobs, its own included.
+    pub tenants: usize,
+}
+
+/// A hint to other processes that something happened. A process that misses one finds out by polling, a little later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Notification {
+    /// There is something to be claimed.
+    Work,
+    /// This job has ended.
+    Ended(Uuid),
+    /// This job is to be cancelled; its worker does so.
+    Cancel(Uuid),
+}
+
+/// Where nodes receive each other's notifications. What is missed is found by polling, up to a second later.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum NotifyMode {
+    /// At the URL of the database.
+    #[default]
+    Database,
+    /// At another URL of the same database: a pooler that gives each transaction another session passes none on.
+    Direct(String),
+    /// Nowhere.
+    Off,
+}
+
+/// A node as it shows itself to the others.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Node {
+    /// Random, new with every start.
+    pub id: Uuid,
+    /// Jobs that it solves at the same time.
+    pub workers: usize,
+}
+
+/// What a node learns when it shows itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ClusterView {
+    /// Nodes that have shown themselves lately.
+    pub nodes: usize,
+    /// Their workers.
+    pub workers: usize,
+}
+
+/// What a database knows of itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Deployment {
+    /// Random, given when the tables were made.
+    pub id: String,
+    /// URL of the place of large results; empty: they are in the database; `None`: not decided.
+    pub results_place: Option<String>,
+    /// There are large results.
+    pub has_results: bool,
+    /// Nodes that have shown themselves lately.
+    pub nodes: u64,
+}
+
+impl Deployment {
+    /// The place of the results can no longer be changed.
+    #[must_use]
+    pub fn in_use(&self) -> bool {
+        self.results_place.is_some() && (self.has_results || self.nodes > 0)
+    }
+}
+
+/// Calls of a store that several processes use at once.
+#[async_trait]
+pub trait Cluster: Send + Sync + Debug {
+    /// The clock of the store, epoch milliseconds.
+    async fn now(&self) -> Result<i64, StoreError>;
+
+    /// Shows that a node lives, and tells how many do.
+    async fn beat(&self, node: &Node) -> Result<ClusterView, StoreError>;
+
+    /// The node is no more.
+    async fn leave(&self, node: Uuid) -> Result<(), StoreError>;
+
+    /// Those of these running jobs that are to be cancelled.
+    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError>;
+
+    /// Shows that these batches are still received or filled. A batch of which nobody has shown that for a minute is
+    /// [unfinished](crate::jobs::store::Batches::unfinished_batches).
+    async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError>;
+
+    /// Removes large results that were written long ago and that no job refers to: what a node left that was killed between the
+    /// two. Returns their number.
+    async fn sweep_objects(&self) -> Result<u64, StoreError>;
+
+    /// Brings what the database counts into a short form.
+    async fn fold_counts(&self) -> Result<(), StoreError>;
+
+    /// What the database knows of itself.
+    async fn deployment(&self) -> Result<Deployment, StoreError>;
+
+    /// Notes the place of the results if it is still what it was before; says whether it was.
+    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool, StoreError>;
+
+    /// Takes the turn to sweep results outside the database, unless somebody did so within a day; says whether it has it.
+    async fn take_sweep(&self) -> Result<bool, StoreError>;
+
+    /// Where large results are kept that are in the database.
+    fn objects(&self) -> Arc<dyn ObjectStore>;
+
+    /// Rings soon, together with what else is to be rung. Never waits.
+    fn publish(&self, notification: Notification);
+
+    /// Listens to the notifications of all nodes until the connection fails; for ever with [`NotifyMode::Off`].
+    async fn listen(&self, heard: &(dyn Fn(Notification) + Send + Sync)) -> Result<(), StoreError>;
+}
+
+/// A solved slice about to be stored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NewSlice {
+    /// What is known of it.
+    pub note: SliceRecord,
+    /// Its part of the answer.
+    pub result: StoredResult,
+    /// Part of the job that is done with it, 0 to 1.
+    pub done: f64,
+    /// Expected solve time of the rest in µs.
+    pub rest_us: u64,
+}
+
+/// How an attempt ends.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ending {
+    /// The result is stored.
+    Succeeded {
+        /// Remarks of the solution.
+        remarks: Vec<RemarkEntry>,
+        /// Where the result is kept.
+        result: StoredResult,
+        /// Patches with stored fields.
+        field_patches: u32,
+    },
+    /// There is no answer.
+    Failed(Failure),
+    /// The client no longer wanted it.
+    Cancelled,
+    /// It gets the result of this succeeded job; the attempt does not count.
+    Cached {
+        /// Whose result it gets.
+        source: Uuid,
+    },
+}
+
+impl Ending {
+    /// The state of the job that ended so.
+    #[must_use]
+    pub fn state(&self) -> State {
+        match self {
+            Ending::Succeeded { .. } | Ending::Cached { .. } => State::Succeeded,
+            Ending::Failed(_) => State::Failed,
+            Ending::Cancelled => State::Cancelled,
+        }
+    }
+}
+
+/// Where a result is kept once its job has ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum StoredResult {
+    /// Under this key, where it already lies, with its size in bytes.
+    Blob(String, u64),
+    /// In the database, written together with the end of the job: a small one.
+    Inline(EncodedResult),
+}
+
+impl StoredResult {
+    /// A small result as the database has it.
+    pub(crate) fn inline(solution: Vec<u8>, fields: Option<Vec<u8>>) -> StoredResult {
+        StoredResult::Inline(EncodedResult {
+            solution: solution.into(),
+            fields: fields.map(Bytes::from),
+        })
+    }
+
+    /// Size in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        match self {
+            StoredResult::Blob(_, bytes) => *bytes,
+            StoredResult::Inline(result) => result.bytes() as u64,
+        }
+    }
+}
+
+/// A result with what is needed to show it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ResultRef {
+    /// Where it is, or itself.
+    pub result: StoredResult,
+    /// Patches with stored fields; 0 if there is no fields object.
+    pub field_patches: usize,
+    /// The outputs the case asks for, as the JSON list of their names.
+    pub outputs: String,
+}
+
+/// What is known of a stored slice of a sweep.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SliceRecord {
+    /// Place among the slices of the case, from 0.
+    pub number: u32,
+    /// Motions of the case up to its end.
+    pub motions: u32,
+    /// Digest of the case as the solver that solved it knew it; of another digest it is of no use.
+    pub digest: String,
+    /// Solver time of the job up to its end.
+    pub spent: Duration,
+}
+
+/// Where the jobs of a list belong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Membership {
+    /// To this batch.
+    Batch(Uuid),
+    /// To no batch: each was submitted alone.
+    Alone,
+}
+
+/// Which work of a kind to list; everything left out does not restrict. Lists of batches and runs know no states, memberships and times of
+/// changes.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Filter {
+    /// The kind of the work.
+    pub kind: Kind,
+    /// Only jobs in one of these states; any if there is none.
+    pub states: Vec<State>,
+    /// Only jobs of one batch, or of none.
+    pub member: Option<Membership>,
+    /// Only work that carry each of these labels with its value.
+    pub labels: Vec<(String, String)>,
+    /// Only work whose name contains this text; ASCII letters match in either case.
+    pub name: Option<String>,
+    /// Only work submitted at or after this time (epoch milliseconds).
+    pub created_after: Option<i64>,
+    /// Only work submitted before this time (epoch milliseconds). Together with `created_after`: a half-open window.
+    pub created_before: Option<i64>,
+    /// Only jobs that changed at or after this time (epoch milliseconds), progress aside.
+    pub updated_after: Option<i64>,
+}
+
+/// One page of a list. It may have fewer entries than asked for although more follow: where many have to be looked at to find
+/// some, a page ends after a bounded number of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Page<T> {
+    /// The entries, newest first.
+    pub entries: Vec<T>,
+    /// Where the next page begins; absent on the last page.
+    pub next_cursor: Option<String>,
+    /// Number of entries of the whole list.
+    pub total: Total,
+}
+
+impl<T> Page<T> {
+    /// The same page with other entries.
+    #[must_use]
+    pub fn map<U>(self, entry: impl FnMut(T) -> U) -> Page<U> {
+        Page {
+            entries: self.entries.into_iter().map(entry).collect(),
+            next_cursor: self.next_cursor,
+            total: self.total,
+        }
+    }
+}
+
+/// Number of entries of a list.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Total {
+    /// So many.
+    Exactly(u64),
+    /// So many were counted, there may be more.
+    AtLeast(u64),
+}
+
+/// A job that changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Change {
+    /// The job.
+    pub id: Uuid,
+    /// Its batch.
+    pub batch: Option<Uuid>,
+    /// [`Kind::Case`], or [`Kind::Rows`] for a chunk of a run.
+    pub kind: Kind,
+    /// When, epoch milliseconds.
+    pub at: i64,
+}
+
+impl Filter {
+    /// All work of a kind.
+    #[must_use]
+    pub fn of(kind: Kind) -> Filter {
+        Filter {
+            kind,
+            ..Filter::default()
+        }
+    }
+
+    /// The cursor that continues this list after the entry `last`: 40 characters of `[0-9a-f]`.
+    #[must_use]
+    pub fn cursor_after(&self, last: Uuid) -> String {
+        format!("{}{}", last.simple(), self.digest())
+    }
+
+    /// The entry after which `text` continues; `None` if it is not a cursor of this very filter.
+    #[must_use]
+    pub fn read_cursor(&self, text: &str) -> Option<Uuid> {
+        let (id, digest) = text.split_at_checked(32)?;
+        if digest != self.digest() {
+            return None;
+        }
+        let read = Uuid::try_parse(id).ok()?;
+        // Only our own spelling is a cursor: the parser would also take capital letters.
+        (read.simple().to_string() == id).then_some(read)
+    }
+
+    /// Whether jobs themselves have to be read, because no index knows all that is asked for.
+    pub(crate) fn reads_jobs(&self) -> bool {
+        self.labels.len() > 1
+            || self.name.is_some()
+            || self.updated_after.is_some()
+            || (self.alone() && !self.labels.is_empty())
+    }
+
+    /// Whether only jobs of no batch are listed.
+    pub(crate) fn alone(&self) -> bool {
+        self.member == Some(Membership::Alone)
+    }
+
+    /// The batch whose jobs are listed.
+    pub(crate) fn batch(&self) -> Option<Uuid> {
+        match self.member {
+            Some(Membership::Batch(id)) => Some(id),
+            Some(Membership::Alone) | None => None,
+        }
+    }
+
+    /// Smallest id a job of the filter can have: UUIDv7 begins with 48 bits of milliseconds.
+    pub(crate) fn id_from(&self) -> Option<Uuid> {
+        self.created_after.map(first_id_at)
+    }
+
+    /// Smallest id that is too young for the filter.
+    pub(crate) fn id_before(&self) -> Option<Uuid> {
+        self.created_before.map(first_id_at)
+    }
+
+    /// Eight hexadecimal digits of a digest of the filter.
+    fn digest(&self) -> String {
+        let mut parts = vec![
+            Some(self.kind.name().to_owned()),
+            self.created_after.map(|time| time.to_string()),
+            self.created_before.map(|time| time.to_string()),
+            self.updated_after.map(|time| time.to_string()),
+            self.member.map(|member| match member {
+                Membership::Batch(id) => id.to_string(),
+                Membership::Alone => "none".to_owned(),
+            }),
+            self.name.clone(),
+            Some(self.states.len().to_string()),
+        ];
+        let states = self.states.iter().map(|state| state.name().to_owned());
+        let labels = self.labels.iter().flat_map(|(key, value)| [key, value]);
+        parts.extend(states.chain(labels.cloned()).map(Some));
+        let mut hasher = blake3::Hasher::new();
+        for part in parts {
+            // Length first, so that neighbouring parts cannot run into each other.
+            let part = part.map_or_else(|| "-".to_owned(), |text| format!("+{text}"));
+            hasher.update(&(part.len() as u64).to_le_bytes());
+            hasher.update(part.as_bytes());
+        }
+        hasher.finalize().to_hex()[..8].to_owned()
+    }
+}
+
+/// The smallest UUID whose leading 48 bits are the given time; times outside 48 bits are clamped.
+pub(crate) fn first_id_at(epoch_ms: i64) -> Uuid {
+    let millis = u128::try_from(epoch_ms.clamp(0, (1 << 48) - 1)).unwrap_or(0);
+    Uuid::from_u128(millis << 80)
+}
+
+/// A kept cross-section.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredProfile {
+    /// Digest of its JSON value, 64 hexadecimal digits.
+    pub digest: String,
+    /// Its JSON text.
+    pub body: Bytes,
+    /// When it was first sent, epoch milliseconds.
+    pub created_at: i64,
+}
+
+/// What became of a cross-section that was to be kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ProfileKept {
+    /// It is kept.
+    Added,
+    /// It was kept already.
+    Existing(StoredProfile),
+    /// There is no room for it.
+    Full,
+}
+
+/// What a list says of a stored cross-section.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProfileEntry {
+    /// Its digest.
+    pub digest: String,
+    /// Its size.
+    pub bytes: u64,
+    /// When it was first sent, epoch milliseconds.
+    pub created_at: i64,
+}
+
+/// The last entry of a page: its time in ms and the first digits of its digest. As text 40 characters of `[0-9a-f]`, as the cursors of other lists.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProfileCursor(pub i64, pub String);
+
+impl ProfileCursor {
+    /// The cursor behind this entry.
+    #[must_use]
+    pub fn after(entry: &ProfileEntry) -> ProfileCursor {
+        let digits = entry.digest.chars().take(28);
+        ProfileCursor(entry.created_at, digits.collect())
+    }
+
+    /// The cursor that a text is.
+    #[must_use]
+    pub fn read(text: &str) -> Option<ProfileCursor> {
+        let (time, digest) = text.split_at_checked(12)?;
+        let time = i64::from_str_radix(time, 16).ok()?;
+        let cursor = ProfileCursor(time, digest.to_owned());
+        (digest.len() == 28 && cursor.to_string() == text).then_some(cursor)
+    }
+}
+
+impl std::fmt::Display for ProfileCursor {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:012x}{}", self.0, self.1)
+    }
+}
+
+/// The answer to a call that deletes a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Deleted {
+    /// The row and all that hung on it are gone.
+    Done,
+    /// It has not ended.
+    NotEnded(State),
+    /// There was none.
+    NotFound,
+}
+
+/// The present, and what became of the clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Moment {
+    /// Epoch milliseconds.
+    pub now: i64,
+    /// What was submitted before this time is judged by the next.
+    pub set_at: i64,
+    /// The present of a clock that was not set.
+    pub unset: i64,
+}
+
+/// What is to be removed. Times are epoch milliseconds.
+#[derive(Debug, Clone, Copy)]
+pub struct RetentionRule {
+    /// The present.
+    pub now: i64,
+    /// Jobs that ended at this time or before have expired.
+    pub ended_before: i64,
+    /// Ids of what was removed at this time or before are forgotten.
+    pub forget_before: i64,
+    /// Most jobs to remove.
+    pub jobs: u32,
+}
+
+/// Statistics of a job table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stats {
+    /// Number of jobs in each state; every state is there.
+    pub jobs: BTreeMap<State, u64>,
+    /// Time of submission of the oldest queued job, epoch milliseconds.
+    pub oldest_queued_at: Option<i64>,
+    /// Mean expected solve time of queued jobs in µs; of a long queue, of some of them.
+    pub mean_cost_us: f64,
+    /// Size of the database file and its write-ahead log.
+    pub database_bytes: u64,
+    /// Size of the results outside the table.
+    pub result_bytes: u64,
+}
+
+/// What a tenant has in a job table.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Usage {
+    /// Number of jobs and of chunks of runs in each state; a state may be missing.
+    pub jobs: BTreeMap<State, u64>,
+    /// Places in the queue that are reserved for batches that are being received.
+    pub reserved: u64,
+    /// Bytes that these stand for.
+    pub staged_bytes: u64,
+    /// Bytes of cases, templates and results that are stored.
+    pub stored_bytes: u64,
+}
+
+/// Jobs whose deadline has passed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Overdue {
+    /// Those that were queued and have been ended.
+    pub ended: Vec<Uuid>,
+    /// Those that are running.
+    pub running: Vec<Uuid>,
+}
+
+/// Equal for cases of one tenant that have the same answer.
+pub type CacheKey = [u8; 16];
+
+/// A job about to be queued.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct NewJob {
+    /// UUIDv7.
+    pub id: Uuid,
+    /// Whose it is.
+    pub tenant: Arc<str>,
+    /// [`Kind::Case`], or [`Kind::Rows`] for a chunk of a run.
+    pub kind: Kind,
+    /// Time of submission.
+    pub created_at: i64,
+    /// Free text of the client.
+    pub name: Option<String>,
+    /// Labels of the client.
+    pub labels: BTreeMap<String, String>,
+    /// The method asked for, for the logs.
+    pub method: String,
+    /// The case as submitted, as JSON text; of a row of a table what it puts into the template of its batch.
+    pub body: Bytes,
+    /// It is such a row.
+    pub row: bool,
+    /// The outputs the case asks for, as the JSON list of their names.
+    pub outputs: String,
+    /// Expected solve time in µs; small jobs are claimed in groups.
+    pub cost_us: u32,
+    /// That of its longest slice.
+    pub slice_us: u32,
+    /// What tells later identical cases that this job's result is theirs too.
+    pub cache_key: Option<CacheKey>,
+    /// A succeeded job whose result this one gets, instead of being queued, and the time at which it ends so.
+    pub source: Option<(Uuid, i64)>,
+    /// The client's idempotency key with the digest of case and options; not used inside a batch.
+    pub idempotency: Option<(String, [u8; 32])>,
+    /// W3C trace context of its submission, if its trace is collected.
+    pub traceparent: Option<Arc<str>>,
+    /// Options of the submission.
+    pub options: SubmitOptions,
+}
+
+impl NewJob {
+    /// When the job must have ended.
+    #[must_use]
+    pub fn deadline(&self) -> Option<i64> {
+        let within = i64::try_from(self.options.ends_within?.as_millis()).unwrap_or(i64::MAX);
+        Some(self.created_at.saturating_add(within))
+    }
+}
+
+/// Bounds of the queue: of queued jobs together with the places reserved for batches that are being filled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueueBounds {
+    /// Of all tenants.
+    pub all: u64,
+    /// Of one tenant, the chunks of its runs included.
+    pub tenant: u64,
+    /// Bytes that one tenant may have stored, if they are bounded.
+    pub stored: Option<u64>,
+}
+
+impl QueueBounds {
+    /// No bound.
+    pub const NONE: QueueBounds = QueueBounds {
+        all: u64::MAX,
+        tenant: u64::MAX,
+        stored: None,
+    };
+}
+
+/// Which bound is reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// That of the tenant.
+    Quota,
+    /// That of the queue.
+    Queue,
+    /// That of the bytes that the tenant has stored.
+    Stored,
+}
+
+/// A batch about to be filled.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NewBatch {
+    /// UUIDv7; that of its reservation, if it has one.
+    pub id: Uuid,
+    /// Whose it is.
+    pub tenant: Arc<str>,
+    /// [`Kind::Cases`] or [`Kind::Rows`].
+    pub kind: Kind,
+    /// Time of submission.
+    pub created_at: i64,
+    /// Number of jobs it will have.
+    pub count: u32,
+    /// Number of cases that were refused.
+    pub rejected: u32,
+    /// Free text of the client.
+    pub name: Option<String>,
+    /// Labels of the client.
+    pub labels: BTreeMap<String, String>,
+    /// The case that its rows fill, if it is a table.
+    pub template: Option<Bytes>,
+    /// Of a run: its own part of what its chunks share.
+    pub head: Option<Bytes>,
+    /// Bytes of its cases as they will be stored.
+    pub bytes: u64,
+    /// The client's idempotency key with the digest of all cases and options.
+    pub idempotency: Option<(String, [u8; 32])>,
+}
+
+/// Whether this process receives or fills a batch at the moment of the call. It is called within the transaction that decides what an
+/// idempotency key stands for: a batch that began while the transaction waited for the writer counts too.
+pub type FilledHere<'a> = &'a (dyn Fn(Uuid) -> bool + Sync);
+
+/// What became of an attempt to begin a batch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum BatchBegun {
+    /// The batch can be filled.
+    Created,
+    /// The idempotency key already stands for this batch, with the same cases.
+    Existing(Uuid),
+    /// The idempotency key stands for a batch that is being filled at this moment.
+    Unfinished,
+    /// The idempotency key already stands for other cases or options.
+    Conflict,
+    /// There is no room; nothing was stored.
+    Refused(Refusal),
+}
+
+/// What became of an attempt to queue a job.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Enqueued {
+    /// The job is queued, or has ended with the result of its source.
+    Created(Job),
+    /// The idempotency key already stands for this job, with the same case.
+    Existing(Job),
+    /// The idempotency key already stands for another case, or for other options.
+    Conflict,
+    /// There is no room; nothing was stored.
+    Refused(Refusal),
+}
+
+/// The case of a claimed job.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ClaimedCase {
+    /// The case.
+    pub case: StoredCase,
+    /// The client asked to cancel the job.
+    pub cancel_requested: bool,
+    /// A succeeded job with the same answer, if the job may end with that.
+    pub source: Option<Uuid>,
+}
+
+/// A case as it is stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredCase {
+    /// [`Kind::Case`], or [`Kind::Rows`] for a chunk of a run.
+    pub kind: Kind,
+    /// The case that the body fills; none if the body is the case.
+    pub template: Option<Bytes>,
+    /// Of a chunk of a run: the run's own part of what its chunks share.
+    pub head: Option<Bytes>,
+    /// JSON text.
+    pub body: Bytes,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cursor_leads_back_to_its_job_and_to_no_other_filter() {
+        let filter = Filter {
+            states: vec![State::Queued],
+            ..Filter::default()
+        };
+        let id = Uuid::now_v7();
+        let cursor = filter.cursor_after(id);
+        assert!(cursor.chars().all(|c| c.is_ascii_alphanumeric()));
+        assert_eq!(filter.read_cursor(&cursor), Some(id));
+        assert_eq!(Filter::default().read_cursor(&cursor), None);
+        for wrong in [
+            "",
+            "é",
+            &cursor[1..],
+            &cursor.to_uppercase(),
+            &format!("{cursor}0"),
+        ] {
+            assert_eq!(filter.read_cursor(wrong), None, "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn parts_of_a_filter_do_not_run_into_each_other() {
+        let with = |key: &str, value: &str| Filter {
+            labels: vec![(key.to_owned(), value.to_owned())],
+            ..Filter::default()
+        };
+        assert_ne!(with("ab", "c").digest(), with("a", "bc").digest());
+    }
+
+    #[test]
+    fn the_first_id_of_a_millisecond_is_not_above_any_id_of_it() {
+        let id = Uuid::now_v7();
+        let time = i64::try_from(id.as_u128() >> 80).unwrap();
+        assert!(first_id_at(time) <= id && id < first_id_at(time + 1));
+        assert!(first_id_at(-5) <= id && id < first_id_at(i64::MAX));
+    }
 }

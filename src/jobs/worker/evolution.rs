@@ -8,12 +8,11 @@ use serde_json::Value;
 use crate::contact::error::SolveError;
 use crate::contact::evolution::task::{Evolution, SolveContext};
 use crate::contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
-use crate::jobs::attempts::attempt_control::AttemptControl;
-use crate::jobs::attempts::outcome::{Ended, Outcome};
-use crate::jobs::attempts::slices::{SlicedEvolution, SlicedWork};
+use crate::jobs::attempts::attempt::AttemptControl;
+use crate::jobs::attempts::slices::{Ended, Outcome, SlicedEvolution, SlicedWork};
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::ending::SliceRecord;
+use crate::jobs::store::SliceRecord;
 
 /// Steps that are stored together, unless a record ends them before.
 const STEPS: u32 = 16;

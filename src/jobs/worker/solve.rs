@@ -1,26 +1,36 @@
 //! What a solver thread does for one job: check, solve, encode.
-
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Duration;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use serde_json::json;
+use tokio::sync::OwnedMutexGuard;
+use tokio_util::sync::CancellationToken;
 
 use crate::contact::error::SolveError;
+use crate::contact::evaluate::many::{ManyTask, solve_many};
+use crate::contact::evaluate::many_answer::ManyAnswer;
 use crate::contact::monitor::Monitor;
+use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::words::answer::{Fields, PatchFields, Solution};
-use crate::jobs::attempts::attempt_control::AttemptControl;
-use crate::jobs::attempts::outcome::{Ended, Outcome, Work};
-use crate::jobs::attempts::slices::{SlicedCase, SlicedWork};
+use crate::jobs::attempts::attempt::{
+    Attempt, AttemptControl, Member, Outcomes, Phase, Solver, SolverThread, Task,
+};
+use crate::jobs::attempts::slices::{Ended, Outcome, SlicedCase, SlicedWork, Work};
 use crate::jobs::codec::encode::encode;
+use crate::jobs::codec::parquet;
 use crate::jobs::codec::result::EncodedResult;
+use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::error::JobsError;
-use crate::jobs::model::job::{Failure, FailureKind};
-use crate::jobs::model::kind::Kind;
+use crate::jobs::job_trace::JobTrace;
+use crate::jobs::model::{Failure, FailureKind, Kind, Queue};
+use crate::jobs::run::model::{REASON, RunChunk, RunHead, parted};
 use crate::jobs::shared::Shared;
-use crate::jobs::store::ending::SliceRecord;
-use crate::jobs::store::submission::StoredCase;
-use crate::jobs::worker::{evolution, rows};
+use crate::jobs::store::{Claim, SliceRecord, StoredCase};
+use crate::jobs::sync::lock;
+use crate::jobs::worker::{evolution, heartbeat};
 
 /// Does the work; a panic becomes a failure and the thread stays usable.
 pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Work) -> Outcome {
@@ -51,7 +61,7 @@ fn check_and_solve(
     notes: &[SliceRecord],
 ) -> Ended {
     if stored.kind == Kind::Rows {
-        return rows::solve_chunk(shared, control, stored);
+        return solve_chunk(shared, control, stored);
     }
     let case = stored.value().map_err(|error| error.to_string())?;
     if stored.kind == Kind::Evolution {
@@ -186,6 +196,178 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
         .copied()
         .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("no message")
+}
+
+/// Solves a chunk; its answers are a Parquet file.
+pub(crate) fn solve_chunk(shared: &Shared, control: &AttemptControl, stored: &StoredCase) -> Ended {
+    let (head, chunk) = read_rows(stored).map_err(|error| error.to_string())?;
+    let first_row = chunk.first_row;
+    let (varied, carried) = parted(&head, chunk);
+    let limits = &shared.options.limits;
+    let task = ManyTask {
+        case: &head.case,
+        columns: &varied,
+        profiles: &head.profiles,
+        known: &shared.engine.known,
+        limits,
+        time_limit: shared.options.time_limit,
+    };
+    control.begin(Duration::ZERO);
+    let solve =
+        |checked: &CheckedCase, monitor: &dyn Monitor| shared.engine.solve_whole(checked, monitor);
+    let solved = solve_many(&task, &solve, control);
+    control.pause();
+    let answer = solved?;
+    let rows = answer.status.len();
+    let without = answer.without_answer();
+    shared.metrics.rows_ended(&answer);
+    let file = parquet::encode(&table(&head, first_row, carried, answer));
+    let file = file.map_err(|error| format!("a chunk of rows cannot be written: {error}"))?;
+    Ok(Outcome::Solved {
+        result: EncodedResult {
+            solution: Bytes::from(json!({ "rows": rows, "without_answer": without }).to_string()),
+            fields: Some(Bytes::from(file)),
+        },
+        remarks: Vec::new(),
+        field_patches: u32::try_from(without).unwrap_or(u32::MAX),
+    })
+}
+
+fn read_rows(stored: &StoredCase) -> Result<(RunHead, RunChunk), JobsError> {
+    let head = RunHead::read(
+        stored.template.as_deref().unwrap_or_default(),
+        stored.head.as_deref(),
+    )?;
+    let chunk = RunChunk::read(&stored.body, &head.columns)?;
+    Ok((head, chunk))
+}
+
+/// The answers in the order of [`RunHead::answers`].
+fn table(
+    head: &RunHead,
+    first_row: u64,
+    carried: Vec<(String, TableColumn)>,
+    answer: ManyAnswer,
+) -> RowTable {
+    let rows = (first_row..).take(answer.status.len());
+    let rows = TableColumn::Integers(rows.map(u64::cast_signed).collect());
+    let status = answer.status.iter();
+    let status = status.map(|status| Some(status.name().to_owned()));
+    let method = answer.method.iter();
+    let method = method.map(|method| method.map(|method| method.name().to_owned()));
+    let mut columns = vec![("row".to_owned(), rows)];
+    columns.extend(carried);
+    columns.push(("status".to_owned(), TableColumn::Texts(status.collect())));
+    columns.push(("method".to_owned(), TableColumn::Texts(method.collect())));
+    let numbers = head.numbers.iter().cloned().zip(answer.numbers);
+    columns.extend(numbers.map(|(name, values)| (name, TableColumn::Numbers(values))));
+    if head.with_reasons {
+        let reasons = answer.reason.into_iter();
+        let reasons = reasons.map(|reason| Some(reason).filter(|reason| !reason.is_empty()));
+        columns.push((REASON.to_owned(), TableColumn::Texts(reasons.collect())));
+    }
+    RowTable { columns }
+}
+
+/// A group that takes longer hands back what it has not begun.
+const GROUP_TIME: Duration = Duration::from_millis(400);
+
+/// Lists claimed jobs as running and keeps their leases from now on.
+pub(crate) fn take_up(
+    shared: &Arc<Shared>,
+    queue: Queue,
+    claims: Vec<Claim>,
+    suspect: Option<OwnedMutexGuard<()>>,
+) -> Attempt {
+    let was_begun = claims.iter().any(|claim| claim.slices > 0);
+    let members: Vec<Member> = claims
+        .into_iter()
+        .map(|claim| {
+            let control = Arc::new(AttemptControl::default());
+            Member {
+                _listed: shared.running.enter(claim.id, &control),
+                claim,
+                control,
+                phase: Phase::Solving,
+                case: None,
+                sliced: None,
+            }
+        })
+        .collect();
+    let held = members
+        .iter()
+        .map(|one| (one.claim.clone(), one.control.clone()));
+    Attempt {
+        queue,
+        lease: heartbeat::keep(shared, held.collect()),
+        members,
+        _suspect: suspect,
+        was_begun,
+        turn_began: Instant::now(),
+        spent: Duration::ZERO,
+        solver: None,
+    }
+}
+
+/// Hands the work for the members at these places to a thread.
+pub(crate) fn begin(
+    shared: &Arc<Shared>,
+    attempt: &mut Attempt,
+    thread: SolverThread,
+    work: Vec<(usize, Work)>,
+) {
+    attempt.spent = Duration::ZERO;
+    let outcomes = Outcomes::default();
+    let over = CancellationToken::new();
+    let closed = Arc::new(Mutex::new(false));
+    let work: Vec<_> = work
+        .into_iter()
+        .map(|(place, work)| {
+            let member = &attempt.members[place];
+            member.control.reset_started();
+            let traced = shared.job_trace(&member.claim);
+            (place, member.control.clone(), work, traced)
+        })
+        .collect();
+    let task: Task = {
+        let (shared, closed) = (shared.clone(), closed.clone());
+        let (lease, over) = (attempt.lease.0.clone(), over.clone().drop_guard());
+        let outcomes = outcomes.clone();
+        Box::new(move || {
+            let _over = over;
+            let start = Instant::now();
+            for (number, (place, control, work, traced)) in work.into_iter().enumerate() {
+                let late = number > 0 && start.elapsed() > GROUP_TIME;
+                {
+                    let closed = lock(&closed);
+                    if late || *closed || shared.stopping.is_cancelled() {
+                        break;
+                    }
+                    control.take_up();
+                }
+                let from_queue = matches!(work, Work::New(..));
+                let solve = || solve_guarded(&shared, &control, work);
+                let outcome = JobTrace::solving(traced.as_ref(), from_queue, solve);
+                let mut outcomes = lock(&outcomes);
+                outcomes.push((place, outcome));
+                lease.alive();
+            }
+        })
+    };
+    if thread.give(task) {
+        attempt.solver = Some(Solver {
+            thread,
+            outcomes,
+            over,
+            closed,
+        });
+        return;
+    }
+    // The thread is gone, which no panic of a solver can do.
+    let died = || Failure::new(FailureKind::Internal, "the solver thread had died");
+    for place in attempt.to_solve() {
+        attempt.members[place].phase = Phase::Solved(Outcome::Broken(died()));
+    }
 }
 
 #[cfg(test)]

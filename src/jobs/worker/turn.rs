@@ -11,16 +11,13 @@ use std::time::{Duration, Instant};
 
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::jobs::attempts::attempt::{Attempt, Phase};
-use crate::jobs::attempts::attempt_control::StopReason;
-use crate::jobs::attempts::outcome::Work;
-use crate::jobs::attempts::solver_thread::{Counted, SolverThread};
+use crate::jobs::attempts::attempt::{Attempt, Counted, Phase, SolverThread, StopReason};
+use crate::jobs::attempts::slices::Work;
 use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::claim::ReleaseReason;
-use crate::jobs::store::submission::ClaimedCase;
-use crate::jobs::worker::begin;
+use crate::jobs::store::{ClaimedCase, ReleaseReason};
 use crate::jobs::worker::pool::{StepReport, Worker};
+use crate::jobs::worker::solve;
 
 /// How long a solver that was told to stop may go on before its thread is left behind.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
@@ -97,7 +94,7 @@ impl Worker {
             Some(thread) => thread,
             None => SolverThread::start(&self.name)?,
         };
-        begin::begin(&self.shared, attempt, thread, work);
+        solve::begin(&self.shared, attempt, thread, work);
         Ok(())
     }
 

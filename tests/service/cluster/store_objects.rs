@@ -3,7 +3,7 @@
 use bytes::Bytes;
 use object_store::path::Path;
 use object_store::{ObjectStoreExt, PutPayload};
-use railhead::jobs::store::submission::QueueBounds;
+use railhead::jobs::store::QueueBounds;
 
 use crate::store::{StoreKind, Table, new_job, success};
 

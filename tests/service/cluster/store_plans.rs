@@ -3,16 +3,14 @@
 
 use std::sync::Arc;
 
-use railhead::jobs::State;
-use railhead::jobs::model::kind::{Kind, Queue};
-use railhead::jobs::store::Store;
-use railhead::jobs::store::claim::{Claim, ClaimKind, ClaimRequest, Lease, Reap, ReleaseReason};
-use railhead::jobs::store::list::{Filter, Membership};
+use railhead::jobs::model::{Kind, Queue};
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
-use railhead::jobs::store::retention::{Moment, RetentionRule};
-use railhead::jobs::store::submission::{Enqueued, NewJob, QueueBounds};
-use railhead::jobs::{Failure, FailureKind};
+use railhead::jobs::store::{
+    Claim, ClaimKind, ClaimRequest, Enqueued, Filter, Lease, Membership, Moment, NewJob,
+    QueueBounds, Reap, ReleaseReason, RetentionRule, Store,
+};
+use railhead::jobs::{Failure, FailureKind, State};
 use serde_json::Value;
 use sqlx::PgPool;
 use uuid::Uuid;

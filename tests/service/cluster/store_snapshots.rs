@@ -1,12 +1,12 @@
 //! Does it cost claims and ends nothing that somebody keeps a transaction open, so that dead rows stay? Work is counted, not time.
 
 use railhead::jobs::codec::result::EncodedResult;
-use railhead::jobs::model::kind::Queue;
-use railhead::jobs::store::claim::{ClaimKind, ClaimRequest, Lease, ReleaseReason};
-use railhead::jobs::store::ending::{Ending, StoredResult};
+use railhead::jobs::model::Queue;
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
-use railhead::jobs::store::{Claims, Ends, Leases};
+use railhead::jobs::store::{
+    ClaimKind, ClaimRequest, Claims, Ending, Ends, Lease, Leases, ReleaseReason, StoredResult,
+};
 use sqlx::{Connection, PgConnection};
 
 use crate::cluster::postgres::database;

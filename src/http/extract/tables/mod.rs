@@ -9,17 +9,17 @@ use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 use axum::body::Bytes;
 
 use self::npz::read_arrays;
-pub use self::npz::too_large;
-pub use self::text::CsvRows;
 use self::text::JsonRows;
 use crate::contact::evaluate::varied::Values;
 use crate::http::extract::titles::{NamedColumns, Titled, faulty, require_few};
-use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
+use crate::http::problem::{ApiError, ProblemKind};
 use crate::jobs::codec::arrow;
 use crate::jobs::codec::parquet::TableReader;
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
-use crate::jobs::run::head::RunColumn;
+use crate::jobs::run::model::RunColumn;
+
+pub use self::npz::too_large;
+pub use self::text::CsvRows;
 
 /// Largest group of rows of a Parquet file, unpacked, in bytes.
 const GROUP_BYTES_MAX: i64 = 1 << 28;

@@ -8,8 +8,7 @@ use axum::body::Bytes;
 use zip::ZipArchive;
 
 use crate::http::extract::titles::{faulty, require_few};
-use crate::http::problem::error::ApiError;
-use crate::http::problem::kinds::ProblemKind;
+use crate::http::problem::{ApiError, ProblemKind};
 
 /// What an array may hold.
 const KINDS: &str = "float32, float64, or integers";

@@ -9,7 +9,7 @@ use crate::http::extract::tables::{Chunk, Title};
 use crate::http::extract::titles::{
     delimiter, faulty, is_line_of_units, is_text, number, require_few,
 };
-use crate::http::problem::error::ApiError;
+use crate::http::problem::ApiError;
 
 /// Rows that are read at once.
 const ROWS: usize = 8192;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use tokio::time::timeout;
 
-use crate::jobs::store_error::{StorageFault, StoreError};
+use crate::jobs::error::{StorageFault, StoreError};
 
 /// How long a call may take; the server ends its statements before.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(15);

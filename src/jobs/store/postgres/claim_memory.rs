@@ -11,11 +11,11 @@ use std::time::{Duration, Instant};
 use sqlx::Row;
 use sqlx::postgres::{PgConnection, PgRow};
 
-use crate::jobs::model::kind::Queue;
-use crate::jobs::store::claim::ClaimRequest;
+use crate::jobs::error::StoreError;
+use crate::jobs::model::Queue;
+use crate::jobs::store::ClaimRequest;
 use crate::jobs::store::postgres::sql::claim::peek;
 use crate::jobs::store::postgres::sql::rows::count;
-use crate::jobs::store_error::StoreError;
 use crate::jobs::sync::lock;
 
 /// Queues that are shorter are counted and walked from their start at every claim.

@@ -8,13 +8,13 @@ use railhead_macros::repeat_conflicts;
 use sqlx::Row;
 use uuid::Uuid;
 
-use crate::jobs::store::cluster::{Cluster, ClusterView, Deployment, Node, Notification};
+use crate::jobs::error::StoreError;
 use crate::jobs::store::postgres::connection::{FOLD, LOCKS};
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::postgres::objects::PgObjects;
 use crate::jobs::store::postgres::sql::rows::{count, read_id, read_small};
 use crate::jobs::store::postgres::{engine, notifier};
-use crate::jobs::store_error::StoreError;
+use crate::jobs::store::{Cluster, ClusterView, Deployment, Node, Notification};
 
 const NOW: &str = "SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)";
 

@@ -7,9 +7,8 @@ use sqlx::Connection;
 use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
 use tokio::time::timeout;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, StoreError};
 use crate::jobs::store::postgres::url;
-use crate::jobs::store_error::StoreError;
 
 /// How long a call waits for a connection.
 const CONNECT_WITHIN: Duration = Duration::from_secs(5);

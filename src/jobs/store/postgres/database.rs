@@ -4,14 +4,13 @@ use std::fmt;
 
 use sqlx::postgres::{PgConnectOptions, PgPool};
 
-use crate::jobs::error::JobsError;
-use crate::jobs::store::cluster::NotifyMode;
+use crate::jobs::error::{JobsError, StoreError};
+use crate::jobs::store::NotifyMode;
 use crate::jobs::store::postgres::claim_memory::ClaimMemory;
 use crate::jobs::store::postgres::connection::{connect, session};
 use crate::jobs::store::postgres::notifier::Notifier;
 use crate::jobs::store::postgres::schema::require;
-use crate::jobs::store::postgres::sql::group_commit::GroupCommit;
-use crate::jobs::store_error::StoreError;
+use crate::jobs::store::postgres::sql::submit::GroupCommit;
 
 /// The job table that several processes share.
 #[derive(Clone)]

@@ -6,16 +6,15 @@ use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow, Postgres};
 use sqlx::query::Query;
 use uuid::Uuid;
 
-use crate::jobs::model::kind::Queue;
-use crate::jobs::store::claim::{ClaimKind, ClaimRequest};
-use crate::jobs::store::cluster::Cluster;
+use crate::jobs::error::StoreError;
+use crate::jobs::model::Queue;
 use crate::jobs::store::postgres::answer::in_time;
 use crate::jobs::store::postgres::claim_memory::{PEEK_BEGUN, first_queued};
 use crate::jobs::store::postgres::connection::{ADMISSION, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::postgres::sql::claim::{claimed, push_lease_until};
 use crate::jobs::store::postgres::sql::rows::{count, push_list, read_count, read_flag, read_id};
-use crate::jobs::store_error::StoreError;
+use crate::jobs::store::{ClaimKind, ClaimRequest, Cluster};
 
 pub(crate) use sqlx::{Row, query, query_scalar};
 

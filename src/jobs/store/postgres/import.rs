@@ -3,12 +3,11 @@
 use sqlx::postgres::PgConnection;
 use sqlx::{AssertSqlSafe, Connection};
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, StoreError};
 use crate::jobs::store::portion::{Portion, TABLES, Values};
 use crate::jobs::store::postgres::connection::{ADMISSION, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::sqlite::database::SqliteStore;
-use crate::jobs::store_error::StoreError;
 
 /// What nodes may have made before: rows that are there stay as they are.
 const ONCE: [&str; 3] = ["tombstones", "api_keys", "profiles"];

@@ -8,9 +8,9 @@ use tokio::sync::mpsc;
 use tokio::time::timeout;
 use uuid::Uuid;
 
-use crate::jobs::store::cluster::Notification;
+use crate::jobs::error::StoreError;
+use crate::jobs::store::Notification;
 use crate::jobs::store::postgres::answer::in_time;
-use crate::jobs::store_error::StoreError;
 
 /// The channel of all nodes.
 const CHANNEL: &str = "railhead";

@@ -1,17 +1,143 @@
-//! Large results that nobody refers to any more.
-
-use super::blob_refs::{VALUES_PER_STATEMENT, leave_to_collector, push_keys};
-use super::engine::{self, QueryBuilder, Row, SqlStore, query_scalar};
-use super::rows::{push_list, read_id};
+//! References to blobs, in the transactions that make and drop them.
+//!
+//! A blob is a row. Jobs and stored slices refer to it; a job that shares a result is one more reference. [`release_blobs`] is
+//! the only place where a blob ends: it is called in every transaction that drops references.
 use std::collections::HashSet;
-use uuid::Uuid;
 
 use async_trait::async_trait;
 use railhead_macros::repeat_conflicts;
+use uuid::Uuid;
 
-use crate::jobs::store::Orphans;
-use crate::jobs::store::ResultKeys;
-use crate::jobs::store_error::StoreError;
+use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query_scalar};
+use super::rows::{count, fence, push_list, read_blob_ids, read_id, read_small, read_state};
+use crate::jobs::error::StoreError;
+use crate::jobs::store::{Claim, Orphans, ResultKeys, StoredResult};
+
+/// Values bound in one statement; far below the bound of SQLite.
+pub(crate) const VALUES_PER_STATEMENT: usize = 250;
+
+impl SqlStore {
+    /// Stores results of claimed jobs whose leases are held, within the caller's transaction; the ids of their blobs are in the order of
+    /// the results.
+    pub(crate) async fn insert_blobs(
+        &self,
+        connection: &mut DbConnection,
+        results: &[(&Claim, &StoredResult)],
+    ) -> Result<Vec<i64>, StoreError> {
+        if results.is_empty() {
+            return Ok(Vec::new());
+        }
+        let ids = self.new_blob_ids(connection, results.len()).await?;
+        let mut next = ids.iter();
+        for some in results.chunks(VALUES_PER_STATEMENT) {
+            let mut insert = QueryBuilder::new(
+                "WITH made (id, job, lease_token, key, bytes, solution, fields) AS (",
+            );
+            insert.push_values(some, |mut row, (claim, result)| {
+                let (key, inside) = match result {
+                    StoredResult::Blob(key, _) => (Some(key.as_str()), None),
+                    StoredResult::Inline(result) => (None, Some(result)),
+                };
+                row.push_bind(next.next().copied())
+                    .push_bind(claim.id.to_string())
+                    .push_bind(fence(claim))
+                    .push_bind(key)
+                    .push_bind(count(result.bytes()))
+                    .push_bind(inside.map(|result| result.solution.as_ref()))
+                    .push_bind(inside.and_then(|result| result.fields.as_deref()));
+            });
+            insert.push(concat!(
+                ") INSERT INTO blobs (id, key, bytes, solution, fields, tenant) \
+                 SELECT made.id, made.key, made.bytes, made.solution, made.fields, jobs.tenant FROM made JOIN jobs \
+                 ON jobs.id = made.job AND jobs.lease_token = made.lease_token WHERE ",
+                unordered!("jobs.state"),
+                " = 'running'"
+            ));
+            insert.build().execute(&mut *connection).await?;
+        }
+        Ok(ids)
+    }
+}
+
+/// Removes those of these blobs that nothing refers to any more; the keys of the large ones enter the outbox.
+pub(crate) async fn release_blobs(
+    connection: &mut DbConnection,
+    mut ids: Vec<i64>,
+) -> Result<(), StoreError> {
+    ids.sort_unstable();
+    ids.dedup();
+    for some in ids.chunks(VALUES_PER_STATEMENT) {
+        // Of two transactions that drop the last two references, the later has to see that the other one is gone.
+        engine::lock_blobs(connection, some).await?;
+        let mut free = QueryBuilder::new("DELETE FROM blobs WHERE id IN (");
+        let mut list = free.separated(", ");
+        for id in some {
+            list.push_bind(*id);
+        }
+        free.push(
+            ") AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.blob_id = blobs.id) \
+             AND NOT EXISTS (SELECT 1 FROM job_slices WHERE job_slices.blob_id = blobs.id) RETURNING key",
+        );
+        let gone = free.build().fetch_all(&mut *connection).await?;
+        let keys = gone
+            .iter()
+            .map(|row| row.try_get::<Option<String>, _>("key"));
+        let keys = keys.collect::<Result<Vec<_>, _>>()?;
+        let keys: Vec<String> = keys.into_iter().flatten().collect();
+        leave_to_collector(connection, &keys).await?;
+    }
+    Ok(())
+}
+
+/// Removes the slices of those of these jobs that have ended. The rows have the columns `id`, `state` and `slices`.
+pub(crate) async fn drop_slices_of_ended(
+    connection: &mut DbConnection,
+    rows: &[DbRow],
+) -> Result<(), StoreError> {
+    let mut ids = Vec::new();
+    for row in rows {
+        let slices: u32 = read_small(row, "slices")?;
+        if slices > 0 && read_state(row)?.ended() {
+            ids.push(read_id(row)?);
+        }
+    }
+    for some in ids.chunks(VALUES_PER_STATEMENT) {
+        let mut drop = QueryBuilder::new("DELETE FROM job_slices WHERE job_id IN (");
+        push_list(&mut drop, some);
+        drop.push(") RETURNING blob_id");
+        let gone = drop.build().fetch_all(&mut *connection).await?;
+        release_blobs(connection, read_blob_ids(&gone)?).await?;
+    }
+    Ok(())
+}
+
+/// Leaves these keys to the collector, except those that another blob has: a call that is repeated because its answer was
+/// lost brings the same key twice.
+pub(crate) async fn leave_to_collector(
+    connection: &mut DbConnection,
+    keys: &[String],
+) -> Result<(), StoreError> {
+    for some in keys.chunks(VALUES_PER_STATEMENT) {
+        let mut leave = QueryBuilder::new("WITH gone (key) AS (");
+        leave.push_values(some, |mut row, key| {
+            row.push_bind(key);
+        });
+        leave.push(
+            ") INSERT INTO blob_outbox (key) SELECT key FROM gone \
+             WHERE NOT EXISTS (SELECT 1 FROM blobs WHERE blobs.key = gone.key) ON CONFLICT DO NOTHING",
+        );
+        leave.build().execute(&mut *connection).await?;
+    }
+    Ok(())
+}
+
+pub(crate) fn push_keys(query: &mut QueryBuilder, keys: &[String]) {
+    let mut list = query.separated(", ");
+    for key in keys {
+        list.push_bind(key.clone());
+    }
+    query.push(")");
+}
 
 #[repeat_conflicts]
 #[async_trait]

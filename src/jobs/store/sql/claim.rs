@@ -1,16 +1,25 @@
 //! Claims: the next group of queued jobs of a tenant.
-
-use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
-use super::rows::{count, read_cache_key, read_count, read_flag, read_id, read_kind, read_small};
+use std::collections::HashMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use async_trait::async_trait;
+use bytes::Bytes;
 use railhead_macros::repeat_conflicts;
+use uuid::Uuid;
 
-use crate::jobs::model::kind::Queue;
-use crate::jobs::store::Claims;
-use crate::jobs::store::claim::{Claim, ClaimRequest, Lease};
-use crate::jobs::store_error::StoreError;
+use super::blobs::{drop_slices_of_ended, release_blobs};
+use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
+use super::rows::{
+    count, fence, push_list, read_blob_ids, read_cache_key, read_count, read_flag, read_id,
+    read_kind, read_move, read_optional_id, read_small,
+};
+use crate::jobs::error::StoreError;
+use crate::jobs::model::{Queue, State};
+use crate::jobs::store::{
+    Claim, ClaimRequest, ClaimedCase, Claims, Lease, Leases, NewSlice, ReleaseReason, Renewal,
+    SliceRecord, Slices, StoredCase, StoredResult,
+};
 
 /// Selects the first jobs of the queue $1 and $5, at most `$most`; suspects if `$suspects` is 1.
 macro_rules! peek {
@@ -102,4 +111,279 @@ fn read_claim(row: &DbRow) -> Result<Claim, StoreError> {
         suspect: read_flag(row, "suspect")?,
         slices: read_small(row, "slices")?,
     })
+}
+
+#[repeat_conflicts]
+#[async_trait]
+impl Leases for SqlStore {
+    async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>, StoreError> {
+        if ids.is_empty() {
+            return Ok(HashMap::new());
+        }
+        let mut query = QueryBuilder::new(
+            "SELECT id, kind, cases.row, body, batch_id, cancel_requested, CASE WHEN bypass_cache = 0 AND jobs.cache_key IS NOT NULL THEN \
+             (SELECT source.id FROM jobs AS source WHERE source.cache_key = jobs.cache_key AND source.state = 'succeeded' LIMIT 1) END AS source \
+             FROM cases JOIN jobs ON jobs.id = cases.job_id \
+             WHERE job_id IN (",
+        );
+        push_list(&mut query, ids);
+        query.push(")");
+        let mut connection = self.readers.acquire().await?;
+        let rows = query.build().fetch_all(&mut *connection).await?;
+        drop(connection);
+        let mut templates: HashMap<String, (Bytes, Option<Bytes>)> = HashMap::new();
+        let mut cases = HashMap::with_capacity(rows.len());
+        for row in &rows {
+            let (mut template, mut head) = (None, None);
+            if read_flag(row, "row")? {
+                let batch: String = row.try_get("batch_id")?;
+                if !templates.contains_key(&batch)
+                    && let Some(read) = self.template(&batch).await?
+                {
+                    templates.insert(batch.clone(), read);
+                }
+                let Some((of_batch, of_run)) = templates.get(&batch) else {
+                    continue;
+                };
+                template = Some(of_batch.clone());
+                head.clone_from(of_run);
+            }
+            let body: Vec<u8> = row.try_get("body")?;
+            let case = StoredCase {
+                kind: read_kind(row)?,
+                template,
+                head,
+                body: body.into(),
+            };
+            let claimed = ClaimedCase {
+                case,
+                cancel_requested: read_flag(row, "cancel_requested")?,
+                source: read_optional_id(row, "source")?,
+            };
+            cases.insert(read_id(row)?, claimed);
+        }
+        Ok(cases)
+    }
+
+    async fn renew(
+        &self,
+        claims: &[(&Claim, f64)],
+        lease: Lease,
+    ) -> Result<Vec<Renewal>, StoreError> {
+        if claims.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut query = QueryBuilder::new("WITH held (id, lease_token, now_at) AS (");
+        query.push_values(claims, |mut row, (claim, progress)| {
+            row.push_bind(claim.id.to_string())
+                .push_bind(fence(claim))
+                .push_bind(*progress);
+        });
+        query.push(") UPDATE jobs SET lease_until = ");
+        push_lease_until(&mut query, self, lease);
+        query.push(concat!(
+            ", progress = ",
+            greatest!(),
+            "(held.now_at, done), \
+         version = CASE WHEN progress = ",
+            greatest!(),
+            "(held.now_at, done) THEN version ELSE version + 1 END"
+        ));
+        query.push(OF_HELD).push("jobs.id AS id, cancel_requested");
+        let rows = query.build().fetch_all(&self.writer).await?;
+        let mut held = HashMap::with_capacity(rows.len());
+        for row in &rows {
+            held.insert(read_id(row)?, read_flag(row, "cancel_requested")?);
+        }
+        let answers = claims.iter().map(|(claim, _)| match held.get(&claim.id) {
+            Some(cancel_requested) => Renewal::Held {
+                cancel_requested: *cancel_requested,
+            },
+            None => Renewal::Lost,
+        });
+        Ok(answers.collect())
+    }
+
+    async fn release(
+        &self,
+        claims: &[Claim],
+        why: ReleaseReason,
+        now: i64,
+    ) -> Result<Vec<(Uuid, State)>, StoreError> {
+        if claims.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut query = with_held(claims);
+        query.push(
+            " UPDATE jobs SET state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
+             started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
+             attempt = attempt - 1, progress = done, lease_until = NULL, worker = NULL, \
+             version = version + 1",
+        );
+        match why {
+            ReleaseReason::NotBegun => {}
+            ReleaseReason::SolveItself => drop(query.push(", bypass_cache = 1")),
+            ReleaseReason::Long { slice_us } => {
+                let slice_us = count(slice_us);
+                query
+                    .push(concat!(", slice_us = ", greatest!(), "(slice_us, "))
+                    .push_bind(slice_us);
+                query
+                    .push(concat!("), cost_us = ", greatest!(), "(cost_us, "))
+                    .push_bind(slice_us);
+                query.push(")");
+            }
+        }
+        query.push(", updated_at = ").push_bind(now);
+        query.push(", ended_at = CASE WHEN cancel_requested = 1 THEN ");
+        query.push_bind(now);
+        query
+            .push(" ELSE NULL END")
+            .push(OF_HELD)
+            .push("jobs.id AS id, state, slices");
+        let mut transaction = engine::begin(&self.writer).await?;
+        let rows = query.build().fetch_all(&mut *transaction).await?;
+        drop_slices_of_ended(&mut transaction, &rows).await?;
+        transaction.commit().await?;
+        self.requeued();
+        rows.iter()
+            .map(|row| read_move(row, State::Running))
+            .collect()
+    }
+}
+
+impl SqlStore {
+    /// The template of a batch, and the head of a run.
+    async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>, StoreError> {
+        let row = query(
+            "SELECT body, head FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
+             WHERE batches.id = $1",
+        )
+        .bind(batch)
+        .fetch_optional(&self.readers)
+        .await?;
+        // It goes with the last job of its batch.
+        let Some(row) = row else { return Ok(None) };
+        let (body, head): (Vec<u8>, Option<Vec<u8>>) = (row.try_get("body")?, row.try_get("head")?);
+        Ok(Some((body.into(), head.map(Bytes::from))))
+    }
+}
+
+/// The end of an update of claimed jobs, as long as their leases are held.
+const OF_HELD: &str = concat!(
+    " FROM held WHERE jobs.id = held.id AND jobs.lease_token = held.lease_token AND ",
+    unordered!("jobs.state"),
+    " = 'running' RETURNING "
+);
+
+fn with_held(claims: &[Claim]) -> QueryBuilder {
+    let mut query = QueryBuilder::new("WITH held (id, lease_token) AS (");
+    query.push_values(claims, |mut row, claim| {
+        row.push_bind(claim.id.to_string()).push_bind(fence(claim));
+    });
+    query.push(")");
+    query
+}
+
+pub(crate) const NOTES: &str =
+    "SELECT number, motions, digest, spent_us FROM job_slices WHERE job_id = $1 ORDER BY number";
+
+pub(crate) const RESULTS: &str = "SELECT key, bytes, solution, fields FROM job_slices JOIN blobs ON blobs.id = blob_id \
+     WHERE job_id = $1 ORDER BY number";
+
+#[repeat_conflicts]
+#[async_trait]
+impl Slices for SqlStore {
+    async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool, StoreError> {
+        let id = claim.id.to_string();
+        let note = &slice.note;
+        let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
+        let mut transaction = engine::begin(&self.writer).await?;
+        // Attempts are counted from the last slice that was stored: who gets on is not what processes die of.
+        let added = query(
+            "UPDATE jobs SET attempt = 1, version = version + 1, slices = $1, done = $2, progress = $2, cost_us = $3 \
+             WHERE id = $4 AND lease_token = $5 AND state = 'running'",
+        )
+        .bind(i64::from(note.number) + 1)
+        .bind(slice.done)
+        .bind(count(slice.rest_us))
+        .bind(&id)
+        .bind(fence(claim))
+        .execute(&mut *transaction)
+        .await?;
+        if added.rows_affected() == 0 {
+            return Ok(false);
+        }
+        let there = query(
+            "SELECT 1 FROM job_slices WHERE job_id = $1 AND number = $2 AND digest = $3 AND spent_us = $4",
+        )
+        .bind(&id)
+        .bind(i64::from(note.number))
+        .bind(&note.digest)
+        .bind(spent_us)
+        .fetch_optional(&mut *transaction)
+        .await?;
+        if there.is_none() {
+            let replaced = query(
+                "DELETE FROM job_slices WHERE job_id = $1 AND number >= $2 RETURNING blob_id",
+            )
+            .bind(&id)
+            .bind(i64::from(note.number))
+            .fetch_all(&mut *transaction)
+            .await?;
+            release_blobs(&mut transaction, read_blob_ids(&replaced)?).await?;
+            let blobs = self
+                .insert_blobs(&mut transaction, &[(claim, &slice.result)])
+                .await?;
+            query(
+                "INSERT INTO job_slices (job_id, number, motions, digest, spent_us, blob_id) \
+                 VALUES ($1, $2, $3, $4, $5, $6)",
+            )
+            .bind(&id)
+            .bind(i64::from(note.number))
+            .bind(i64::from(note.motions))
+            .bind(&note.digest)
+            .bind(spent_us)
+            .bind(blobs.first())
+            .execute(&mut *transaction)
+            .await?;
+        }
+        transaction.commit().await?;
+        Ok(true)
+    }
+
+    async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>, StoreError> {
+        let rows = query(NOTES)
+            .bind(id.to_string())
+            .fetch_all(&self.readers)
+            .await?;
+        rows.iter()
+            .map(|row| {
+                Ok(SliceRecord {
+                    number: read_small(row, "number")?,
+                    motions: read_small(row, "motions")?,
+                    digest: row.try_get("digest")?,
+                    spent: Duration::from_micros(read_count(row, "spent_us")?),
+                })
+            })
+            .collect()
+    }
+
+    async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, StoreError> {
+        let rows = query(RESULTS)
+            .bind(id.to_string())
+            .fetch_all(&self.readers)
+            .await?;
+        rows.iter()
+            .map(|row| {
+                if let Some(key) = row.try_get::<Option<String>, _>("key")? {
+                    return Ok(StoredResult::Blob(key, read_count(row, "bytes")?));
+                }
+                Ok(StoredResult::inline(
+                    row.try_get("solution")?,
+                    row.try_get("fields")?,
+                ))
+            })
+            .collect()
+    }
 }

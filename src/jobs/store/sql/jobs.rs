@@ -1,24 +1,22 @@
 //! What clients ask of one job.
+use std::cmp::Reverse;
 
-use super::blob_refs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, Row, SqlStore, query};
-use super::rows::{
-    GET, job_columns, read_blob_id, read_count, read_flag, read_job, read_kind, read_small,
-};
 use async_trait::async_trait;
-use railhead_macros::repeat_conflicts;
-
-use crate::jobs::store::ending::StoredResult;
-use crate::jobs::store::submission::StoredCase;
 use bytes::Bytes;
-
+use railhead_macros::repeat_conflicts;
 use uuid::Uuid;
 
-use crate::jobs::model::job::Job;
-use crate::jobs::store::ClientJobs;
-use crate::jobs::store::ending::ResultRef;
-use crate::jobs::store::retention::Deleted;
-use crate::jobs::store_error::StoreError;
+use super::blobs::{drop_slices_of_ended, release_blobs};
+use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
+use super::rows::{
+    GET, job_columns, read_blob_id, read_count, read_flag, read_id, read_job, read_kind,
+    read_optional_id, read_small,
+};
+use crate::jobs::error::StoreError;
+use crate::jobs::model::{Job, State};
+use crate::jobs::store::{
+    Change, ClientJobs, Deleted, Filter, JobLists, Page, ResultRef, StoredCase, StoredResult, Total,
+};
 
 #[repeat_conflicts]
 #[async_trait]
@@ -133,4 +131,283 @@ impl ClientJobs for SqlStore {
             body: body.into(),
         }))
     }
+}
+
+/// Most jobs that are examined for one page where no index finds them.
+const EXAMINED_MAX: i64 = 20_000;
+/// How far the jobs of a list are counted.
+const COUNTED: i64 = 1_000;
+
+#[repeat_conflicts]
+#[async_trait]
+impl JobLists for SqlStore {
+    async fn list(
+        &self,
+        tenant: &str,
+        filter: &Filter,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Page<Job>, StoreError> {
+        let (mut jobs, mut looked_to) = (Vec::new(), None);
+        for state in walked(filter) {
+            let mut query = page_query(tenant, filter, state, after, limit);
+            for row in &query.build().fetch_all(&self.readers).await? {
+                jobs.push(read_job(row)?);
+            }
+            if filter.reads_jobs() {
+                let mut query = end_query(tenant, filter, state, after);
+                let end = query.build().fetch_optional(&self.readers).await?;
+                looked_to = looked_to.max(end.as_ref().map(read_id).transpose()?);
+            }
+        }
+        jobs.sort_unstable_by_key(|job| Reverse(job.id));
+        // Below, not every state was looked at.
+        jobs.retain(|job| looked_to.is_none_or(|to| job.id >= to));
+        // One job more than asked for was read: it says whether there is a next page.
+        let more = jobs.len() > limit as usize;
+        jobs.truncate(limit as usize);
+        let last = if more {
+            jobs.last().map(|job| job.id)
+        } else {
+            looked_to
+        };
+        Ok(Page {
+            next_cursor: last.map(|last| filter.cursor_after(last)),
+            total: match filter.reads_jobs() {
+                true => Total::AtLeast(jobs.len() as u64),
+                false => self.count(tenant, filter).await?,
+            },
+            entries: jobs,
+        })
+    }
+
+    async fn changes(
+        &self,
+        tenant: &str,
+        since: i64,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Vec<Change>, StoreError> {
+        let rows = query(CHANGES)
+            .bind(tenant)
+            .bind(since)
+            .bind(after.map_or_else(String::new, |id| id.to_string()))
+            .bind(i64::from(limit))
+            .fetch_all(&self.readers)
+            .await?;
+        let change = |row: &DbRow| {
+            Ok(Change {
+                id: read_id(row)?,
+                batch: read_optional_id(row, "batch_id")?,
+                kind: read_kind(row)?,
+                at: row.try_get("updated_at")?,
+            })
+        };
+        rows.iter().map(change).collect()
+    }
+}
+
+impl SqlStore {
+    async fn count(&self, tenant: &str, filter: &Filter) -> Result<Total, StoreError> {
+        let restricted = filter.member.is_some()
+            || !filter.labels.is_empty()
+            || filter.created_after.or(filter.created_before).is_some();
+        let (mut total, mut all) = (0, true);
+        for state in walked(filter) {
+            let mut query = if restricted {
+                count_query(tenant, filter, state)
+            } else {
+                kept_count_query(tenant, filter, state)
+            };
+            let row = query.build().fetch_one(&self.readers).await?;
+            let number = read_count(&row, "number")?;
+            all &= !restricted || number < COUNTED.unsigned_abs();
+            total += number;
+        }
+        Ok(match all {
+            true => Total::Exactly(total),
+            false => Total::AtLeast(total),
+        })
+    }
+}
+
+const CHANGES: &str = "SELECT id, batch_id, kind, updated_at FROM jobs WHERE tenant = $1 AND (updated_at, id) > ($2, $3) \
+     ORDER BY updated_at, id LIMIT $4";
+
+/// The states whose jobs are walked one after the other; `None` stands for all of them.
+fn walked(filter: &Filter) -> Vec<Option<State>> {
+    let all = State::ALL.iter().all(|state| filter.states.contains(state));
+    match filter.states.is_empty() || all {
+        // The index of jobs that were submitted alone is sorted by state first.
+        true if filter.alone() => State::ALL.map(Some).to_vec(),
+        true => vec![None],
+        false => filter.states.iter().copied().map(Some).collect(),
+    }
+}
+
+/// The statement of one page of the jobs in one state, or in any.
+pub(crate) fn page_query(
+    tenant: &str,
+    filter: &Filter,
+    state: Option<State>,
+    after: Option<Uuid>,
+    limit: u32,
+) -> QueryBuilder {
+    let most = i64::from(limit) + 1;
+    if !filter.reads_jobs() {
+        let mut query = QueryBuilder::new("");
+        walk(&mut query, job_columns!(), tenant, filter, state, after);
+        query.push(" LIMIT ").push_bind(most);
+        return query;
+    }
+    let mut query = QueryBuilder::new(concat!("SELECT ", job_columns!(), " FROM ("));
+    walk(&mut query, job_columns!(), tenant, filter, state, after);
+    query.push(" LIMIT ").push_bind(EXAMINED_MAX);
+    query.push(") AS examined WHERE TRUE");
+    if filter.alone() {
+        query.push(" AND batch_id IS NULL");
+    }
+    if let Some(time) = filter.updated_after {
+        query.push(" AND updated_at >= ").push_bind(time);
+    }
+    if let Some(name) = &filter.name {
+        query.push(concat!(
+            " AND ",
+            place_in!(),
+            "(lower(COALESCE(name, '')), "
+        ));
+        query.push_bind(name.to_ascii_lowercase()).push(") > 0");
+    }
+    for (key, value) in filter.labels.iter().skip(1) {
+        query.push(" AND EXISTS (SELECT 1 FROM job_labels WHERE of_tenant = ");
+        query.push_bind(tenant.to_owned()).push(" AND key = ");
+        query.push_bind(key.clone()).push(" AND value = ");
+        query.push_bind(value.clone());
+        query.push(" AND job_id = examined.id)");
+    }
+    query.push(" ORDER BY id DESC LIMIT ").push_bind(most);
+    query
+}
+
+/// The last of the jobs that are examined for one page, if it was not the last of all.
+fn end_query(
+    tenant: &str,
+    filter: &Filter,
+    state: Option<State>,
+    after: Option<Uuid>,
+) -> QueryBuilder {
+    let mut query = QueryBuilder::new("");
+    walk(&mut query, "id", tenant, filter, state, after);
+    query.push(" LIMIT 1 OFFSET ").push_bind(EXAMINED_MAX - 1);
+    query
+}
+
+fn count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuilder {
+    let mut query = QueryBuilder::new("SELECT COUNT(*) AS number FROM (");
+    walk(&mut query, "id", tenant, filter, state, None);
+    query.push(" LIMIT ").push_bind(COUNTED);
+    query.push(") AS counted");
+    query
+}
+
+/// The counts that the database keeps itself.
+fn kept_count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuilder {
+    let mut query = QueryBuilder::new(
+        "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts WHERE tenant = ",
+    );
+    query.push_bind(tenant.to_owned());
+    query.push(" AND kind = ").push_bind(filter.kind.name());
+    if let Some(state) = state {
+        query.push(" AND state = ").push_bind(state.name());
+    }
+    query
+}
+
+/// Walks the jobs of a filter, as far as an index finds them, from the newest. Labels have a table of their own, sorted by job
+/// within each label, so that every kind of list walks an index and stops at its limit.
+fn walk(
+    query: &mut QueryBuilder,
+    columns: &str,
+    tenant: &str,
+    filter: &Filter,
+    state: Option<State>,
+    after: Option<Uuid>,
+) {
+    let label = filter.labels.first();
+    let (source, id) = match label {
+        Some(_) => (
+            " FROM (SELECT of_tenant, key, value, job_id, state AS label_state FROM job_labels) AS job_labels JOIN jobs ON jobs.id = job_id",
+            "job_id",
+        ),
+        None => (" FROM jobs", "id"),
+    };
+    query.push("SELECT ").push(columns).push(source);
+    let mut joint = " WHERE ";
+    let mut and = |query: &mut QueryBuilder, condition: &str, value: String| {
+        query.push(joint).push(condition).push_bind(value);
+        joint = " AND ";
+    };
+    // Within a batch one of its indices is walked, not that of the tenant: a bare expression keeps that out.
+    let owner = match (label, filter.batch()) {
+        (Some(_), _) => "of_tenant = ",
+        (None, Some(_)) => concat!(bare!("tenant"), " = "),
+        (None, None) => "tenant = ",
+    };
+    and(query, owner, tenant.to_owned());
+    and(query, "kind = ", filter.kind.name().to_owned());
+    if let Some((key, value)) = label {
+        and(query, "key = ", key.clone());
+        and(query, "value = ", value.clone());
+    }
+    if let Some(batch) = filter.batch() {
+        // Nothing of a batch of another tenant is walked.
+        let column = match label {
+            Some(_) => concat!(bare!("batch_id"), " = (SELECT id FROM batches WHERE id = "),
+            None => "batch_id = (SELECT id FROM batches WHERE id = ",
+        };
+        and(query, column, batch.to_string());
+        query
+            .push(" AND tenant = ")
+            .push_bind(tenant.to_owned())
+            .push(")");
+    }
+    if let Some(state) = state {
+        let column = match label {
+            Some(_) => "label_state = ",
+            None => "state = ",
+        };
+        and(query, column, state.name().to_owned());
+    }
+    // Of several bounds only the closest is passed on, so that the index is entered at one place.
+    let before = [after, filter.id_before()].into_iter().flatten().min();
+    if label.is_none() && filter.alone() {
+        query.push(" AND batch_id IS NULL");
+    }
+    if let (Some(_), Some(batch)) = (label, filter.batch()) {
+        within_batch(query, batch, filter.id_from(), before);
+    } else {
+        if let Some(first) = filter.id_from() {
+            and(query, &format!("{id} >= "), first.to_string());
+        }
+        if let Some(before) = before {
+            and(query, &format!("{id} < "), before.to_string());
+        }
+    }
+    query.push(format!(" ORDER BY {id} DESC"));
+}
+
+/// Ids within a batch lie between its first and its last, so no more of a label is walked than was sent meanwhile.
+fn within_batch(query: &mut QueryBuilder, batch: Uuid, from: Option<Uuid>, before: Option<Uuid>) {
+    let end = "(SELECT MAX(id) FROM jobs WHERE batch_id = ";
+    let last = before.map_or(Uuid::max(), |id| {
+        Uuid::from_u128(id.as_u128().saturating_sub(1))
+    });
+    query.push(concat!(" AND job_id >= ", greatest!(), "("));
+    query.push_bind(from.unwrap_or_default().to_string());
+    query.push(", ").push(end.replace("MAX", "MIN"));
+    query.push_bind(batch.to_string());
+    query.push(concat!(")) AND job_id <= ", least!(), "("));
+    query.push_bind(last.to_string());
+    query.push(", ").push(end).push_bind(batch.to_string());
+    query.push("))");
 }

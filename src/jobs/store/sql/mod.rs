@@ -8,24 +8,12 @@
 
 use super::engine;
 
-pub mod batch_lists;
-mod batches;
-pub mod blob_refs;
+pub mod batches;
 pub mod blobs;
-pub mod cached;
 pub mod claim;
-pub mod enqueue;
 pub mod finish;
-pub mod group_commit;
-pub mod insert;
 pub mod jobs;
 pub mod keys;
-pub mod lease;
-pub mod lists;
-mod profiles;
-pub mod quota;
 pub mod rows;
-pub mod slices;
-pub mod stats;
-pub mod store;
+pub mod submit;
 pub mod upkeep;

@@ -1,16 +1,13 @@
 //! Rows of the job table as the words of this room, and back.
 
-use super::engine::{DbRow, QueryBuilder, Row};
-use crate::jobs::store::claim::Claim;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use uuid::Uuid;
 
-use crate::jobs::model::job::{Job, State};
-use crate::jobs::model::kind::Kind;
-use crate::jobs::model::submit_options::Priority;
-use crate::jobs::store::submission::CacheKey;
-use crate::jobs::store_error::StoreError;
+use super::engine::{DbRow, QueryBuilder, Row};
+use crate::jobs::error::StoreError;
+use crate::jobs::model::{Job, Kind, Priority, State};
+use crate::jobs::store::{CacheKey, Claim};
 
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {

@@ -13,7 +13,7 @@ use rusqlite::{ErrorCode, Statement, ToSql};
 use tokio::runtime::{Handle, RuntimeFlavor};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::jobs::store_error::{StorageFault, StoreError};
+use crate::jobs::error::{StorageFault, StoreError};
 use crate::jobs::sync::lock;
 
 /// How long a statement waits for a lock that another process holds.

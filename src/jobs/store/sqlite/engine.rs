@@ -5,14 +5,13 @@ use std::path::Path;
 
 use uuid::Uuid;
 
-use crate::jobs::model::kind::Queue;
-use crate::jobs::store::claim::{ClaimKind, ClaimRequest};
-use crate::jobs::store::cluster::Cluster;
+use crate::jobs::error::StoreError;
+use crate::jobs::model::Queue;
 use crate::jobs::store::sqlite::connection::{Query, Transaction};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::sql::claim::{claimed, peek};
 use crate::jobs::store::sqlite::sql::rows::count;
-use crate::jobs::store_error::StoreError;
+use crate::jobs::store::{ClaimKind, ClaimRequest, Cluster};
 
 pub(crate) use crate::jobs::store::sqlite::connection::{
     Connection as DbConnection, Pool as DbPool, QueryBuilder, Row, SqliteRow as DbRow, query,

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use tokio::sync::mpsc;
 
+use crate::jobs::error::StoreError;
 use crate::jobs::store::portion::{Portion, Values};
 use crate::jobs::store::sqlite::connection::{Row, SqliteRow, query, query_scalar};
 use crate::jobs::store::sqlite::database::SqliteStore;
-use crate::jobs::store_error::StoreError;
 
 /// A portion ends with this row, or once its bytes are so many.
 const ROWS_MAX: usize = 500;

@@ -4,9 +4,8 @@
 //! `schema.sql` is its first form that later ones go on with. Every later one is a step, which is one transaction: a process that dies
 //! between two steps leaves a table that the next start brings forward.
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, StoreError};
 use crate::jobs::store::sqlite::connection::{Connection, Pool, query, query_scalar};
-use crate::jobs::store_error::StoreError;
 
 /// The statements that make an empty file a job table of the first form.
 const SCHEMA: &str = include_str!("schema.sql");

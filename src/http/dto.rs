@@ -1,0 +1,788 @@
+//! The forms of answers as JSON.
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use crate::contact::case::words::motion::MotionWords;
+use crate::contact::case::words::solver::{Case, Output};
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::solution::words::answer::{
+    ErrorEstimate, HistoryPoint, Origin, Solution, Total, Zone,
+};
+use crate::contact::solution::words::damage::ProfileUncertainty;
+use crate::http::options::HttpOptions;
+use crate::http::problem::{ApiError, Fault, ProblemBody};
+use crate::jobs::codec::table::TableKind;
+use crate::jobs::model::{Batch, Job, Kind, Priority, QueuePlace, State as JobState};
+use crate::jobs::run::model::{Run, RunColumn};
+
+/// A job as the client sees it. Times are RFC 3339 in UTC with milliseconds.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Job)]
+pub(crate) struct JobAnswer {
+    /// Identifier; sorts by time of submission.
+    #[schema(value_type = String, format = "uuid")]
+    id: String,
+    /// Where the job stands.
+    state: JobState,
+    /// Free text of the case.
+    name: Option<String>,
+    /// Labels of the case.
+    labels: BTreeMap<String, String>,
+    /// The batch that the job belongs to; null for a job submitted alone.
+    #[schema(format = "uuid")]
+    batch_id: Option<String>,
+    /// Its place among the queued jobs of the tenant.
+    priority: Priority,
+    /// Time of submission.
+    #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
+    created_at: String,
+    /// Time of the last change, progress aside.
+    #[schema(format = "date-time")]
+    updated_at: String,
+    /// Start of the current or last attempt; null while queued.
+    #[schema(format = "date-time")]
+    started_at: Option<String>,
+    /// End of the job; null before it.
+    #[schema(format = "date-time")]
+    ended_at: Option<String>,
+    /// When the job fails if it has not ended by then; null where no deadline was set.
+    #[schema(format = "date-time")]
+    deadline_at: Option<String>,
+    /// When the job will be removed with its result; null before its end, and where ended jobs are kept for ever.
+    #[schema(format = "date-time")]
+    expires_at: Option<String>,
+    /// Attempts since the last slice of the job was stored, the current one included.
+    attempt: u32,
+    /// The result was computed for an identical case before, so nothing was solved.
+    cached: bool,
+    /// Rough progress. A queued job of which some slices are solved keeps theirs.
+    #[schema(minimum = 0.0, maximum = 1.0)]
+    progress: f64,
+    /// Its place among the queued jobs; only where one job is looked at, as long as it is queued and not too far behind.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    queue: Option<QueuePlace>,
+    /// What the client should know before using the numbers.
+    remarks: Vec<RemarkEntry>,
+    /// Why the job failed; null unless it did.
+    error: Option<ProblemBody>,
+    /// Where to go from here.
+    links: BTreeMap<String, String>,
+    /// The result; only in the answer to `Prefer: wait`, when the job succeeded in time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    result: Option<JobResult>,
+}
+
+impl JobAnswer {
+    /// Shows a job.
+    #[must_use]
+    pub(crate) fn new(job: Job) -> Self {
+        let error = job
+            .failure
+            .as_ref()
+            .map(|failure| ProblemBody::of_job(&job, failure));
+        JobAnswer {
+            id: job.id.to_string(),
+            state: job.state,
+            links: job_links(&job),
+            name: job.name,
+            labels: job.labels,
+            batch_id: job.batch_id.map(|id| id.to_string()),
+            priority: job.priority,
+            created_at: rfc3339(job.created_at),
+            updated_at: rfc3339(job.updated_at),
+            started_at: job.started_at.map(rfc3339),
+            ended_at: job.ended_at.map(rfc3339),
+            deadline_at: job.deadline.map(rfc3339),
+            expires_at: job.expires_at.map(rfc3339),
+            attempt: job.attempt,
+            cached: job.cached,
+            progress: job.progress,
+            queue: job.queue,
+            remarks: job.remarks,
+            error,
+            result: None,
+        }
+    }
+}
+
+/// What can be done with a job in its present state.
+fn job_links(job: &Job) -> BTreeMap<String, String> {
+    let (own, asked) = match job.kind {
+        Kind::Evolution => (format!("/v1/evolutions/{}", job.id), "request"),
+        _ => (format!("/v1/jobs/{}", job.id), "case"),
+    };
+    let mut links = BTreeMap::from([(asked.to_owned(), format!("{own}/{asked}"))]);
+    links.insert("events".to_owned(), format!("{own}/events"));
+    if job.state == JobState::Succeeded {
+        links.insert("result".to_owned(), format!("{own}/result"));
+    }
+    if !job.state.ended() {
+        links.insert("cancel".to_owned(), format!("{own}/cancel"));
+    }
+    links.insert("self".to_owned(), own);
+    links
+}
+
+/// Milliseconds since 1970 as RFC 3339 in UTC, for example `2026-01-31T09:30:00.000Z`.
+pub(crate) fn rfc3339(epoch_ms: i64) -> String {
+    jiff::Timestamp::from_millisecond(epoch_ms)
+        .map_or_else(|_| epoch_ms.to_string(), |time| format!("{time:.3}"))
+}
+
+/// The cases of a batch.
+#[derive(ToSchema)]
+#[schema(min_items = 1, max_items = 200_000)]
+#[expect(
+    dead_code,
+    reason = "the form of a body that is cut into cases while it arrives"
+)]
+pub(crate) struct Cases(Vec<BatchElement>);
+
+/// A case, alone or with options of its own.
+#[derive(ToSchema)]
+#[serde(untagged)]
+#[expect(
+    dead_code,
+    reason = "the form of a body that is cut into cases while it arrives"
+)]
+pub(crate) enum BatchElement {
+    /// The case alone.
+    Case(Case),
+    /// The case with options in place of those of the batch.
+    WithOptions(CaseWithOptions),
+}
+
+/// A case with options in place of those of its batch.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "the form of a body that is cut into cases while it arrives"
+)]
+pub(crate) struct CaseWithOptions {
+    /// The case.
+    case: Case,
+    /// Which of the queued jobs of the tenant are solved first.
+    #[schema(nullable = false)]
+    priority: Option<Priority>,
+    /// Seconds from now within which the job must have ended.
+    #[schema(nullable = false, minimum = 1, maximum = 2_592_000)]
+    deadline_s: Option<u32>,
+}
+
+/// A batch that was accepted, with the faults of cases that were left out.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct BatchReceipt {
+    #[serde(flatten)]
+    pub batch: BatchAnswer,
+    /// The faults of the cases that were left out, those of the first 1000; none unless the request said `on_invalid=skip`.
+    pub errors: Vec<Fault>,
+}
+
+/// A batch: how far it is.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Batch)]
+pub(crate) struct BatchAnswer {
+    /// Identifier of the batch.
+    #[schema(value_type = String, format = "uuid")]
+    id: String,
+    /// Where the batch stands.
+    state: BatchState,
+    /// Free text of the client.
+    name: Option<String>,
+    /// Labels of the client; those of its cases are with the jobs.
+    labels: BTreeMap<String, String>,
+    /// Time of submission.
+    #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
+    created_at: String,
+    /// End of the last job; null until every job has ended.
+    #[schema(format = "date-time")]
+    ended_at: Option<String>,
+    /// Number of jobs made.
+    count: u32,
+    /// Number of faulty cases that were left out.
+    rejected: u32,
+    /// Number of jobs in each state.
+    states: BatchStates,
+    /// Share of the jobs that have ended.
+    #[schema(minimum = 0.0, maximum = 1.0)]
+    progress: f64,
+    /// Every job has ended.
+    pub ended: bool,
+    /// Where to go from here.
+    links: BTreeMap<String, String>,
+}
+
+/// Where a batch stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum BatchState {
+    /// No job has begun.
+    Queued,
+    /// Some jobs have begun, and not all have ended.
+    Running,
+    /// Every job has ended.
+    Ended,
+}
+
+/// Number of jobs in each state.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct BatchStates {
+    queued: u64,
+    running: u64,
+    succeeded: u64,
+    failed: u64,
+    cancelled: u64,
+}
+
+impl From<Batch> for BatchAnswer {
+    fn from(batch: Batch) -> Self {
+        let (ended, all) = batch.ended();
+        #[expect(clippy::cast_precision_loss, reason = "far fewer jobs than 2^53")]
+        let progress = if all == 0 {
+            1.0
+        } else {
+            ended as f64 / all as f64
+        };
+        let state = match (ended, batch.in_state(JobState::Running)) {
+            (ended, _) if ended == all => BatchState::Ended,
+            (0, 0) => BatchState::Queued,
+            _ => BatchState::Running,
+        };
+        let ended_at = batch.last_ended_at.filter(|_| ended == all);
+        BatchAnswer {
+            id: batch.id.to_string(),
+            state,
+            created_at: rfc3339(batch.created_at),
+            ended_at: ended_at.map(rfc3339),
+            count: batch.count,
+            rejected: batch.rejected,
+            states: BatchStates {
+                queued: batch.in_state(JobState::Queued),
+                running: batch.in_state(JobState::Running),
+                succeeded: batch.in_state(JobState::Succeeded),
+                failed: batch.in_state(JobState::Failed),
+                cancelled: batch.in_state(JobState::Cancelled),
+            },
+            progress,
+            ended: ended == all,
+            links: batch_links(&batch),
+            name: batch.name,
+            labels: batch.labels,
+        }
+    }
+}
+
+fn batch_links(batch: &Batch) -> BTreeMap<String, String> {
+    let own = format!("/v1/batches/{}", batch.id);
+    BTreeMap::from([
+        ("results".to_owned(), format!("{own}/results")),
+        ("cancel".to_owned(), format!("{own}/cancel")),
+        ("events".to_owned(), format!("{own}/events")),
+        ("jobs".to_owned(), format!("/v1/jobs?batch={}", batch.id)),
+        ("self".to_owned(), own),
+    ])
+}
+
+/// Rows to solve: a case, and columns of values that stand in place of some of its members.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = RunRequest)]
+#[allow(
+    dead_code,
+    reason = "the contract; bodies are read straight into columns"
+)]
+pub(crate) struct RunRequest {
+    /// A case with one motion. Members that a column holds may be left out. Of `outputs` only `resultants`, `zones` and `gradients` are
+    /// allowed.
+    #[schema(value_type = Object)]
+    template: Value,
+    /// Columns of numbers or of texts, all of the same length. A JSON pointer such as `/load/normal_force_n` or a short name such as
+    /// `normal_force_n` varies the case. Columns of places, times and sections, such as `km`, and those of `?carry=` are carried along to the
+    /// answers; any other name is refused.
+    columns: BTreeMap<String, Vec<CellValue>>,
+}
+
+/// A value of a column.
+#[derive(Debug, Serialize, ToSchema)]
+#[serde(untagged)]
+#[allow(
+    dead_code,
+    reason = "the contract; bodies are read straight into columns"
+)]
+pub(crate) enum CellValue {
+    /// A number.
+    Number(f64),
+    /// A text.
+    Text(String),
+}
+
+/// A run: how far it is.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Run)]
+pub(crate) struct RunAnswer {
+    /// Identifier of the run.
+    #[schema(value_type = String, format = "uuid")]
+    id: String,
+    /// Where the run stands. A run that was cancelled keeps the answers that were there; one is `failed` if no row could be tried.
+    state: JobState,
+    /// Free text of the client.
+    name: Option<String>,
+    /// Labels of the client.
+    labels: BTreeMap<String, String>,
+    /// Time of submission.
+    #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
+    created_at: String,
+    /// End of the last row; null before it.
+    #[schema(format = "date-time")]
+    ended_at: Option<String>,
+    /// The method asked for.
+    method: String,
+    /// Number of rows.
+    rows: u64,
+    /// Rows that are over.
+    rows_done: u64,
+    /// Rows of these that have no answer; the column `status` says why.
+    rows_without_answer: u64,
+    /// Share of the work that is done.
+    #[schema(minimum = 0.0, maximum = 1.0)]
+    progress: f64,
+    /// The pieces in which the rows are solved.
+    chunks: RunChunks,
+    /// The columns that were sent.
+    columns: Vec<SentColumn>,
+    /// The columns of the answers, in their order.
+    answers: Vec<AnswerColumn>,
+    /// Where to go from here.
+    links: BTreeMap<String, String>,
+}
+
+/// The pieces of a run.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct RunChunks {
+    /// Number of pieces.
+    count: u32,
+    /// Rows of each but the last.
+    rows: u32,
+    queued: u64,
+    running: u64,
+    succeeded: u64,
+    failed: u64,
+    cancelled: u64,
+}
+
+/// A column that was sent.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct SentColumn {
+    /// Its name.
+    name: String,
+    /// The place in the case that it varies; null if it is carried along to the answers.
+    pointer: Option<String>,
+    /// What its numbers are multiplied by, from the unit of the column to that of the case.
+    factor: f64,
+    /// The unit that its title or a line of units names.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(nullable = false)]
+    unit: Option<String>,
+}
+
+/// A column of the answers.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct AnswerColumn {
+    /// Its name.
+    name: String,
+    /// What it holds.
+    kind: TableKind,
+}
+
+/// The columns of the answers of a run.
+#[must_use]
+pub(crate) fn answer_columns(run: &Run) -> Vec<AnswerColumn> {
+    let columns = run.head.answers().into_iter();
+    let column = |(name, kind)| AnswerColumn { name, kind };
+    columns.map(column).collect()
+}
+
+impl From<Run> for RunAnswer {
+    fn from(run: Run) -> Self {
+        let state = run.state();
+        let chunks = &run.chunks;
+        let sent = |column: &RunColumn| SentColumn {
+            name: column.name.clone(),
+            pointer: column.pointer.clone(),
+            factor: column.factor,
+            unit: column.unit.clone(),
+        };
+        let own = format!("/v1/runs/{}", chunks.id);
+        let links = ["results", "manifest", "totals", "cancel", "events"];
+        let mut links: BTreeMap<String, String> = links
+            .map(|name| (name.to_owned(), format!("{own}/{name}")))
+            .into();
+        links.insert("self".to_owned(), own);
+        RunAnswer {
+            id: chunks.id.to_string(),
+            state,
+            created_at: rfc3339(chunks.created_at),
+            ended_at: chunks.last_ended_at.filter(|_| state.ended()).map(rfc3339),
+            method: run.head.method.clone(),
+            rows: run.head.rows,
+            rows_done: run.rows_done(),
+            rows_without_answer: run.without_answer,
+            progress: run.progress,
+            chunks: RunChunks {
+                count: chunks.count,
+                rows: run.head.chunk_rows,
+                queued: chunks.in_state(JobState::Queued),
+                running: chunks.in_state(JobState::Running),
+                succeeded: chunks.in_state(JobState::Succeeded),
+                failed: chunks.in_state(JobState::Failed),
+                cancelled: chunks.in_state(JobState::Cancelled),
+            },
+            columns: run.head.columns.iter().map(sent).collect(),
+            answers: answer_columns(&run),
+            links,
+            name: run.chunks.name,
+            labels: run.chunks.labels,
+        }
+    }
+}
+
+/// The result of a job: the solution without its fields, and where to get those.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct JobResult {
+    #[serde(flatten)]
+    solution: Solution,
+    /// The result was computed for an identical case before; `seconds` are those of that solve.
+    cached: bool,
+    /// The job, and every part of the result that the case asked for.
+    links: BTreeMap<String, String>,
+}
+
+impl JobResult {
+    /// What follows the stored solution, whose closing brace makes way for it.
+    ///
+    /// # Errors
+    /// It cannot be written as JSON.
+    pub(crate) fn tail(id: Uuid, cached: bool, outputs: &[Output]) -> Result<String, ApiError> {
+        let outputs: Vec<&str> = outputs.iter().copied().map(name_of).collect();
+        let links = serde_json::to_string(&JobResult::links(id, &outputs));
+        let links = links.map_err(|error| ApiError::internal(&error))?;
+        Ok(format!(",\"cached\":{cached},\"links\":{links}}}"))
+    }
+
+    /// The links of the result of a job whose case asked for these outputs.
+    #[must_use]
+    pub(crate) fn links(id: Uuid, outputs: &[impl AsRef<str>]) -> BTreeMap<String, String> {
+        let own = format!("/v1/jobs/{id}");
+        let mut links = BTreeMap::from([("resultants".to_owned(), format!("{own}/resultants"))]);
+        // Derivatives stand beside the resultants.
+        let own_parts = outputs.iter().map(AsRef::as_ref);
+        for name in own_parts.filter(|name| *name != name_of(Output::Gradients)) {
+            links.insert(name.to_owned(), format!("{own}/{name}"));
+            let small = [Output::Resultants, Output::Subsurface, Output::Damage].map(name_of);
+            if !small.contains(&name) {
+                links.insert("fields".to_owned(), format!("{own}/fields"));
+            }
+        }
+        links.insert("job".to_owned(), own);
+        links
+    }
+}
+
+/// The word of an output, in `outputs` and as the last part of its path.
+#[must_use]
+pub(crate) fn name_of(output: Output) -> &'static str {
+    match output {
+        Output::Resultants => "resultants",
+        Output::Zones => "zones",
+        Output::Tractions => "tractions",
+        Output::Pressure => "pressure",
+        Output::Slip => "slip",
+        Output::Subsurface => "subsurface",
+        Output::Damage => "damage",
+        Output::Temperature => "temperature",
+        Output::Gradients => "gradients",
+    }
+}
+
+/// Limits of the requests of the tenant.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct TenantLimits {
+    /// Most requests of the tenant under way, streams of events and waits aside.
+    requests_max: usize,
+    /// Most streams of events of the tenant.
+    streams_max: usize,
+    /// Most requests of the tenant that wait for the end of a job or a batch.
+    waits_max: usize,
+    /// Requests per second of one key, or of one address without a key; 0 for any number.
+    requests_per_second: u32,
+}
+
+impl TenantLimits {
+    /// The limits that every tenant has.
+    #[must_use]
+    pub(crate) fn of(options: &HttpOptions) -> TenantLimits {
+        TenantLimits {
+            requests_max: options.tenant_requests_max,
+            streams_max: options.tenant_streams_max,
+            waits_max: options.tenant_waits_max,
+            requests_per_second: options.requests_per_second,
+        }
+    }
+}
+
+/// Forces and moments.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Resultants {
+    /// One entry per contact patch, or the one that was asked for.
+    pub patches: Vec<PatchResultants>,
+    /// One entry per motion, or the one that was asked for: plain sums over all patches.
+    pub total: Vec<Total>,
+    /// The point that moments refer to.
+    pub origin: Origin,
+}
+
+/// Forces and moments of one patch.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct PatchResultants {
+    /// Number of the patch, counted from 0.
+    pub patch: usize,
+    /// Normal force in N.
+    pub normal_force_n: f64,
+    /// One entry per motion, or the one that was asked for.
+    pub points: Vec<PointResultants>,
+}
+
+/// Forces and moment of one patch for one motion; on the lower body.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct PointResultants {
+    /// Number of the motion, counted from 0.
+    pub point: usize,
+    /// The motion.
+    pub motion: MotionWords,
+    /// Longitudinal force in N.
+    pub force_x_n: f64,
+    /// Lateral force in N.
+    pub force_y_n: f64,
+    /// Moment about the origin in N·mm.
+    pub moment_z_n_mm: f64,
+    /// Estimated absolute errors; null where there is nothing to estimate them from.
+    pub error_estimate: Option<ErrorEstimate>,
+    /// What the measurement of the profiles leaves open; only for `profiles`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<ProfileUncertainty>)]
+    pub profile_uncertainty: Option<Box<ProfileUncertainty>>,
+    /// Dissipated power divided by rolling speed, in N.
+    pub friction_power_n: f64,
+    /// The same without the part of spin, as |ν_x F_x| + |ν_y F_y|, in N.
+    pub friction_power_without_spin_n: f64,
+    /// A prescribed force could not be reached.
+    pub saturated: bool,
+    /// What a history adds; only of `motion.history`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<HistoryPoint>, nullable = false)]
+    pub history: Option<Box<HistoryPoint>>,
+}
+
+impl Resultants {
+    /// Forces and moments of a solution: of one patch or all of them, for one motion or all of them.
+    #[must_use]
+    pub(crate) fn select(
+        solution: Solution,
+        point: Option<usize>,
+        patch: Option<usize>,
+    ) -> Resultants {
+        let chosen =
+            |choice: Option<usize>, index: usize| choice.is_none_or(|choice| choice == index);
+        let patches = solution.patches.into_iter().enumerate();
+        let patches = patches
+            .filter(|(index, _)| chosen(patch, *index))
+            .map(|(number, patch)| {
+                let points = patch
+                    .points
+                    .into_iter()
+                    .enumerate()
+                    .filter(|(index, _)| chosen(point, *index));
+                PatchResultants {
+                    patch: number,
+                    normal_force_n: patch.normal_force_n,
+                    points: points
+                        .map(|(number, point)| PointResultants {
+                            point: number,
+                            motion: point.motion,
+                            force_x_n: point.force_x_n,
+                            force_y_n: point.force_y_n,
+                            moment_z_n_mm: point.moment_z_n_mm,
+                            error_estimate: point.error_estimate,
+                            profile_uncertainty: point.profile_uncertainty.map(Box::new),
+                            friction_power_n: point.friction_power_n,
+                            friction_power_without_spin_n: point.friction_power_without_spin_n,
+                            saturated: point.saturated,
+                            history: point.history.map(Box::new),
+                        })
+                        .collect(),
+                }
+            });
+        let patches = patches.collect();
+        let total = solution.total.into_iter().enumerate();
+        Resultants {
+            patches,
+            total: total
+                .filter(|(index, _)| chosen(point, *index))
+                .map(|(_, total)| total)
+                .collect(),
+            origin: solution.origin,
+        }
+    }
+}
+
+/// What a line of CSV holds besides forces and their errors.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sum {
+    /// The motion.
+    pub motion: MotionWords,
+    /// Normal force in N.
+    pub normal_force_n: f64,
+    /// Dissipated power divided by rolling speed, in N.
+    pub friction_power_n: f64,
+    /// The same without the part of spin, in N.
+    pub friction_power_without_spin_n: f64,
+    /// A prescribed force could not be reached.
+    pub saturated: bool,
+    /// What a history adds, with what all patches have dissipated.
+    pub history: Option<HistoryPoint>,
+}
+
+/// Sums over all patches for each motion, of what `total` does not have.
+#[must_use]
+pub(crate) fn sums(solution: &Solution) -> Vec<Sum> {
+    let load = solution.patches.iter().map(|patch| patch.normal_force_n);
+    let normal_force_n = load.sum();
+    let motions = solution
+        .patches
+        .first()
+        .map_or(&[][..], |patch| &patch.points);
+    let points = motions.iter().enumerate().map(|(number, first)| {
+        let parts = || {
+            let patches = solution.patches.iter();
+            patches.filter_map(move |patch| patch.points.get(number))
+        };
+        Sum {
+            motion: first.motion,
+            normal_force_n,
+            friction_power_n: parts().map(|part| part.friction_power_n).sum(),
+            friction_power_without_spin_n: parts()
+                .map(|part| part.friction_power_without_spin_n)
+                .sum(),
+            saturated: parts().any(|part| part.saturated),
+            history: first.history.map(|history| HistoryPoint {
+                dissipated_n_mm: parts()
+                    .filter_map(|part| Some(part.history?.dissipated_n_mm))
+                    .sum(),
+                ..history
+            }),
+        }
+    });
+    points.collect()
+}
+
+/// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run
+/// counter-clockwise, holes clockwise.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub(crate) struct Outlines {
+    /// The border of the patch.
+    pub patch: Vec<Vec<[f64; 2]>>,
+    /// Around the cells that stick; only with zones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stick: Option<Vec<Vec<[f64; 2]>>>,
+    /// Around the cells that slip; only with zones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slip: Option<Vec<Vec<[f64; 2]>>>,
+}
+
+/// Values per cell, strip by strip from smaller to larger y, in each strip from smaller to larger x. All arrays have
+/// the same length; those of other fields are absent.
+#[derive(Serialize, ToSchema)]
+pub(crate) struct Cells {
+    /// Centre of the cell along x in mm.
+    pub x_mm: Vec<f64>,
+    /// Centre of the cell across in mm.
+    pub y_mm: Vec<f64>,
+    /// Width of the cell along x in mm.
+    pub dx_mm: Vec<f64>,
+    /// Width of the cell across in mm.
+    pub dy_mm: Vec<f64>,
+    /// Number of the strip, counted from 0.
+    pub strip: Vec<u32>,
+    /// Stick or slip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zone: Option<Vec<Zone>>,
+    /// Pressure in MPa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pressure_mpa: Option<Vec<f64>>,
+    /// Traction on the lower body along x in MPa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traction_x_mpa: Option<Vec<f64>>,
+    /// Traction on the lower body across in MPa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traction_y_mpa: Option<Vec<f64>>,
+    /// Slip along x, divided by rolling speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slip_x: Option<Vec<f64>>,
+    /// Slip across, divided by rolling speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slip_y: Option<Vec<f64>>,
+    /// Temperature of both surfaces in °C.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<Vec<f64>>,
+}
+
+/// Values on a regular grid over the bounding box of the patch: `values[iy][ix]` at `(x_mm[ix], y_mm[iy])`, null
+/// outside the patch; those of other fields are absent.
+#[derive(Serialize, ToSchema)]
+pub(crate) struct GriddedField {
+    /// Number of the patch, counted from 0.
+    pub patch: usize,
+    /// Number of the motion, counted from 0.
+    pub point: usize,
+    /// The border of the patch, and of its zones where they are part of the answer.
+    pub outlines: Outlines,
+    /// Samples along x in mm, ascending.
+    pub x_mm: Vec<f64>,
+    /// Samples across in mm, ascending.
+    pub y_mm: Vec<f64>,
+    /// Stick or slip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zone: Option<Vec<Vec<Option<Zone>>>>,
+    /// Pressure in MPa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pressure_mpa: Option<Vec<Vec<Option<f64>>>>,
+    /// Traction on the lower body along x in MPa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traction_x_mpa: Option<Vec<Vec<Option<f64>>>>,
+    /// Traction on the lower body across in MPa.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traction_y_mpa: Option<Vec<Vec<Option<f64>>>>,
+    /// Slip along x, divided by rolling speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slip_x: Option<Vec<Vec<Option<f64>>>>,
+    /// Slip across, divided by rolling speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slip_y: Option<Vec<Vec<Option<f64>>>>,
+    /// Temperature of both surfaces in °C.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<Vec<Vec<Option<f64>>>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_have_milliseconds_and_are_in_utc() {
+        assert_eq!(rfc3339(1_769_851_800_000), "2026-01-31T09:30:00.000Z");
+        assert_eq!(rfc3339(1_769_851_800_007), "2026-01-31T09:30:00.007Z");
+    }
+}

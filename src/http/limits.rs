@@ -1,0 +1,709 @@
+//! What requests may take at once: places, memory, and turns at long work.
+use std::collections::HashMap;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll};
+use std::thread::available_parallelism;
+use std::time::{Duration, Instant};
+
+use axum::body::{Body, Bytes, HttpBody};
+use axum::extract::Request;
+use axum::middleware::Next;
+use axum::response::Response;
+use hyper::body::{Frame, SizeHint};
+use tokio::runtime::Handle;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::timeout;
+use tokio_util::sync::{CancellationToken, DropGuard};
+
+use crate::http::options::HttpOptions;
+use crate::http::problem::{ApiError, ProblemKind};
+use crate::jobs::sync::{blocking, lock};
+
+/// Units of memory, requests or turns, in all and for each tenant. Clones share the semaphore.
+#[derive(Debug, Clone)]
+pub(crate) struct TenantSemaphore {
+    all: Arc<Semaphore>,
+    of_tenant: usize,
+    /// Tenants are made by the operator, so their number is small.
+    tenants: Arc<Mutex<HashMap<Arc<str>, Arc<Semaphore>>>>,
+}
+
+/// Units that one request holds; they are released on drop.
+#[derive(Debug)]
+pub struct Permit {
+    of_tenant: OwnedSemaphorePermit,
+    of_all: OwnedSemaphorePermit,
+}
+
+impl TenantSemaphore {
+    /// A semaphore of `all` units, of which a tenant may hold `of_tenant`.
+    #[must_use]
+    pub(crate) fn new(all: usize, of_tenant: usize) -> TenantSemaphore {
+        TenantSemaphore {
+            all: Arc::new(Semaphore::new(all.min(Semaphore::MAX_PERMITS))),
+            of_tenant: of_tenant.min(all).min(Semaphore::MAX_PERMITS),
+            tenants: Arc::default(),
+        }
+    }
+
+    /// The most that one tenant may hold.
+    #[must_use]
+    pub(crate) fn of_one(&self) -> usize {
+        self.of_tenant
+    }
+
+    /// Takes `many` units at once, if they are free.
+    #[must_use]
+    pub(crate) fn try_take(&self, tenant: &str, many: u32) -> Option<Permit> {
+        let of_tenant = self.of(tenant).try_acquire_many_owned(many).ok()?;
+        let of_all = self.all.clone().try_acquire_many_owned(many).ok()?;
+        Some(Permit { of_tenant, of_all })
+    }
+
+    /// Waits for `many` units, first come, first served. Returns `None` if they are not free within the time, or never can be.
+    pub(crate) async fn take(&self, tenant: &str, many: u32, within: Duration) -> Option<Permit> {
+        if many as usize > self.of_tenant {
+            return None;
+        }
+        let both = async {
+            let of_tenant = self.of(tenant).acquire_many_owned(many).await.ok()?;
+            let of_all = self.all.clone().acquire_many_owned(many).await.ok()?;
+            Some(Permit { of_tenant, of_all })
+        };
+        timeout(within, both).await.ok().flatten()
+    }
+
+    fn of(&self, tenant: &str) -> Arc<Semaphore> {
+        let mut tenants = lock(&self.tenants);
+        if let Some(own) = tenants.get(tenant) {
+            return own.clone();
+        }
+        let own = Arc::new(Semaphore::new(self.of_tenant));
+        tenants.insert(tenant.into(), own.clone());
+        own
+    }
+}
+
+impl Permit {
+    /// Releases all but `many` units.
+    pub fn shrink_to_units(&mut self, many: usize) {
+        let surplus = self.of_all.num_permits().saturating_sub(many);
+        drop(self.of_all.split(surplus));
+        drop(self.of_tenant.split(surplus));
+    }
+}
+
+/// How long a request waits for memory, or for its first turn.
+const WITHIN: Duration = Duration::from_secs(20);
+/// How long a computation keeps its turn while others wait: far longer than passing it on takes, shorter than people notice.
+const SLICE: Duration = Duration::from_millis(100);
+
+/// A number of turns; clones share them. Tenants that wait take turns: only one request of each stands in the line, where the others follow it.
+#[derive(Debug, Clone)]
+pub(crate) struct Turns {
+    free: Arc<Semaphore>,
+    /// The place of each tenant in the line.
+    places: TenantSemaphore,
+}
+
+/// A turn; passed on when dropped.
+#[derive(Debug)]
+pub struct Turn(
+    #[expect(dead_code, reason = "held until it is dropped")] Option<OwnedSemaphorePermit>,
+);
+
+impl Turns {
+    /// This many turns, at least one.
+    #[must_use]
+    pub(crate) fn new(count: usize) -> Turns {
+        Turns {
+            free: Arc::new(Semaphore::new(count.max(1))),
+            places: TenantSemaphore::new(1, 1),
+        }
+    }
+
+    /// Waits for a turn.
+    pub(crate) async fn take(&self, tenant: &str) -> Turn {
+        let _place = self.places.of(tenant).acquire_owned().await;
+        // It is never closed.
+        Turn(self.free.clone().acquire_owned().await.ok())
+    }
+
+    /// Waits for a turn, but not longer than a request may wait.
+    ///
+    /// # Errors
+    /// `overloaded`: it does not come in time.
+    pub(crate) async fn take_in_time(&self, tenant: &str) -> Result<Turn, ApiError> {
+        let turn = timeout(WITHIN, self.take(tenant)).await;
+        turn.map_err(|_| overloaded("other requests of this kind take all turns"))
+    }
+}
+
+/// The computing of one request, done in turns. Its work ends soon after this is dropped, as it is when the client leaves.
+#[derive(Debug)]
+pub struct Computation {
+    turns: Turns,
+    tenant: Arc<str>,
+    limit: Duration,
+    spent: Duration,
+    left: CancellationToken,
+    _leaves: DropGuard,
+}
+
+impl Computation {
+    /// A computation of a tenant that may take this much time, waiting aside.
+    #[must_use]
+    pub(crate) fn new(turns: Turns, tenant: &str, limit: Duration) -> Computation {
+        let left = CancellationToken::new();
+        Computation {
+            turns,
+            tenant: tenant.into(),
+            limit,
+            spent: Duration::ZERO,
+            _leaves: left.clone().drop_guard(),
+            left,
+        }
+    }
+
+    /// Does a part of the work on the pool of blocking threads. The work calls [`Pace::step`] between its steps.
+    ///
+    /// # Errors
+    /// `overloaded`: the first turn does not come in time; or the error of the work or of its steps.
+    pub async fn run<T: Send + 'static>(
+        &mut self,
+        work: impl FnOnce(&mut Pace) -> Result<T, ApiError> + Send + 'static,
+    ) -> Result<T, ApiError> {
+        let mut pace = Pace {
+            turn: Some(self.turns.take_in_time(&self.tenant).await?),
+            turns: self.turns.clone(),
+            tenant: self.tenant.clone(),
+            limit: self.limit,
+            spent: self.spent,
+            begun: Instant::now(),
+            left: self.left.clone(),
+        };
+        let work = blocking(move || {
+            let done = work(&mut pace);
+            (done, pace.spent + pace.begun.elapsed())
+        });
+        let (done, spent) = work.await?;
+        self.spent = spent;
+        done
+    }
+}
+
+/// The pace of a computation on its blocking thread.
+#[derive(Debug)]
+pub struct Pace {
+    turn: Option<Turn>,
+    turns: Turns,
+    tenant: Arc<str>,
+    limit: Duration,
+    /// Computing time before the present slice.
+    spent: Duration,
+    /// The begin of the present slice.
+    begun: Instant,
+    left: CancellationToken,
+}
+
+impl Pace {
+    /// Ends a step of the work. Passes the turn on and waits for the next one if the slice is over and another request waits.
+    ///
+    /// # Errors
+    /// The client has left, or `body-too-large`: the computation has taken longer than it may.
+    pub fn step(&mut self) -> Result<(), ApiError> {
+        if self.left.is_cancelled() {
+            return Err(client_left());
+        }
+        let slice = self.begun.elapsed();
+        if self.spent + slice >= self.limit {
+            return Err(ApiError::new(
+                ProblemKind::BodyTooLarge,
+                format!(
+                    "reading and computing the rows has taken {} s, as long as one request may (`--table-time-s`); send fewer rows at once",
+                    self.limit.as_secs_f64()
+                ),
+            ));
+        }
+        if slice < SLICE {
+            return Ok(());
+        }
+        self.spent += slice;
+        // It comes back at once if nobody waits.
+        self.turn = None;
+        self.turn = Handle::current().block_on(async {
+            tokio::select! {
+                turn = self.turns.take(&self.tenant) => Some(turn),
+                () = self.left.cancelled() => None,
+            }
+        });
+        self.begun = Instant::now();
+        match self.turn {
+            Some(_) => Ok(()),
+            None => Err(client_left()),
+        }
+    }
+}
+
+/// Nobody reads this.
+fn client_left() -> ApiError {
+    ApiError::internal(&"the client has left")
+}
+
+/// Requests, streams and waits in progress; clones share them.
+#[derive(Debug, Clone)]
+pub struct ConcurrencyLimits {
+    requests: TenantSemaphore,
+    streams: TenantSemaphore,
+    waits: TenantSemaphore,
+}
+
+impl ConcurrencyLimits {
+    /// The limits of these options.
+    #[must_use]
+    pub fn new(options: &HttpOptions) -> ConcurrencyLimits {
+        ConcurrencyLimits {
+            requests: TenantSemaphore::new(options.connections_max, options.tenant_requests_max),
+            streams: TenantSemaphore::new(options.streams_max, options.tenant_streams_max),
+            waits: TenantSemaphore::new(options.waits_max, options.tenant_waits_max),
+        }
+    }
+
+    /// Counts one more request of a tenant.
+    ///
+    /// # Errors
+    /// `too-many-requests`: there are as many as there may be.
+    pub fn request(&self, tenant: &str) -> Result<Permit, ApiError> {
+        self.requests.try_take(tenant, 1).ok_or_else(|| {
+            too_many(
+                "the tenant has as many requests under way as it may (`--tenant-requests-max`)",
+            )
+        })
+    }
+
+    /// Counts one more stream of events of a tenant.
+    ///
+    /// # Errors
+    /// As [`ConcurrencyLimits::request`].
+    pub fn stream(&self, tenant: &str) -> Result<Permit, ApiError> {
+        self.streams.try_take(tenant, 1).ok_or_else(|| {
+            too_many("as many streams of events are open as there may be (`--tenant-streams-max`, `--streams-max`)")
+        })
+    }
+
+    /// Counts one more waiting request, if there may be one. If not, the request is answered at once: `Prefer: wait` is not binding.
+    #[must_use]
+    pub fn wait(&self, tenant: &str) -> Option<Permit> {
+        self.waits.try_take(tenant, 1)
+    }
+
+    /// The same where the answer depends on the wait.
+    ///
+    /// # Errors
+    /// As [`ConcurrencyLimits::request`].
+    pub fn require_wait(&self, tenant: &str) -> Result<Permit, ApiError> {
+        self.wait(tenant).ok_or_else(|| {
+            too_many("as many requests wait as there may be (`--tenant-waits-max`, `--waits-max`)")
+        })
+    }
+}
+
+fn too_many(detail: &str) -> ApiError {
+    ApiError::new(ProblemKind::TooManyRequests, detail)
+}
+
+/// A body and the resource that it holds.
+struct HoldingBody<T>(Body, T);
+
+/// The same answer; `held` is dropped when its body has been sent.
+pub(crate) fn hold_while_sent<T: Send + Unpin + 'static>(response: Response, held: T) -> Response {
+    response.map(|body| Body::new(HoldingBody(body, held)))
+}
+
+impl<T: Unpin> HttpBody for HoldingBody<T> {
+    type Data = Bytes;
+    type Error = axum::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
+        Pin::new(&mut self.0).poll_frame(context)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.0.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.0.size_hint()
+    }
+}
+
+/// Permits that a request holds until its answer has been sent; in its extensions.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct HeldPermits(Arc<Mutex<Vec<Permit>>>);
+
+impl HeldPermits {
+    /// Holds one more share.
+    pub(crate) fn add(&self, share: Permit) {
+        lock(&self.0).push(share);
+    }
+
+    /// Gives all shares back; the caller counts the rest of the request elsewhere.
+    pub(crate) fn release(&self) {
+        lock(&self.0).clear();
+    }
+}
+
+/// Layer in which requests can hold shares.
+pub(crate) async fn hold(mut request: Request, next: Next) -> Response {
+    let held = HeldPermits::default();
+    request.extensions_mut().insert(held.clone());
+    hold_while_sent(next.run(request).await, held)
+}
+
+/// Bytes of one unit, in which shares are counted.
+const UNIT: usize = 1 << 10;
+/// Smaller amounts are not counted: even the largest number of requests takes little memory with them.
+pub(crate) const SMALL_BYTES: usize = 64 << 10;
+/// The word for the memory of answers in refusals.
+const ANSWERS: &str = "answers that clients have not taken yet";
+
+/// Memory and turns to compute of all requests; clones share them.
+#[derive(Debug, Clone)]
+pub struct Memory {
+    bodies: TenantSemaphore,
+    parsed: TenantSemaphore,
+    answers: TenantSemaphore,
+    /// Turns for large cases: half of the cores, so that small cases need not wait for large ones.
+    large: Turns,
+    small: Turns,
+    /// Turns for solves that find out how long a case takes: half of the cores, beside the workers.
+    trials: Turns,
+    /// Turns for large grids.
+    grids: Turns,
+    /// Turns for pictures, small grids and tables, which therefore need not wait for large grids.
+    renderings: Turns,
+    waiting: TenantSemaphore,
+    table_time: Duration,
+}
+
+impl Permit {
+    /// Releases what is held beyond `bytes`.
+    pub fn shrink_to(&mut self, bytes: usize) {
+        self.shrink_to_units(bytes.div_ceil(UNIT));
+    }
+}
+
+/// A turn to compute an answer, and the memory for it.
+#[derive(Debug)]
+pub struct Rendering {
+    share: Option<Permit>,
+    turn: Turn,
+    memory: Memory,
+    tenant: String,
+}
+
+/// Memory and a turn to compute; given back on drop.
+#[derive(Debug, Default)]
+pub struct MemoryPermit {
+    /// The memory.
+    pub share: Option<Permit>,
+    /// The turn.
+    pub turn: Option<Turn>,
+}
+
+impl Memory {
+    /// The limits of these options.
+    #[must_use]
+    pub fn new(options: &HttpOptions) -> Memory {
+        let part = |eighths: usize| {
+            let units = |bytes: usize| bytes / 8 * eighths / UNIT;
+            TenantSemaphore::new(
+                units(options.memory_max_bytes),
+                units(options.tenant_memory_max_bytes),
+            )
+        };
+        let cores = available_parallelism().map_or(1, usize::from);
+        let waiting = options.renderings_waiting_max;
+        Memory {
+            bodies: part(1),
+            parsed: part(3),
+            answers: part(4),
+            large: Turns::new(cores / 2),
+            small: Turns::new(cores),
+            trials: Turns::new(cores / 2),
+            grids: Turns::new(options.renderings),
+            renderings: Turns::new(options.renderings),
+            waiting: TenantSemaphore::new(waiting, waiting.div_ceil(2)),
+            table_time: options.table_time,
+        }
+    }
+
+    /// Memory for a body of so many bytes.
+    ///
+    /// # Errors
+    /// `overloaded`: it is not free in time.
+    pub async fn body(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
+        take(&self.bodies, tenant, bytes, "the bodies of requests").await
+    }
+
+    /// Memory for a parsed case of so many bytes.
+    ///
+    /// # Errors
+    /// As [`Memory::body`].
+    pub async fn parsed(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
+        take(&self.parsed, tenant, bytes, "cases that are read").await
+    }
+
+    /// Memory for rows: their text, columns and answer.
+    ///
+    /// # Errors
+    /// As [`Memory::body`].
+    pub async fn rows(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
+        take(&self.answers, tenant, bytes, ANSWERS).await
+    }
+
+    /// A turn to check a case of this size in memory.
+    ///
+    /// # Errors
+    /// `overloaded`: it does not come in time.
+    pub async fn turn(&self, tenant: &str, bytes: usize) -> Result<Turn, ApiError> {
+        let turns = if bytes > SMALL_BYTES {
+            &self.large
+        } else {
+            &self.small
+        };
+        turns.take_in_time(tenant).await
+    }
+
+    /// The reading of a table or the evaluation of rows, in turns for large cases.
+    #[must_use]
+    pub fn computation(&self, tenant: &str) -> Computation {
+        Computation::new(self.large.clone(), tenant, self.table_time)
+    }
+
+    /// A turn to solve a case for a moment; none if it does not come within that time.
+    pub async fn trial(&self, tenant: &str, within: Duration) -> Option<Turn> {
+        let turn = timeout(within, self.trials.take(tenant));
+        turn.await.ok()
+    }
+
+    /// Memory for an answer that exists already. It does not wait, since the answer would be held in the meantime.
+    ///
+    /// # Errors
+    /// `overloaded`: it is not free.
+    pub fn ready_answer(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
+        if bytes <= SMALL_BYTES {
+            return Ok(None);
+        }
+        let share = self.answers.try_take(tenant, units(bytes));
+        share.map(Some).ok_or_else(|| no_memory(ANSWERS, bytes))
+    }
+
+    /// Could there ever be memory for an answer of so many bytes?
+    #[must_use]
+    pub fn has_room_for(&self, bytes: usize) -> bool {
+        bytes <= SMALL_BYTES || self.answers.of_one() >= units(bytes) as usize
+    }
+
+    /// A turn and memory for an answer of so many bytes; to be taken before anything is loaded for it.
+    ///
+    /// # Errors
+    /// `overloaded`: too many wait already, or too long.
+    pub async fn rendering(&self, tenant: &str, bytes: usize) -> Result<Rendering, ApiError> {
+        let waiting = self.waiting.try_take(tenant, 1).ok_or_else(|| {
+            overloaded("as many requests wait for pictures, grids and tables as there may be (`--renderings-waiting-max`)")
+        })?;
+        let share = take(&self.answers, tenant, bytes, ANSWERS).await?;
+        let turns = if bytes > SMALL_BYTES {
+            &self.grids
+        } else {
+            &self.renderings
+        };
+        let turn = turns.take_in_time(tenant).await?;
+        drop(waiting);
+        Ok(Rendering {
+            share,
+            turn,
+            memory: self.clone(),
+            tenant: tenant.to_owned(),
+        })
+    }
+}
+
+impl Rendering {
+    /// Runs the work on the pool of blocking threads. The second value holds the memory of the answer, counted by its actual size.
+    ///
+    /// # Errors
+    /// What `work` fails with, or `overloaded` if the answer is larger than was thought and there is no memory for it.
+    pub async fn run<T: Send + 'static>(
+        self,
+        work: impl FnOnce() -> Result<T, ApiError> + Send + 'static,
+        size: impl Fn(&T) -> usize,
+    ) -> Result<(T, Option<Permit>), ApiError> {
+        let turn = self.turn;
+        let work = blocking(move || {
+            // The turn is held until the work ends, even if the client has gone away.
+            let _turn = turn;
+            work()
+        });
+        let done = work.await??;
+        let bytes = size(&done);
+        let share = match self.share {
+            Some(mut share) => {
+                share.shrink_to(bytes);
+                Some(share)
+            }
+            None => self.memory.ready_answer(&self.tenant, bytes)?,
+        };
+        Ok((done, share))
+    }
+}
+
+async fn take(
+    shares: &TenantSemaphore,
+    tenant: &str,
+    bytes: usize,
+    what: &str,
+) -> Result<Option<Permit>, ApiError> {
+    if bytes <= SMALL_BYTES {
+        return Ok(None);
+    }
+    let share = shares.take(tenant, units(bytes), WITHIN).await;
+    share.map(Some).ok_or_else(|| no_memory(what, bytes))
+}
+
+fn units(bytes: usize) -> u32 {
+    u32::try_from(bytes.div_ceil(UNIT)).unwrap_or(u32::MAX)
+}
+
+fn no_memory(what: &str, bytes: usize) -> ApiError {
+    overloaded(&format!(
+        "the memory for {what} is taken; {bytes} bytes are needed (`--request-memory-mb`, `--tenant-request-memory-mb`)"
+    ))
+}
+
+fn overloaded(detail: &str) -> ApiError {
+    ApiError::new(ProblemKind::Overloaded, detail)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn a_tenant_gets_its_share_and_leaves_the_rest_to_others() {
+        let shares = TenantSemaphore::new(5, 3);
+        let mut held = shares.try_take("a", 3).unwrap();
+        assert!(shares.try_take("a", 1).is_none());
+        assert!(shares.try_take("b", 3).is_none(), "two are left");
+        let other = shares.try_take("b", 2).unwrap();
+        held.shrink_to_units(1);
+        assert!(shares.try_take("a", 3).is_none());
+        assert!(shares.try_take("a", 2).is_some());
+        drop((held, other));
+        assert!(shares.try_take("c", 3).is_some());
+    }
+
+    #[tokio::test]
+    async fn what_is_not_free_in_time_is_not_waited_for_any_longer() {
+        let shares = TenantSemaphore::new(2, 2);
+        let held = shares.try_take("a", 2).unwrap();
+        let soon = Duration::from_millis(20);
+        assert!(shares.take("b", 1, soon).await.is_none());
+        assert!(shares.take("b", 3, Duration::MAX).await.is_none());
+        let (later, ()) = tokio::join!(shares.take("b", 1, Duration::from_secs(60)), async {
+            drop(held);
+        });
+        assert!(later.is_some());
+    }
+
+    #[tokio::test]
+    async fn tenants_take_turns_however_many_requests_one_of_them_has() {
+        let turns = Turns::new(1);
+        let held = turns.take("a").await;
+        let order = Arc::new(Mutex::new(Vec::new()));
+        let mut waiting = Vec::new();
+        for tenant in ["a", "a", "a", "b", "c", "b"] {
+            let (turns, order) = (turns.clone(), order.clone());
+            waiting.push(tokio::spawn(async move {
+                let _turn = turns.take(tenant).await;
+                order.lock().unwrap().push(tenant);
+            }));
+            // They queue in this order.
+            tokio::task::yield_now().await;
+        }
+        drop(held);
+        for request in waiting {
+            request.await.unwrap();
+        }
+        assert_eq!(*order.lock().unwrap(), ["a", "b", "c", "a", "b", "a"]);
+        assert_eq!(turns.free.available_permits(), 1);
+    }
+
+    #[tokio::test]
+    async fn requests_that_are_given_up_leave_no_turn_behind() {
+        let turns = Turns::new(1);
+        let held = turns.take("a").await;
+        for _ in 0..1000 {
+            let mut waiting = Box::pin(turns.take("b"));
+            assert!(futures_util::poll!(&mut waiting).is_pending());
+        }
+        let mut last = Box::pin(turns.take("b"));
+        assert!(futures_util::poll!(&mut last).is_pending());
+        drop(held);
+        drop(last.await);
+        assert_eq!(turns.free.available_permits(), 1);
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn an_endless_computation_lets_others_pass_and_ends_when_its_client_leaves() {
+        let turns = Turns::new(1);
+        let minutes = Duration::from_secs(600);
+        let steps = Arc::new(AtomicUsize::new(0));
+        let counted = steps.clone();
+        let mut endless = Computation::new(turns.clone(), "a", minutes);
+        let endless = tokio::spawn(async move {
+            let work = move |pace: &mut Pace| -> Result<(), ApiError> {
+                loop {
+                    counted.fetch_add(1, Ordering::Relaxed);
+                    pace.step()?;
+                }
+            };
+            endless.run(work).await
+        });
+        while steps.load(Ordering::Relaxed) == 0 {
+            tokio::task::yield_now().await;
+        }
+        for tenant in ["b", "a"] {
+            let mut short = Computation::new(turns.clone(), tenant, minutes);
+            assert_eq!(short.run(|_| Ok(7)).await.unwrap(), 7);
+        }
+        endless.abort();
+        // Its turn comes back, and it stays.
+        drop(turns.take("b").await);
+        while turns.free.available_permits() == 0 {
+            tokio::task::yield_now().await;
+        }
+    }
+
+    #[tokio::test]
+    async fn the_time_of_all_parts_of_a_computation_is_bounded() {
+        let limit = Duration::from_millis(20);
+        let mut computation = Computation::new(Turns::new(1), "a", limit);
+        let part = |pace: &mut Pace| {
+            std::thread::sleep(Duration::from_millis(15));
+            pace.step()
+        };
+        let mut parts = 0;
+        while computation.run(part).await.is_ok() {
+            parts += 1;
+        }
+        assert!(parts <= 1, "{parts}");
+    }
+}

@@ -1,0 +1,662 @@
+//! Problems (RFC 9457): their kinds, their form, and how errors become answers.
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use axum::extract::Request;
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use railhead_macros::none_is_absent;
+use serde::Serialize;
+use serde_json::{Number, Value};
+use utoipa::ToSchema;
+use utoipa::openapi::schema::Type;
+use utoipa::openapi::{ContentBuilder, HeaderBuilder, ObjectBuilder, Ref, RefOr, ResponseBuilder};
+
+use crate::contact::error::{CaseError, Fault as CaseFault, FaultCode};
+use crate::jobs::StorageFault;
+use crate::jobs::error::JobsError;
+use crate::jobs::model::{Failure, FailureKind, Job, Kind, State};
+
+/// Declares the kinds of problems once: name, status, slug, title, meaning.
+macro_rules! kinds {
+    ($($kind:ident $status:literal $slug:literal $title:literal $meaning:literal)*) => {
+        /// A kind of problem; its slug is the last part of the problem's `type`.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum ProblemKind { $(#[doc = $meaning] $kind,)* }
+
+        impl ProblemKind {
+            /// Every kind there is.
+            pub const ALL: &[ProblemKind] = &[$(ProblemKind::$kind),*];
+
+            /// The last part of the problem's `type`.
+            #[must_use]
+            pub fn slug(self) -> &'static str { match self { $(ProblemKind::$kind => $slug),* } }
+
+            /// The problem's `title`.
+            #[must_use]
+            pub fn title(self) -> &'static str { match self { $(ProblemKind::$kind => $title),* } }
+
+            /// What this kind means and what to do about it.
+            #[must_use]
+            pub fn meaning(self) -> &'static str { match self { $(ProblemKind::$kind => $meaning),* } }
+
+            /// The status code that goes with it.
+            #[must_use]
+            pub fn status(self) -> u16 { match self { $(ProblemKind::$kind => $status),* } }
+        }
+    };
+}
+
+kinds! {
+    MalformedJson 400 "malformed-json" "The body is not JSON" "The body could not be parsed as JSON; `line` and `column` say where. Members written twice and numbers too large for a 64-bit float count as malformed."
+    BadQuery 400 "bad-query" "The query is not understood" "A query parameter is unknown, repeated or has a value that is not allowed; `errors` names every such parameter."
+    BadHeader 400 "bad-header" "A header is not understood" "A request header has a value that is not allowed; `errors` names it."
+    UnreadableBody 400 "unreadable-body" "The body could not be read" "The connection ended or broke before the whole body had arrived."
+    Unauthorized 401 "unauthorized" "A key is needed" "The service is asked with `Authorization: Bearer` and an API key; there was none, or it is unknown or revoked. Keys come from the operator of the service."
+    Forbidden 403 "forbidden" "This key may not do that" "The key is good, but it may only read, or it is bound to labels and this concerns the whole tenant, or only the tenant `operator` may do this."
+    CrossSite 403 "cross-site" "A foreign page may not change anything" "Without a key nothing is changed on behalf of a web page of another origin; the operator names origins that may with `--cors-origin`."
+    HostNotAllowed 403 "host-not-allowed" "The service has another name" "Without a key the service is asked by an address, as `localhost`, or by a name that its operator gave with `--allowed-host`; `Host` was another."
+    UnknownRoute 404 "unknown-route" "There is nothing at this address" "The path names no resource of this service; `/openapi.json` lists all of them."
+    JobNotFound 404 "job-not-found" "There is no such job" "No job has this id; it was never made here, or it was deleted."
+    BatchNotFound 404 "batch-not-found" "There is no such batch" "No batch has this id; it was never made here, or it was deleted."
+    RunNotFound 404 "run-not-found" "There is no such run" "No run has this id; it was never made here, or it was deleted."
+    RowNotFound 404 "row-not-found" "There is no such row" "The run has no row of this number; rows are counted from 0 in the order in which they were sent."
+    ProfileNotFound 404 "profile-not-found" "There is no such profile" "No profile of the tenant has this digest; it was never kept here, or it was deleted."
+    OutputNotAsked 404 "output-not-asked" "This output was not asked for" "The case did not ask for this output, so it was not computed; submit the case again with the output named in `outputs`."
+    MethodNotAllowed 405 "method-not-allowed" "This method is not allowed here" "The resource exists, but not for this HTTP method; the header `Allow` lists those it has."
+    NotAcceptable 406 "not-acceptable" "This form cannot be answered" "The header `Accept` excludes every form in which this resource can be answered, or `format` names another; the detail names them. Most answer `application/json` only."
+    BodyTimeout 408 "body-timeout" "The body came too slowly" "The whole body did not arrive within the allowed time (60 s for one case), or a batch came at less than 1024 bytes per second."
+    ResultNotReady 409 "result-not-ready" "The job has not ended" "The job is queued or running, so there is no result yet; ask again after `Retry-After` seconds, or submit with `Prefer: wait=N`."
+    JobFailed 409 "job-failed" "The job failed" "The job ended without a result; the member `error` of the job says why."
+    JobCancelled 409 "job-cancelled" "The job was cancelled" "The job was cancelled before it had a result."
+    JobNotEnded 409 "job-not-ended" "The job has not ended" "Only an ended job can be deleted; cancel it first."
+    BatchNotEnded 409 "batch-not-ended" "The batch has not ended" "Only a batch of which every job has ended can be deleted; cancel it first."
+    RunNotEnded 409 "run-not-ended" "The run has not ended" "Only a run of which every row is over can be deleted; cancel it first."
+    Expired 410 "expired" "This has expired" "The job or batch was here, but ended longer ago than this service keeps ended jobs (`expires_at` of a job says until when); it was removed with its results. Its id is remembered for 30 days."
+    BodyTooLarge 413 "body-too-large" "The body is too large" "The body exceeds the size that this service accepts for one case, or for a batch; a batch has too many cases, or its rows take longer to read or to evaluate than one request may."
+    UnsupportedMediaType 415 "unsupported-media-type" "The body is not declared as JSON" "A case is sent with `Content-Type: application/json`, a batch also with `application/x-ndjson`."
+    UnsupportedEncoding 415 "unsupported-encoding" "The body is packed in a way that is not understood" "A body may be sent with `Content-Encoding: gzip` or `zstd`, one of them, or as it is; `Accept-Encoding` of the answer names them."
+    FaultyCase 422 "faulty-case" "The case has faults" "The body is JSON but not a case that can be solved; `errors` names every fault by its JSON pointer, with the value given and what is allowed."
+    FaultyBatch 422 "faulty-batch" "The batch has faults" "The body holds no cases, or some of them have faults: `errors` names every fault by a JSON pointer that begins with the place of its case (counted from 0), and by its line in NDJSON. Nothing was stored; with `?on_invalid=skip` the good cases are taken."
+    FaultyTable 422 "faulty-table" "The header of the table has faults" "The first line of a table names its columns by JSON pointers such as `/load/normal_force_n`, by short names or by quantities with their units; the detail names the column, what it may mean and what is allowed. With `errors` there is one for each faulty column."
+    TooManyRequests 429 "too-many-requests" "Too many requests" "The key, or without one the address, sends more requests per second than it may, or the tenant has as many requests, streams or waits under way as it may; the detail says which. Try again after `Retry-After` seconds."
+    QuotaExceeded 429 "quota-exceeded" "Too many jobs are waiting" "The tenant has as many queued jobs as it may; nothing was stored, try again after `Retry-After` seconds."
+    StoredQuotaExceeded 507 "stored-quota-exceeded" "The tenant has stored as much as it may" "The cases, templates and results of the tenant take as many bytes as they may; nothing was stored, and nothing stored is removed. Delete ended jobs, batches or runs, then send it again."
+    ProfilesFull 429 "profiles-full" "No more profiles are kept" "The profiles of the tenant take as many bytes as they may; delete some, then send it again."
+    EvaluationTooLong 422 "evaluation-too-long" "The rows take too long to answer at once" "The rows need the solver, and more time, memory or rows than one evaluation may take; the detail says which. Nothing was stored. Submit them to `/v1/runs`, which takes the same body and any number of rows, or one case to `/v1/jobs`."
+    IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body, priority, deadline or `no-cache`; use a new key for a new case."
+    Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
+    QueueFull 503 "queue-full" "The queue is full" "The service holds as many unfinished jobs as it may; nothing was stored, try again after `Retry-After` seconds."
+    StorageUnwritable 503 "storage-unwritable" "The disk cannot be written" "The disk of the service is read-only or fails, or its job table is locked by another process; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
+    StorageUnreachable 503 "storage-unreachable" "The storage cannot be reached" "The database that the nodes share, or the store of the results, does not answer or takes nothing; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
+    StorageFull 507 "storage-full" "The disk is full" "The disk of the service has no room for another job; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
+    Draining 503 "draining" "The service is shutting down" "The service takes no new jobs because it is shutting down; jobs already accepted are kept. Try again after `Retry-After` seconds."
+    Overloaded 503 "overloaded" "The service has too much to do" "The memory or the turns for requests of this kind are taken, or every connection has a request under way; nothing was done. Try again after `Retry-After` seconds."
+    NotReady 503 "not-ready" "The service is not ready" "The job store cannot be reached at the moment."
+    NotConverged 422 "not-converged" "The solver did not converge" "Only inside a job: the iteration ended without meeting its tolerance; `residual` and `iterations` belong to the best iterate, `detail` says what to try."
+    Unsolvable 422 "unsolvable" "The contact has no answer" "Only inside a job: the region cannot be meshed or the contact does not exist; the detail says why."
+    OutOfTime 422 "out-of-time" "The solve ran out of time" "Only inside a job: the case's `solver.time_limit_s` was used up."
+    DeadlinePassed 422 "deadline-passed" "The job came too late" "Only inside a job: `deadline_s` of the submission was over before the job had ended; it was not solved any further."
+    SolverPanic 500 "solver-panic" "The solver failed" "Only inside a job: the solver stopped on a defect of its own. Other jobs are not affected."
+    WorkerLost 500 "worker-lost" "The workers of this job were lost" "Only inside a job: each worker that took the job ended without an answer, as often as is allowed."
+}
+
+impl ProblemKind {
+    /// Does it pass with time, so that the answer carries `Retry-After`?
+    #[must_use]
+    pub fn passes(self) -> bool {
+        matches!(
+            self,
+            ProblemKind::ResultNotReady
+                | ProblemKind::TooManyRequests
+                | ProblemKind::QuotaExceeded
+                | ProblemKind::QueueFull
+                | ProblemKind::StorageUnwritable
+                | ProblemKind::StorageUnreachable
+                | ProblemKind::StorageFull
+                | ProblemKind::Draining
+                | ProblemKind::Overloaded
+                | ProblemKind::NotReady
+        )
+    }
+}
+
+/// A failure as the client reads it (RFC 9457).
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[schema(as = Problem)]
+pub(crate) struct ProblemBody {
+    /// Address of the kind of problem, relative to this service; it answers with an explanation.
+    #[serde(rename = "type")]
+    #[schema(example = "/problems/faulty-case")]
+    pub kind: String,
+    /// The kind of problem in a few words.
+    pub title: String,
+    /// HTTP status code. Inside a job: the one that describes the failure best.
+    #[schema(minimum = 400, maximum = 599)]
+    pub status: u16,
+    /// What happened this time: what was given and what is allowed.
+    pub detail: String,
+    /// Path of the resource that the request was for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instance: Option<String>,
+    /// Every fault found, not only the first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub errors: Vec<Fault>,
+    /// Line of malformed JSON, counted from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<usize>,
+    /// Column of malformed JSON, counted from 1; 0 at the start of a line.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column: Option<usize>,
+    /// Best residual of a solve that did not converge, relative to the traction scale of the case.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub residual: Option<f64>,
+    /// Iterations of a solve that did not converge.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub iterations: Option<u32>,
+}
+
+/// One fault of a request. Exactly one of `pointer`, `parameter` and `header` says where it is.
+#[none_is_absent]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
+pub struct Fault {
+    /// JSON pointer (RFC 6901) into the body; empty for the body as a whole.
+    #[schema(example = "/material/poisson_ratio")]
+    #[schema(nullable = true)]
+    pub pointer: Option<String>,
+    /// Name of a query parameter.
+    #[schema(nullable = true)]
+    pub parameter: Option<String>,
+    /// Name of a request header.
+    #[schema(nullable = true)]
+    pub header: Option<String>,
+    /// Line of the body that holds the faulty case of a batch, counted from 1; only of NDJSON.
+    #[schema(nullable = true)]
+    pub line: Option<u64>,
+    /// Kind of the fault: `invalid` where only `detail` tells more, else `missing`, `unknown-member`, `wrong-type`, `out-of-range`,
+    /// `unknown-word`, `too-long`, `unknown-parameter`, or `repeated`. There may be more.
+    #[schema(example = "out-of-range")]
+    pub code: Cow<'static, str>,
+    /// The value given and what is allowed.
+    pub detail: String,
+    /// The value given, where it is no array, no object and no long text.
+    #[schema(value_type = Option<Value>)]
+    #[schema(nullable = true)]
+    pub value: Option<Value>,
+    /// Smallest number allowed.
+    #[schema(value_type = Option<f64>)]
+    pub minimum: Option<Number>,
+    /// The smallest number itself is not allowed; absent if it is.
+    pub minimum_excluded: Option<bool>,
+    /// Largest number, or number of characters, allowed.
+    #[schema(value_type = Option<f64>)]
+    pub maximum: Option<Number>,
+    /// Unit of these numbers.
+    #[schema(value_type = Option<String>)]
+    pub unit: Option<&'static str>,
+    /// The words that are allowed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    pub allowed: Vec<String>,
+}
+
+impl Fault {
+    /// A fault of a query parameter.
+    #[must_use]
+    pub fn parameter(name: &str, detail: impl Into<String>) -> Self {
+        Fault {
+            parameter: Some(name.to_owned()),
+            ..Fault::invalid(detail)
+        }
+    }
+
+    /// A fault of which no more is known than the sentence; where it is has to be filled in.
+    #[must_use]
+    pub fn invalid(detail: impl Into<String>) -> Self {
+        Fault {
+            code: FaultCode::default().name().into(),
+            detail: detail.into(),
+            ..Fault::default()
+        }
+    }
+}
+
+impl From<CaseFault> for Fault {
+    fn from(fault: CaseFault) -> Self {
+        let figures = *fault.figures;
+        Fault {
+            pointer: Some(fault.pointer),
+            code: figures.code.name().into(),
+            value: figures.value,
+            minimum: figures.minimum,
+            minimum_excluded: figures.minimum_excluded.then_some(true),
+            maximum: figures.maximum,
+            unit: figures.unit,
+            allowed: figures.allowed,
+            ..Fault::invalid(fault.detail)
+        }
+    }
+}
+
+impl ProblemBody {
+    /// A problem of this kind with a sentence about this occurrence.
+    #[must_use]
+    pub(crate) fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
+        ProblemBody {
+            kind: format!("/problems/{}", kind.slug()),
+            title: kind.title().to_owned(),
+            status: kind.status(),
+            detail: detail.into(),
+            instance: None,
+            errors: Vec::new(),
+            line: None,
+            column: None,
+            residual: None,
+            iterations: None,
+        }
+    }
+
+    /// The reason why a job failed, as the job shows it.
+    #[must_use]
+    pub(crate) fn of_job(job: &Job, failure: &Failure) -> Self {
+        let kind = match failure.kind {
+            FailureKind::NotConverged => ProblemKind::NotConverged,
+            FailureKind::Unsolvable => ProblemKind::Unsolvable,
+            FailureKind::OutOfTime => ProblemKind::OutOfTime,
+            FailureKind::DeadlinePassed => ProblemKind::DeadlinePassed,
+            FailureKind::Panic => ProblemKind::SolverPanic,
+            FailureKind::WorkerLost => ProblemKind::WorkerLost,
+            FailureKind::Internal => ProblemKind::Internal,
+        };
+        let mut problem = ProblemBody::new(kind, failure.detail.clone());
+        problem.instance = Some(format!("/v1/jobs/{}", job.id));
+        problem.residual = failure.residual;
+        problem.iterations = failure.iterations;
+        problem
+            .errors
+            .extend(failure.pointer.as_ref().map(|pointer| Fault {
+                pointer: Some(pointer.clone()),
+                ..Fault::invalid(failure.detail.clone())
+            }));
+        problem
+    }
+}
+
+/// A kind of problem, explained.
+#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
+#[schema(as = ProblemKind)]
+pub(crate) struct ProblemMeaning {
+    /// The `type` that problems of this kind carry.
+    #[serde(rename = "type")]
+    #[schema(value_type = String, example = "/problems/faulty-case")]
+    path: ProblemPath,
+    /// The kind in a few words.
+    title: &'static str,
+    /// HTTP status code.
+    status: u16,
+    /// What it means and what to do about it.
+    meaning: &'static str,
+}
+
+/// Written as `/problems/{slug}`.
+#[derive(Debug, Clone, Copy)]
+struct ProblemPath(&'static str);
+
+impl Serialize for ProblemPath {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("/problems/{}", self.0))
+    }
+}
+
+impl From<ProblemKind> for ProblemMeaning {
+    fn from(kind: ProblemKind) -> Self {
+        ProblemMeaning {
+            path: ProblemPath(kind.slug()),
+            title: kind.title(),
+            status: kind.status(),
+            meaning: kind.meaning(),
+        }
+    }
+}
+
+/// Declares the problems that a route can answer beside those that every route can, for its documentation.
+macro_rules! problems {
+    ($(#[$meta:meta])* $name:ident: $($kind:ident),* $(,)?) => {
+        $(#[$meta])*
+        pub(crate) struct $name;
+
+        impl utoipa::IntoResponses for $name {
+            fn responses() -> std::collections::BTreeMap<
+                String,
+                utoipa::openapi::RefOr<utoipa::openapi::Response>,
+            > {
+                $crate::http::problem::describe(&[$($crate::http::problem::ProblemKind::$kind),*])
+            }
+        }
+    };
+}
+pub(crate) use problems;
+
+problems! {
+    /// What a route that takes nothing can fail with.
+    PlainProblems: BadQuery
+}
+
+/// The responses of these kinds of problems, one per status code.
+#[must_use]
+pub(crate) fn describe(
+    kinds: &[ProblemKind],
+) -> BTreeMap<String, RefOr<utoipa::openapi::Response>> {
+    let mut by_status = BTreeMap::<u16, Vec<ProblemKind>>::new();
+    for kind in kinds {
+        by_status.entry(kind.status()).or_default().push(*kind);
+    }
+    by_status
+        .into_iter()
+        .map(|(status, kinds)| (status.to_string(), describe_together(&kinds)))
+        .collect()
+}
+
+/// One response for all of these kinds.
+pub(crate) fn describe_together(kinds: &[ProblemKind]) -> RefOr<utoipa::openapi::Response> {
+    let lines: Vec<String> = kinds
+        .iter()
+        .map(|kind| format!("`{}`: {}", kind.slug(), kind.meaning()))
+        .collect();
+    let content = ContentBuilder::new()
+        .schema(Some(Ref::from_schema_name("Problem")))
+        .build();
+    let mut response = ResponseBuilder::new()
+        .description(lines.join("\n\n"))
+        .content(PROBLEM_JSON, content);
+    if kinds.iter().any(|kind| kind.passes()) {
+        let schema = ObjectBuilder::new().schema_type(Type::Integer);
+        let header = HeaderBuilder::new()
+            .schema(Some(schema))
+            .description(Some("Seconds after which to try again."))
+            .build();
+        response = response.header("Retry-After", header);
+    }
+    response.build().into()
+}
+
+/// Content type of every failure.
+pub(crate) const PROBLEM_JSON: &str = "application/problem+json";
+
+/// Seconds after which a refused client may try again.
+const RETRY_SECONDS: u32 = 1;
+/// The same where somebody has to make room first.
+const DISK_RETRY_SECONDS: u32 = 10;
+
+/// Faults of one case that are listed.
+const FAULTS_LISTED: usize = 1000;
+
+/// A failure on its way to the client.
+#[derive(Debug)]
+pub struct ApiError {
+    problem: Box<ProblemBody>,
+    retry_after: Option<u32>,
+}
+
+impl ApiError {
+    /// A problem of this kind with a sentence about this occurrence.
+    #[must_use]
+    pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
+        ApiError {
+            problem: Box::new(ProblemBody::new(kind, detail)),
+            retry_after: kind.passes().then_some(RETRY_SECONDS),
+        }
+    }
+
+    /// The same, with the seconds after which to try again.
+    #[must_use]
+    pub fn after(mut self, seconds: u32) -> Self {
+        self.retry_after = Some(seconds);
+        self
+    }
+
+    /// The same, naming the query parameter that it is about.
+    #[must_use]
+    pub fn about(mut self, parameter: &str) -> Self {
+        let detail = self.problem.detail.clone();
+        self.problem
+            .errors
+            .push(Fault::parameter(parameter, detail));
+        self
+    }
+
+    /// The sentence about this occurrence.
+    #[must_use]
+    pub fn detail(&self) -> &str {
+        &self.problem.detail
+    }
+
+    /// The same in other words.
+    #[must_use]
+    pub fn saying(mut self, detail: impl Into<String>) -> Self {
+        self.problem.detail = detail.into();
+        self
+    }
+
+    /// A failure of the service itself: the reason goes to the log, not to the client.
+    #[must_use]
+    pub fn internal(reason: &dyn std::fmt::Display) -> Self {
+        tracing::error!(%reason, "a request failed inside the service");
+        ApiError::new(
+            ProblemKind::Internal,
+            "the request could not be answered; the service's log has the reason under the request id",
+        )
+    }
+
+    /// Malformed JSON with its position.
+    #[must_use]
+    pub fn malformed(error: &serde_json::Error) -> Self {
+        let mut failure = ApiError::new(
+            ProblemKind::MalformedJson,
+            format!("the body is not JSON: {error}"),
+        );
+        failure.problem.line = Some(error.line());
+        failure.problem.column = Some(error.column());
+        failure
+    }
+
+    /// An element of an array that is not JSON, with its place in the array.
+    #[must_use]
+    pub fn malformed_element(index: u32, error: &serde_json::Error) -> Self {
+        ApiError::new(
+            ProblemKind::MalformedJson,
+            format!(
+                "the body is not JSON: element {index} (counted from 0): {error}, within the element"
+            ),
+        )
+    }
+
+    /// A problem of this kind with faults that clients can find.
+    #[must_use]
+    pub fn listing(kind: ProblemKind, detail: impl Into<String>, faults: Vec<Fault>) -> Self {
+        let mut failure = ApiError::new(kind, detail);
+        failure.problem.errors = faults;
+        failure
+    }
+
+    /// A query with faults; `faults` is not empty.
+    #[must_use]
+    pub fn bad_query(faults: Vec<Fault>) -> Self {
+        let details: Vec<&str> = faults.iter().map(|fault| &*fault.detail).collect();
+        ApiError::listing(ProblemKind::BadQuery, details.join("; "), faults)
+    }
+
+    /// One query parameter with a value that is not allowed.
+    #[must_use]
+    pub fn bad_parameter(name: &str, detail: impl Into<String>) -> Self {
+        ApiError::bad_query(vec![Fault::parameter(name, detail)])
+    }
+
+    /// A request header with a value that is not allowed.
+    #[must_use]
+    pub fn bad_header(name: &str, detail: impl Into<String>) -> Self {
+        let detail = detail.into();
+        let fault = Fault {
+            header: Some(name.to_owned()),
+            ..Fault::invalid(detail.clone())
+        };
+        ApiError::listing(ProblemKind::BadHeader, detail, vec![fault])
+    }
+}
+
+impl From<CaseError> for ApiError {
+    fn from(CaseError(faults): CaseError) -> Self {
+        let detail = match faults.as_slice() {
+            [fault] if fault.pointer.is_empty() => {
+                format!("the case has 1 fault: {}", fault.detail)
+            }
+            [fault] => format!(
+                "the case has 1 fault, `{}`: {}",
+                fault.pointer, fault.detail
+            ),
+            faults if faults.len() > FAULTS_LISTED => format!(
+                "the case has {} faults; the first {FAULTS_LISTED} are listed",
+                faults.len()
+            ),
+            faults => format!("the case has {} faults", faults.len()),
+        };
+        let faults = faults.into_iter().take(FAULTS_LISTED).map(Fault::from);
+        ApiError::listing(ProblemKind::FaultyCase, detail, faults.collect())
+    }
+}
+
+impl From<JobsError> for ApiError {
+    fn from(error: JobsError) -> Self {
+        let kind = match error {
+            JobsError::Case(faults) => return faults.into(),
+            JobsError::NoSuchPatch { .. } => {
+                return ApiError::bad_parameter("patch", error.to_string());
+            }
+            JobsError::NoSuchPoint { .. } => {
+                return ApiError::bad_parameter("point", error.to_string());
+            }
+            JobsError::BadCursor => return ApiError::bad_parameter("cursor", error.to_string()),
+            JobsError::NotFound => ProblemKind::JobNotFound,
+            JobsError::BatchNotFound(Kind::Rows) => ProblemKind::RunNotFound,
+            JobsError::BatchNotFound(_) => ProblemKind::BatchNotFound,
+            JobsError::ProfileNotFound => ProblemKind::ProfileNotFound,
+            JobsError::Expired => ProblemKind::Expired,
+            JobsError::NotReady(_) => ProblemKind::ResultNotReady,
+            JobsError::NotSucceeded(ref job) if job.state == State::Cancelled => {
+                ProblemKind::JobCancelled
+            }
+            JobsError::NotSucceeded(_) => ProblemKind::JobFailed,
+            JobsError::NotEnded(_) => ProblemKind::JobNotEnded,
+            JobsError::BatchNotEnded(Kind::Rows, _) => ProblemKind::RunNotEnded,
+            JobsError::BatchNotEnded(..) => ProblemKind::BatchNotEnded,
+            JobsError::IdempotencyConflict => ProblemKind::IdempotencyConflict,
+            JobsError::QueueFull { .. } | JobsError::StagingFull { .. } => ProblemKind::QueueFull,
+            JobsError::QuotaExceeded { .. } | JobsError::StagingQuotaExceeded { .. } => {
+                ProblemKind::QuotaExceeded
+            }
+            JobsError::StoredQuotaExceeded { .. } => ProblemKind::StoredQuotaExceeded,
+            JobsError::ProfilesFull(_) => ProblemKind::ProfilesFull,
+            JobsError::TooManyRows(_) => ProblemKind::BodyTooLarge,
+            JobsError::BoundKey { .. } => ProblemKind::Forbidden,
+            JobsError::Draining => ProblemKind::Draining,
+            other => {
+                return match other.storage_fault() {
+                    Some(fault) => storage_failed(fault, &other),
+                    None => ApiError::internal(&other),
+                };
+            }
+        };
+        ApiError::new(kind, error.to_string())
+    }
+}
+
+/// The storage rejects writes; the log has the message of the system.
+fn storage_failed(fault: StorageFault, reason: &JobsError) -> ApiError {
+    tracing::warn!(%reason, "a request failed for want of its storage");
+    let (kind, what) = match fault {
+        StorageFault::Full => (ProblemKind::StorageFull, "the disk of the service is full"),
+        StorageFault::Unwritable => (
+            ProblemKind::StorageUnwritable,
+            "the disk of the service cannot be written at the moment",
+        ),
+        StorageFault::Damaged => (
+            ProblemKind::StorageUnwritable,
+            "the job table of the service is damaged; its operator has to restore it",
+        ),
+        StorageFault::Unreachable => (
+            ProblemKind::StorageUnreachable,
+            "the database or the store of results of the service cannot be reached at the moment",
+        ),
+    };
+    ApiError::new(kind, what).after(DISK_RETRY_SECONDS)
+}
+
+impl IntoResponse for ApiError {
+    fn into_response(self) -> Response {
+        let mut response = render(&self.problem);
+        if let Some(seconds) = self.retry_after {
+            response
+                .headers_mut()
+                .insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if self.problem.status == 401 {
+            let scheme = HeaderValue::from_static("Bearer realm=\"railhead\"");
+            response
+                .headers_mut()
+                .insert(header::WWW_AUTHENTICATE, scheme);
+        }
+        // The handler does not know the path it answers for; `name_instance` writes the problem again with it.
+        response.extensions_mut().insert(self.problem);
+        response
+    }
+}
+
+/// Completes every problem with the path it is about; layer around all routes.
+pub(crate) async fn name_instance(request: Request, next: Next) -> Response {
+    let path = request.uri().path().to_owned();
+    let mut response = next.run(request).await;
+    // The readable contract answers unknown files of its own with bare text.
+    if response.status() == StatusCode::NOT_FOUND
+        && response.extensions().get::<Box<ProblemBody>>().is_none()
+    {
+        response = unknown_route(&path).into_response();
+    }
+    let Some(mut problem) = response.extensions_mut().remove::<Box<ProblemBody>>() else {
+        return response;
+    };
+    problem.instance = Some(path);
+    let (mut parts, _) = response.into_parts();
+    parts.headers.remove(header::CONTENT_LENGTH);
+    let (_, body) = render(&problem).into_parts();
+    Response::from_parts(parts, body)
+}
+
+/// The answer for a path that names nothing.
+#[must_use]
+pub(crate) fn unknown_route(path: &str) -> ApiError {
+    if path.len() > 1 && path.ends_with('/') {
+        let detail = format!(
+            "there is nothing at `{path}`; the paths of this service do not end with a slash"
+        );
+        return ApiError::new(ProblemKind::UnknownRoute, detail);
+    }
+    ApiError::new(
+        ProblemKind::UnknownRoute,
+        format!(
+            "there is nothing at `{path}`; `/openapi.json` lists every resource, `/docs` shows them"
+        ),
+    )
+}
+
+fn render(problem: &ProblemBody) -> Response {
+    let status = StatusCode::from_u16(problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+    match serde_json::to_vec(problem) {
+        Ok(body) => (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response(),
+        Err(error) => {
+            tracing::error!(%error, "a problem could not be written as JSON");
+            StatusCode::INTERNAL_SERVER_ERROR.into_response()
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! What requests for parts of a result have in common.
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, Uri};
+use axum::response::Response;
+use uuid::Uuid;
+
+use crate::contact::case::words::solver::Output;
+use crate::contact::solution::words::answer::{PatchCells, PointFields};
+use crate::http::dto::name_of;
+use crate::http::extract::caller::{Caller, JobId};
+use crate::http::layers::etag::{Precondition, tagged};
+use crate::http::limits::Rendering;
+use crate::http::problem::{ApiError, ProblemKind, problems};
+use crate::http::render::format::Format;
+use crate::http::state::AppState;
+use crate::jobs::Jobs;
+use crate::jobs::error::JobsError;
+
+/// A request for a part of the result of a job.
+pub(crate) struct PartRequest {
+    /// The jobs of the client.
+    pub jobs: Jobs,
+    /// The job in the path.
+    pub id: Uuid,
+    /// What every handler can reach.
+    pub shared: AppState,
+    /// The address that was asked.
+    pub uri: Uri,
+    /// The head of the request.
+    pub headers: HeaderMap,
+}
+
+impl FromRequestParts<AppState> for PartRequest {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, shared: &AppState) -> Result<Self, ApiError> {
+        let Caller(jobs) = Caller::from_request_parts(parts, shared).await?;
+        let JobId(id) = JobId::from_request_parts(parts, shared).await?;
+        Ok(PartRequest {
+            jobs,
+            id,
+            shared: shared.clone(),
+            uri: parts.uri.clone(),
+            headers: parts.headers.clone(),
+        })
+    }
+}
+
+impl PartRequest {
+    /// The answer with its tag; nothing is loaded or computed for it if the client has it already.
+    ///
+    /// # Errors
+    /// There is no such job, or those of `answer`.
+    pub(crate) async fn unless_known(
+        &self,
+        format: Format,
+        answer: impl Future<Output = Result<Response, ApiError>> + Send,
+    ) -> Result<Response, ApiError> {
+        match Precondition::of(&self.jobs, self.id, &self.uri, &self.headers, format).await? {
+            Precondition::NotModified(unchanged) => Ok(unchanged),
+            Precondition::Proceed(tag) => Ok(tagged(&tag, answer.await?)),
+        }
+    }
+
+    /// A turn and memory for an answer of so many bytes.
+    ///
+    /// # Errors
+    /// As [`Memory::rendering`](crate::http::limits::Memory::rendering).
+    pub(crate) async fn rendering(&self, bytes: usize) -> Result<Rendering, ApiError> {
+        self.shared
+            .memory
+            .rendering(self.jobs.tenant(), bytes)
+            .await
+    }
+}
+
+problems! {
+    /// What a field can fail with.
+    FieldProblems: BadQuery, JobNotFound, OutputNotAsked, ResultNotReady, JobFailed, JobCancelled
+}
+
+/// The cells of a patch and the values of one motion, in which the output is present.
+///
+/// # Errors
+/// `output-not-asked`, or there is no such patch or motion, or no result.
+pub(crate) async fn stored(
+    jobs: &Jobs,
+    id: Uuid,
+    patch: usize,
+    point: usize,
+    output: Output,
+) -> Result<(PatchCells, PointFields), ApiError> {
+    let mut fields = match jobs.point_fields(id, patch, point).await {
+        // Nothing is stored per cell when the case asked for no field at all.
+        Err(JobsError::NoSuchPatch { patches: 0 }) => return not_asked(jobs, id, output).await,
+        fields => fields?,
+    };
+    // One motion was asked for, so there is one entry, and one mesh.
+    let values = fields.points.pop().unwrap_or_default();
+    let cells = fields.meshes.pop().unwrap_or_default();
+    if !has(&cells, &values, output) {
+        return not_asked(jobs, id, output).await;
+    }
+    Ok((cells, values))
+}
+
+/// Is the output among what was stored?
+#[must_use]
+pub(crate) fn has(cells: &PatchCells, values: &PointFields, output: Output) -> bool {
+    match output {
+        Output::Tractions => values.traction_x_mpa.is_some() && values.traction_y_mpa.is_some(),
+        Output::Pressure => cells.pressure_mpa.is_some(),
+        Output::Slip => values.slip_x.is_some() && values.slip_y.is_some(),
+        Output::Zones => values.zone.is_some(),
+        Output::Temperature => values.temperature_c.is_some(),
+        Output::Subsurface => values.subsurface.is_some(),
+        Output::Resultants | Output::Damage | Output::Gradients => true,
+    }
+}
+
+/// The failure of a client that fetches what its case did not ask for.
+///
+/// # Errors
+/// Always: `output-not-asked`, or what went wrong while finding out.
+pub(crate) async fn not_asked<T>(jobs: &Jobs, id: Uuid, output: Output) -> Result<T, ApiError> {
+    let asked: Vec<String> = jobs
+        .outputs(id)
+        .await?
+        .into_iter()
+        .map(|output| format!("`{}`", name_of(output)))
+        .collect();
+    let name = name_of(output);
+    Err(ApiError::new(
+        ProblemKind::OutputNotAsked,
+        format!(
+            "the case asked for {} only; submit it again with `{name}` among its `outputs`",
+            asked.join(", ")
+        ),
+    ))
+}

@@ -1,0 +1,608 @@
+//! What the service can do and how it is: methods, remarks, examples, problems, the tenant, probes and metrics.
+use std::collections::BTreeMap;
+
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+
+use crate::contact::case::words::solver::{Case, MethodName, Output};
+use crate::contact::remark::kind::RemarkKind;
+use crate::contact::remark::list::Remark;
+use crate::http::contract::EXAMPLES;
+use crate::http::dto::TenantLimits;
+use crate::http::extract::caller::{AnyTenant, Caller, Operator};
+use crate::http::layers::metrics::Metrics;
+use crate::http::options::HttpOptions;
+use crate::http::problem::{ApiError, PlainProblems, ProblemKind, ProblemMeaning, problems};
+use crate::http::routes::wait::WAIT_MAX_SECONDS;
+use crate::jobs::PAGE_MAX;
+use crate::jobs::error::JobsError;
+use crate::jobs::model::State as JobState;
+
+/// What the service can do.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Abilities)]
+pub(crate) struct Capabilities {
+    /// Values of `solver.method`.
+    methods: Vec<MethodCapability>,
+    /// Values of `contact.type`.
+    contacts: Vec<ContactCapability>,
+    /// Values of `outputs`.
+    outputs: Vec<OutputCapability>,
+    /// Limits of requests.
+    limits: RequestLimits,
+    /// Version of the service.
+    #[schema(value_type = String)]
+    version: &'static str,
+}
+
+/// A method of solving the tangential contact.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = MethodAbility)]
+pub(crate) struct MethodCapability {
+    /// The word for `solver.method`.
+    name: MethodName,
+    /// Used when the case names none.
+    default: bool,
+    /// What it is and when to choose it.
+    #[schema(value_type = String)]
+    summary: &'static str,
+}
+
+/// A way to describe where the bodies touch.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = ContactAbility)]
+pub(crate) struct ContactCapability {
+    /// The word for `contact.type`.
+    #[schema(value_type = String)]
+    name: &'static str,
+    /// Must the case have a `load`?
+    needs_load: bool,
+    /// What it describes.
+    #[schema(value_type = String)]
+    summary: &'static str,
+}
+
+/// Something a case can ask for.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = OutputAbility)]
+pub(crate) struct OutputCapability {
+    /// The word for `outputs`.
+    name: Output,
+    /// Computed when the case names no outputs.
+    default: bool,
+    /// What it is.
+    #[schema(value_type = String)]
+    summary: &'static str,
+}
+
+/// Limits of requests.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct RequestLimits {
+    /// Largest body of one case in bytes.
+    body_max_bytes: usize,
+    /// Longest `Prefer: wait`, in s.
+    wait_max_seconds: u32,
+    /// Most jobs in one page of a list.
+    list_limit_max: u32,
+    /// Most motions of one case.
+    motions_max: usize,
+    /// Most samples of a grid in a case, one axis times the other.
+    samples_max: usize,
+    /// Most memory in bytes that a case may be estimated to need.
+    memory_max_bytes: u64,
+    /// Longest solver time of a case in s, also of one that names no `time_limit_s`.
+    time_limit_max_seconds: f64,
+    /// Largest body of a batch in bytes.
+    batch_max_bytes: u64,
+    /// Most cases of a batch.
+    batch_max_cases: u32,
+    /// Largest body of a run in bytes.
+    run_max_bytes: u64,
+    /// Most rows of a run.
+    run_max_rows: u64,
+    /// Most queued jobs of the tenant.
+    queue_max: u64,
+    /// Most samples of a `grid` that a result is resampled on.
+    grid_max_samples: usize,
+    /// Limits of the requests of the tenant.
+    #[serde(flatten)]
+    tenant: TenantLimits,
+}
+
+/// The methods, contacts and outputs that a case can name.
+#[utoipa::path(
+    get,
+    path = "/v1/methods",
+    tag = "cases",
+    operation_id = "list_methods",
+    responses((status = 200, description = "What the service can do", body = Capabilities), PlainProblems)
+)]
+pub(crate) async fn methods(
+    State(options): State<HttpOptions>,
+    State(AnyTenant(jobs)): State<AnyTenant>,
+) -> Json<Capabilities> {
+    let own = jobs.options();
+    Json(Capabilities {
+        methods: METHODS
+            .map(|(name, summary)| MethodCapability {
+                name,
+                default: name == MethodName::default(),
+                summary,
+            })
+            .into(),
+        contacts: CONTACTS
+            .map(|(name, needs_load, summary)| ContactCapability {
+                name,
+                needs_load,
+                summary,
+            })
+            .into(),
+        outputs: OUTPUTS
+            .map(|(name, default, summary)| OutputCapability {
+                name,
+                default,
+                summary,
+            })
+            .into(),
+        limits: RequestLimits {
+            body_max_bytes: options.body_max_bytes,
+            wait_max_seconds: WAIT_MAX_SECONDS,
+            list_limit_max: PAGE_MAX,
+            motions_max: own.limits.motions_max,
+            samples_max: own.limits.samples_max,
+            memory_max_bytes: own.limits.memory_bytes,
+            time_limit_max_seconds: own.time_limit.as_secs_f64(),
+            batch_max_bytes: options.batch_max_bytes,
+            batch_max_cases: options.batch_max_cases,
+            run_max_bytes: options.run_max_bytes,
+            run_max_rows: options.run_max_rows,
+            queue_max: own.tenant_queue_max.min(own.queue_max),
+            grid_max_samples: options.grid_max_samples,
+            tenant: TenantLimits::of(&options),
+        },
+        version: env!("CARGO_PKG_VERSION"),
+    })
+}
+
+/// Methods with what they are for.
+const METHODS: [(MethodName, &str); 5] = [
+    (
+        MethodName::Auto,
+        "Resultants by `table` for elliptic contacts of like bodies with one coefficient of friction and given creepages, where the bound of its \
+         error meets `target_error`, and else by `boundary_element`. Values per cell are by `boundary_element`.",
+    ),
+    (
+        MethodName::BoundaryElement,
+        "Boundary elements with a semismooth Newton iteration: fast, for every motion and any shape of patch.",
+    ),
+    (
+        MethodName::LiuHsu,
+        "The Newton–Raphson method of Liu and Hsu with its two initial guesses. Slower, for small meshes; \
+         it does not converge at every spin and then says so.",
+    ),
+    (
+        MethodName::Fastsim,
+        "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one.",
+    ),
+    (
+        MethodName::Table,
+        "Resultants and their derivatives interpolated in a table that `boundary_element` made, in about a microsecond, with a \
+         bound of the error: elliptic patches with a/b from 0.1 to 10, others by the ellipse that carries their load the same way.",
+    ),
+];
+
+/// Types of contacts: whether they need a load, and how they are given.
+const CONTACTS: [(&str, bool, &str); 7] = [
+    (
+        "radii",
+        true,
+        "Relative radii of curvature: an elliptic patch after Hertz.",
+    ),
+    (
+        "ellipse",
+        true,
+        "An elliptic patch of given semi-axes with Hertz's pressure.",
+    ),
+    (
+        "gap_profile",
+        true,
+        "A gap measured across, between bodies that are circular along rolling: region and pressure are found.",
+    ),
+    (
+        "gap_grid",
+        true,
+        "Any gap on a grid: region and pressure are found, in one or several patches.",
+    ),
+    (
+        "profiles",
+        true,
+        "A wheel on a rail by their cross-sections: every patch is found, with its place and its own frame.",
+    ),
+    (
+        "wheelset",
+        true,
+        "A wheelset on both rails by their cross-sections, in one or several positions: its roll, its height and every patch are found; with \
+         its equivalent conicity if asked.",
+    ),
+    (
+        "pressure_grid",
+        false,
+        "A given pressure on a grid; its positive part is the contact, in one or several patches.",
+    ),
+];
+
+/// Outputs: whether they are the default, and what they are.
+const OUTPUTS: [(Output, bool, &str); 9] = [
+    (
+        Output::Resultants,
+        true,
+        "Forces, moment and dissipated power.",
+    ),
+    (
+        Output::Zones,
+        true,
+        "Stick and slip zones: cells, areas and outlines.",
+    ),
+    (Output::Tractions, false, "Tangential tractions per cell."),
+    (Output::Pressure, false, "Pressure per cell."),
+    (
+        Output::Slip,
+        false,
+        "Relative slip per cell, divided by rolling speed.",
+    ),
+    (
+        Output::Subsurface,
+        false,
+        "Stresses below the surface at the points of `subsurface`, and the worst point of every patch.",
+    ),
+    (
+        Output::Damage,
+        false,
+        "Friction power, wear and fatigue of one pass by the models of `damage`.",
+    ),
+    (
+        Output::Temperature,
+        false,
+        "Temperature of both surfaces per cell; needs `thermal` and `speed_mm_per_s` in the motion.",
+    ),
+    (
+        Output::Gradients,
+        false,
+        "Derivatives of forces and moment by creepages and spin, and by the normal force of Hertz contacts; not of a `history`.",
+    ),
+];
+
+/// Every remark that an answer can carry: its code, what it means and what to do about it.
+#[utoipa::path(
+    get,
+    path = "/v1/remarks",
+    tag = "cases",
+    operation_id = "list_remarks",
+    responses((status = 200, description = "All kinds of remarks", body = Vec<RemarkKind>), PlainProblems)
+)]
+pub(crate) async fn remarks() -> Json<Vec<RemarkKind>> {
+    Json(Remark::kinds())
+}
+
+/// A case to begin with.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct ExampleCase {
+    /// Its name, as in `api/examples/{name}.case.json`.
+    #[schema(value_type = String)]
+    name: &'static str,
+    /// What it shows.
+    #[schema(value_type = String)]
+    summary: &'static str,
+    /// The case, ready to be submitted.
+    #[schema(value_type = Case)]
+    case: Value,
+}
+
+/// Cases to begin with, each ready to be submitted.
+#[utoipa::path(
+    get,
+    path = "/v1/examples",
+    tag = "cases",
+    operation_id = "list_examples",
+    responses((status = 200, description = "All examples", body = Vec<ExampleCase>), PlainProblems)
+)]
+pub(crate) async fn examples() -> Result<Json<Vec<ExampleCase>>, ApiError> {
+    let read = |(name, summary, text): (&'static str, &'static str, &str)| {
+        let case = serde_json::from_str(text);
+        let case = case.map_err(|error| ApiError::internal(&error))?;
+        Ok(ExampleCase {
+            name,
+            summary,
+            case,
+        })
+    };
+    EXAMPLES
+        .into_iter()
+        .map(read)
+        .collect::<Result<_, _>>()
+        .map(Json)
+}
+
+/// A healthy answer.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Health {
+    /// `alive` or `ready`.
+    #[schema(value_type = String, example = "ready")]
+    status: &'static str,
+    /// Version of the service.
+    #[schema(value_type = String)]
+    version: &'static str,
+}
+
+impl Health {
+    fn new(status: &'static str) -> Json<Health> {
+        Json(Health {
+            status,
+            version: env!("CARGO_PKG_VERSION"),
+        })
+    }
+}
+
+/// Is the process alive? Asks nothing else.
+#[utoipa::path(
+    get,
+    path = "/healthz",
+    tag = "service",
+    operation_id = "healthz",
+    responses((status = 200, description = "The process is alive", body = Health))
+)]
+pub(crate) async fn alive() -> Json<Health> {
+    Health::new("alive")
+}
+
+problems! {
+    /// What `GET /readyz` can fail with.
+    ReadyProblems: NotReady, Draining, StorageFull, StorageUnwritable, StorageUnreachable
+}
+
+/// Can the service take jobs? Asks the job store.
+#[utoipa::path(
+    get,
+    path = "/readyz",
+    tag = "service",
+    operation_id = "readyz",
+    responses((status = 200, description = "The service takes jobs", body = Health), ReadyProblems)
+)]
+pub(crate) async fn ready(
+    State(AnyTenant(jobs)): State<AnyTenant>,
+) -> Result<Json<Health>, ApiError> {
+    match jobs.ready().await {
+        Ok(()) => Ok(Health::new("ready")),
+        Err(reason)
+            if matches!(reason, JobsError::Draining) || reason.storage_fault().is_some() =>
+        {
+            Err(reason.into())
+        }
+        Err(reason) => {
+            tracing::warn!(%reason, "the job store does not answer");
+            Err(ApiError::new(
+                ProblemKind::NotReady,
+                "the job store cannot be reached; the service's log has the reason",
+            ))
+        }
+    }
+}
+
+/// The text form that Prometheus asks for first.
+const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+/// The form before it.
+const PLAIN: &str = "text/plain; version=0.0.4; charset=utf-8";
+
+problems! {
+    /// What `GET /metrics` can fail with.
+    MetricsProblems: Unauthorized, Forbidden, TooManyRequests
+}
+
+/// What the service counts, as OpenMetrics text, or in the older text form for those who accept only that.
+///
+/// Every name begins with `railhead_`. Labels have few values; none holds an id or a text of a client.
+#[utoipa::path(
+    get,
+    path = "/metrics",
+    tag = "service",
+    operation_id = "get_metrics",
+    responses((status = 200, description = "The figures", content((String = "application/openmetrics-text"), (String = "text/plain"))), MetricsProblems)
+)]
+pub(crate) async fn metrics(
+    Operator(jobs): Operator,
+    State(metrics): State<Metrics>,
+    headers: HeaderMap,
+) -> Result<Response, ApiError> {
+    jobs.refresh_metrics().await?;
+    let mut text = String::new();
+    metrics
+        .write(&mut text)
+        .map_err(|error| ApiError::internal(&error))?;
+    if wants_plain_text(&headers) {
+        return Ok(([(header::CONTENT_TYPE, PLAIN)], plain(&text)).into_response());
+    }
+    Ok(([(header::CONTENT_TYPE, OPEN_METRICS)], text).into_response())
+}
+
+/// Older tools name the text form and not OpenMetrics.
+fn wants_plain_text(headers: &HeaderMap) -> bool {
+    let names = |wanted: &str| {
+        let values = headers.get_all(header::ACCEPT).iter();
+        let mut values = values.filter_map(|value| value.to_str().ok());
+        values.any(|value| value.contains(wanted))
+    };
+    names("text/plain") && !names("application/openmetrics-text")
+}
+
+/// OpenMetrics text in the older form: counters and infos are called as their samples are, and there is no end mark.
+fn plain(text: &str) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    let mut samples = text.lines().peekable();
+    while let Some(line) = samples.next() {
+        let Some(about) = line.strip_prefix("# ") else {
+            lines.push(line.to_owned());
+            continue;
+        };
+        let mut words = about.splitn(3, ' ');
+        let (kind, name, rest) = (words.next(), words.next(), words.next());
+        let (Some("HELP"), Some(name), Some(help)) = (kind, name, rest) else {
+            // Units and the end mark; types are taken with their help.
+            continue;
+        };
+        let of_type = samples.next().and_then(|line| line.rsplit(' ').next());
+        let (suffix, of_type) = match of_type {
+            Some("counter") => ("_total", "counter"),
+            Some("info") => ("_info", "gauge"),
+            Some("unknown") | None => ("", "untyped"),
+            Some(other) => ("", other),
+        };
+        lines.push(format!("# HELP {name}{suffix} {help}"));
+        lines.push(format!("# TYPE {name}{suffix} {of_type}"));
+    }
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+problems! {
+    /// What `GET /problems/{name}` can fail with.
+    ExplainProblems: BadQuery, UnknownRoute
+}
+
+/// Every kind of problem that this service knows.
+#[utoipa::path(
+    get,
+    path = "/problems",
+    tag = "service",
+    operation_id = "list_problems",
+    responses((status = 200, description = "All kinds of problems", body = Vec<ProblemMeaning>), PlainProblems)
+)]
+pub(crate) async fn list_problems() -> Json<Vec<ProblemMeaning>> {
+    Json(
+        ProblemKind::ALL
+            .iter()
+            .copied()
+            .map(ProblemMeaning::from)
+            .collect(),
+    )
+}
+
+/// One kind of problem, explained; a problem's `type` leads here.
+#[utoipa::path(
+    get,
+    path = "/problems/{name}",
+    tag = "service",
+    operation_id = "explain_problem",
+    params(("name" = String, Path, description = "The last part of a problem's `type`", example = "faulty-case")),
+    responses((status = 200, description = "What this kind of problem means", body = ProblemMeaning), ExplainProblems)
+)]
+pub(crate) async fn explain(Path(name): Path<String>) -> Result<Json<ProblemMeaning>, ApiError> {
+    let known = ProblemKind::ALL
+        .iter()
+        .copied()
+        .find(|kind| kind.slug() == name);
+    known.map(|kind| Json(kind.into())).ok_or_else(|| {
+        ApiError::new(
+            ProblemKind::UnknownRoute,
+            format!("`{name}` is no kind of problem; `/problems` lists them all"),
+        )
+    })
+}
+
+/// Who asks, what it uses, and what it may use.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Me {
+    /// The tenant that the key belongs to; `anonymous` without a key.
+    tenant: String,
+    /// Labels that the key is bound to: the key can access only resources with these labels, and resources created with it get them.
+    labels: BTreeMap<String, String>,
+    /// What the tenant may use at most.
+    quota: Quota,
+    /// What the tenant uses at present.
+    used: Used,
+    /// Limits of requests.
+    limits: TenantLimits,
+}
+
+/// What a tenant may use at most.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Quota {
+    /// Queued jobs and chunks of runs, with those of batches that are being received.
+    queued: u64,
+    /// Bytes reserved for batches that are being received.
+    staged_bytes: u64,
+    /// Bytes of stored cases, templates and results; null: any number.
+    stored_bytes: Option<u64>,
+}
+
+/// What a tenant uses at present.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct Used {
+    /// Queued jobs and chunks of runs, with the places that are reserved for batches being received.
+    queued: u64,
+    /// Bytes reserved for batches that are being received.
+    staged_bytes: u64,
+    /// Bytes of stored cases, templates and results.
+    stored_bytes: u64,
+    /// Number of its jobs in each state, the chunks of its runs included.
+    #[schema(value_type = BTreeMap<String, u64>)]
+    jobs: BTreeMap<&'static str, u64>,
+}
+
+/// Returns the client's tenant, its use and its limits.
+#[utoipa::path(
+    get,
+    path = "/v1/me",
+    tag = "service",
+    operation_id = "get_me",
+    responses((status = 200, description = "The tenant with its use and its limits", body = Me), PlainProblems)
+)]
+pub(crate) async fn me(
+    Caller(jobs): Caller,
+    State(options): State<HttpOptions>,
+) -> Result<Json<Me>, ApiError> {
+    let own = jobs.options();
+    let usage = jobs.usage().await?;
+    let number = |state| usage.jobs.get(&state).copied().unwrap_or(0);
+    Ok(Json(Me {
+        tenant: jobs.tenant().to_owned(),
+        labels: jobs.bound().clone(),
+        quota: Quota {
+            queued: own.tenant_queue_max.min(own.queue_max),
+            staged_bytes: own.staging.tenant.min(own.staging.all),
+            stored_bytes: own.tenant_stored_max_bytes,
+        },
+        used: Used {
+            queued: number(JobState::Queued) + usage.reserved,
+            staged_bytes: usage.staged_bytes,
+            stored_bytes: usage.stored_bytes,
+            jobs: JobState::ALL
+                .map(|state| (state.name(), number(state)))
+                .into(),
+        },
+        limits: TenantLimits::of(&options),
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_older_form_calls_metrics_as_their_samples_are_called() {
+        let text = "# HELP a_build The version.\n# TYPE a_build info\na_build_info{version=\"1\"} 1\n\
+                    # HELP a_jobs Jobs.\n# TYPE a_jobs counter\na_jobs_total{state=\"x\"} 2\n\
+                    # HELP a_size Size.\n# TYPE a_size gauge\n# UNIT a_size bytes\na_size 3\n# EOF\n";
+        assert_eq!(
+            plain(text),
+            "# HELP a_build_info The version.\n# TYPE a_build_info gauge\na_build_info{version=\"1\"} 1\n\
+             # HELP a_jobs_total Jobs.\n# TYPE a_jobs_total counter\na_jobs_total{state=\"x\"} 2\n\
+             # HELP a_size Size.\n# TYPE a_size gauge\na_size 3\n"
+        );
+    }
+}

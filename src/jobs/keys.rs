@@ -1,0 +1,179 @@
+//! API keys: which tenant a request belongs to.
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use crate::jobs::clock::Clock;
+use crate::jobs::error::JobsError;
+use crate::jobs::handle::Jobs;
+use crate::jobs::model::{Key, Labels, MARK, is_tenant};
+use crate::jobs::open_store::{open_beside, open_shared, table_file};
+use crate::jobs::store::Store;
+use crate::jobs::sync::lock;
+
+/// The keys of a data folder, also beside a running service.
+#[derive(Debug)]
+pub struct Keyring {
+    store: Arc<dyn Store>,
+}
+
+impl Keyring {
+    /// Opens the keys of a data folder. The folder must be there; a new one gets its job table.
+    ///
+    /// # Errors
+    /// There is no such folder, or it cannot be used.
+    pub async fn open(data_dir: &Path) -> Result<Keyring, JobsError> {
+        std::fs::read_dir(data_dir).map_err(|source| JobsError::DataDir {
+            path: data_dir.to_owned(),
+            source,
+        })?;
+        let store = open_beside(data_dir).await?;
+        Ok(Keyring { store })
+    }
+
+    /// Opens the keys in a database.
+    ///
+    /// # Errors
+    /// It cannot be reached, has no job table, or one of another version.
+    pub async fn open_shared(url: &str) -> Result<Keyring, JobsError> {
+        let store = open_shared(url).await?;
+        Ok(Keyring { store })
+    }
+
+    /// Is this the data folder of a service?
+    #[must_use]
+    pub fn is_there(data_dir: &Path) -> bool {
+        table_file(data_dir).is_file()
+    }
+
+    /// Makes a key of a tenant. The secret, returned second, is shown this one time and kept nowhere.
+    ///
+    /// # Errors
+    /// [`JobsError::BadTenant`], no randomness, or a failed database.
+    pub async fn create(
+        &self,
+        tenant: &str,
+        name: Option<String>,
+        read_only: bool,
+        labels: Labels,
+    ) -> Result<(Key, String), JobsError> {
+        if !is_tenant(tenant) {
+            return Err(JobsError::BadTenant);
+        }
+        let mut id = [0; 6];
+        let mut secret = [0; 32];
+        getrandom::fill(&mut id)
+            .and_then(|()| getrandom::fill(&mut secret))
+            .map_err(|error| JobsError::Damaged(format!("no randomness: {error}")))?;
+        let id = hex(&id);
+        let text = format!("{MARK}{id}_{}", hex(&secret));
+        let key = Key {
+            id,
+            hash: blake3::hash(text.as_bytes()),
+            tenant: tenant.into(),
+            name,
+            created_at: Clock::system().now_ms(),
+            revoked_at: None,
+            read_only,
+            labels: Arc::new(labels),
+        };
+        self.store.add_key(&key).await?;
+        Ok((key, text))
+    }
+
+    /// All keys, oldest first, the revoked ones included.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn list(&self) -> Result<Vec<Key>, JobsError> {
+        Ok(self.store.keys().await?)
+    }
+
+    /// Revokes a key by its id; `None` if there is none.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn revoke(&self, id: &str) -> Result<Option<Key>, JobsError> {
+        Ok(self.store.revoke_key(id, Clock::system().now_ms()).await?)
+    }
+
+    /// Closes the data folder.
+    pub async fn close(self) {
+        self.store.close().await;
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    use std::fmt::Write;
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// How long a valid key is not read again; a revoked one stops working within this time.
+const TRUSTED_FOR: Duration = Duration::from_secs(1);
+
+/// Keys remembered at most.
+const REMEMBERED: usize = 4096;
+
+impl Jobs {
+    /// The key that `text` is, if it was found a moment ago.
+    #[must_use]
+    pub fn remembered_key(&self, text: &str) -> Option<Key> {
+        let id = id_of(text)?;
+        let trusted = lock(&self.shared.trusted);
+        let (key, since) = trusted.get(id)?;
+        let good = since.elapsed() < TRUSTED_FOR && key.hash == blake3::hash(text.as_bytes());
+        good.then(|| key.clone())
+    }
+
+    /// The key that `text` is, if it is one that is not revoked. Hashes are compared in constant time.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn key(&self, text: &str) -> Result<Option<Key>, JobsError> {
+        let Some(id) = id_of(text) else {
+            return Ok(None);
+        };
+        let hash = blake3::hash(text.as_bytes());
+        if let Some((key, since)) = lock(&self.shared.trusted).get(id)
+            && since.elapsed() < TRUSTED_FOR
+        {
+            return Ok((key.hash == hash).then(|| key.clone()));
+        }
+        // Taken before the read: a key that is revoked meanwhile is not trusted for longer.
+        let now = Instant::now();
+        let found = self.shared.store.key(id).await?;
+        let good = found.filter(|key| key.hash == hash && key.revoked_at.is_none());
+        let mut trusted = lock(&self.shared.trusted);
+        match &good {
+            Some(key) => {
+                if trusted.len() >= REMEMBERED {
+                    trusted.clear();
+                }
+                trusted.insert(id.to_owned(), (key.clone(), now));
+            }
+            None => {
+                trusted.remove(id);
+            }
+        }
+        Ok(good)
+    }
+
+    /// Is there any key that is not revoked?
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn any_key(&self) -> Result<bool, JobsError> {
+        let keys = self.shared.store.keys().await?;
+        Ok(keys.iter().any(|key| key.revoked_at.is_none()))
+    }
+}
+
+/// The part of a key that is no secret.
+fn id_of(text: &str) -> Option<&str> {
+    let (id, _) = text.strip_prefix(MARK)?.split_once('_')?;
+    Some(id)
+}

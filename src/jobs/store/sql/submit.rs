@@ -1,0 +1,469 @@
+//! Submission: places in the queue, rows of jobs, and single submissions that share a transaction.
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use railhead_macros::repeat_conflicts;
+use tokio::sync::{mpsc, oneshot};
+use uuid::Uuid;
+
+use super::engine::{self, DbConnection, DbPool, QueryBuilder, Row, SqlStore, query};
+use super::finish::end_with_sources;
+use super::rows::{GET, count, job_columns, push_list, read_count, read_id, read_job, to_json};
+use crate::jobs::error::StoreError;
+use crate::jobs::model::{Job, State};
+use crate::jobs::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, SubmitJobs};
+
+/// Places still free, as one transaction has read them and takes them.
+pub(crate) struct Places {
+    bounds: QueueBounds,
+    /// Queued jobs of all tenants with the places that are reserved for batches being filled.
+    all: u64,
+    /// Queued jobs and reserved places of each tenant, and its stored bytes.
+    of_tenants: HashMap<String, (u64, u64)>,
+}
+
+impl Places {
+    /// What these tenants have taken.
+    pub(crate) async fn of<'a>(
+        connection: &mut DbConnection,
+        tenants: impl IntoIterator<Item = &'a str>,
+        bounds: QueueBounds,
+    ) -> Result<Places, StoreError> {
+        let mut query = QueryBuilder::new("WITH asked (tenant) AS (");
+        query.push_values(tenants, |mut row, tenant| {
+            row.push_bind(tenant);
+        });
+        query.push(
+            ") SELECT tenant, \
+             (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued' AND job_counts.tenant = asked.tenant) + \
+             (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND batches.tenant = asked.tenant) AS taken, \
+             (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued') + \
+             (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0) AS taken_by_all, \
+             (SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM stored_bytes WHERE stored_bytes.tenant = asked.tenant) AS stored FROM asked",
+        );
+        let mut places = Places {
+            bounds,
+            all: 0,
+            of_tenants: HashMap::new(),
+        };
+        for row in &query.build().fetch_all(connection).await? {
+            places.all = read_count(row, "taken_by_all")?;
+            let of_tenant = (read_count(row, "taken")?, read_count(row, "stored")?);
+            places.of_tenants.insert(row.try_get("tenant")?, of_tenant);
+        }
+        Ok(places)
+    }
+
+    /// Takes as many places as there are, at most `most`; a refusal if there is not even one.
+    pub(crate) fn take(&mut self, tenant: &str, most: u64) -> Result<u64, Refusal> {
+        let (of_tenant, stored) = self.taken_by(tenant);
+        let places = most
+            .min(self.bounds.all.saturating_sub(self.all))
+            .min(self.bounds.tenant.saturating_sub(of_tenant));
+        if places == 0 && most > 0 {
+            return Err(self.refusal_of(tenant));
+        }
+        self.all += places;
+        self.of_tenants
+            .insert(tenant.to_owned(), (of_tenant + places, stored));
+        Ok(places)
+    }
+
+    /// Counts bytes that are about to be stored; a refusal if the tenant would have more than it may.
+    pub(crate) fn store(&mut self, tenant: &str, bytes: u64) -> Result<(), Refusal> {
+        let (of_tenant, stored) = self.taken_by(tenant);
+        if self.bounds.stored.is_some_and(|most| stored + bytes > most) {
+            return Err(Refusal::Stored);
+        }
+        self.of_tenants
+            .insert(tenant.to_owned(), (of_tenant, stored + bytes));
+        Ok(())
+    }
+
+    fn taken_by(&self, tenant: &str) -> (u64, u64) {
+        self.of_tenants.get(tenant).copied().unwrap_or((0, 0))
+    }
+
+    /// Which bound has no place left.
+    pub(crate) fn refusal_of(&self, tenant: &str) -> Refusal {
+        if self.taken_by(tenant).0 >= self.bounds.tenant {
+            Refusal::Quota
+        } else {
+            Refusal::Queue
+        }
+    }
+}
+
+/// Bytes of cases, templates and results that a tenant has stored.
+pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Result<u64, StoreError> {
+    let row = query(
+        "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM stored_bytes WHERE tenant = $1",
+    )
+    .bind(tenant)
+    .fetch_one(connection)
+    .await?;
+    read_count(&row, "bytes")
+}
+
+/// Those of these jobs that have succeeded.
+pub(crate) async fn succeeded(
+    connection: &mut DbConnection,
+    ids: &[Uuid],
+) -> Result<HashSet<Uuid>, StoreError> {
+    if ids.is_empty() {
+        return Ok(HashSet::new());
+    }
+    let mut query = QueryBuilder::new(concat!(
+        "SELECT id FROM jobs WHERE ",
+        bare!("state"),
+        " = 'succeeded' AND id IN ("
+    ));
+    push_list(&mut query, ids);
+    query.push(")");
+    let rows = query.build().fetch_all(connection).await?;
+    rows.iter().map(read_id).collect()
+}
+
+/// Jobs in one statement; with 20 values each far below the bound of SQLite.
+const ROWS_PER_STATEMENT: usize = 250;
+
+/// Queues jobs within the caller's transaction, those of a batch with their places in it. Returns those that ended at once with the
+/// result of their source.
+pub(crate) async fn insert_jobs(
+    connection: &mut DbConnection,
+    batch: Option<Uuid>,
+    jobs: &[(Option<u32>, &NewJob)],
+) -> Result<Vec<Uuid>, StoreError> {
+    let mut ended = Vec::new();
+    let batch = batch.map(|id| id.to_string());
+    for some in jobs.chunks(ROWS_PER_STATEMENT) {
+        let labels = some
+            .iter()
+            .map(|(_, job)| to_json(&job.labels))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut rows = QueryBuilder::new(
+            "INSERT INTO jobs (id, state, name, labels, method, created_at, updated_at, batch_id, batch_index, cost_us, slice_us, outputs, \
+             cache_key, tenant, bypass_cache, rank, deadline, traceparent, case_bytes, kind) ",
+        );
+        rows.push_values(
+            some.iter().zip(labels),
+            |mut row, ((index, job), labels)| {
+                row.push_bind(job.id.to_string())
+                    .push("'queued'")
+                    .push_bind(&job.name)
+                    .push_bind(labels)
+                    .push_bind(&job.method)
+                    .push_bind(job.created_at)
+                    .push_bind(job.created_at)
+                    .push_bind(&batch)
+                    .push_bind(index.map(i64::from))
+                    .push_bind(i64::from(job.cost_us))
+                    .push_bind(i64::from(job.slice_us))
+                    .push_bind(&job.outputs)
+                    .push_bind(job.cache_key.as_ref().map(CacheKey::as_slice))
+                    .push_bind(&*job.tenant)
+                    .push_bind(i64::from(job.options.bypass_cache))
+                    .push_bind(job.options.priority.rank())
+                    .push_bind(job.deadline())
+                    .push_bind(job.traceparent.as_deref())
+                    .push_bind(count(job.body.len()))
+                    .push_bind(job.kind.name());
+            },
+        );
+        rows.build().execute(&mut *connection).await?;
+        let mut cases = QueryBuilder::new("INSERT INTO cases (job_id, row, body) ");
+        cases.push_values(some, |mut row, (_, job)| {
+            row.push_bind(job.id.to_string())
+                .push_bind(i64::from(job.row))
+                .push_bind(job.body.as_ref());
+        });
+        cases.build().execute(&mut *connection).await?;
+        let labels: Vec<_> = some
+            .iter()
+            .flat_map(|(_, job)| job.labels.iter().map(move |label| (job, label)))
+            .collect();
+        for some in labels.chunks(ROWS_PER_STATEMENT) {
+            let mut rows =
+                QueryBuilder::new("INSERT INTO job_labels (of_tenant, key, value, job_id, state) ");
+            rows.push_values(some, |mut row, (job, (key, value))| {
+                row.push_bind(&*job.tenant)
+                    .push_bind(*key)
+                    .push_bind(*value)
+                    .push_bind(job.id.to_string())
+                    .push("'queued'");
+            });
+            rows.build().execute(&mut *connection).await?;
+        }
+        let jobs = some.iter().map(|(_, job)| *job);
+        ended.extend(end_with_sources(&mut *connection, jobs).await?);
+    }
+    Ok(ended)
+}
+
+/// Most jobs stored together.
+const GROUP_MAX: usize = 256;
+
+/// What an idempotency key of a tenant stands for.
+pub(crate) const BY_KEY: &str = concat!(
+    "SELECT ",
+    job_columns!(),
+    ", digest FROM idempotency_keys JOIN jobs ON jobs.id = idempotency_keys.job_id WHERE of_tenant = $1 AND key = $2"
+);
+
+/// A job whose submitter waits.
+#[derive(Debug)]
+pub(crate) struct Submission {
+    pub(crate) new: NewJob,
+    pub(crate) bounds: QueueBounds,
+    pub(crate) reply: oneshot::Sender<Result<Enqueued, StoreError>>,
+}
+
+/// The way to the task that stores jobs; it ends with the last of these.
+#[derive(Debug, Clone)]
+pub(crate) struct GroupCommit(pub(crate) mpsc::Sender<Submission>);
+
+impl GroupCommit {
+    /// Starts the task.
+    pub(crate) fn start(writer: DbPool) -> GroupCommit {
+        let (sender, waiting) = mpsc::channel(GROUP_MAX);
+        tokio::spawn(store_all(writer, waiting));
+        GroupCommit(sender)
+    }
+}
+
+async fn store_all(writer: DbPool, mut waiting: mpsc::Receiver<Submission>) {
+    let mut group = Vec::with_capacity(GROUP_MAX);
+    while waiting.recv_many(&mut group, GROUP_MAX).await > 0 {
+        while !group.is_empty() {
+            let later = set_aside_repeated_keys(&mut group);
+            store_some(&writer, std::mem::replace(&mut group, later)).await;
+        }
+    }
+}
+
+/// Takes out jobs whose idempotency key another of the group has: they have to see what became of that one.
+fn set_aside_repeated_keys(group: &mut Vec<Submission>) -> Vec<Submission> {
+    let mut seen = HashSet::new();
+    let keyed = |waiting: &Submission| {
+        let key = waiting.new.idempotency.as_ref()?.0.clone();
+        Some((waiting.new.tenant.clone(), key))
+    };
+    group
+        .extract_if(.., |waiting| {
+            keyed(waiting).is_some_and(|key| !seen.insert(key))
+        })
+        .collect()
+}
+
+async fn store_some(writer: &DbPool, group: Vec<Submission>) {
+    let jobs: Vec<&NewJob> = group.iter().map(|waiting| &waiting.new).collect();
+    let Some(bounds) = group.first().map(|waiting| waiting.bounds) else {
+        return;
+    };
+    let stored = engine::again(|| store_together(writer, &jobs, bounds)).await;
+    let alone = group.len() == 1;
+    match stored {
+        Ok(answers) => {
+            for (waiting, answer) in group.into_iter().zip(answers) {
+                // The submitter may have stopped waiting.
+                let _ = waiting.reply.send(Ok(answer));
+            }
+        }
+        // What is wrong with the disk is wrong for all of them.
+        Err(error) if alone || error.storage_fault().is_some() => {
+            for waiting in group {
+                let _ = waiting.reply.send(Err(error.clone()));
+            }
+        }
+        Err(_) => {
+            for waiting in group {
+                let one = [&waiting.new];
+                let stored = engine::again(|| store_together(writer, &one, bounds)).await;
+                let answer = stored.and_then(|mut answers| answers.pop().ok_or_else(lost));
+                let _ = waiting.reply.send(answer);
+            }
+        }
+    }
+}
+
+/// Stores jobs in one transaction; the answers are in their order. Idempotency keys must differ.
+async fn store_together(
+    writer: &DbPool,
+    jobs: &[&NewJob],
+    bounds: QueueBounds,
+) -> Result<Vec<Enqueued>, StoreError> {
+    let mut transaction = engine::begin(writer).await?;
+    engine::lock_admission(&mut transaction).await?;
+    let tenants: HashSet<&str> = jobs.iter().map(|job| &*job.tenant).collect();
+    let mut places = Places::of(&mut transaction, tenants, bounds).await?;
+    let sources: Vec<Uuid> = jobs.iter().filter_map(|job| Some(job.source?.0)).collect();
+    let living = succeeded(&mut transaction, &sources).await?;
+    let mut known = HashMap::new();
+    for job in jobs {
+        if let Some((key, digest)) = &job.idempotency
+            && let Some(found) = by_key(&mut transaction, &job.tenant, key, digest).await?
+        {
+            known.insert(job.id, found);
+        }
+    }
+    let mut added: Vec<_> = jobs
+        .iter()
+        .filter(|job| !known.contains_key(&job.id))
+        .map(|job| (None, *job))
+        .collect();
+    for (_, job) in &added {
+        // A job that ends at once with the result of its source needs no place.
+        let ends = job
+            .source
+            .is_some_and(|(source, _)| living.contains(&source));
+        let taken = match ends {
+            true => Ok(0),
+            false => places.take(&job.tenant, 1),
+        };
+        let room = taken.and_then(|_| places.store(&job.tenant, job.body.len() as u64));
+        if let Err(refusal) = room {
+            known.insert(job.id, Enqueued::Refused(refusal));
+        }
+    }
+    added.retain(|(_, job)| !known.contains_key(&job.id));
+    if added.is_empty() {
+        transaction.commit().await?;
+        return answers(jobs, known);
+    }
+    let ended = insert_jobs(&mut transaction, None, &added).await?;
+    for (_, job) in added {
+        if let Some((key, digest)) = &job.idempotency {
+            query("INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) VALUES ($1, $2, $3, $4)")
+                .bind(&*job.tenant)
+                .bind(key)
+                .bind(digest.as_slice())
+                .bind(job.id.to_string())
+                .execute(&mut *transaction)
+                .await?;
+        }
+        let as_it_is = if ended.contains(&job.id) {
+            read_back(&mut transaction, job).await?
+        } else {
+            queued(job)
+        };
+        known.insert(job.id, Enqueued::Created(as_it_is));
+    }
+    transaction.commit().await?;
+    answers(jobs, known)
+}
+
+/// The answers in the order of the jobs.
+fn answers(
+    jobs: &[&NewJob],
+    mut known: HashMap<Uuid, Enqueued>,
+) -> Result<Vec<Enqueued>, StoreError> {
+    jobs.iter()
+        .map(|job| known.remove(&job.id).ok_or_else(lost))
+        .collect()
+}
+
+fn lost() -> StoreError {
+    StoreError::Corrupt("a job was stored and not answered".to_owned())
+}
+
+/// What an idempotency key of a tenant stands for, if it was used.
+pub(crate) async fn by_key(
+    connection: &mut DbConnection,
+    tenant: &str,
+    key: &str,
+    digest: &[u8; 32],
+) -> Result<Option<Enqueued>, StoreError> {
+    let row = query(BY_KEY)
+        .bind(tenant)
+        .bind(key)
+        .fetch_optional(connection)
+        .await?;
+    let Some(row) = row else { return Ok(None) };
+    let stored: Vec<u8> = row.try_get("digest")?;
+    Ok(Some(if stored == digest {
+        Enqueued::Existing(read_job(&row)?)
+    } else {
+        Enqueued::Conflict
+    }))
+}
+
+async fn read_back(connection: &mut DbConnection, job: &NewJob) -> Result<Job, StoreError> {
+    let row = query(GET)
+        .bind(job.id.to_string())
+        .bind(&*job.tenant)
+        .fetch_one(connection)
+        .await?;
+    read_job(&row)
+}
+
+/// A job as its row is right after it was added.
+fn queued(new: &NewJob) -> Job {
+    Job {
+        id: new.id,
+        tenant: new.tenant.to_string(),
+        kind: new.kind,
+        state: State::Queued,
+        name: new.name.clone(),
+        labels: new.labels.clone(),
+        batch_id: None,
+        priority: new.options.priority,
+        created_at: new.created_at,
+        updated_at: new.created_at,
+        started_at: None,
+        ended_at: None,
+        deadline: new.deadline(),
+        expires_at: None,
+        attempt: 0,
+        progress: 0.0,
+        remarks: Vec::new(),
+        failure: None,
+        cached: false,
+        version: 1,
+        queue: None,
+    }
+}
+
+#[repeat_conflicts]
+#[async_trait]
+impl SubmitJobs for SqlStore {
+    #[once]
+    async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, StoreError> {
+        let gone = || {
+            StoreError::Failed(Arc::new(std::io::Error::other(
+                "the task that stores jobs has ended",
+            )))
+        };
+        let (reply, answer) = oneshot::channel();
+        let waiting = Submission {
+            new: new.clone(),
+            bounds,
+            reply,
+        };
+        self.group_commit
+            .0
+            .send(waiting)
+            .await
+            .map_err(|_| gone())?;
+        answer.await.map_err(|_| gone())?
+    }
+
+    async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), StoreError> {
+        query("DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2")
+            .bind(tenant)
+            .bind(key)
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
+    async fn job_by_key(
+        &self,
+        tenant: &str,
+        key: &str,
+        digest: &[u8; 32],
+    ) -> Result<Option<Enqueued>, StoreError> {
+        let mut connection = self.readers.acquire().await?;
+        by_key(&mut connection, tenant, key, digest).await
+    }
+}
