@@ -2,9 +2,8 @@
 //!
 //! | to find | look in |
 //! |---|---|
-//! | a command, and the flags of all but `serve` | [`commands`] |
-//! | a flag of `serve` | [`serve_args`], [`Options`](crate::jobs::Options), [`HttpOptions`](crate::http::HttpOptions), [`case_args`], [`database_args`] |
-//! | in which order a service starts and stops | [`serve`], [`stop`] |
+//! | a command or flag | [`commands`], [`Options`](crate::jobs::Options), [`HttpOptions`](crate::http::HttpOptions) |
+//! | in which order a service starts and stops | [`serve`] |
 
 mod backup;
 mod commands;

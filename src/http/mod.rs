@@ -5,10 +5,11 @@
 //!
 //! 1. [`server::serve`] accepts the connection and passes its requests on. [`server::connections`] limits the number of connections,
 //!    and closes those whose client sends no request or does not read its answer.
-//! 2. The [`layers`] around all routes, from the outside inward: [`security_headers`], the client behind a trusted proxy
-//!    ([`client_address`]), [`drain_body`], [`request_id`], [`request_log`], `otel` (feature `otlp`), [`metrics`], [`etag::complete`], [`compression`], [`final_newline`], the path in problems
-//!    ([`problem::name_instance`]), [`origin_guard`], what is left of the rate ([`auth::add_rate_limit_headers`]), what the request holds
-//!    until its answer is sent ([`holding_body`]), [`catch_panic`], [`admission`] of compressed bodies and their decompression.
+//! 2. The [`layers`] around all routes, from the outside inward: headers for browsers ([`response::secure`]), the client behind a trusted
+//!    proxy ([`client_address`]), [`drain_body`], the request's id and its line in the log ([`request_log`]), `otel` (feature `otlp`),
+//!    [`metrics`], [`etag::complete`], compression and the final line break ([`response`]), the path in problems
+//!    ([`problem::name_instance`]), [`auth::admit`], what is left of the rate ([`auth::add_rate_limit_headers`]), what the request holds
+//!    until its answer is sent ([`limits::hold`]), panics as answers, [`admission`] of compressed bodies and their decompression.
 //! 3. The layers of a group of routes: whether JSON is accepted ([`accept::require_json`]) and what clients may keep
 //!    ([`etag::immutable`], [`etag::revalidate`]).
 //! 4. [`extract`]: the caller (key, tenant, rate), ids, query and body, each read strictly; what it takes is counted by

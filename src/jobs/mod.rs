@@ -9,23 +9,23 @@
 //!    case that the tenant had solved before gives a job that has already succeeded with the same result.
 //! 3. **Insert** ([`store`]): one transaction decides key, quota and queue bound and inserts the job. Single
 //!    submissions that arrive together share it. From here on the job survives the process.
-//! 4. **Claim** ([`worker::pool`], [`worker::claim_loop`]): a worker, whose loop is `Worker::step`, asks whose [turn](attempts::fair_scheduler) it is and claims a group of that
+//! 4. **Claim** ([`worker::pool`]): a worker, whose loop is `Worker::step`, asks whose [turn](attempts::fair_scheduler) it is and claims a group of that
 //!    tenant's jobs. A single job is a group of one. Each claim has a
 //!    fencing token, which every later write names.
 //! 5. **Keep the lease** ([`worker::heartbeat`]): from the claim until the end is written. A lease is renewed while the
 //!    solver ticks and while results are being stored; otherwise it runs out and the
-//!    [reaper](maintenance::reaper) takes the job back.
+//!    [reaper](maintenance) takes the job back.
 //! 6. **Settle without solving** ([`worker::record`]): jobs with a known answer end with it; equal jobs of the group wait
 //!    for the first of them.
-//! 7. **Solve** ([`worker::turn`], [`worker::begin`], [`worker::solve`]): on a thread, outside any transaction, one case after the other. A
+//! 7. **Solve** ([`worker::turn`], [`worker::solve`]): on a thread, outside any transaction, one case after the other. A
 //!    long sweep is cut into [slices](attempts::slices), each stored when it is solved, between which others have their turn. While
 //!    every worker is at a solve without a cut, a spare one serves short jobs.
-//! 8. **Judge** ([`worker::disposition`]): the one place that decides what an outcome means for the job.
+//! 8. **Judge** ([`worker::record::disposition_of`]): the one place that decides what an outcome means for the job.
 //! 9. **Store and finish** ([`worker::record`]): a large result goes to the [`blobs`] first, under a key with the fencing
 //!    token; then one transaction writes all ends of the group, small results included. What was not begun is released.
-//! 10. **Tell** ([`notify`]): those who wait for a job or follow it read it again.
+//! 10. **Tell** ([`work`]): those who wait for a job or follow it read it again.
 //! 11. **Fetch** ([`results`]): the row first, then the blob; what has gone in between is answered as expired.
-//! 12. **Expire** ([`maintenance::retention`], [`maintenance::blob_collector`]): rows go after their retention time; a blob
+//! 12. **Expire** ([`maintenance`]): rows go after their retention time; a blob
 //!     whose last reference goes enters an outbox in the same transaction, and the collector deletes it.
 //!
 //! [`lifecycle`] opens, starts and stops all this; [`shared`] holds what all handles and workers use.

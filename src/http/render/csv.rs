@@ -1,46 +1,49 @@
-//! CSV (RFC 4180): a header with the names, one line per row. Zones are words; what lies outside the patch is empty.
+//! CSV (RFC 4180): a header with the names, one line per row.
 
 use std::borrow::Cow;
 use std::fmt::Write;
 use std::ops::Range;
 
-use crate::http::render::table::{ArrayData, Precision, Rows, Table};
+use serde::Serialize;
+use utoipa::ToSchema;
 
-/// The line with the names.
+/// How exactly numbers are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Precision {
+    /// As they were computed: 64 bits.
+    #[default]
+    Double,
+    /// 32 bits, some seven digits: enough for pictures, and half as large.
+    Single,
+}
+
+/// The line with the names of the columns.
 ///
 /// # Errors
 /// Never, as memory takes all that is written.
-pub(crate) fn head(table: &Table) -> Result<Vec<u8>, csv::Error> {
+pub(crate) fn head<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
-    let axes: &[&str] = match table.rows {
-        Rows::Cells => &[],
-        Rows::Grid { .. } => &["x_mm", "y_mm"],
-    };
-    let columns = table.columns.iter().map(|column| column.name);
-    out.write_record(axes.iter().copied().chain(columns))?;
+    out.write_record(names.into_iter().map(|name| text_field(name).into_owned()))?;
     finish(out)
 }
 
-/// Some lines. Numbers have as many digits as it takes to read the same number back.
+/// Some lines, whose fields `write` makes of column and row.
 ///
 /// # Errors
 /// Never, as memory takes all that is written.
-pub(crate) fn lines(table: &Table, rows: Range<usize>) -> Result<Vec<u8>, csv::Error> {
-    let mut out = csv::Writer::from_writer(Vec::new());
-    let written = |value: f64| number_as(value, table.precision);
+pub(crate) fn lines(
+    columns: usize,
+    rows: Range<usize>,
+    write: impl Fn(&mut String, usize, usize),
+) -> Result<Vec<u8>, csv::Error> {
+    let mut out = csv::Writer::from_writer(Vec::with_capacity(16 * rows.len() * columns));
+    let mut field = String::new();
     for row in rows {
-        if let Rows::Grid { x_mm, y_mm } = &table.rows {
-            out.write_field(written(x_mm[row % x_mm.len()]))?;
-            out.write_field(written(y_mm[row / x_mm.len()]))?;
-        }
-        for column in &table.columns {
-            match &column.data {
-                ArrayData::Numbers(values) => out.write_field(written(values[row]))?,
-                ArrayData::Integers(values) => out.write_field(values[row].to_string())?,
-                ArrayData::Zones(zones) => {
-                    out.write_field(zones[row].map_or("", |zone| zone.name()))?;
-                }
-            }
+        for column in 0..columns {
+            field.clear();
+            write(&mut field, column, row);
+            out.write_field(&field)?;
         }
         out.write_record(None::<&[u8]>)?;
     }
@@ -79,20 +82,9 @@ pub(crate) fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
 /// The shortest text that reads back as the same number; empty for NaN.
 #[must_use]
 pub(crate) fn number(value: f64) -> String {
-    if value.is_nan() {
-        String::new()
-    } else {
-        format!("{value:?}")
-    }
-}
-
-/// The same in this precision.
-#[must_use]
-pub(crate) fn number_as(value: f64, precision: Precision) -> String {
-    match precision {
-        Precision::Single if !value.is_nan() => format!("{:?}", single(value)),
-        _ => number(value),
-    }
+    let mut text = String::new();
+    write_number(&mut text, value, Precision::Double, "");
+    text
 }
 
 /// The nearest number of 32 bits; NaN stays NaN.
@@ -102,13 +94,14 @@ pub(crate) fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// The shortest digits that are read as the same number.
-pub(crate) fn write_number(text: &mut String, number: f64, none: &str) {
-    if number.is_finite() {
-        let _ = write!(text, "{number:?}");
-    } else {
-        text.push_str(none);
-    }
+/// Writes the shortest digits that are read as the same number, or `none` where there is none.
+pub(crate) fn write_number(text: &mut String, number: f64, precision: Precision, none: &str) {
+    // Writing to a string does not fail.
+    let _ = match precision {
+        _ if !number.is_finite() => write!(text, "{none}"),
+        Precision::Double => write!(text, "{number:?}"),
+        Precision::Single => write!(text, "{:?}", single(number)),
+    };
 }
 
 #[cfg(test)]

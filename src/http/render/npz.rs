@@ -12,8 +12,8 @@ use zip::{CompressionMethod, ZipWriter};
 
 use crate::contact::evaluate::answer::RowsAnswer;
 use crate::http::dto::Outlines;
-use crate::http::render::csv::single;
-use crate::http::render::table::{ArrayData, Precision, Rows, Table, zone_code};
+use crate::http::render::csv::{Precision, single};
+use crate::http::render::table::{ArrayData, Rows, Table, zone_code};
 
 /// What an NPY header has to be a multiple of, the parts before it included.
 const ALIGNMENT: usize = 64;

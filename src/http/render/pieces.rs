@@ -1,53 +1,113 @@
 //! Text of a table piece by piece, made when the client takes it: a large answer takes no more memory than its table.
 
-use std::fmt::Write;
-use std::ops::Range;
+use std::convert::Infallible;
 
 use axum::body::{Body, Bytes};
 use futures_util::stream;
 
-use crate::contact::solution::words::answer::Zone;
 use crate::http::render::csv;
-use crate::http::render::table::{ArrayData, Precision, Rows, Table};
+use crate::http::render::table::{Rows, Table};
 
 /// Pieces are at least this large, but for the last one.
 const PIECE_BYTES: usize = 32 << 10;
 /// Rows written at once.
 const ROWS: usize = 256;
 
-/// A part of a JSON text.
-enum JsonPart {
-    Text(String),
-    /// Values of a column, parted by commas.
-    Values(ColumnName, Range<usize>),
-}
-
-#[derive(Clone, Copy)]
-enum ColumnName {
-    X,
-    Y,
-    Value(usize),
-}
-
-/// The table as CSV.
+/// The table as CSV. Zones are words; what lies outside the patch is empty.
 pub(crate) fn csv_body(table: Table) -> Body {
-    let starts = (0..table.len()).step_by(ROWS);
-    let head = csv::head(&table);
-    let lines = starts.map(move |start| {
-        let end = (start + ROWS).min(table.len());
-        csv::lines(&table, start..end)
+    let names = table.names();
+    let columns = names.len();
+    let lines = (0..table.len()).step_by(ROWS).map(move |start| {
+        let rows = start..(start + ROWS).min(table.len());
+        csv::lines(columns, rows, |out, column, row| {
+            table.write(out, column, table.index(column, row), ["", ""]);
+        })
     });
-    body(std::iter::once(head).chain(lines))
+    body(std::iter::once(csv::head(names)).chain(lines))
 }
 
 /// The table as the JSON of a field: members written before (`"patch":0,…`), then per cell inside `cells`, or on a grid.
 pub(crate) fn json_body(table: Table, members: &str) -> Body {
-    let parts = parts(&table, members);
-    let texts = parts.into_iter().map(move |part| match part {
-        JsonPart::Text(text) => Ok::<_, std::convert::Infallible>(text.into_bytes()),
-        JsonPart::Values(column, rows) => Ok(values(&table, column, rows).into_bytes()),
+    let (open, close, axes) = match &table.rows {
+        Rows::Cells => (",\"cells\":{", "}}", Vec::new()),
+        Rows::Grid { x_mm, y_mm } => (",", "}", vec![x_mm.len(), y_mm.len()]),
+    };
+    let columns = table.names().into_iter().enumerate();
+    let columns = columns.map(|(place, name)| match axes.get(place) {
+        Some(count) => JsonColumn::new(name, *count),
+        None => JsonColumn {
+            inner: axes.first().copied(),
+            ..JsonColumn::new(name, table.len())
+        },
     });
-    body(texts)
+    let columns = columns.collect();
+    json_columns(
+        format!("{{{members}{open}"),
+        columns,
+        close,
+        move |out, column, index| {
+            table.write(out, column, index, ["null", "\""]);
+        },
+    )
+}
+
+/// A column of a JSON text.
+pub(crate) struct JsonColumn {
+    name: &'static str,
+    /// Number of its values.
+    count: usize,
+    /// Values of each array inside its array; nothing if it has numbers.
+    inner: Option<usize>,
+}
+
+impl JsonColumn {
+    /// A column with this many numbers or texts.
+    pub(crate) fn new(name: &'static str, count: usize) -> JsonColumn {
+        JsonColumn {
+            name,
+            count,
+            inner: None,
+        }
+    }
+}
+
+/// `"name":[…],…` for each column between two texts; `write` makes the value of column and row.
+pub(crate) fn json_columns(
+    open: String,
+    columns: Vec<JsonColumn>,
+    close: &'static str,
+    write: impl Fn(&mut String, usize, usize) + Send + 'static,
+) -> Body {
+    let mut parts = vec![(open, 0, 0..0)];
+    for (place, JsonColumn { name, count, inner }) in columns.into_iter().enumerate() {
+        let (step, [begin, between, end]) = match inner.filter(|_| count > 0) {
+            Some(inner) => (inner, ["[[", "],[", "]]"]),
+            None => (ROWS, ["[", ",", "]"]),
+        };
+        let comma = if place == 0 { "" } else { "," };
+        let mut before = format!("{comma}\"{name}\":{begin}");
+        for start in (0..count).step_by(step) {
+            let rows = start..(start + step).min(count);
+            parts.push((
+                std::mem::replace(&mut before, between.to_owned()),
+                place,
+                rows,
+            ));
+        }
+        let begun = if count == 0 { before } else { String::new() };
+        parts.push((begun + end, 0, 0..0));
+    }
+    parts.push((close.to_owned(), 0, 0..0));
+    body(parts.into_iter().map(move |(mut text, column, rows)| {
+        let first = rows.start;
+        for row in rows {
+            if row > first {
+                text.push(',');
+            }
+            write(&mut text, column, row);
+        }
+        Ok::<_, Infallible>(text.into_bytes())
+    }))
 }
 
 /// The texts, gathered into pieces; each is made when the client has taken those before it.
@@ -69,95 +129,6 @@ where
     Body::from_stream(stream::iter(pieces))
 }
 
-fn parts(table: &Table, members: &str) -> Vec<JsonPart> {
-    let mut parts = Vec::new();
-    let (open, close) = match &table.rows {
-        Rows::Cells => (",\"cells\":{", "}}"),
-        Rows::Grid { .. } => (",", "}"),
-    };
-    parts.push(JsonPart::Text(format!("{{{members}{open}")));
-    if let Rows::Grid { x_mm, y_mm } = &table.rows {
-        array(&mut parts, "x_mm", ColumnName::X, x_mm.len());
-        array(&mut parts, "y_mm", ColumnName::Y, y_mm.len());
-    }
-    for (number, column) in table.columns.iter().enumerate() {
-        let values = ColumnName::Value(number);
-        match &table.rows {
-            Rows::Cells => array(&mut parts, column.name, values, table.len()),
-            Rows::Grid { x_mm, y_mm } => {
-                let nx = x_mm.len();
-                parts.push(JsonPart::Text(format!("\"{}\":[", column.name)));
-                for iy in 0..y_mm.len() {
-                    let open = if iy == 0 { "[" } else { ",[" };
-                    parts.push(JsonPart::Text(open.to_owned()));
-                    parts.push(JsonPart::Values(values, iy * nx..(iy + 1) * nx));
-                    parts.push(JsonPart::Text("]".to_owned()));
-                }
-                parts.push(JsonPart::Text("],".to_owned()));
-            }
-        }
-    }
-    // The comma after the last array makes way.
-    if let Some(JsonPart::Text(last)) = parts.last_mut() {
-        last.pop();
-    }
-    parts.push(JsonPart::Text(close.to_owned()));
-    parts
-}
-
-/// `"name":[…],`
-fn array(parts: &mut Vec<JsonPart>, name: &str, column: ColumnName, count: usize) {
-    parts.push(JsonPart::Text(format!("\"{name}\":[")));
-    for start in (0..count).step_by(ROWS) {
-        if start > 0 {
-            parts.push(JsonPart::Text(",".to_owned()));
-        }
-        parts.push(JsonPart::Values(column, start..(start + ROWS).min(count)));
-    }
-    parts.push(JsonPart::Text("],".to_owned()));
-}
-
-fn values(table: &Table, column: ColumnName, rows: Range<usize>) -> String {
-    let mut out = String::new();
-    for row in rows {
-        if !out.is_empty() {
-            out.push(',');
-        }
-        match (column, &table.rows) {
-            (ColumnName::X, Rows::Grid { x_mm, .. }) => push(&mut out, x_mm[row], table.precision),
-            (ColumnName::Y, Rows::Grid { y_mm, .. }) => push(&mut out, y_mm[row], table.precision),
-            (ColumnName::Value(number), _) => match &table.columns[number].data {
-                ArrayData::Numbers(numbers) => push(&mut out, numbers[row], table.precision),
-                ArrayData::Integers(numbers) => {
-                    // Writing to a string cannot fail.
-                    let _ = write!(out, "{}", numbers[row]);
-                }
-                ArrayData::Zones(zones) => push_zone(&mut out, zones[row]),
-            },
-            _ => unreachable!("the parts were made from this table"),
-        }
-    }
-    out
-}
-
-/// The number as JSON; null where there is none.
-fn push(out: &mut String, value: f64, precision: Precision) {
-    let _ = match (serde_json::Number::from_f64(value), precision) {
-        (None, _) => write!(out, "null"),
-        (Some(number), Precision::Double) => write!(out, "{number}"),
-        (Some(_), Precision::Single) => write!(out, "{:?}", csv::single(value)),
-    };
-}
-
-fn push_zone(out: &mut String, zone: Option<Zone>) {
-    match zone {
-        Some(zone) => {
-            let _ = write!(out, "\"{}\"", zone.name());
-        }
-        None => out.push_str("null"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use http_body_util::BodyExt;
@@ -165,8 +136,8 @@ mod tests {
 
     use super::*;
     use crate::contact::case::words::solver::Output;
-    use crate::contact::solution::words::answer::{PatchCells, PointFields};
-    use crate::http::render::table::TableColumn;
+    use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
+    use crate::http::render::table::{ArrayData, Precision, TableColumn};
 
     async fn text(body: Body) -> String {
         let bytes = body.collect().await.unwrap().to_bytes();

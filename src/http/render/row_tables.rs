@@ -2,9 +2,14 @@
 
 use std::error::Error;
 use std::fmt::Write;
+use std::ops::Range;
 
-use crate::http::render::csv::{text_field, write_number};
+use axum::body::Body;
+
+use crate::contact::evaluate::answer::RowsAnswer;
+use crate::http::render::csv::{self, Precision, text_field, write_number};
 use crate::http::render::format::Format;
+use crate::http::render::pieces::{JsonColumn, body, json_columns};
 use crate::jobs::codec::arrow::ArrowWriter;
 use crate::jobs::codec::parquet::TableWriter;
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
@@ -60,11 +65,7 @@ impl RowWriter {
     /// It cannot be written.
     pub(crate) fn head(&mut self) -> Result<Vec<u8>, WriteError> {
         match self {
-            RowWriter::Csv(names) => {
-                let mut writer = csv::Writer::from_writer(Vec::new());
-                writer.write_record(names.iter().map(|name| text_field(name).into_owned()))?;
-                Ok(writer.into_inner()?)
-            }
+            RowWriter::Csv(names) => Ok(csv::head(names.iter().map(String::as_str))?),
             _ => Ok(Vec::new()),
         }
     }
@@ -108,25 +109,19 @@ impl RowWriter {
 }
 
 fn csv_lines(table: &RowTable) -> Result<Vec<u8>, WriteError> {
-    let mut writer = csv::Writer::from_writer(Vec::with_capacity(
-        16 * table.row_count() * table.columns.len(),
-    ));
-    let mut field = String::new();
-    for row in 0..table.row_count() {
-        for (_, column) in &table.columns {
-            field.clear();
-            match column {
-                TableColumn::Integers(values) => write!(field, "{}", values[row])?,
-                TableColumn::Numbers(values) => write_number(&mut field, values[row], ""),
-                TableColumn::Texts(values) => {
-                    field.push_str(&text_field(values[row].as_deref().unwrap_or_default()));
-                }
+    let columns = &table.columns;
+    let lines = csv::lines(
+        columns.len(),
+        0..table.row_count(),
+        |out, column, row| match &columns[column].1 {
+            TableColumn::Integers(values) => *out += &values[row].to_string(),
+            TableColumn::Numbers(values) => write_number(out, values[row], Precision::Double, ""),
+            TableColumn::Texts(values) => {
+                *out += &text_field(values[row].as_deref().unwrap_or_default());
             }
-            writer.write_field(&field)?;
-        }
-        writer.write_record(None::<&[u8]>)?;
-    }
-    Ok(writer.into_inner()?)
+        },
+    );
+    Ok(lines?)
 }
 
 fn json_lines(table: &RowTable) -> Result<String, WriteError> {
@@ -140,7 +135,9 @@ fn json_lines(table: &RowTable) -> Result<String, WriteError> {
             write!(text, "{before}{name}:")?;
             match column {
                 TableColumn::Integers(values) => write!(text, "{}", values[row])?,
-                TableColumn::Numbers(values) => write_number(&mut text, values[row], "null"),
+                TableColumn::Numbers(values) => {
+                    write_number(&mut text, values[row], Precision::Double, "null");
+                }
                 TableColumn::Texts(values) => text.push_str(&serde_json::to_string(&values[row])?),
             }
         }
@@ -149,9 +146,132 @@ fn json_lines(table: &RowTable) -> Result<String, WriteError> {
     Ok(text)
 }
 
+/// Rows of a batch of Arrow records, or of a group of a Parquet file.
+const BATCH_ROWS: usize = 1 << 15;
+
+/// Rows of text written at once.
+const ROWS: usize = 1024;
+
+/// `{"rows": …, "columns": {"force_x_n": […], …, "status": […]}}`; null where a row has no number.
+pub(crate) fn json_body(answer: RowsAnswer) -> Body {
+    let rows = answer.status.len();
+    let names = answer.numbers.iter().map(|(name, _)| *name);
+    let columns = names.chain(["status"]);
+    let columns = columns.map(|name| JsonColumn::new(name, rows)).collect();
+    let open = format!("{{\"rows\":{rows},\"columns\":{{");
+    json_columns(open, columns, "}}", move |out, column, row| {
+        match answer.numbers.get(column) {
+            Some((_, values)) => write_number(out, values[row], Precision::Double, "null"),
+            None => *out += &format!("\"{}\"", answer.status[row].name()),
+        }
+    })
+}
+
+/// The columns as a table.
+///
+/// # Errors
+/// It cannot be begun.
+pub(crate) fn table_body(format: Format, answer: RowsAnswer) -> Result<Body, WriteError> {
+    let columns = answer.columns().into_iter();
+    let columns: Vec<_> = columns
+        .map(|(name, _)| (name.to_owned(), TableKind::Numbers))
+        .chain([("status".to_owned(), TableKind::Texts)])
+        .collect();
+    let rows = answer.status.len();
+    let step = match format {
+        Format::Arrow | Format::Parquet => BATCH_ROWS,
+        _ => ROWS,
+    };
+    let mut writer = RowWriter::new(format, &columns)?;
+    let head = writer.head()?;
+    let starts = (0..rows).step_by(step).map(Some).chain([None]);
+    let pieces = starts.map(move |start| {
+        let written = match start {
+            Some(start) => writer.write(part(&answer, start..(start + step).min(rows))),
+            None => writer.finish(),
+        };
+        written.map_err(std::io::Error::other)
+    });
+    Ok(body(std::iter::once(Ok(head)).chain(pieces)))
+}
+
+fn part(answer: &RowsAnswer, range: Range<usize>) -> RowTable {
+    let status = answer.status[range.clone()].iter();
+    let status = status
+        .map(|status| Some(status.name().to_owned()))
+        .collect();
+    let numbers = answer.columns().into_iter();
+    let numbers = numbers.map(|(name, column)| {
+        let column = TableColumn::Numbers(column[range.clone()].to_vec());
+        (name.to_owned(), column)
+    });
+    RowTable {
+        columns: numbers
+            .chain([("status".to_owned(), TableColumn::Texts(status))])
+            .collect(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use http_body_util::BodyExt;
+    use serde_json::{Value, json};
+
     use super::*;
+    use crate::contact::evaluate::answer::RowStatus;
+
+    fn answer(rows: usize) -> RowsAnswer {
+        let column = |scale: f64| (0..rows).map(|k| scale * k as f64).collect();
+        let mut numbers: Vec<(&'static str, Vec<f64>)> = vec![
+            ("force_x_n", column(0.1)),
+            ("force_y_n", column(-1e-9)),
+            ("moment_z_n_mm", column(1e12)),
+            ("error_estimate", column(3.0)),
+            ("friction_power_n", column(0.0)),
+            ("stick_share", column(1.0)),
+        ];
+        numbers[5].1[1] = f64::NAN;
+        let mut answer = RowsAnswer {
+            numbers,
+            status: vec![RowStatus::Ok; rows],
+        };
+        answer.status[1] = RowStatus::NotCovered;
+        answer
+    }
+
+    async fn text(body: Body) -> String {
+        let bytes = body.collect().await.unwrap().to_bytes();
+        String::from_utf8(bytes.to_vec()).unwrap()
+    }
+
+    #[tokio::test]
+    async fn columns_are_json_and_csv_of_the_same_numbers() {
+        let rows = 2 * ROWS + 7;
+        let given = answer(rows);
+        let read: Value = serde_json::from_str(&text(json_body(given.clone())).await).unwrap();
+        assert_eq!(read["rows"], json!(rows));
+        assert_eq!(read["columns"]["stick_share"][1], Value::Null);
+        assert_eq!(read["columns"]["status"][1], json!("not_covered"));
+        let csv = text(table_body(Format::Csv, given.clone()).unwrap()).await;
+        let lines: Vec<&str> = csv.lines().collect();
+        assert_eq!(lines.len(), rows + 1);
+        for row in [0, 1, ROWS, rows - 1] {
+            let fields: Vec<&str> = lines[row + 1].split(',').collect();
+            let names: Vec<&str> = lines[0].split(',').collect();
+            for (name, field) in names.iter().zip(fields) {
+                let known = &read["columns"][*name][row];
+                match known {
+                    Value::Null => assert_eq!(field, ""),
+                    Value::String(word) => assert_eq!(field, word),
+                    number => assert_eq!(field.parse::<f64>().ok(), number.as_f64()),
+                }
+            }
+            assert_eq!(
+                read["columns"]["force_x_n"][row],
+                json!(given.column("force_x_n")[row])
+            );
+        }
+    }
 
     #[test]
     fn lines_quote_what_needs_it_and_leave_gaps() {

@@ -1,6 +1,5 @@
 //! Fields as tables, and the formats that a table can be written in; one format is one file here.
 
-use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::solver::Output;
@@ -8,6 +7,7 @@ use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
 use crate::http::dto::Outlines;
 use crate::http::render::shape::outlines::{outlines, patch_outline};
 use crate::http::render::shape::resample::{Gridded, resample, resample_zone};
+use crate::http::render::csv::{Precision, write_number};
 
 /// A file, byte for byte.
 #[derive(Debug, ToSchema)]
@@ -38,17 +38,6 @@ impl Outlines {
             slip: around(Zone::Slip),
         }
     }
-}
-
-/// How exactly numbers are written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum Precision {
-    /// As they were computed: 64 bits.
-    #[default]
-    Double,
-    /// 32 bits, some seven digits: enough for pictures, and half as large.
-    Single,
 }
 
 impl Table {
@@ -143,6 +132,54 @@ impl Table {
         match &self.rows {
             Rows::Cells => self.numbers(PLACES[0]).map_or(0, <[f64]>::len),
             Rows::Grid { x_mm, y_mm } => x_mm.len() * y_mm.len(),
+        }
+    }
+
+    /// The names of the columns, those of the axes first.
+    #[must_use]
+    pub(crate) fn names(&self) -> Vec<&'static str> {
+        let axes: &[&str] = match self.rows {
+            Rows::Cells => &[],
+            Rows::Grid { .. } => &PLACES[..2],
+        };
+        let columns = self.columns.iter().map(|column| column.name);
+        axes.iter().copied().chain(columns).collect()
+    }
+
+    /// The place of the value of a row within a column of [`Table::names`].
+    pub(crate) fn index(&self, column: usize, row: usize) -> usize {
+        match (&self.rows, column) {
+            (Rows::Grid { x_mm, .. }, 0) => row % x_mm.len(),
+            (Rows::Grid { x_mm, .. }, 1) => row / x_mm.len(),
+            _ => row,
+        }
+    }
+
+    /// Writes a value of a column of [`Table::names`], `none` where there is none; zones between quotes.
+    pub(crate) fn write(
+        &self,
+        out: &mut String,
+        column: usize,
+        index: usize,
+        [none, quote]: [&str; 2],
+    ) {
+        let place = match (&self.rows, column) {
+            (Rows::Grid { x_mm, .. }, 0) => {
+                return write_number(out, x_mm[index], self.precision, none);
+            }
+            (Rows::Grid { y_mm, .. }, 1) => {
+                return write_number(out, y_mm[index], self.precision, none);
+            }
+            (Rows::Grid { .. }, place) => place - 2,
+            (Rows::Cells, place) => place,
+        };
+        match &self.columns[place].data {
+            ArrayData::Numbers(values) => write_number(out, values[index], self.precision, none),
+            ArrayData::Integers(values) => *out += &values[index].to_string(),
+            ArrayData::Zones(zones) => match zones[index] {
+                Some(zone) => *out += &format!("{quote}{}{quote}", zone.name()),
+                None => *out += none,
+            },
         }
     }
 

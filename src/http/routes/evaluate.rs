@@ -36,7 +36,7 @@ use crate::http::options::HttpOptions;
 use crate::http::problem::{ApiError, ProblemKind, problems};
 use crate::http::render::format::Format;
 use crate::http::render::npz;
-use crate::http::render::rows::{json_body, table_body};
+use crate::http::render::row_tables::{json_body, table_body};
 use crate::jobs::Jobs;
 use crate::jobs::run::model::RunColumn;
 

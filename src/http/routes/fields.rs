@@ -16,9 +16,10 @@ use crate::http::extract::query::{
 };
 use crate::http::limits::{Rendering, hold_while_sent};
 use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::render::csv::Precision;
 use crate::http::render::format::Format;
 use crate::http::render::pieces::{csv_body, json_body};
-use crate::http::render::table::{File, Precision, Table};
+use crate::http::render::table::{File, Table};
 use crate::http::render::{npz, vtk};
 use crate::http::routes::parts::{FieldProblems, PartRequest, has, not_asked, stored};
 use crate::http::routes::plots::{PlotOptions, View, WIDTH_DEFAULT, picture};

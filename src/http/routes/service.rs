@@ -169,113 +169,42 @@ pub(crate) async fn methods(
     })
 }
 
-/// Methods with what they are for.
-const METHODS: [(MethodName, &str); 5] = [
-    (
-        MethodName::Auto,
-        "Resultants by `table` for elliptic contacts of like bodies with one coefficient of friction and given creepages, where the bound of its \
-         error meets `target_error`, and else by `boundary_element`. Values per cell are by `boundary_element`.",
-    ),
-    (
-        MethodName::BoundaryElement,
-        "Boundary elements with a semismooth Newton iteration: fast, for every motion and any shape of patch.",
-    ),
-    (
-        MethodName::LiuHsu,
-        "The Newton–Raphson method of Liu and Hsu with its two initial guesses. Slower, for small meshes; \
-         it does not converge at every spin and then says so.",
-    ),
-    (
-        MethodName::Fastsim,
-        "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one.",
-    ),
-    (
-        MethodName::Table,
-        "Resultants and their derivatives interpolated in a table that `boundary_element` made, in about a microsecond, with a \
-         bound of the error: elliptic patches with a/b from 0.1 to 10, others by the ellipse that carries their load the same way.",
-    ),
-];
+/// A list whose entries stand in a line each.
+macro_rules! entries {
+    ($($($part:expr),+;)*) => {
+        [$(($($part),+)),*]
+    };
+}
 
-/// Types of contacts: whether they need a load, and how they are given.
-const CONTACTS: [(&str, bool, &str); 7] = [
-    (
-        "radii",
-        true,
-        "Relative radii of curvature: an elliptic patch after Hertz.",
-    ),
-    (
-        "ellipse",
-        true,
-        "An elliptic patch of given semi-axes with Hertz's pressure.",
-    ),
-    (
-        "gap_profile",
-        true,
-        "A gap measured across, between bodies that are circular along rolling: region and pressure are found.",
-    ),
-    (
-        "gap_grid",
-        true,
-        "Any gap on a grid: region and pressure are found, in one or several patches.",
-    ),
-    (
-        "profiles",
-        true,
-        "A wheel on a rail by their cross-sections: every patch is found, with its place and its own frame.",
-    ),
-    (
-        "wheelset",
-        true,
-        "A wheelset on both rails by their cross-sections, in one or several positions: its roll, its height and every patch are found; with \
-         its equivalent conicity if asked.",
-    ),
-    (
-        "pressure_grid",
-        false,
-        "A given pressure on a grid; its positive part is the contact, in one or several patches.",
-    ),
-];
+const METHODS: [(MethodName, &str); 5] = entries! {
+    MethodName::Auto, "Resultants by `table` for elliptic contacts of like bodies with one coefficient of friction and given creepages, where the bound of its error meets `target_error`, and else by `boundary_element`. Values per cell are by `boundary_element`.";
+    MethodName::BoundaryElement, "Boundary elements with a semismooth Newton iteration: fast, for every motion and any shape of patch.";
+    MethodName::LiuHsu, "The Newton–Raphson method of Liu and Hsu with its two initial guesses. Slower, for small meshes; it does not converge at every spin and then says so.";
+    MethodName::Fastsim, "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one.";
+    MethodName::Table, "Resultants and their derivatives interpolated in a table that `boundary_element` made, in about a microsecond, with a bound of the error: elliptic patches with a/b from 0.1 to 10, others by the ellipse that carries their load the same way.";
+};
 
-/// Outputs: whether they are the default, and what they are.
-const OUTPUTS: [(Output, bool, &str); 9] = [
-    (
-        Output::Resultants,
-        true,
-        "Forces, moment and dissipated power.",
-    ),
-    (
-        Output::Zones,
-        true,
-        "Stick and slip zones: cells, areas and outlines.",
-    ),
-    (Output::Tractions, false, "Tangential tractions per cell."),
-    (Output::Pressure, false, "Pressure per cell."),
-    (
-        Output::Slip,
-        false,
-        "Relative slip per cell, divided by rolling speed.",
-    ),
-    (
-        Output::Subsurface,
-        false,
-        "Stresses below the surface at the points of `subsurface`, and the worst point of every patch.",
-    ),
-    (
-        Output::Damage,
-        false,
-        "Friction power, wear and fatigue of one pass by the models of `damage`.",
-    ),
-    (
-        Output::Temperature,
-        false,
-        "Temperature of both surfaces per cell; needs `thermal` and `speed_mm_per_s` in the motion.",
-    ),
-    (
-        Output::Gradients,
-        false,
-        "Derivatives of forces and moment by creepages and spin, and by the normal force of Hertz contacts; not of a `history`.",
-    ),
-];
+const CONTACTS: [(&str, bool, &str); 7] = entries! {
+    "radii", true, "Relative radii of curvature: an elliptic patch after Hertz.";
+    "ellipse", true, "An elliptic patch of given semi-axes with Hertz's pressure.";
+    "gap_profile", true, "A gap measured across, between bodies that are circular along rolling: region and pressure are found.";
+    "gap_grid", true, "Any gap on a grid: region and pressure are found, in one or several patches.";
+    "profiles", true, "A wheel on a rail by their cross-sections: every patch is found, with its place and its own frame.";
+    "wheelset", true, "A wheelset on both rails by their cross-sections, in one or several positions: its roll, its height and every patch are found; with its equivalent conicity if asked.";
+    "pressure_grid", false, "A given pressure on a grid; its positive part is the contact, in one or several patches.";
+};
+
+const OUTPUTS: [(Output, bool, &str); 9] = entries! {
+    Output::Resultants, true, "Forces, moment and dissipated power.";
+    Output::Zones, true, "Stick and slip zones: cells, areas and outlines.";
+    Output::Tractions, false, "Tangential tractions per cell.";
+    Output::Pressure, false, "Pressure per cell.";
+    Output::Slip, false, "Relative slip per cell, divided by rolling speed.";
+    Output::Subsurface, false, "Stresses below the surface at the points of `subsurface`, and the worst point of every patch.";
+    Output::Damage, false, "Friction power, wear and fatigue of one pass by the models of `damage`.";
+    Output::Temperature, false, "Temperature of both surfaces per cell; needs `thermal` and `speed_mm_per_s` in the motion.";
+    Output::Gradients, false, "Derivatives of forces and moment by creepages and spin, and by the normal force of Hertz contacts; not of a `history`.";
+};
 
 /// Every remark that an answer can carry: its code, what it means and what to do about it.
 #[utoipa::path(
