@@ -486,25 +486,21 @@ fn fix_length(schema: &mut Schema, length: usize) {
 /// Moves headers, responses, parameters and examples that several operations have into `components`.
 pub(super) fn share(document: &mut Value) {
     leave_out_double(document);
-    for kind in [
-        Kind::Headers,
-        Kind::Responses,
-        Kind::Parameters,
-        Kind::Examples,
-    ] {
+    for (kind, path) in SHARED {
+        let path: Vec<&str> = path.split('/').collect();
         let mut uses: BTreeMap<String, usize> = BTreeMap::new();
-        visit(document, kind, &mut |_, value| {
+        visit(document, &path, "", &mut |_, value| {
             *uses.entry(value.to_string()).or_default() += 1;
         });
         let mut names: BTreeMap<String, String> = BTreeMap::new();
         let mut shared = Map::new();
-        visit(document, kind, &mut |key, value| {
+        visit(document, &path, "", &mut |key, value| {
             let text = value.to_string();
             if uses[&text] < 2 {
                 return;
             }
             let name = names.entry(text).or_insert_with(|| {
-                let stem = kind.stem(key, value);
+                let stem = stem(kind, key, value);
                 let mut name = stem.clone();
                 let mut number = 1;
                 while shared.contains_key(&name) {
@@ -514,11 +510,11 @@ pub(super) fn share(document: &mut Value) {
                 shared.insert(name.clone(), value.clone());
                 name
             });
-            let reference = format!("#/components/{}/{name}", kind.name());
+            let reference = format!("#/components/{kind}/{name}");
             *value = json!({ "$ref": reference });
         });
         if !shared.is_empty() {
-            document["components"][kind.name()] = shared.into();
+            document["components"][kind] = shared.into();
         }
     }
 }
@@ -568,91 +564,51 @@ fn write(value: &Value, path: &[&str], text: &mut String) {
     }
 }
 
-/// A kind of component that operations share.
-#[derive(Debug, Clone, Copy)]
-enum Kind {
-    Headers,
-    Responses,
-    Parameters,
-    Examples,
+/// Components that operations share: the member of `components`, and where they stand; `*` is any member or entry.
+const SHARED: [(&str, &str); 4] = [
+    ("headers", "paths/*/*/responses/*/headers/*"),
+    ("responses", "paths/*/*/responses/*"),
+    ("parameters", "paths/*/*/parameters/*"),
+    ("examples", "paths/*/*/requestBody/content/*/examples/*"),
+];
+
+/// The name of a component, which may get a number.
+fn stem(kind: &str, key: &str, value: &Value) -> String {
+    let reason = || {
+        StatusCode::from_u16(key.parse().ok()?)
+            .ok()?
+            .canonical_reason()
+    };
+    let words = match kind {
+        "responses" => reason(),
+        "parameters" => value["name"].as_str(),
+        _ => None,
+    };
+    let words = words.unwrap_or(key);
+    let words = words.split(|letter: char| !letter.is_ascii_alphanumeric());
+    let words = words.filter(|word| !word.is_empty());
+    words
+        .map(|word| word[..1].to_ascii_uppercase() + &word[1..])
+        .collect()
 }
 
-impl Kind {
-    /// The member of `components`.
-    fn name(self) -> &'static str {
-        match self {
-            Kind::Headers => "headers",
-            Kind::Responses => "responses",
-            Kind::Parameters => "parameters",
-            Kind::Examples => "examples",
-        }
-    }
-
-    /// The name of a component, which may get a number.
-    fn stem(self, key: &str, value: &Value) -> String {
-        let words = match self {
-            Kind::Responses => {
-                let status = key.parse().ok();
-                let status = status.and_then(|code: u16| StatusCode::from_u16(code).ok());
-                status
-                    .and_then(|status| status.canonical_reason())
-                    .unwrap_or(key)
-            }
-            Kind::Parameters => value["name"].as_str().unwrap_or(key),
-            Kind::Headers | Kind::Examples => key,
-        };
-        let words = words.split(|letter: char| !letter.is_ascii_alphanumeric());
-        let words = words.filter(|word| !word.is_empty());
-        words
-            .map(|word| word[..1].to_ascii_uppercase() + &word[1..])
-            .collect()
-    }
-}
-
-/// Calls `with` for everything of this kind in the operations, with its key.
-fn visit(document: &mut Value, kind: Kind, with: &mut impl FnMut(&str, &mut Value)) {
-    let paths = document["paths"].as_object_mut().into_iter().flatten();
-    let operations = paths.flat_map(|(_, item)| item.as_object_mut().into_iter().flatten());
-    for (_, operation) in operations {
-        match kind {
-            Kind::Responses => {
-                for (status, response) in members(operation, "responses") {
-                    with(status, response);
-                }
-            }
-            Kind::Headers => {
-                for (_, response) in members(operation, "responses") {
-                    for (name, header) in members(response, "headers") {
-                        with(name, header);
-                    }
-                }
-            }
-            Kind::Parameters => {
-                let parameters = operation.get_mut("parameters");
-                let parameters = parameters.and_then(Value::as_array_mut).into_iter();
-                for parameter in parameters.flatten() {
-                    with("parameter", parameter);
-                }
-            }
-            Kind::Examples => {
-                let body = operation.get_mut("requestBody");
-                for (_, content) in body.into_iter().flat_map(|body| members(body, "content")) {
-                    for (name, example) in members(content, "examples") {
-                        with(name, example);
-                    }
-                }
+/// Calls `with` for every value at a path of [`SHARED`], with its key.
+fn visit(value: &mut Value, path: &[&str], key: &str, with: &mut dyn FnMut(&str, &mut Value)) {
+    let [first, rest @ ..] = path else {
+        return with(key, value);
+    };
+    match value {
+        Value::Object(members) => {
+            let members = members.iter_mut();
+            for (name, member) in members.filter(|(name, _)| *first == "*" || *name == first) {
+                visit(member, rest, name, with);
             }
         }
+        Value::Array(items) => items
+            .iter_mut()
+            .for_each(|item| visit(item, rest, key, with)),
+        _ => {}
     }
-}
-
-/// The members of the member `name` of an object; empty if there is no such member.
-fn members<'v>(
-    value: &'v mut Value,
-    name: &str,
-) -> impl Iterator<Item = (&'v String, &'v mut Value)> {
-    let member = value.get_mut(name).and_then(Value::as_object_mut);
-    member.into_iter().flatten()
 }
 
 #[cfg(test)]

@@ -6,7 +6,6 @@ use axum::body::{Body, BodyDataStream, Bytes, HttpBody};
 use axum::extract::{FromRef, FromRequest, Request};
 use axum::http::{HeaderMap, header};
 use futures_util::StreamExt;
-use http_body_util::{BodyExt, Limited};
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 use tokio::time::{Instant, timeout_at};
@@ -182,36 +181,14 @@ async fn read_whole(
     tenant: &str,
     options: &HttpOptions,
 ) -> Result<(Bytes, Option<Permit>), ApiError> {
-    let max_bytes = options.body_max_bytes;
-    let too_large = || {
-        ApiError::new(
-            ProblemKind::BodyTooLarge,
-            format!("the body is larger than the {max_bytes} bytes that are allowed for one case"),
-        )
-    };
-    // A declared length is judged before anything is read.
-    let declared = request.headers().get(header::CONTENT_LENGTH);
-    let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
-    if declared.is_some_and(|length| length > max_bytes as u64) {
-        return Err(too_large());
-    }
+    let (max_bytes, within) = (options.body_max_bytes, options.body_timeout);
     let exact = request.body().size_hint().exact();
-    let exact = exact.and_then(|bytes| usize::try_from(bytes).ok());
-    let mut share = memory.body(tenant, exact.unwrap_or(0)).await?;
-    let mut body = Limited::new(request.into_body(), max_bytes);
-    let mut held = Vec::with_capacity(exact.unwrap_or(0).min(max_bytes));
+    let exact = exact.map_or(0, |bytes| usize::try_from(bytes).unwrap_or(max_bytes));
+    let mut reader = BodyReader::new(within, max_bytes as u64, "one case", request)?;
+    let mut share = memory.body(tenant, exact).await?;
+    let mut held = Vec::with_capacity(exact.min(max_bytes));
     let read = async {
-        while let Some(frame) = body.frame().await {
-            let frame = frame.map_err(|error| {
-                if too_long(error.as_ref()) {
-                    too_large()
-                } else {
-                    unreadable(error.as_ref())
-                }
-            })?;
-            let Ok(data) = frame.into_data() else {
-                continue;
-            };
+        while let Some(data) = reader.next().await? {
             if share.is_none() && held.len() + data.len() > SMALL_BYTES {
                 share = memory.body(tenant, max_bytes).await?;
             }
@@ -223,18 +200,11 @@ async fn read_whole(
         }
         Ok::<(), ApiError>(())
     };
-    match tokio::time::timeout(options.body_timeout, read).await {
-        Ok(read) => read?,
-        Err(_) => {
-            return Err(ApiError::new(
-                ProblemKind::BodyTimeout,
-                format!(
-                    "the body did not arrive within {} s",
-                    options.body_timeout.as_secs_f64()
-                ),
-            ));
-        }
-    }
+    let read = tokio::time::timeout(within, read).await;
+    read.map_err(|_| {
+        let detail = format!("the body did not arrive within {} s", within.as_secs_f64());
+        ApiError::new(ProblemKind::BodyTimeout, detail)
+    })??;
     if let Some(share) = &mut share {
         share.shrink_to(held.len());
     }

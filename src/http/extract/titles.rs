@@ -44,80 +44,25 @@ struct Units {
     usual: &'static str,
 }
 
-const FORCE: Units = Units {
-    list: &[("N", "n", 1.0), ("kN", "kn", 1e3)],
-    usual: "kN",
-};
-const LENGTH: Units = Units {
-    list: &[
-        ("mm", "mm", 1.0),
-        ("m", "m", 1e3),
-        ("cm", "cm", 10.0),
-        ("µm", "um", 1e-3),
-        ("μm", "um", 1e-3),
-        ("um", "um", 1e-3),
-    ],
-    usual: "mm",
-};
-const CURVATURE: Units = Units {
-    list: &[
-        ("1/mm", "per_mm", 1.0),
-        ("1/m", "per_m", 1e-3),
-        ("rad/mm", "rad_per_mm", 1.0),
-        ("rad/m", "rad_per_m", 1e-3),
-    ],
-    usual: "1/m",
-};
-const ANGLE: Units = Units {
-    list: &[
-        ("rad", "rad", 1.0),
-        ("mrad", "mrad", 1e-3),
-        ("deg", "deg", PI / 180.0),
-        ("°", "degrees", PI / 180.0),
-    ],
-    usual: "mrad",
-};
-const SPEED: Units = Units {
-    list: &[
-        ("mm/s", "mm_per_s", 1.0),
-        ("m/s", "m_per_s", 1e3),
-        ("km/h", "km_per_h", 1e3 / 3.6),
-    ],
-    usual: "km/h",
-};
-const RATIO: Units = Units {
-    list: &[
-        ("-", "", 1.0),
-        ("1", "", 1.0),
-        ("%", "percent", 1e-2),
-        ("‰", "permille", 1e-3),
-    ],
-    usual: "-",
-};
-const PRESSURE: Units = Units {
-    list: &[("MPa", "mpa", 1.0), ("N/mm²", "n_per_mm2", 1.0)],
-    usual: "MPa",
-};
-const TORQUE: Units = Units {
-    list: &[
-        ("N·mm", "n_mm", 1.0),
-        ("Nmm", "n_mm", 1.0),
-        ("N mm", "n_mm", 1.0),
-    ],
-    usual: "N·mm",
-};
-const ANGULAR_SPEED: Units = Units {
-    list: &[("rad/s", "rad_per_s", 1.0), ("1/s", "per_s", 1.0)],
-    usual: "rad/s",
-};
-const TEMPERATURE: Units = Units {
-    list: &[("°C", "c", 1.0), ("C", "c", 1.0), ("degC", "c", 1.0)],
-    usual: "°C",
-};
-const TIME: Units = Units {
-    list: &[("s", "s", 1.0)],
-    usual: "s",
-};
+macro_rules! units {
+    ($($name:ident $usual:literal: $($unit:literal $end:literal $factor:expr),+;)*) => {
+        $(const $name: Units = Units { list: &[$(($unit, $end, $factor)),+], usual: $usual };)*
+    };
+}
+// Name of the quantity, its usual unit, and each unit with the end of a title that stands for it and its factor.
+units! {
+    FORCE "kN": "N" "n" 1.0, "kN" "kn" 1e3;
+    LENGTH "mm": "mm" "mm" 1.0, "m" "m" 1e3, "cm" "cm" 10.0, "µm" "um" 1e-3, "μm" "um" 1e-3, "um" "um" 1e-3;
+    CURVATURE "1/m": "1/mm" "per_mm" 1.0, "1/m" "per_m" 1e-3, "rad/mm" "rad_per_mm" 1.0, "rad/m" "rad_per_m" 1e-3;
+    ANGLE "mrad": "rad" "rad" 1.0, "mrad" "mrad" 1e-3, "deg" "deg" (PI / 180.0), "°" "degrees" (PI / 180.0);
+    SPEED "km/h": "mm/s" "mm_per_s" 1.0, "m/s" "m_per_s" 1e3, "km/h" "km_per_h" (1e3 / 3.6);
+    RATIO "-": "-" "" 1.0, "1" "" 1.0, "%" "percent" 1e-2, "‰" "permille" 1e-3;
+    PRESSURE "MPa": "MPa" "mpa" 1.0, "N/mm²" "n_per_mm2" 1.0;
+    TORQUE "N·mm": "N·mm" "n_mm" 1.0, "Nmm" "n_mm" 1.0, "N mm" "n_mm" 1.0;
+    ANGULAR_SPEED "rad/s": "rad/s" "rad_per_s" 1.0, "1/s" "per_s" 1.0;
+    TEMPERATURE "°C": "°C" "c" 1.0, "C" "c" 1.0, "degC" "c" 1.0;
+    TIME "s": "s" "s" 1.0;
+}
 
 /// The ends of names of members and the units that they stand for; the longer ends come first.
 const MEMBER_UNITS: [(&str, &Units); 10] = [
@@ -147,126 +92,66 @@ struct Quantity {
     doubtful: &'static str,
 }
 
+macro_rules! quantities {
+    ($($pointer:literal $units:ident $names:literal $codes:literal $doubtful:literal;)*) => {
+        [$(Quantity { pointer: $pointer, units: &$units, names: $names, codes: $codes, doubtful: $doubtful }),*]
+    };
+}
 /// Symbols of creepages in codes and papers: ν (Simpack, GENSYS), ξ (Universal Mechanism, Kalker), γ (VAMPIRE, Wickens). Greek letters are
 /// spelt out before titles are compared.
-const QUANTITIES: [Quantity; 13] = [
-    Quantity {
-        pointer: "/load/normal_force_n",
-        units: &FORCE,
-        names: "normal_force",
-        codes: "n fn f_n normal_load normal_contact_force contact_normal_force",
-        doubtful: "q fz f_z f_q q_force load force contact_force vertical",
-    },
-    Quantity {
-        pointer: "/load/vertical_force_n",
-        units: &FORCE,
-        names: "vertical_force wheel_load",
-        codes: "vertical_wheel_force vertical_load",
-        doubtful: "q fz f_z f_q q_force load force wheel_force vertical",
-    },
-    Quantity {
-        pointer: "/load/approach_mm",
-        units: &LENGTH,
-        names: "approach",
-        codes: "",
-        doubtful: "penetration interpenetration indentation",
-    },
-    Quantity {
-        pointer: "/motion/creepage_x",
-        units: &RATIO,
-        names: "creepage_x longitudinal_creepage",
-        codes: "nu_x nux xi_x xix xsi_x ksi_x ksix gamma_x gammax creep_x creepx x_creep x_creepage vx_creep creep_vx \
-                    longitudinal_creep long_creep long_creepage creepage_long creepage_longitudinal creep_longitudinal",
-        doubtful: "nu_1 nu1 xi_1 xi1 gamma_1 gamma1 vx v_x slip_x slipx sx s_x cx longitudinal_slip long_slip creepage creep slip",
-    },
-    Quantity {
-        pointer: "/motion/creepage_y",
-        units: &RATIO,
-        names: "creepage_y lateral_creepage",
-        codes: "nu_y nuy xi_y xiy xsi_y ksi_y ksiy gamma_y gammay creep_y creepy y_creep y_creepage vy_creep creep_vy lateral_creep \
-                    lat_creep lat_creepage creepage_lat creepage_lateral creep_lateral",
-        doubtful: "nu_2 nu2 xi_2 xi2 gamma_2 gamma2 vy v_y slip_y slipy sy s_y cy lateral_slip lat_slip creepage creep slip",
-    },
-    Quantity {
-        pointer: "/motion/spin_per_mm",
-        units: &CURVATURE,
-        names: "spin spin_creepage",
-        codes: "phi phi_z phi_spin spin_creep creep_spin creepage_spin nu_z nuz nu_phi nu_sp nu_spin xi_z xi_phi xi_sp xi_spin ksi_sp \
-                    ksi_spin gamma_sp gamma_spin gamma_z omega_spin",
-        doubtful: "nu_3 nu3 xi_3 xi3 gamma_3 gamma3 gamma_s omega_z spin_z",
-    },
-    Quantity {
-        pointer: "/motion/force_x_n",
-        units: &FORCE,
-        names: "force_x",
-        codes: "",
-        doubtful: "fx f_x tx t_x longitudinal_force long_force creep_force_x force traction",
-    },
-    Quantity {
-        pointer: "/motion/force_y_n",
-        units: &FORCE,
-        names: "force_y",
-        codes: "",
-        doubtful: "fy f_y ty t_y lateral_force lat_force creep_force_y force y y_force guiding_force",
-    },
-    Quantity {
-        pointer: "/friction/coefficient",
-        units: &RATIO,
-        names: "friction_coefficient friction mu",
-        codes: "mue cof coefficient_of_friction friction_coeff",
-        doubtful: "f my adhesion adhesion_coefficient",
-    },
-    Quantity {
-        pointer: "/motion/speed_mm_per_s",
-        units: &SPEED,
-        names: "speed rolling_speed",
-        codes: "v velocity vehicle_speed vehicle_velocity running_speed train_speed rolling_velocity v_vehicle v_train",
-        doubtful: "vx v_x v0 v_0 vkmh vel v_rel",
-    },
-    Quantity {
-        pointer: "/contact/lateral_shift_mm",
-        units: &LENGTH,
-        names: "lateral_shift lateral_displacement",
-        codes: "y_rel yrel rel_y y_shift shift_y shift",
-        doubtful: "y dy d_y y_w y_ws y_wheelset y_wr y_wheel u_y lateral_position lateral displacement",
-    },
-    Quantity {
-        pointer: "/contact/yaw_rad",
-        units: &ANGLE,
-        names: "yaw yaw_angle",
-        codes: "psi angle_of_attack attack_angle aoa",
-        doubtful: "alpha attack p",
-    },
-    Quantity {
-        pointer: "/contact/roll_rad",
-        units: &ANGLE,
-        names: "roll roll_angle",
-        codes: "",
-        doubtful: "phi phi_x",
-    },
-];
+const QUANTITIES: [Quantity; 13] = quantities! {
+    "/load/normal_force_n" FORCE "normal_force"
+        "n fn f_n normal_load normal_contact_force contact_normal_force"
+        "q fz f_z f_q q_force load force contact_force vertical";
+    "/load/vertical_force_n" FORCE "vertical_force wheel_load"
+        "vertical_wheel_force vertical_load"
+        "q fz f_z f_q q_force load force wheel_force vertical";
+    "/load/approach_mm" LENGTH "approach"
+        ""
+        "penetration interpenetration indentation";
+    "/motion/creepage_x" RATIO "creepage_x longitudinal_creepage"
+        "nu_x nux xi_x xix xsi_x ksi_x ksix gamma_x gammax creep_x creepx x_creep x_creepage vx_creep creep_vx longitudinal_creep long_creep long_creepage creepage_long creepage_longitudinal creep_longitudinal"
+        "nu_1 nu1 xi_1 xi1 gamma_1 gamma1 vx v_x slip_x slipx sx s_x cx longitudinal_slip long_slip creepage creep slip";
+    "/motion/creepage_y" RATIO "creepage_y lateral_creepage"
+        "nu_y nuy xi_y xiy xsi_y ksi_y ksiy gamma_y gammay creep_y creepy y_creep y_creepage vy_creep creep_vy lateral_creep lat_creep lat_creepage creepage_lat creepage_lateral creep_lateral"
+        "nu_2 nu2 xi_2 xi2 gamma_2 gamma2 vy v_y slip_y slipy sy s_y cy lateral_slip lat_slip creepage creep slip";
+    "/motion/spin_per_mm" CURVATURE "spin spin_creepage"
+        "phi phi_z phi_spin spin_creep creep_spin creepage_spin nu_z nuz nu_phi nu_sp nu_spin xi_z xi_phi xi_sp xi_spin ksi_sp ksi_spin gamma_sp gamma_spin gamma_z omega_spin"
+        "nu_3 nu3 xi_3 xi3 gamma_3 gamma3 gamma_s omega_z spin_z";
+    "/motion/force_x_n" FORCE "force_x"
+        ""
+        "fx f_x tx t_x longitudinal_force long_force creep_force_x force traction";
+    "/motion/force_y_n" FORCE "force_y"
+        ""
+        "fy f_y ty t_y lateral_force lat_force creep_force_y force y y_force guiding_force";
+    "/friction/coefficient" RATIO "friction_coefficient friction mu"
+        "mue cof coefficient_of_friction friction_coeff"
+        "f my adhesion adhesion_coefficient";
+    "/motion/speed_mm_per_s" SPEED "speed rolling_speed"
+        "v velocity vehicle_speed vehicle_velocity running_speed train_speed rolling_velocity v_vehicle v_train"
+        "vx v_x v0 v_0 vkmh vel v_rel";
+    "/contact/lateral_shift_mm" LENGTH "lateral_shift lateral_displacement"
+        "y_rel yrel rel_y y_shift shift_y shift"
+        "y dy d_y y_w y_ws y_wheelset y_wr y_wheel u_y lateral_position lateral displacement";
+    "/contact/yaw_rad" ANGLE "yaw yaw_angle"
+        "psi angle_of_attack attack_angle aoa"
+        "alpha attack p";
+    "/contact/roll_rad" ANGLE "roll roll_angle"
+        ""
+        "phi phi_x";
+};
 
-/// Short names of columns and what they stand for.
-const SHORT_NAMES: [(&str, &str); 18] = [
-    ("name", "/name"),
-    ("normal_force_n", "/load/normal_force_n"),
-    ("vertical_force_n", "/load/vertical_force_n"),
-    ("approach_mm", "/load/approach_mm"),
-    ("creepage_x", "/motion/creepage_x"),
-    ("creepage_y", "/motion/creepage_y"),
-    ("spin_per_mm", "/motion/spin_per_mm"),
-    ("force_x_n", "/motion/force_x_n"),
-    ("force_y_n", "/motion/force_y_n"),
-    ("friction_coefficient", "/friction/coefficient"),
-    ("rolling_mm", "/contact/rolling_mm"),
-    ("lateral_mm", "/contact/lateral_mm"),
-    ("a_mm", "/contact/a_mm"),
-    ("b_mm", "/contact/b_mm"),
-    ("rolling_radius_mm", "/contact/rolling_radius_mm"),
-    ("lateral_shift_mm", "/contact/lateral_shift_mm"),
-    ("yaw_rad", "/contact/yaw_rad"),
-    ("roll_rad", "/contact/roll_rad"),
-];
+/// Members whose names are also short names of columns; `friction_coefficient` is one as well.
+const SHORT_NAMES: &str = "/name /load/normal_force_n /load/vertical_force_n /load/approach_mm /motion/creepage_x /motion/creepage_y \
+    /motion/spin_per_mm /motion/force_x_n /motion/force_y_n /contact/rolling_mm /contact/lateral_mm /contact/a_mm \
+    /contact/b_mm /contact/rolling_radius_mm /contact/lateral_shift_mm /contact/yaw_rad /contact/roll_rad";
+
+/// The short names of columns and what they stand for.
+fn named_members() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let members = SHORT_NAMES.split_whitespace();
+    let members = members.map(|pointer| (pointer.rsplit('/').next().unwrap_or_default(), pointer));
+    members.chain([("friction_coefficient", "/friction/coefficient")])
+}
 
 /// Names of places along the track and of times, which are carried along with or without a unit of length or time.
 const PLACES_AND_TIMES: &str = "t time clock hour step time_step timestep s s_track track_s km kp pk kilometre kilometer kilometrage chainage station \
@@ -453,14 +338,13 @@ fn factor_at(pointer: &str, unit: Option<&str>) -> Result<f64, String> {
 
 /// The JSON pointer that a short name stands for.
 fn short_pointer(title: &str) -> Option<&'static str> {
-    let short = SHORT_NAMES.iter().find(|(name, _)| *name == title);
-    short.map(|(_, pointer)| *pointer)
+    named_members().find_map(|(name, pointer)| (name == title).then_some(pointer))
 }
 
 /// The short names, for messages.
 #[must_use]
 pub fn short_names() -> String {
-    let names = SHORT_NAMES.iter().map(|(name, _)| format!("`{name}`"));
+    let names = named_members().map(|(name, _)| format!("`{name}`"));
     names.collect::<Vec<_>>().join(", ")
 }
 

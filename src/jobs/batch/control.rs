@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use futures_util::stream::BoxStream;
-use tokio::time::{Instant, timeout_at};
+use tokio::time::Instant;
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt::StopReason;
@@ -12,7 +12,7 @@ use crate::jobs::batch::upload::{BatchUpload, StagedCase};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::{Batch, BatchItem, ItemFault, Kind, State, SubmitOptions};
-use crate::jobs::shared::{POLL_INTERVAL, Shared};
+use crate::jobs::shared::Shared;
 use crate::jobs::storage_fault::StoragePlace;
 use crate::jobs::store::{BatchBegun, NewBatch, NewJob, Notification};
 use crate::jobs::sync::blocking;
@@ -346,8 +346,6 @@ impl Jobs {
     ) -> Result<(Vec<BatchItem>, Option<Uuid>), JobsError> {
         let until = until.unwrap_or_else(Instant::now);
         loop {
-            // Subscribe first, then read: what ends in between is announced.
-            let mut ended = self.shared.ended.subscribe();
             let mut lines = self
                 .shared
                 .store
@@ -363,25 +361,11 @@ impl Jobs {
                 if done == 0
                     && let Some(first) = lines.first().map(|line| line.job.id)
                 {
-                    while Instant::now() < until
-                        && !self.shared.draining.is_cancelled()
-                        && self
-                            .recent(first, REREAD_PAUSE)
-                            .await
-                            .is_ok_and(|job| !job.state.ended())
-                    {
-                        let poll_at = until.min(Instant::now() + POLL_INTERVAL);
-                        // A lagging receiver may have missed the announcement, so it reads again as well.
-                        let announced =
-                            async { while ended.recv().await.is_ok_and(|ended| ended != first) {} };
-                        tokio::select! {
-                            _ = timeout_at(poll_at, announced) => {}
-                            () = self.shared.draining.cancelled() => {}
-                        }
-                        // Many jobs end in the same moment; one read serves all of them.
-                        tokio::time::sleep(REREAD_PAUSE).await;
-                        ended = ended.resubscribe();
-                    }
+                    let left = until.saturating_duration_since(Instant::now());
+                    // If it is gone, the lines are read again.
+                    let _ = self.of_kind(Kind::Case).wait_for(first, left).await;
+                    // Many jobs end in the same moment; one read serves all of them.
+                    tokio::time::sleep(REREAD_PAUSE).await;
                     continue;
                 }
                 lines.truncate(done);
