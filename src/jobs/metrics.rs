@@ -1,12 +1,14 @@
 //! What the jobs room counts for the operator. Labels have few values, all known beforehand: never an id, never a name
 //! that a client chose.
 
+use std::sync::atomic::AtomicU64;
+
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::metrics::info::Info;
-use prometheus_client::registry::{Metric, Registry};
+use prometheus_client::registry::Registry;
 
 use crate::contact::case::words::solver::MethodName;
 use crate::contact::evaluate::many_answer::ManyAnswer;
@@ -35,179 +37,73 @@ impl Drop for BusyWorker {
     }
 }
 
-/// Counters of one service; clones share them.
-#[derive(Debug, Clone)]
-pub(crate) struct Metrics {
-    pub(crate) jobs: Family<Label, Gauge>,
-    pub(crate) oldest_queued_seconds: Gauge<f64, std::sync::atomic::AtomicU64>,
-    pub(crate) queue_cost_seconds: Gauge<f64, std::sync::atomic::AtomicU64>,
-    pub(crate) database_bytes: Gauge,
-    pub(crate) result_bytes: Gauge,
-    pub(crate) operator_bytes: Gauge,
-    solve_seconds: Family<Label, Histogram>,
-    iterations: Family<Label, Histogram>,
-    rows: Family<Label, Counter>,
-    ended: Family<Label, Counter>,
-    failures: Family<Label, Counter>,
-    storage_failing: Gauge,
-    pub(crate) abandoned: Gauge,
-    pub(crate) workers: Gauge,
-    working: Gauge,
-    cache_hits: Counter,
-    cache_misses: Counter,
-    pub(crate) results_swept: Counter,
-    pub(crate) store_requests: StoreRequests,
+/// Declares the counters, each with its name and what it counts.
+macro_rules! metrics {
+    ($($vis:vis $field:ident: $kind:ty = $make:expr, $name:literal $about:literal;)*) => {
+        /// Counters of one service; clones share them.
+        #[derive(Debug, Clone)]
+        pub(crate) struct Metrics {
+            $($vis $field: $kind,)*
+        }
+
+        impl Metrics {
+            fn registered(registry: &mut Registry) -> Metrics {
+                $(
+                    let $field: $kind = $make;
+                    registry.register($name, $about, $field.clone());
+                )*
+                Metrics { $($field),* }
+            }
+        }
+    };
+}
+
+metrics! {
+    pub(crate) jobs: Family<Label, Gauge> = Family::default(), "jobs" "Jobs in the store by state";
+    pub(crate) oldest_queued_seconds: Gauge<f64, AtomicU64> = Gauge::default(), "queue_oldest_age_seconds" "Age of the oldest queued job; 0 if none is queued";
+    pub(crate) queue_cost_seconds: Gauge<f64, AtomicU64> = Gauge::default(), "queue_cost_seconds" "Expected solver seconds of all queued jobs, from the mean of up to 1000 of them";
+    pub(crate) database_bytes: Gauge = Gauge::default(), "database_bytes" "Size of the job table with its write-ahead log";
+    pub(crate) result_bytes: Gauge = Gauge::default(), "result_bytes" "Size of the results kept outside the job table";
+    pub(crate) operator_bytes: Gauge = Gauge::default(), "operator_store_bytes" "Size of the operators of meshes that are kept in memory for the next cases";
+    solve_seconds: Family<Label, Histogram> = Family::new_with_constructor(|| Histogram::new(SOLVE_SECONDS)), "solve_seconds" "Wall time of one case on a solver thread, by the method that gave the numbers";
+    iterations: Family<Label, Histogram> = Family::new_with_constructor(|| Histogram::new(ITERATIONS)), "newton_iterations" "Newton iterations of one motion on one patch";
+    rows: Family<Label, Counter> = Family::default(), "run_rows" "Rows of runs that were answered, by what became of them";
+    ended: Family<Label, Counter> = Family::default(), "jobs_ended" "Jobs that ended, by state";
+    failures: Family<Label, Counter> = Family::default(), "job_failures" "Jobs that failed, by reason";
+    storage_failing: Gauge = Gauge::default(), "storage_failing" "1 while the disk is full or cannot be written, or database or object store cannot be reached";
+    pub(crate) abandoned: Gauge = Gauge::default(), "solver_threads_abandoned" "Solver threads that did not stop when they were told to and still run";
+    pub(crate) workers: Gauge = Gauge::default(), "workers" "Workers, each with one solver at work at most";
+    working: Gauge = Gauge::default(), "workers_busy" "Workers whose solver is at work";
+    cache_hits: Counter = Counter::default(), "cache_hits" "Cases answered with the result of an identical earlier one";
+    cache_misses: Counter = Counter::default(), "cache_misses" "Cases for which an earlier result was looked for in vain";
+    pub(crate) results_swept: Counter = Counter::default(), "results_swept" "Results without a job removed from outside the database";
+    pub(crate) store_requests: StoreRequests = Family::default(), "result_store_requests" "Requests to the object store of the results, repeated ones included, by the class of the answer";
 }
 
 /// Requests to an object store, by method and by class of the answer: `2xx` to `5xx`, or `none` if there was none.
-#[derive(Debug, Clone, Default)]
-#[cfg_attr(
-    not(feature = "cluster"),
-    expect(dead_code, reason = "only clusters keep results in object stores")
-)]
-pub(crate) struct StoreRequests(Family<[(&'static str, String); 2], Counter>);
+pub(crate) type StoreRequests = Family<[(&'static str, String); 2], Counter>;
 
-impl StoreRequests {
-    /// A request was answered with this status, or not at all.
-    #[cfg(feature = "cluster")]
-    pub(crate) fn count(&self, method: &str, status: Option<u16>) {
-        let status = match status.map(|status| status / 100) {
-            Some(2) => "2xx",
-            Some(3) => "3xx",
-            Some(4) => "4xx",
-            Some(_) => "5xx",
-            None => "none",
-        };
-        let labels = [("method", method.to_owned()), ("status", status.to_owned())];
-        self.0.get_or_create_owned(&labels).inc();
-    }
-}
-
-/// Registers a metric and returns it.
-fn registered<M: Metric + Clone>(registry: &mut Registry, name: &str, about: &str, metric: M) -> M {
-    registry.register(name, about, metric.clone());
-    metric
+/// A request was answered with this status, or not at all.
+#[cfg(feature = "cluster")]
+pub(crate) fn count_request(requests: &StoreRequests, method: &str, status: Option<u16>) {
+    let status = match status.map(|status| status / 100) {
+        Some(2) => "2xx",
+        Some(3) => "3xx",
+        Some(4) => "4xx",
+        Some(_) => "5xx",
+        None => "none",
+    };
+    let labels = [("method", method.to_owned()), ("status", status.to_owned())];
+    requests.get_or_create_owned(&labels).inc();
 }
 
 impl Metrics {
     /// Counters at zero, and the registry that shows them.
-    #[expect(clippy::too_many_lines, reason = "one entry for each metric")]
     pub(crate) fn new() -> (Metrics, Registry) {
         let mut registry = Registry::with_prefix("railhead");
         let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);
         registry.register("build", "The running version", version);
-        let all = &mut registry;
-        let metrics = Metrics {
-            jobs: registered(all, "jobs", "Jobs in the store by state", Family::default()),
-            oldest_queued_seconds: registered(
-                all,
-                "queue_oldest_age_seconds",
-                "Age of the oldest queued job; 0 if none is queued",
-                Gauge::default(),
-            ),
-            queue_cost_seconds: registered(
-                all,
-                "queue_cost_seconds",
-                "Expected solver seconds of all queued jobs, from the mean of up to 1000 of them",
-                Gauge::default(),
-            ),
-            database_bytes: registered(
-                all,
-                "database_bytes",
-                "Size of the job table with its write-ahead log",
-                Gauge::default(),
-            ),
-            result_bytes: registered(
-                all,
-                "result_bytes",
-                "Size of the results kept outside the job table",
-                Gauge::default(),
-            ),
-            operator_bytes: registered(
-                all,
-                "operator_store_bytes",
-                "Size of the operators of meshes that are kept in memory for the next cases",
-                Gauge::default(),
-            ),
-            store_requests: StoreRequests(registered(
-                all,
-                "result_store_requests",
-                "Requests to the object store of the results, repeated ones included, by the class of the answer",
-                Family::default(),
-            )),
-            results_swept: registered(
-                all,
-                "results_swept",
-                "Results without a job removed from outside the database",
-                Counter::default(),
-            ),
-            rows: registered(
-                all,
-                "run_rows",
-                "Rows of runs that were answered, by what became of them",
-                Family::default(),
-            ),
-            storage_failing: registered(
-                all,
-                "storage_failing",
-                "1 while the disk is full or cannot be written, or database or object store cannot be reached",
-                Gauge::default(),
-            ),
-            abandoned: registered(
-                all,
-                "solver_threads_abandoned",
-                "Solver threads that did not stop when they were told to and still run",
-                Gauge::default(),
-            ),
-            workers: registered(
-                all,
-                "workers",
-                "Workers, each with one solver at work at most",
-                Gauge::default(),
-            ),
-            working: registered(
-                all,
-                "workers_busy",
-                "Workers whose solver is at work",
-                Gauge::default(),
-            ),
-            solve_seconds: registered(
-                all,
-                "solve_seconds",
-                "Wall time of one case on a solver thread, by the method that gave the numbers",
-                Family::new_with_constructor(|| Histogram::new(SOLVE_SECONDS)),
-            ),
-            iterations: registered(
-                all,
-                "newton_iterations",
-                "Newton iterations of one motion on one patch",
-                Family::new_with_constructor(|| Histogram::new(ITERATIONS)),
-            ),
-            ended: registered(
-                all,
-                "jobs_ended",
-                "Jobs that ended, by state",
-                Family::default(),
-            ),
-            cache_hits: registered(
-                all,
-                "cache_hits",
-                "Cases answered with the result of an identical earlier one",
-                Counter::default(),
-            ),
-            cache_misses: registered(
-                all,
-                "cache_misses",
-                "Cases for which an earlier result was looked for in vain",
-                Counter::default(),
-            ),
-            failures: registered(
-                all,
-                "job_failures",
-                "Jobs that failed, by reason",
-                Family::default(),
-            ),
-        };
+        let metrics = Metrics::registered(&mut registry);
         // A series that appears only with its first event hides that event from a rate.
         for state in State::ALL.into_iter().filter(|state| state.ended()) {
             drop(metrics.ended.get_or_create(&state_label(state)));

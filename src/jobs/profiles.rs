@@ -10,9 +10,10 @@ use tokio::runtime::Handle;
 use crate::contact::case::check::{SectionReport, check_section};
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::answer::RowsAnswer;
-use crate::contact::evaluate::many::{ManyTask, NotAtOnce, evaluate_at_once};
+use crate::contact::evaluate::many::{ManyTask, NotAtOnce, evaluate_at_once, several_answers};
 use crate::contact::evaluate::varied::{
-    Values, VariedColumn, column_pointer, named_and_given, named_sections, put_section,
+    Values, VariedColumn, case_of_row, column_pointer, named_and_given, named_sections,
+    of_first_row, put_section,
 };
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
@@ -174,24 +175,77 @@ impl Jobs {
         &self,
         columns: &[VariedColumn],
     ) -> Result<BTreeMap<String, Value>, JobsError> {
-        let mut known = HashMap::new();
-        for column in columns {
-            let Values::Texts(names) = &column.values else {
+        let mut known = KnownSections::new();
+        let named = columns.iter();
+        let named = named.map(|column| (&*column.pointer, &*column.pointer, &column.values));
+        let faults = self.find_sections(named, 0, (&mut known, &mut 0), usize::MAX)?;
+        match faults.is_empty() {
+            true => Ok(known.into_iter().collect()),
+            false => Err(CaseError(faults).into()),
+        }
+    }
+
+    /// Reads the profiles that the rows of columns name, from row `first` on; each column has its name, its place in the case and its values.
+    /// Blocks. Answers the first fault: no such profile, or more than `bytes_max` bytes of them, which are added to the second of `found`.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub(crate) fn find_sections<'a>(
+        &self,
+        columns: impl Iterator<Item = (&'a str, &'a str, &'a Values)>,
+        first: u64,
+        (known, bytes): (&mut KnownSections, &mut usize),
+        bytes_max: usize,
+    ) -> Result<Vec<Fault>, JobsError> {
+        for (name, _, values) in columns.filter(|(_, place, _)| place.ends_with("/profile")) {
+            let Values::Texts(digests) = values else {
                 continue;
             };
-            if !column.pointer.ends_with("/profile") {
-                continue;
-            }
-            for (row, name) in names.iter().enumerate() {
-                let Some(name) = name else { continue };
-                let found = Handle::current().block_on(self.known_section(name, &mut known))?;
-                if found.is_none() {
-                    let pointer = format!("{}/{row}", column_pointer(&column.pointer));
-                    return Err(CaseError(vec![unknown(pointer, name)]).into());
+            for (row, digest) in (first..).zip(digests) {
+                // A row without a name is refused with its case.
+                let Some(digest) = digest.as_ref().filter(|it| !known.contains_key(*it)) else {
+                    continue;
+                };
+                let pointer = format!("{}/{row}", column_pointer(name));
+                match Handle::current().block_on(self.known_section(digest, known))? {
+                    Some(section) => *bytes += section.to_string().len(),
+                    None => return Ok(vec![unknown(pointer, digest)]),
+                }
+                if *bytes > bytes_max {
+                    let detail = format!(
+                        "the profiles that rows name take more than {bytes_max} bytes; send the rows as several runs"
+                    );
+                    return Ok(vec![Fault::new(pointer, detail)]);
                 }
             }
         }
-        Ok(known.into_iter().collect())
+        Ok(Vec::new())
+    }
+
+    /// The template with the values of the first row in place, checked; the columns have these places in the case and names.
+    ///
+    /// # Errors
+    /// A column has no place in the case, the case has faults, or it has several answers.
+    pub fn first_row(
+        &self,
+        template: &Value,
+        columns: &[VariedColumn],
+        profiles: &BTreeMap<String, Value>,
+        names: &[(&str, &str)],
+    ) -> Result<(Value, CheckedCase), CaseError> {
+        let case = case_of_row(template, columns, profiles, 0).map_err(|(pointer, reason)| {
+            let detail = format!("the column `{pointer}` {reason}");
+            CaseError(vec![Fault::new(column_pointer(&pointer), detail)])
+        })?;
+        let checked = self.check(&case);
+        let checked = checked.map_err(|error| of_first_row(error, names))?;
+        match several_answers(&checked) {
+            Some(fault) => Err(CaseError(vec![Fault {
+                pointer: format!("/template{}", fault.pointer),
+                ..fault
+            }])),
+            None => Ok((case, checked)),
+        }
     }
 
     /// Answers rows at once, without a job, on this thread, which may block. `checked` is the checked case of the first row, `case`.

@@ -17,10 +17,8 @@ use uuid::Uuid;
 
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::answer::RowsAnswer;
-use crate::contact::evaluate::many::{NotAtOnce, SOLVED_ROWS_MAX, several_answers};
-use crate::contact::evaluate::varied::{
-    Values, VariedColumn, case_of_row, column_pointer, of_first_row, of_values,
-};
+use crate::contact::evaluate::many::{NotAtOnce, SOLVED_ROWS_MAX};
+use crate::contact::evaluate::varied::{Values, VariedColumn, column_pointer, of_values};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::http::dto::CellValue;
 use crate::http::extract::accept::{choose, one_of};
@@ -355,19 +353,12 @@ impl Evaluation {
         }
         let template = Handle::current().block_on(self.jobs.with_profiles(template))?;
         let profiles = self.jobs.profiles_of(columns)?;
-        let case = case_of_row(&template, columns, &profiles, 0).map_err(|(pointer, reason)| {
-            let detail = format!("the column `{pointer}` {reason}");
-            CaseError(vec![Fault::new("/columns", detail)])
-        })?;
-        let checked = self.jobs.check(&case).map_err(|error| {
-            let pointers = columns.iter().map(|column| &*column.pointer);
-            let pointers: Vec<_> = pointers.map(|pointer| (pointer, pointer)).collect();
-            of_first_row(error, &pointers)
-        })?;
-        if let Some(fault) = several_answers(&checked) {
-            let pointer = format!("/template{}", fault.pointer);
-            return Err(CaseError(vec![Fault { pointer, ..fault }]).into());
-        }
+        let pointers = columns.iter().map(|column| &*column.pointer);
+        let pointers: Vec<_> = pointers.map(|pointer| (pointer, pointer)).collect();
+        let first = self
+            .jobs
+            .first_row(&template, columns, &profiles, &pointers);
+        let (case, checked) = first?;
         // Beyond this number of rows the solver is not used.
         let solver_bytes = match rows <= SOLVED_ROWS_MAX {
             true => usize::try_from(checked.cost().own_bytes()).unwrap_or(usize::MAX),

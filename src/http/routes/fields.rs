@@ -15,16 +15,15 @@ use crate::http::extract::query::{
     Parameters, Reader, index, query, reader, require_index, whole, word,
 };
 use crate::http::limits::{Rendering, hold_while_sent};
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::ApiError;
 use crate::http::render::csv::Precision;
 use crate::http::render::format::Format;
 use crate::http::render::pieces::{csv_body, json_body};
 use crate::http::render::table::{File, Table};
 use crate::http::render::{npz, vtk};
-use crate::http::routes::parts::{FieldProblems, PartRequest, has, not_asked, stored};
+use crate::http::routes::parts::{FieldProblems, PARTS, PartRequest, has, not_asked, stored};
 use crate::http::routes::plots::{PlotOptions, View, WIDTH_DEFAULT, picture};
 use crate::jobs::Jobs;
-use crate::jobs::error::JobsError;
 
 /// Most samples along one axis of a regular grid.
 const GRID_AXIS_MAX: u32 = 1000;
@@ -175,7 +174,7 @@ pub(crate) fn grid(samples_max: usize) -> Reader<(usize, usize)> {
 
 /// Defines the route of each field from its summary, path, operation id, output and description of the answer.
 macro_rules! field_routes {
-    ($($(#[doc = $summary:tt])* $name:ident($path:tt, $operation:tt, $output:ident, $described:tt);)*) => {$(
+    ($($(#[doc = $summary:tt])* $name:ident($path:tt, $operation:tt, $output:ident, $schema:tt, $described:tt);)*) => {$(
         $(#[doc = $summary])*
         ///
         /// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
@@ -186,7 +185,7 @@ macro_rules! field_routes {
             operation_id = $operation,
             params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
             responses((status = 200, description = $described, content(
-                (Field = "application/json"),
+                ($schema = "application/json"),
                 (String = "text/csv"),
                 (File = "application/x-npz"),
                 (File = "application/x-vtk"),
@@ -202,13 +201,15 @@ macro_rules! field_routes {
 
 field_routes! {
     /// Tangential tractions of a succeeded job.
-    tractions("/v1/jobs/{id}/tractions", "get_tractions", Tractions, "Tractions on the lower body, in MPa");
+    tractions("/v1/jobs/{id}/tractions", "get_tractions", Tractions, Field, "Tractions on the lower body, in MPa");
     /// Pressure of a succeeded job; the same for every motion.
-    pressure("/v1/jobs/{id}/pressure", "get_pressure", Pressure, "Pressure in MPa");
+    pressure("/v1/jobs/{id}/pressure", "get_pressure", Pressure, Field, "Pressure in MPa");
     /// Slip of a succeeded job: the upper body relative to the lower one, divided by rolling speed.
-    slip("/v1/jobs/{id}/slip", "get_slip", Slip, "Relative slip, dimensionless");
+    slip("/v1/jobs/{id}/slip", "get_slip", Slip, Field, "Relative slip, dimensionless");
     /// Temperature of both surfaces in the contact of a succeeded job; both bodies have the same there.
-    temperature("/v1/jobs/{id}/temperature", "get_temperature", Temperature, "Temperature at the middle of every cell, in °C");
+    temperature("/v1/jobs/{id}/temperature", "get_temperature", Temperature, Field, "Temperature at the middle of every cell, in °C");
+    /// Stick and slip zones of a succeeded job.
+    zones("/v1/jobs/{id}/zones", "get_zones", Zones, Zones, "Areas, outlines and the zone of every cell, or zones on a regular grid; only cells or grid in forms other than JSON");
 }
 
 async fn answer(request: &PartRequest, output: Output) -> Result<Response, ApiError> {
@@ -218,17 +219,40 @@ async fn answer(request: &PartRequest, output: Output) -> Result<Response, ApiEr
             return Ok(picture);
         }
         let rendering = request.rendering(selection.bytes()).await?;
-        let (jobs, id) = (&request.jobs, request.id);
-        let (cells, values) = stored(jobs, id, selection.patch, selection.point, output).await?;
-        let field = FieldValues {
-            outputs: vec![output],
-            cells,
-            values,
-            members: String::new(),
+        let members = match output {
+            Output::Zones => sizes_of_zones(&request.jobs, request.id, selection).await?,
+            _ => String::new(),
         };
-        field.write(rendering, selection, name_of(output)).await
+        let name = name_of(output);
+        write_parts(request, rendering, selection, vec![output], (members, name)).await
     };
     request.unless_known(selection.format, answer).await
+}
+
+/// The values of these outputs, or of all that there are if none is named.
+async fn write_parts(
+    request: &PartRequest,
+    rendering: Rendering,
+    selection: Selection,
+    wanted: Vec<Output>,
+    (members, name): (String, &'static str),
+) -> Result<Response, ApiError> {
+    let place = [selection.patch, selection.point];
+    let (cells, values) = stored(&request.jobs, request.id, place, &wanted).await?;
+    let outputs = match wanted.is_empty() {
+        true => PARTS
+            .into_iter()
+            .filter(|part| has(&cells, &values, *part))
+            .collect(),
+        false => wanted,
+    };
+    let field = FieldValues {
+        outputs,
+        cells,
+        values,
+        members,
+    };
+    field.write(rendering, selection, name).await
 }
 
 /// The values of a field, and what its JSON has besides.
@@ -305,15 +329,6 @@ impl FieldValues {
     }
 }
 
-/// The parts that have a value per cell.
-const PARTS: [Output; 5] = [
-    Output::Pressure,
-    Output::Tractions,
-    Output::Slip,
-    Output::Temperature,
-    Output::Zones,
-];
-
 /// The forms that the fields come in.
 const PART_FORMATS: &[Format] = &[Format::Json, Format::Csv, Format::Npz, Format::Vtk];
 
@@ -387,61 +402,11 @@ pub(crate) async fn fields(request: PartRequest) -> Result<Response, ApiError> {
     let answer = async {
         let most = query.parts.as_ref().map_or(PARTS.len(), Vec::len);
         let rendering = request.rendering(most * selection.bytes()).await?;
-        let (jobs, id) = (&request.jobs, request.id);
-        let field = stored_parts(jobs, id, selection, query.parts).await?;
-        field.write(rendering, selection, "fields").await
+        let wanted = query.parts.unwrap_or_default();
+        let told = (String::new(), "fields");
+        write_parts(&request, rendering, selection, wanted, told).await
     };
     request.unless_known(selection.format, answer).await
-}
-
-/// The parts that are wanted, else all that are stored, with the cells of the patch and the values of the motion.
-async fn stored_parts(
-    jobs: &Jobs,
-    id: Uuid,
-    selection: Selection,
-    wanted: Option<Vec<Output>>,
-) -> Result<FieldValues, ApiError> {
-    let (patch, point) = (selection.patch, selection.point);
-    let mut fields = match jobs.point_fields(id, patch, point).await {
-        // Nothing is stored per cell when the case asked for no field at all.
-        Err(JobsError::NoSuchPatch { patches: 0 }) => {
-            return match wanted.and_then(|parts| parts.first().copied()) {
-                Some(part) => not_asked(jobs, id, part).await,
-                None => Err(nothing_per_cell()),
-            };
-        }
-        fields => fields?,
-    };
-    // One motion was asked for, so there is one entry, and one mesh.
-    let values = fields.points.pop().unwrap_or_default();
-    let cells = fields.meshes.pop().unwrap_or_default();
-    let stored = |part: &Output| has(&cells, &values, *part);
-    let parts = match wanted {
-        Some(parts) => {
-            if let Some(missing) = parts.iter().find(|part| !stored(part)) {
-                return not_asked(jobs, id, *missing).await;
-            }
-            parts
-        }
-        None => PARTS.into_iter().filter(stored).collect(),
-    };
-    Ok(FieldValues {
-        outputs: parts,
-        cells,
-        values,
-        members: String::new(),
-    })
-}
-
-fn nothing_per_cell() -> ApiError {
-    let names = PARTS.map(|part| format!("`{}`", name_of(part)));
-    ApiError::new(
-        ProblemKind::OutputNotAsked,
-        format!(
-            "the case asked for nothing per cell; submit it again with some of {} among its `outputs`",
-            names.join(", ")
-        ),
-    )
 }
 
 /// Stick and slip zones of one patch for one motion.
@@ -476,63 +441,8 @@ pub(crate) struct ZoneCells {
     cells: Cells,
 }
 
-/// Stick and slip zones of a succeeded job.
-#[utoipa::path(
-    get,
-    path = "/v1/jobs/{id}/zones",
-    tag = "results",
-    operation_id = "get_zones",
-    params(
-        ("id" = String, Path, description = "Id of the job", format = "uuid"),
-        FieldQuery
-    ),
-    responses((status = 200, description = "Areas, outlines and the zone of every cell, or zones on a regular grid; only cells or grid in forms other than JSON", content(
-        (Zones = "application/json"),
-        (String = "text/csv"),
-        (File = "application/x-npz"),
-        (File = "application/x-vtk"),
-        (String = "image/svg+xml"),
-        (File = "image/png")
-    )), FieldProblems)
-)]
-pub(crate) async fn zones(request: PartRequest) -> Result<Response, ApiError> {
-    let selection = Selection::read(&request)?;
-    let shown = Output::Zones;
-    let answer = async {
-        match selection.picture(&request, shown).await? {
-            Some(picture) => Ok(picture),
-            None => zone_cells(&request, selection).await,
-        }
-    };
-    request.unless_known(selection.format, answer).await
-}
-
-async fn zone_cells(request: &PartRequest, selection: Selection) -> Result<Response, ApiError> {
-    let shown = Output::Zones;
-    let (jobs, id) = (&request.jobs, request.id);
-    let rendering = request.rendering(selection.bytes()).await?;
-    let Some(sizes) = sizes_of_zones(jobs, id, selection).await? else {
-        return not_asked(jobs, id, shown).await;
-    };
-    let (cells, values) = stored(jobs, id, selection.patch, selection.point, shown).await?;
-    let field = FieldValues {
-        outputs: vec![shown],
-        cells,
-        values,
-        members: match selection.grid {
-            None => sizes,
-            Some(_) => String::new(),
-        },
-    };
-    field.write(rendering, selection, "zones").await
-}
-
 /// The areas and numbers of cells of the zones as members of JSON; `None` if the case did not ask for zones.
-async fn sizes_of_zones(
-    jobs: &Jobs,
-    id: Uuid,
-    selection: Selection,
-) -> Result<Option<String>, ApiError> {
+async fn sizes_of_zones(jobs: &Jobs, id: Uuid, selection: Selection) -> Result<String, ApiError> {
     let solution = jobs.solution(id).await?;
     require_index("patch", Some(selection.patch), solution.patches.len())?;
     let points = &solution.patches[selection.patch].points;
@@ -547,5 +457,9 @@ async fn sizes_of_zones(
         ])
     };
     let member = |(name, value)| format!(",\"{name}\":{value}");
-    Ok(sizes().map(|sizes| sizes.map(member).concat()))
+    match sizes() {
+        None => not_asked(jobs, id, Output::Zones).await,
+        Some(_) if selection.grid.is_some() => Ok(String::new()),
+        Some(sizes) => Ok(sizes.map(member).concat()),
+    }
 }

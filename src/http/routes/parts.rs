@@ -80,29 +80,46 @@ problems! {
     FieldProblems: BadQuery, JobNotFound, OutputNotAsked, ResultNotReady, JobFailed, JobCancelled
 }
 
-/// The cells of a patch and the values of one motion, in which the output is present.
+/// The parts that have a value per cell.
+pub(crate) const PARTS: [Output; 5] = [
+    Output::Pressure,
+    Output::Tractions,
+    Output::Slip,
+    Output::Temperature,
+    Output::Zones,
+];
+
+/// The cells of a patch and the values of one motion, in which these outputs are present.
 ///
 /// # Errors
 /// `output-not-asked`, or there is no such patch or motion, or no result.
 pub(crate) async fn stored(
     jobs: &Jobs,
     id: Uuid,
-    patch: usize,
-    point: usize,
-    output: Output,
+    [patch, point]: [usize; 2],
+    wanted: &[Output],
 ) -> Result<(PatchCells, PointFields), ApiError> {
     let mut fields = match jobs.point_fields(id, patch, point).await {
         // Nothing is stored per cell when the case asked for no field at all.
-        Err(JobsError::NoSuchPatch { patches: 0 }) => return not_asked(jobs, id, output).await,
+        Err(JobsError::NoSuchPatch { patches: 0 }) => {
+            let Some(output) = wanted.first() else {
+                let names = PARTS.map(|part| format!("`{}`", name_of(part))).join(", ");
+                let detail = format!(
+                    "the case asked for nothing per cell; submit it again with some of {names} among its `outputs`"
+                );
+                return Err(ApiError::new(ProblemKind::OutputNotAsked, detail));
+            };
+            return not_asked(jobs, id, *output).await;
+        }
         fields => fields?,
     };
     // One motion was asked for, so there is one entry, and one mesh.
     let values = fields.points.pop().unwrap_or_default();
     let cells = fields.meshes.pop().unwrap_or_default();
-    if !has(&cells, &values, output) {
-        return not_asked(jobs, id, output).await;
+    match wanted.iter().find(|output| !has(&cells, &values, **output)) {
+        Some(missing) => not_asked(jobs, id, *missing).await,
+        None => Ok((cells, values)),
     }
-    Ok((cells, values))
 }
 
 /// Is the output among what was stored?

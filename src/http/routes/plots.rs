@@ -244,7 +244,7 @@ async fn of_section(
     require_index("patch", Some(wish.patch), patches)?;
     let patch = &solution.patches[wish.patch];
     require_index("point", Some(wish.point), patch.points.len())?;
-    let (cells, values) = stored(jobs, id, wish.patch, wish.point, Output::Tractions).await?;
+    let (cells, values) = stored(jobs, id, [wish.patch, wish.point], &[Output::Tractions]).await?;
     let counted = counted(wish, patches, patch.points.len());
     let sections = Sections {
         title,
@@ -506,7 +506,7 @@ async fn of_patch(
     require_index("patch", Some(wish.patch), patches)?;
     let points = &solution.patches[wish.patch].points;
     require_index("point", Some(wish.point), points.len())?;
-    let (fields, values) = stored(jobs, id, wish.patch, wish.point, wish.shown).await?;
+    let (fields, values) = stored(jobs, id, [wish.patch, wish.point], &[wish.shown]).await?;
     let normal = solution.patches[wish.patch].normal_force_n;
     let counted = counted(wish, patches, points.len());
     let scene = Scene {

@@ -236,7 +236,7 @@ async fn write_stresses(
 ) -> Result<Response, ApiError> {
     let (jobs, id) = (&request.jobs, request.id);
     let output = Output::Subsurface;
-    let (_, values) = stored(jobs, id, patch, point, output).await?;
+    let (_, values) = stored(jobs, id, [patch, point], &[output]).await?;
     let solution = jobs.solution(id).await?;
     require_index("patch", Some(patch), solution.patches.len())?;
     let motions = &solution.patches[patch].points;

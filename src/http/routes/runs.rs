@@ -17,7 +17,7 @@ use uuid::Uuid;
 use crate::http::dto::{AnswerColumn, RunRequest, answer_columns};
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::{Caller, Credential, RunId, RunRowId, revoked, until_revoked};
-use crate::http::extract::query::{Parameters, Repeated, id, query, reader};
+use crate::http::extract::query::{Parameters, Reader, Repeated, id, query, reader};
 use crate::http::extract::rows::{TableUpload, form, read_run, separate_template};
 use crate::http::extract::titles::{NamedColumns, named_column};
 use crate::http::limits::{Memory, hold_while_sent};
@@ -56,9 +56,7 @@ query! {
         /// Titles of columns that are carried along to the answers, with commas between. Columns of places, times, sections and vehicles, such as `km`,
         /// `time` or `axle_no`, need no mention; any other column whose title names nothing in the case is refused
         #[param(example = "Y_left,curvature")]
-        carry: Vec<String> as String = reader("titles of columns with commas between", |text| {
-            Some(text.split(',').map(|title| title.trim().to_owned()).collect())
-        });
+        carry: Vec<String> as String = names("titles of columns with commas between");
     }
 }
 
@@ -128,9 +126,7 @@ query! {
     RunResultsQuery(() => ()) {
         /// Only these columns, with commas between, such as `row,force_y_n,status`
         #[param(example = "row,status,force_y_n")]
-        columns: Vec<String> as String = reader("names of columns with commas between", |text| {
-            Some(text.split(',').map(|name| name.trim().to_owned()).collect())
-        });
+        columns: Vec<String> as String = names("names of columns with commas between");
         /// Only the rows from the first number on and before the second, such as `1000:2000`; either may be left out
         #[param(pattern = "^[0-9]*:[0-9]*$", example = "1000:2000")]
         rows: Range<u64> as String = reader("two row numbers with a colon between, such as `1000:2000`; either may be left out", row_range);
@@ -138,6 +134,14 @@ query! {
         #[param(pattern = "^(ndjson|csv|arrow|parquet)$", example = "parquet")]
         format: Format as String = one_of(FORMATS);
     }
+}
+
+/// Reads names with commas between.
+fn names(allowed: &'static str) -> Reader<Vec<String>> {
+    reader(allowed, |text| {
+        let names = text.split(',').map(|name| name.trim().to_owned());
+        Some(names.collect())
+    })
 }
 
 fn row_range(text: &str) -> Option<Range<u64>> {
@@ -502,9 +506,7 @@ query! {
     RunTotalsQuery(() => ()) {
         /// Columns of numbers, with commas between; forces, power and pressure when left out
         #[param(example = "force_y_n,friction_power_n")]
-        columns: Vec<String> as String = reader("names of columns with commas between", |text| {
-            Some(text.split(',').map(|name| name.trim().to_owned()).collect())
-        });
+        columns: Vec<String> as String = names("names of columns with commas between");
         /// Percentiles from 0 to 100, with commas between; 50, 90, 99 and 100 when left out
         #[param(example = "50,95,99.9")]
         percentiles: Vec<f64> as String = reader("numbers from 0 to 100 with commas between", |text| {
@@ -614,7 +616,12 @@ pub(crate) async fn totals(
     let mut wanted = names.clone();
     wanted.push("status".to_owned());
     wanted.extend(section.iter().map(|section| section.name.clone()));
-    let mut gathered = Gathered::new(names, section);
+    let mut gathered = Gathered {
+        names,
+        section,
+        all: Numbers::default(),
+        sections: BTreeMap::new(),
+    };
     let mut source = ChunkSource::new(jobs, run);
     while let Some(chunk) = source.next().await? {
         let table = source.answers(&chunk, wanted.clone()).await?;
@@ -673,6 +680,7 @@ enum SectionKey {
     Text(String),
 }
 
+/// The numbers of all rows, and of each section.
 struct Gathered {
     names: Vec<String>,
     section: Option<RowSection>,
@@ -681,61 +689,33 @@ struct Gathered {
 }
 
 /// The numbers of some rows.
+#[derive(Default)]
 struct Numbers {
     rows: u64,
     statuses: BTreeMap<String, u64>,
     columns: Vec<Vec<f64>>,
 }
 
-impl Numbers {
-    fn new(columns: usize) -> Numbers {
-        Numbers {
-            rows: 0,
-            statuses: BTreeMap::new(),
-            columns: vec![Vec::new(); columns],
-        }
-    }
-}
-
 impl Gathered {
-    fn new(names: Vec<String>, section: Option<RowSection>) -> Gathered {
-        Gathered {
-            all: Numbers::new(names.len()),
-            names,
-            section,
-            sections: BTreeMap::new(),
-        }
-    }
-
     fn add(&mut self, table: &RowTable) -> Result<(), ApiError> {
         let Some(TableColumn::Texts(statuses)) = table.column("status") else {
             return Err(ApiError::internal(&"answers without a status"));
         };
-        let columns: Vec<&[f64]> = self
-            .names
-            .iter()
-            .filter_map(|name| match table.column(name)? {
-                TableColumn::Numbers(numbers) => Some(numbers.as_slice()),
-                _ => None,
-            })
-            .collect();
+        let columns = self.names.iter();
+        let columns = columns.filter_map(|name| match table.column(name)? {
+            TableColumn::Numbers(numbers) => Some(numbers.as_slice()),
+            _ => None,
+        });
+        let columns: Vec<&[f64]> = columns.collect();
         for (row, status) in statuses.iter().enumerate() {
             let status = status.as_deref().unwrap_or_default();
-            note(&mut self.all, status, &columns, row);
-            let Some(section) = &self.section else {
+            self.all.note(status, &columns, row);
+            let section = self.section.as_ref();
+            let Some(key) = section.and_then(|section| section.key(table, row)) else {
                 continue;
             };
-            let Some(key) = section.key(table, row) else {
-                continue;
-            };
-            let width = self.names.len();
-            let numbers = self.sections.entry(key);
-            note(
-                numbers.or_insert_with(|| Numbers::new(width)),
-                status,
-                &columns,
-                row,
-            );
+            let numbers = self.sections.entry(key).or_default();
+            numbers.note(status, &columns, row);
             if self.sections.len() > SECTIONS_MAX {
                 let detail = format!("there are more than {SECTIONS_MAX} sections");
                 return Err(ApiError::bad_parameter("by", detail));
@@ -767,32 +747,32 @@ impl Gathered {
 
 impl RowSection {
     fn key(&self, table: &RowTable, row: usize) -> Option<SectionKey> {
-        match table.column(&self.name)? {
+        let number = match table.column(&self.name)? {
             TableColumn::Texts(texts) => {
-                Some(SectionKey::Text(texts[row].clone().unwrap_or_default()))
+                return Some(SectionKey::Text(texts[row].clone().unwrap_or_default()));
             }
-            TableColumn::Numbers(numbers) => self.interval(numbers[row]),
+            TableColumn::Numbers(numbers) => numbers[row],
             #[expect(clippy::cast_precision_loss, reason = "for an interval")]
-            TableColumn::Integers(numbers) => self.interval(numbers[row] as f64),
-        }
-    }
-
-    fn interval(&self, number: f64) -> Option<SectionKey> {
+            TableColumn::Integers(numbers) => numbers[row] as f64,
+        };
         let place = (number / self.width?).floor();
         #[expect(clippy::cast_possible_truncation, reason = "saturates")]
         (!place.is_nan()).then_some(SectionKey::Interval(place as i64))
     }
 }
 
-fn note(numbers: &mut Numbers, status: &str, columns: &[&[f64]], row: usize) {
-    numbers.rows += 1;
-    match numbers.statuses.get_mut(status) {
-        Some(count) => *count += 1,
-        None => drop(numbers.statuses.insert(status.to_owned(), 1)),
-    }
-    for (kept, column) in numbers.columns.iter_mut().zip(columns) {
-        if !column[row].is_nan() {
-            kept.push(column[row]);
+impl Numbers {
+    fn note(&mut self, status: &str, columns: &[&[f64]], row: usize) {
+        self.rows += 1;
+        match self.statuses.get_mut(status) {
+            Some(count) => *count += 1,
+            None => drop(self.statuses.insert(status.to_owned(), 1)),
+        }
+        self.columns.resize_with(columns.len(), Vec::new);
+        for (kept, column) in self.columns.iter_mut().zip(columns) {
+            if !column[row].is_nan() {
+                kept.push(column[row]);
+            }
         }
     }
 }
@@ -803,7 +783,12 @@ fn totals_of(
     percentiles: &[f64],
     above: &[f64],
 ) -> SectionTotals {
-    let columns = names.iter().cloned().zip(numbers.columns);
+    // Without rows there are no columns yet.
+    let columns = numbers
+        .columns
+        .into_iter()
+        .chain(std::iter::repeat(Vec::new()));
+    let columns = names.iter().cloned().zip(columns);
     SectionTotals {
         value: None,
         from: None,

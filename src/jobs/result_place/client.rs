@@ -17,7 +17,7 @@ use object_store::client::{
 use tokio::time::timeout;
 
 use crate::jobs::error::JobsError;
-use crate::jobs::metrics::StoreRequests;
+use crate::jobs::metrics::{StoreRequests, count_request};
 
 /// How long a connection may take.
 const CONNECTED_WITHIN: Duration = Duration::from_secs(5);
@@ -79,7 +79,7 @@ impl HttpService for Client {
             Err(late) => Err(HttpError::new(HttpErrorKind::Timeout, late)),
         };
         let status = sent.as_ref().ok().map(|answer| answer.status().as_u16());
-        self.requests.count(method.as_str(), status);
+        count_request(&self.requests, method.as_str(), status);
         let (head, body) = sent?.into_parts();
         let pieces = stream::unfold(Some(body), async |body| {
             let mut body = body?;

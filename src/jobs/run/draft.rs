@@ -4,15 +4,12 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
 
 use serde_json::Value;
-use tokio::runtime::Handle;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::many::{ManyTask, expected_seconds, several_answers};
+use crate::contact::evaluate::many::{ManyTask, expected_seconds};
 use crate::contact::evaluate::many_answer::NumberColumns;
-use crate::contact::evaluate::varied::{
-    Values, VariedColumn, case_of_row, column_pointer, of_first_row, of_values,
-};
+use crate::contact::evaluate::varied::{Values, VariedColumn, column_pointer, of_values};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::codec::table::COLUMNS_MAX;
@@ -20,7 +17,7 @@ use crate::jobs::disk_reserve::nameless;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::{Kind, SubmitOptions};
-use crate::jobs::profiles::{KnownSections, unknown};
+use crate::jobs::profiles::KnownSections;
 use crate::jobs::run::model::{REASON, Run, RunChunk, RunColumn, RunHead};
 use crate::jobs::submit::microseconds;
 use crate::jobs::sync::blocking;
@@ -271,17 +268,14 @@ impl RunDraft {
             })
             .collect();
         let profiles: BTreeMap<String, Value> = self.profiles.clone().into_iter().collect();
-        let case =
-            case_of_row(&self.template, &varied, &profiles, 0).map_err(|(pointer, reason)| {
-                let detail = format!("the column `{pointer}` {reason}");
-                CaseError(vec![Fault::new(column_pointer(&pointer), detail)])
-            })?;
         let names = self.columns.iter();
         let names: Vec<(&str, &str)> = names
             .filter_map(|column| Some((column.pointer.as_deref()?, &*column.name)))
             .collect();
-        let checked = self.jobs.check(&case);
-        let checked = checked.map_err(|error| of_first_row(error, &names))?;
+        let first = self
+            .jobs
+            .first_row(&self.template, &varied, &profiles, &names);
+        let (case, checked) = first?;
         let faults = faults_of_template(&checked);
         if !faults.is_empty() {
             return Err(CaseError(faults).into());
@@ -323,45 +317,13 @@ impl RunDraft {
 
     /// Reads the kept profiles that rows name.
     fn find_profiles(&mut self, columns: &[Values]) -> Result<Vec<Fault>, JobsError> {
-        let of_sections = |column: &RunColumn| {
-            let pointer = column.pointer.as_deref();
-            matches!(
-                pointer,
-                Some(
-                    "/contact/rail/profile"
-                        | "/contact/wheel/profile"
-                        | "/contact/right/rail/profile"
-                        | "/contact/right/wheel/profile"
-                )
-            )
-        };
-        let mut faults = Vec::new();
-        for (column, values) in self.columns.iter().zip(columns) {
-            let Values::Texts(names) = values else {
-                continue;
-            };
-            for (row, name) in (self.rows..).zip(names).filter(|_| of_sections(column)) {
-                // A row without a name is refused with its case.
-                let Some(name) = name else { continue };
-                if self.profiles.contains_key(name) {
-                    continue;
-                }
-                let found = self.jobs.known_section(name, &mut self.profiles);
-                let pointer = format!("{}/{row}", column_pointer(&column.name));
-                match Handle::current().block_on(found)? {
-                    Some(section) => self.profile_bytes += section.to_string().len(),
-                    None => return Ok(vec![unknown(pointer, name)]),
-                }
-                if self.profile_bytes > PROFILE_BYTES_MAX {
-                    let detail = format!(
-                        "the profiles that rows name take more than {PROFILE_BYTES_MAX} bytes; send the rows as several runs"
-                    );
-                    faults.push(Fault::new(pointer, detail));
-                    return Ok(faults);
-                }
-            }
-        }
-        Ok(faults)
+        let named = self.columns.iter().zip(columns);
+        let named = named.filter_map(|(column, values)| {
+            Some((&*column.name, column.pointer.as_deref()?, values))
+        });
+        let found = (&mut self.profiles, &mut self.profile_bytes);
+        let jobs = &self.jobs;
+        jobs.find_sections(named, self.rows, found, PROFILE_BYTES_MAX)
     }
 
     fn faults_of_rows(&self, columns: &[Values]) -> Vec<Fault> {
@@ -392,14 +354,7 @@ impl RunDraft {
 
 /// What the case of a run may not ask for.
 fn faults_of_template(checked: &CheckedCase) -> Vec<Fault> {
-    let several = several_answers(checked);
-    let mut faults: Vec<Fault> = several
-        .map(|fault| Fault {
-            pointer: format!("/template{}", fault.pointer),
-            ..fault
-        })
-        .into_iter()
-        .collect();
+    let mut faults = Vec::new();
     let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
     if let Some(other) = checked
         .run

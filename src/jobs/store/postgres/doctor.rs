@@ -29,66 +29,48 @@ pub struct Finding {
     pub wrong: bool,
 }
 
-/// A number that is asked for, and from which value on it is wrong.
-struct Question {
-    about: &'static str,
-    statement: &'static str,
-    wrong: fn(i64) -> bool,
+/// What a number is about, the statement that reads it, and when it is wrong.
+type Question = (&'static str, &'static str, fn(i64) -> bool);
+
+macro_rules! questions {
+    ($($about:literal $statement:literal $wrong:expr;)*) => {
+        [$(($about, $statement, $wrong)),*]
+    };
 }
 
-const NUMBERS: [Question; 10] = [
-    Question {
-        about: "server version",
-        statement: "SELECT CAST(current_setting('server_version_num') AS bigint)",
-        wrong: |version| version < VERSION_MIN,
-    },
-    Question {
-        about: "server takes no data (1: it is a standby)",
-        statement: "SELECT CASE WHEN pg_is_in_recovery() THEN 1::bigint ELSE 0 END",
-        wrong: |standby| standby > 0,
-    },
-    Question {
-        about: "commits are on the disk when they are answered (0: they may be lost)",
-        statement: "SELECT CASE WHEN current_setting('synchronous_commit') = 'off' OR current_setting('fsync') = 'off' THEN 0::bigint ELSE 1 END",
-        wrong: |durable| durable == 0,
-    },
+const NUMBERS: [Question; 10] = questions! {
+    "server version"
+        "SELECT CAST(current_setting('server_version_num') AS bigint)"
+        |version| version < VERSION_MIN;
+    "server takes no data (1: it is a standby)"
+        "SELECT CASE WHEN pg_is_in_recovery() THEN 1::bigint ELSE 0 END"
+        |standby| standby > 0;
+    "commits are on the disk when they are answered (0: they may be lost)"
+        "SELECT CASE WHEN current_setting('synchronous_commit') = 'off' OR current_setting('fsync') = 'off' THEN 0::bigint ELSE 1 END"
+        |durable| durable == 0;
     // Behind a pooler that drops the settings with which sessions begin, those of the role count.
-    Question {
-        about: "seconds after which a session that was left inside a transaction is ended (0: never)",
-        statement: "SELECT setting::bigint / 1000 FROM pg_settings WHERE name = 'idle_in_transaction_session_timeout'",
-        wrong: |seconds| seconds == 0,
-    },
-    Question {
-        about: "nodes seen within 20 s",
-        statement: "SELECT COUNT(*) FROM nodes WHERE seen_at > CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - 20000",
-        wrong: |_| false,
-    },
-    Question {
-        about: "queued jobs",
-        statement: "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued'",
-        wrong: |_| false,
-    },
-    Question {
-        about: "running jobs whose lease ran out more than 2 min ago",
-        statement: "SELECT COUNT(*) FROM jobs WHERE state = 'running' AND lease_until < CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - 120000",
-        wrong: |stuck| stuck > 0,
-    },
-    Question {
-        about: "seconds for which the oldest transaction is open",
-        statement: "SELECT CAST(COALESCE(MAX(extract(epoch FROM clock_timestamp() - xact_start)), 0) AS bigint) FROM pg_stat_activity WHERE pid <> pg_backend_pid() AND backend_type = 'client backend'",
-        wrong: |seconds| seconds > TRANSACTION_MAX,
-    },
-    Question {
-        about: "dead rows of the job table",
-        statement: "SELECT CAST(COALESCE(MAX(n_dead_tup), 0) AS bigint) FROM pg_stat_user_tables WHERE relid = to_regclass('jobs')",
-        wrong: |rows| rows > DEAD_ROWS_MAX,
-    },
-    Question {
-        about: "indices that are not valid",
-        statement: "SELECT COUNT(*) FROM pg_index JOIN pg_class ON pg_class.oid = indexrelid WHERE NOT indisvalid AND relnamespace = CAST(current_schema() AS regnamespace)",
-        wrong: |invalid| invalid > 0,
-    },
-];
+    "seconds after which a session that was left inside a transaction is ended (0: never)"
+        "SELECT setting::bigint / 1000 FROM pg_settings WHERE name = 'idle_in_transaction_session_timeout'"
+        |seconds| seconds == 0;
+    "nodes seen within 20 s"
+        "SELECT COUNT(*) FROM nodes WHERE seen_at > CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - 20000"
+        |_| false;
+    "queued jobs"
+        "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued'"
+        |_| false;
+    "running jobs whose lease ran out more than 2 min ago"
+        "SELECT COUNT(*) FROM jobs WHERE state = 'running' AND lease_until < CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - 120000"
+        |stuck| stuck > 0;
+    "seconds for which the oldest transaction is open"
+        "SELECT CAST(COALESCE(MAX(extract(epoch FROM clock_timestamp() - xact_start)), 0) AS bigint) FROM pg_stat_activity WHERE pid <> pg_backend_pid() AND backend_type = 'client backend'"
+        |seconds| seconds > TRANSACTION_MAX;
+    "dead rows of the job table"
+        "SELECT CAST(COALESCE(MAX(n_dead_tup), 0) AS bigint) FROM pg_stat_user_tables WHERE relid = to_regclass('jobs')"
+        |rows| rows > DEAD_ROWS_MAX;
+    "indices that are not valid"
+        "SELECT COUNT(*) FROM pg_index JOIN pg_class ON pg_class.oid = indexrelid WHERE NOT indisvalid AND relnamespace = CAST(current_schema() AS regnamespace)"
+        |invalid| invalid > 0;
+};
 
 /// Looks at a database with a job table; changes nothing.
 ///
@@ -104,14 +86,12 @@ pub async fn examine(url: &str) -> Result<Vec<Finding>, JobsError> {
 async fn ask(pool: &PgPool) -> Result<Vec<Finding>, JobsError> {
     require(pool).await?;
     let mut findings = vec![clock(pool).await?];
-    for question in NUMBERS {
-        let number: i64 = sqlx::query_scalar(question.statement)
-            .fetch_one(pool)
-            .await?;
+    for (about, statement, wrong) in NUMBERS {
+        let number: i64 = sqlx::query_scalar(statement).fetch_one(pool).await?;
         findings.push(Finding {
-            about: question.about,
+            about,
             says: number.to_string(),
-            wrong: (question.wrong)(number),
+            wrong: wrong(number),
         });
     }
     Ok(findings)
