@@ -137,7 +137,8 @@ mod tests {
     use super::*;
     use crate::contact::case::words::solver::Output;
     use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
-    use crate::http::render::table::{ArrayData, Precision, TableColumn};
+    use crate::http::render::csv::Precision;
+    use crate::http::render::table::{ArrayData, TableColumn};
 
     async fn text(body: Body) -> String {
         let bytes = body.collect().await.unwrap().to_bytes();
