@@ -8,99 +8,125 @@ use crate::http::render::forces::Forces;
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
 use crate::jobs::model::BatchItem;
 
-/// Columns of a table for which none are named: these, [`Forces::COLUMNS`] and the rest.
-const FIRST: [&str; 5] = ["index", "id", "name", "state", "point"];
-const LAST: [&str; 6] = [
-    "friction_power_n",
-    "area_mm2",
-    "pressure_max_mpa",
-    "target_met",
-    "remarks",
-    "error",
-];
+/// How the value of a column is found.
+#[derive(Debug, Clone, Copy)]
+enum Of {
+    Place(fn(&TableLine<'_>) -> i64),
+    Number(fn(&TableLine<'_>) -> Option<f64>),
+    Text(fn(&TableLine<'_>) -> Option<String>),
+    /// The label with the key behind [`LABEL`].
+    Label,
+}
 
-/// What else can be named, besides labels.
-const MORE: [&str; 22] = [
-    "patch",
-    "cached",
-    "friction_coefficient",
-    "friction_limit_n",
-    "friction_power_without_spin_n",
-    "traction_max_mpa",
-    "stick_share",
-    "saturated",
-    "contact_angle_rad",
-    "rolling_radius_mm",
-    "track_y_mm",
-    "track_z_mm",
-    "force_track_y_n",
-    "force_track_z_n",
-    "semi_axis_x_mm",
-    "semi_axis_y_mm",
-    "wheel_lowering_mm",
-    "usfd_depth_nm",
-    "archard_depth_nm",
-    "wlrm_damage",
-    "von_mises_max_mpa",
-    "temperature_max_c",
-];
+/// Columns of a table for which none are named.
+const USUAL: usize = 21;
+
+macro_rules! columns {
+    ($($name:literal $of:ident $value:expr;)*) => {
+        [$(($name, Of::$of($value))),*]
+    };
+}
+
+/// All columns besides labels, the usual ones first.
+const COLUMNS: [(&str, Of); 43] = columns! {
+    "index" Place |line| line.item.index.into();
+    "id" Text |line| Some(line.item.job.id.to_string());
+    "name" Text |line| line.item.job.name.clone();
+    "state" Text |line| Some(line.item.job.state.name().into());
+    "point" Place |line| line.point as i64;
+    "creepage_x" Number |line| line.force("creepage_x");
+    "creepage_y" Number |line| line.force("creepage_y");
+    "spin_per_mm" Number |line| line.force("spin_per_mm");
+    "normal_force_n" Number |line| line.sum(|patch, _| Some(patch.normal_force_n));
+    "force_x_n" Number |line| line.force("force_x_n");
+    "force_y_n" Number |line| line.force("force_y_n");
+    "moment_z_n_mm" Number |line| line.force("moment_z_n_mm");
+    "error_force_x_n" Number |line| line.force("error_force_x_n");
+    "error_force_y_n" Number |line| line.force("error_force_y_n");
+    "error_moment_z_n_mm" Number |line| line.force("error_moment_z_n_mm");
+    "friction_power_n" Number |line| line.sum(|_, point| Some(point.friction_power_n));
+    "area_mm2" Number |line| line.sum(|patch, _| Some(patch.area_mm2));
+    "pressure_max_mpa" Number |line| line.largest(|patch, _| Some(patch.pressure_max_mpa));
+    "target_met" Text |line| line.verdict(|point| point.target_met, false);
+    "remarks" Text |line| line.remarks();
+    "error" Text |line| Some(line.error.to_owned()).filter(|error| !error.is_empty());
+    "patch" Place |line| line.patch.unwrap_or(0) as i64;
+    "cached" Text |line| Some(line.item.job.cached.to_string());
+    "friction_coefficient" Number |line| Some(line.solution?.asked.as_ref()?.friction_coefficient);
+    "friction_limit_n" Number |line| line.sum(|patch, _| patch.friction_limit_n);
+    "friction_power_without_spin_n" Number |line| line.sum(|_, point| Some(point.friction_power_without_spin_n));
+    "traction_max_mpa" Number |line| line.largest(|_, point| point.traction_max_mpa);
+    "stick_share" Number |line| { Some(line.sum(|_, point| point.stick_area_mm2)? / line.sum(|patch, _| Some(patch.area_mm2))?) };
+    "saturated" Text |line| line.verdict(|point| Some(point.saturated), true);
+    "contact_angle_rad" Number |line| line.of_one(|patch, _| Some(patch.position?.contact_angle_rad));
+    "rolling_radius_mm" Number |line| line.of_one(|patch, _| Some(patch.position?.rolling_radius_mm));
+    "track_y_mm" Number |line| line.of_one(|patch, _| Some(patch.position?.track_mm[1]));
+    "track_z_mm" Number |line| line.of_one(|patch, _| Some(patch.position?.track_mm[2]));
+    "force_track_y_n" Number |line| line.of_one(|_, point| Some(point.force_track_n?[1]));
+    "force_track_z_n" Number |line| line.of_one(|_, point| Some(point.force_track_n?[2]));
+    "semi_axis_x_mm" Number |line| line.of_one(|patch, _| Some(patch.semi_axes_mm?[0]));
+    "semi_axis_y_mm" Number |line| line.of_one(|patch, _| Some(patch.semi_axes_mm?[1]));
+    "wheel_lowering_mm" Number |line| line.solution?.wheel_lowering_mm;
+    "usfd_depth_nm" Number |line| line.worst(|point| Some(point.damage.as_deref()?.usfd_wear?.depth_nm.value));
+    "archard_depth_nm" Number |line| line.worst(|point| Some(point.damage.as_deref()?.archard_wear?.depth_nm.value));
+    "wlrm_damage" Number |line| line.worst(|point| Some(point.damage.as_deref()?.wlrm?.damage_per_pass.value));
+    "von_mises_max_mpa" Number |line| line.worst(|point| Some(point.subsurface?.worst?.von_mises_mpa));
+    "temperature_max_c" Number |line| line.worst(|point| Some(point.temperature?.max_c));
+};
 
 /// Before the key of a label.
 const LABEL: &str = "label:";
 
 /// The columns of a table.
 #[derive(Debug, Clone)]
-pub(crate) struct Columns(Vec<String>);
+pub(crate) struct Columns(Vec<(String, Of)>);
 
 impl Columns {
     /// The usual columns, and before `remarks` one for each of these labels.
     #[must_use]
     pub(crate) fn with_labels(keys: &[String]) -> Columns {
-        let mut names: Vec<String> = default_names().map(str::to_owned).collect();
-        let place = names.iter().position(|name| name == "remarks");
-        let place = place.unwrap_or(names.len());
-        names.splice(place..place, keys.iter().map(|key| format!("{LABEL}{key}")));
-        Columns(names)
+        let usual = COLUMNS[..USUAL].iter();
+        let mut columns: Vec<_> = usual.map(|(name, of)| ((*name).to_owned(), *of)).collect();
+        let place = columns.iter().position(|(name, _)| name == "remarks");
+        let place = place.unwrap_or(columns.len());
+        let labels = keys.iter().map(|key| (format!("{LABEL}{key}"), Of::Label));
+        columns.splice(place..place, labels);
+        Columns(columns)
     }
 
     /// Reads names with commas between.
     #[must_use]
     pub(crate) fn read(text: &str) -> Option<Columns> {
-        let known = |name: &str| {
-            default_names().any(|own| own == name)
-                || MORE.contains(&name)
-                || name.strip_prefix(LABEL).is_some_and(|key| !key.is_empty())
+        let column = |name: &str| {
+            let label = name.strip_prefix(LABEL).filter(|key| !key.is_empty());
+            let known = COLUMNS.iter().find(|(known, _)| *known == name);
+            let of = label.map(|_| Of::Label).or(known.map(|(_, of)| *of))?;
+            Some((name.to_owned(), of))
         };
-        let names: Vec<String> = text.split(',').map(str::to_owned).collect();
-        names
-            .iter()
-            .all(|name| known(name))
-            .then_some(Columns(names))
+        text.split(',')
+            .map(column)
+            .collect::<Option<_>>()
+            .map(Columns)
     }
 
     /// The names that there are, in words.
     #[must_use]
     pub(crate) fn allowed() -> String {
-        let names: Vec<&str> = default_names().chain(MORE).collect();
-        format!(
-            "names with commas between, of {} and `label:KEY`",
-            names.join(", ")
-        )
+        let names = COLUMNS.map(|(name, _)| name).join(", ");
+        format!("names with commas between, of {names} and `label:KEY`")
     }
 
     /// The names with the kinds of their values.
     pub(crate) fn kinds(&self) -> Vec<(String, TableKind)> {
-        let kind = |name: &String| match name.as_str() {
-            "index" | "point" | "patch" => TableKind::Integers,
-            "id" | "name" | "state" | "cached" | "target_met" | "saturated" | "remarks"
-            | "error" => TableKind::Texts,
-            name if name.starts_with(LABEL) => TableKind::Texts,
-            _ => TableKind::Numbers,
-        };
-        self.0
-            .iter()
-            .map(|name| (name.clone(), kind(name)))
-            .collect()
+        let columns = self.0.iter().map(|(name, of)| {
+            let kind = match of {
+                Of::Place(_) => TableKind::Integers,
+                Of::Number(_) => TableKind::Numbers,
+                Of::Text(_) | Of::Label => TableKind::Texts,
+            };
+            (name.clone(), kind)
+        });
+        columns.collect()
     }
 
     /// A table without rows.
@@ -115,19 +141,16 @@ impl Columns {
 
     /// Adds the line of a job without a result, with `error` saying why.
     pub(crate) fn add_without_result(&self, table: &mut RowTable, item: &BatchItem, error: &str) {
-        for (name, column) in &mut table.columns {
-            match column {
-                TableColumn::Integers(values) => values.push(match name.as_str() {
-                    "index" => i64::from(item.index),
-                    _ => 0,
-                }),
-                TableColumn::Numbers(values) => values.push(f64::NAN),
-                TableColumn::Texts(values) => values.push(match name.as_str() {
-                    "error" => Some(error.to_owned()).filter(|error| !error.is_empty()),
-                    name => of_job(item, name),
-                }),
-            }
-        }
+        self.add_line(
+            table,
+            &TableLine {
+                item,
+                solution: None,
+                point: 0,
+                patch: None,
+                error,
+            },
+        );
     }
 
     /// Adds the lines of these motions of a job.
@@ -138,7 +161,7 @@ impl Columns {
         solution: &Solution,
         points: Range<usize>,
     ) {
-        let by_patch = self.0.iter().any(|name| name == "patch");
+        let by_patch = self.0.iter().any(|(name, _)| name == "patch");
         for point in points {
             let patches: Vec<_> = match by_patch {
                 true => (0..solution.patches.len()).map(Some).collect(),
@@ -147,71 +170,57 @@ impl Columns {
             for patch in patches {
                 let line = TableLine {
                     item,
-                    solution,
+                    solution: Some(solution),
                     point,
                     patch,
+                    error: "",
                 };
-                for (name, column) in &mut table.columns {
-                    match column {
-                        TableColumn::Integers(values) => values.push(line.place_of(name)),
-                        TableColumn::Numbers(values) => {
-                            values.push(line.number(name).unwrap_or(f64::NAN));
-                        }
-                        TableColumn::Texts(values) => values.push(line.text(name)),
-                    }
+                self.add_line(table, &line);
+            }
+        }
+    }
+
+    fn add_line(&self, table: &mut RowTable, line: &TableLine<'_>) {
+        for ((name, of), (_, column)) in self.0.iter().zip(&mut table.columns) {
+            match (of, column) {
+                (Of::Place(of), TableColumn::Integers(values)) => values.push(of(line)),
+                (Of::Number(of), TableColumn::Numbers(values)) => {
+                    values.push(of(line).unwrap_or(f64::NAN));
                 }
+                (Of::Text(of), TableColumn::Texts(values)) => values.push(of(line)),
+                (Of::Label, TableColumn::Texts(values)) => {
+                    let key = name.strip_prefix(LABEL).unwrap_or_default();
+                    values.push(line.item.job.labels.get(key).cloned());
+                }
+                _ => unreachable!("the table has the kinds of these columns"),
             }
         }
     }
 }
 
-fn default_names() -> impl Iterator<Item = &'static str> {
-    FIRST.into_iter().chain(Forces::COLUMNS).chain(LAST)
-}
-
-/// Value of a text column that describes the job.
-fn of_job(item: &BatchItem, name: &str) -> Option<String> {
-    let job = &item.job;
-    match name {
-        "id" => Some(job.id.to_string()),
-        "name" => job.name.clone(),
-        "state" => Some(job.state.name().to_owned()),
-        "cached" => Some(job.cached.to_string()),
-        _ => job.labels.get(name.strip_prefix(LABEL)?).cloned(),
-    }
-}
-
-/// One line: a motion of a job, of one patch or of all of them together.
+/// One line: a motion of a job, of one patch or of all of them together, or a job without a result.
 struct TableLine<'a> {
     item: &'a BatchItem,
-    solution: &'a Solution,
+    solution: Option<&'a Solution>,
     point: usize,
     patch: Option<usize>,
+    error: &'a str,
 }
 
+/// A number of a patch and of the motion of the line on it.
+type OfPart = fn(&PatchSolution, &PointSolution) -> Option<f64>;
+
 impl TableLine<'_> {
-    fn place_of(&self, name: &str) -> i64 {
-        match name {
-            "index" => i64::from(self.item.index),
-            "point" => self.point as i64,
-            _ => self.patch.unwrap_or(0) as i64,
-        }
-    }
-
-    fn text(&self, name: &str) -> Option<String> {
-        match name {
-            "remarks" => Some(codes(&self.solution.remarks, self.point, self.patch)),
-            "target_met" => self.verdict(|point| point.target_met, false),
-            "saturated" => self.verdict(|point| Some(point.saturated), true),
-            name => of_job(self.item, name),
-        }
-    }
-
     /// The patches of the line, each with the motion of the line.
     fn parts(&self) -> impl Iterator<Item = (&PatchSolution, &PointSolution)> + Clone {
-        let patches = self.solution.patches.iter().enumerate();
-        let own = patches.filter(|(place, _)| self.patch.is_none_or(|patch| patch == *place));
+        let patches = self.solution.into_iter().flat_map(|found| &found.patches);
+        let own = patches.enumerate();
+        let own = own.filter(|(place, _)| self.patch.is_none_or(|patch| patch == *place));
         own.filter_map(|(_, patch)| Some((patch, patch.points.get(self.point)?)))
+    }
+
+    fn remarks(&self) -> Option<String> {
+        Some(codes(&self.solution?.remarks, self.point, self.patch))
     }
 
     /// True if it is of all patches, or of any of them; nothing where it is not told.
@@ -225,43 +234,27 @@ impl TableLine<'_> {
         Some(verdict.to_string())
     }
 
-    fn number(&self, name: &str) -> Option<f64> {
-        let of_patches = |of: fn(&PatchSolution) -> Option<f64>| {
-            self.parts()
-                .map(|(patch, _)| of(patch))
-                .sum::<Option<f64>>()
-        };
-        let largest = |of: fn(&(&PatchSolution, &PointSolution)) -> Option<f64>| {
-            self.parts().filter_map(|part| of(&part)).reduce(f64::max)
-        };
-        let of_points = |of: fn(&PointSolution) -> Option<f64>| {
-            self.parts()
-                .map(|(_, point)| of(point))
-                .sum::<Option<f64>>()
-        };
-        match name {
-            "normal_force_n" => of_patches(|patch| Some(patch.normal_force_n)),
-            "area_mm2" => of_patches(|patch| Some(patch.area_mm2)),
-            "friction_limit_n" => of_patches(|patch| patch.friction_limit_n),
-            "pressure_max_mpa" => largest(|(patch, _)| Some(patch.pressure_max_mpa)),
-            "traction_max_mpa" => largest(|(_, point)| point.traction_max_mpa),
-            "friction_power_n" => of_points(|point| Some(point.friction_power_n)),
-            "friction_power_without_spin_n" => {
-                of_points(|point| Some(point.friction_power_without_spin_n))
-            }
-            "stick_share" => {
-                let stick = of_points(|point| point.stick_area_mm2)?;
-                Some(stick / of_patches(|patch| Some(patch.area_mm2))?)
-            }
-            "friction_coefficient" => Some(self.solution.asked.as_ref()?.friction_coefficient),
-            "wheel_lowering_mm" => self.solution.wheel_lowering_mm,
-            "usfd_depth_nm" | "archard_depth_nm" | "wlrm_damage" | "von_mises_max_mpa"
-            | "temperature_max_c" => {
-                let worst = self.parts().map(|(_, point)| maintenance(point, name));
-                worst.reduce(|a, b| Some(a?.max(b?))).flatten()
-            }
-            _ => self.force(name).or_else(|| self.place(name)),
-        }
+    fn sum(&self, of: OfPart) -> Option<f64> {
+        self.solution?;
+        self.parts().map(|(patch, point)| of(patch, point)).sum()
+    }
+
+    fn largest(&self, of: OfPart) -> Option<f64> {
+        let values = self.parts().filter_map(|(patch, point)| of(patch, point));
+        values.reduce(f64::max)
+    }
+
+    /// The largest, if every patch has one.
+    fn worst(&self, of: fn(&PointSolution) -> Option<f64>) -> Option<f64> {
+        let values = self.parts().map(|(_, point)| of(point));
+        values.reduce(|a, b| Some(a?.max(b?))).flatten()
+    }
+
+    /// Of a single patch; nothing for several patches together.
+    fn of_one(&self, of: OfPart) -> Option<f64> {
+        let (patch, point) = self.parts().next()?;
+        let single = self.patch.is_some() || self.solution?.patches.len() == 1;
+        of(patch, point).filter(|_| single)
     }
 
     /// Motion, forces and their errors.
@@ -269,7 +262,7 @@ impl TableLine<'_> {
         let first = self.parts().next().map(|(_, point)| point);
         let motion = first.map(|point| point.motion);
         let forces = match self.patch {
-            None => Forces::of_total(motion, self.solution.total.get(self.point)?),
+            None => Forces::of_total(motion, self.solution?.total.get(self.point)?),
             Some(_) => {
                 let point = first?;
                 Forces {
@@ -280,43 +273,6 @@ impl TableLine<'_> {
             }
         };
         forces.number(name)
-    }
-
-    /// Where a patch lies, and its force in track axes; nothing for several patches together.
-    fn place(&self, name: &str) -> Option<f64> {
-        self.patch
-            .or((self.solution.patches.len() == 1).then_some(0))?;
-        let (patch, point) = self.parts().next()?;
-        if let Some([x, y]) = patch.semi_axes_mm {
-            match name {
-                "semi_axis_x_mm" => return Some(x),
-                "semi_axis_y_mm" => return Some(y),
-                _ => {}
-            }
-        }
-        let position = patch.position?;
-        match name {
-            "contact_angle_rad" => Some(position.contact_angle_rad),
-            "rolling_radius_mm" => Some(position.rolling_radius_mm),
-            "track_y_mm" => Some(position.track_mm[1]),
-            "track_z_mm" => Some(position.track_mm[2]),
-            "force_track_y_n" => Some(point.force_track_n?[1]),
-            "force_track_z_n" => Some(point.force_track_n?[2]),
-            _ => None,
-        }
-    }
-}
-
-/// Damage, stress and temperature of one patch.
-fn maintenance(point: &PointSolution, name: &str) -> Option<f64> {
-    let damage = point.damage.as_deref();
-    match name {
-        "usfd_depth_nm" => Some(damage?.usfd_wear?.depth_nm.value),
-        "archard_depth_nm" => Some(damage?.archard_wear?.depth_nm.value),
-        "wlrm_damage" => Some(damage?.wlrm?.damage_per_pass.value),
-        "von_mises_max_mpa" => Some(point.subsurface?.worst?.von_mises_mpa),
-        "temperature_max_c" => Some(point.temperature?.max_c),
-        _ => None,
     }
 }
 
