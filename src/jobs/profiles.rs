@@ -225,13 +225,14 @@ impl Jobs {
     /// The template with the values of the first row in place, checked; the columns have these places in the case and names.
     ///
     /// # Errors
-    /// A column has no place in the case, the case has faults, or it has several answers.
+    /// A column has no place in the case, the case has faults, it has several answers, or `refused` has a fault of it.
     pub fn first_row(
         &self,
         template: &Value,
         columns: &[VariedColumn],
         profiles: &BTreeMap<String, Value>,
         names: &[(&str, &str)],
+        refused: impl FnOnce(&CheckedCase) -> Option<Fault>,
     ) -> Result<(Value, CheckedCase), CaseError> {
         let case = case_of_row(template, columns, profiles, 0).map_err(|(pointer, reason)| {
             let detail = format!("the column `{pointer}` {reason}");
@@ -239,12 +240,16 @@ impl Jobs {
         })?;
         let checked = self.check(&case);
         let checked = checked.map_err(|error| of_first_row(error, names))?;
-        match several_answers(&checked) {
-            Some(fault) => Err(CaseError(vec![Fault {
-                pointer: format!("/template{}", fault.pointer),
-                ..fault
-            }])),
-            None => Ok((case, checked)),
+        let faults = several_answers(&checked).into_iter();
+        let faults = faults.chain(refused(&checked)).map(|fault| Fault {
+            pointer: format!("/template{}", fault.pointer),
+            ..fault
+        });
+        let faults: Vec<Fault> = faults.collect();
+        if faults.is_empty() {
+            Ok((case, checked))
+        } else {
+            Err(CaseError(faults))
         }
     }
 

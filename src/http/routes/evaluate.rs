@@ -357,7 +357,7 @@ impl Evaluation {
         let pointers: Vec<_> = pointers.map(|pointer| (pointer, pointer)).collect();
         let first = self
             .jobs
-            .first_row(&template, columns, &profiles, &pointers);
+            .first_row(&template, columns, &profiles, &pointers, |_| None);
         let (case, checked) = first?;
         // Beyond this number of rows the solver is not used.
         let solver_bytes = match rows <= SOLVED_ROWS_MAX {

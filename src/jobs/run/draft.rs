@@ -272,14 +272,10 @@ impl RunDraft {
         let names: Vec<(&str, &str)> = names
             .filter_map(|column| Some((column.pointer.as_deref()?, &*column.name)))
             .collect();
-        let first = self
-            .jobs
-            .first_row(&self.template, &varied, &profiles, &names);
+        let first =
+            self.jobs
+                .first_row(&self.template, &varied, &profiles, &names, fields_asked_for);
         let (case, checked) = first?;
-        let faults = faults_of_template(&checked);
-        if !faults.is_empty() {
-            return Err(CaseError(faults).into());
-        }
         let options = self.jobs.options();
         let rows = varied.first().map_or(1, |column| column.values.len());
         let task = ManyTask {
@@ -352,22 +348,15 @@ impl RunDraft {
     }
 }
 
-/// What the case of a run may not ask for.
-fn faults_of_template(checked: &CheckedCase) -> Vec<Fault> {
-    let mut faults = Vec::new();
+/// The fault of a case that asks for more than numbers.
+fn fields_asked_for(checked: &CheckedCase) -> Option<Fault> {
     let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
-    if let Some(other) = checked
-        .run
-        .outputs
-        .iter()
-        .find(|asked| !numbers.contains(asked))
-    {
-        let detail = format!(
-            "{other:?} asked for; rows are answered with numbers: allowed are `resultants`, `zones`, which gives the share that sticks, and `gradients`"
-        );
-        faults.push(Fault::new("/template/outputs", detail));
-    }
-    faults
+    let mut asked = checked.run.outputs.iter();
+    let other = asked.find(|asked| !numbers.contains(asked))?;
+    let detail = format!(
+        "{other:?} asked for; rows are answered with numbers: allowed are `resultants`, `zones`, which gives the share that sticks, and `gradients`"
+    );
+    Some(Fault::new("/outputs", detail))
 }
 
 fn faults_of_columns(columns: &[RunColumn]) -> Vec<Fault> {
