@@ -17,7 +17,7 @@ use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel::WheelTask;
 use crate::contact::numerics::roots::{FRACTION_MAX, RootExit, find_searched};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::physics::Run;
+use crate::contact::problem::physics::{Problem, Run};
 use crate::contact::profile_assessment::trust;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::force_places::CubicLaw;
@@ -92,25 +92,34 @@ struct Reach {
 
 impl FirstEstimate {
     fn of(solution: &Solution, case: &CheckedCase, rolling: FreeRollingState) -> FirstEstimate {
-        let CheckedCase { problem, .. } = case;
-        let (mut limit, mut lateral_normal) = (0.0, 0.0);
-        for patch in &solution.patches {
-            limit += patch.friction_limit_n.unwrap_or(0.0);
-            lateral_normal += patch.normal_force_n * angle_of(patch).sin().abs();
-        }
-        let shapes = solution.patches.iter().map(|patch| {
-            let [x_min, x_max, y_min, y_max] = patch.extent_mm;
-            ((x_max - x_min) / (y_max - y_min), patch.area_mm2)
-        });
-        let law = CubicLaw::of_patches(&problem.elasticity, problem.interface, shapes, limit);
+        let patches = &solution.patches;
+        let (limit, law) = limit_and_law(&case.problem, patches.iter());
+        let sizes = patches
+            .iter()
+            .map(|patch| patch.normal_force_n * angle_of(patch).sin().abs());
         FirstEstimate {
             limit,
             law,
             rolling: rolling.of(&solution.patches),
             lateral: solution.total[0].force_y_n,
-            lateral_normal,
+            lateral_normal: sizes.sum(),
         }
     }
+}
+
+/// Friction limit in N of patches together, and their cubic law.
+pub(crate) fn limit_and_law<'p>(
+    problem: &Problem,
+    patches: impl Iterator<Item = &'p PatchSolution> + Clone,
+) -> (f64, CubicLaw) {
+    let limits = patches.clone().filter_map(|patch| patch.friction_limit_n);
+    let limit = limits.sum();
+    let shapes = patches.map(|patch| {
+        let [x_min, x_max, y_min, y_max] = patch.extent_mm;
+        ((x_max - x_min) / (y_max - y_min), patch.area_mm2)
+    });
+    let law = CubicLaw::of_patches(&problem.elasticity, problem.interface, shapes, limit);
+    (limit, law)
 }
 
 /// The search for the motion of one wheel.

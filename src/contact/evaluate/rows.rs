@@ -161,19 +161,17 @@ impl Rows {
         let at = |variable: Variable| row[variable as usize];
         let [modulus, poisson] = self.material(row);
         let force = at(Variable::NormalForce);
-        let ([a, b], ratio) = if self.radii {
+        let [a, b] = if self.radii {
             let radii = [at(Variable::Rolling), at(Variable::Lateral)];
             let shape = shapes.hertz(radii);
-            let axes = shape.semi_axes(force, modulus / (1.0 - poisson));
-            (axes, shape.ratio())
+            shape.semi_axes(force, modulus / (1.0 - poisson))
         } else {
-            let [a, b] = [at(Variable::SemiAxisA), at(Variable::SemiAxisB)];
-            ([a, b], a / b)
+            [at(Variable::SemiAxisA), at(Variable::SemiAxisB)]
         };
         let patch = RowPatch {
             limit: at(Variable::Friction) * force,
             c: (a * b).sqrt(),
-            ratio,
+            ratio: a / b,
             modulus: self.reduction * modulus,
             poisson,
         };
@@ -187,7 +185,6 @@ impl Rows {
             pressure_max: 1.5 * (force / a) / (PI * b),
             approach: 0.0,
             normal_force: force,
-            shape: None,
         };
         let friction = at(Variable::Friction);
         let lost = friction > 0.0 && friction < COEFFICIENT_LEAST;

@@ -21,8 +21,6 @@ pub struct Ellipse {
     pub approach: f64,
     /// Normal force in N: as given where it was, so that no digit of it is lost.
     pub normal_force: f64,
-    /// The shape of the radii that it follows from, where radii were given.
-    pub shape: Option<HertzShape>,
 }
 
 /// How two bodies are pressed together.
@@ -49,42 +47,17 @@ impl Ellipse {
         loading: NormalLoad,
         contact_modulus: f64,
     ) -> Ellipse {
-        // The larger semi-axis lies along the larger radius, where the gap opens more slowly.
-        let (radius_large, radius_small) = (rolling.max(lateral), rolling.min(lateral));
-        let ratio = axis_ratio(radius_small / radius_large);
-        let (k_integral, d_integral) = complete_integrals(ratio);
-        let curvature = 0.5 / radius_large;
-        let large = match loading {
-            NormalLoad::Force(force) => {
-                (1.5 * force * d_integral / (PI * contact_modulus * curvature)).cbrt()
-            }
+        let shape = HertzShape::of_radii(rolling, lateral);
+        let [a, b] = match loading {
+            NormalLoad::Force(force) => shape.semi_axes(force, contact_modulus),
             NormalLoad::Approach(approach) => {
-                (approach * d_integral / (curvature * k_integral)).sqrt()
+                let (k_integral, _) = complete_integrals(shape.ratio);
+                shape.of_larger(
+                    (approach * shape.d_integral / (shape.curvature * k_integral)).sqrt(),
+                )
             }
         };
-        let small = ratio * large;
-        let (a, b) = if rolling >= lateral {
-            (large, small)
-        } else {
-            (small, large)
-        };
-        Ellipse {
-            shape: Some(HertzShape::of_radii(rolling, lateral)),
-            ..Ellipse::of_semi_axes(a, b, loading, contact_modulus)
-        }
-    }
-
-    /// Semi-axes in mm and their ratio a/b as rows of many contacts have them: of radii to 1e-11, by the shape. The table of creep forces takes
-    /// these, so that a case and a row have the same answer to the last bit.
-    #[must_use]
-    pub fn axes_of_rows(&self, contact_modulus: f64) -> ([f64; 2], f64) {
-        match self.shape {
-            Some(shape) => (
-                shape.semi_axes(self.normal_force, contact_modulus),
-                shape.ratio(),
-            ),
-            None => ([self.a, self.b], self.a / self.b),
-        }
+        Ellipse::of_semi_axes(a, b, loading, contact_modulus)
     }
 
     /// The contact with semi-axes `a` along and `b` across rolling in mm, and contact modulus `E*` in MPa:
@@ -110,7 +83,6 @@ impl Ellipse {
                 NormalLoad::Force(force) => force,
                 NormalLoad::Approach(_) => PI * a * b * pressure_max * 2.0 / 3.0,
             },
-            shape: None,
         }
     }
 
@@ -246,11 +218,12 @@ pub struct HertzShape {
 }
 
 impl HertzShape {
-    /// The shape of bodies with relative radii of curvature `rolling` and `lateral` in mm; relative accuracy about 1e-11.
+    /// The shape of bodies with relative radii of curvature `rolling` and `lateral` in mm. The larger semi-axis lies along the larger radius, where
+    /// the gap opens more slowly.
     #[must_use]
     pub fn of_radii(rolling: f64, lateral: f64) -> HertzShape {
         let (large, small) = (rolling.max(lateral), rolling.min(lateral));
-        let (ratio, d_integral) = axis_ratio_and_integral(small / large);
+        let (ratio, d_integral) = axis_ratio(small / large);
         HertzShape {
             ratio,
             d_integral,
@@ -259,21 +232,15 @@ impl HertzShape {
         }
     }
 
-    /// a/b, the semi-axis along rolling by that across; the same under every load.
-    #[must_use]
-    pub fn ratio(&self) -> f64 {
-        if self.long {
-            1.0 / self.ratio
-        } else {
-            self.ratio
-        }
-    }
-
     /// Semi-axes along and across rolling in mm under a normal force in N, with the contact modulus `E*` in MPa.
     #[must_use]
     pub fn semi_axes(&self, force: f64, contact_modulus: f64) -> [f64; 2] {
         let cube = 1.5 * force * self.d_integral / (PI * contact_modulus * self.curvature);
-        let large = cube.cbrt();
+        self.of_larger(cube.cbrt())
+    }
+
+    /// Both semi-axes with the larger one.
+    fn of_larger(&self, large: f64) -> [f64; 2] {
         let small = self.ratio * large;
         if self.long {
             [large, small]
@@ -300,43 +267,42 @@ pub struct Patch {
     pub extent: [f64; 4],
 }
 
-/// Of the ratio A/B of the curvatures, both from 0 to 1: the ratio k of the semi-axes as [`axis_ratio`], to about 1e-11, and the integral D
-/// there, with a single evaluation of the integrals.
+/// Of the ratio A/B of the curvatures, both from 0 to 1: the ratio k of the semi-axes, smaller to larger, and the integral D there.
 ///
-/// A rational function that is right to 1e-6 gives the k at which they are evaluated; the rest is a step of Newton, whose derivatives
-/// the integrals themselves give: `dK/dk = −(K − D)/k` and `dD/dk = −k (r⁻¹ − 1) D/m` with the `r = k² D/(K − D)` of that k and
+/// Solves `k² D(k)/(K(k) − D(k)) = A/B` by Newton's method for ln k from a rational function that is right to 1e-6 unless the ellipse is very slender. The
+/// derivatives follow from the integrals themselves: `dK/dk = −(K − D)/k` and `dD/dk = −k (r⁻¹ − 1) D/m` with the `r = k² D/(K − D)` of that k and
 /// `m = 1 − k²`.
-pub(crate) fn axis_ratio_and_integral(curvature_ratio: f64) -> (f64, f64) {
+pub(crate) fn axis_ratio(curvature_ratio: f64) -> (f64, f64) {
+    const STEPS_MAX: usize = 40;
     let ln_curvatures = curvature_ratio.ln();
-    if ln_curvatures < -LN_CURVATURES_FITTED {
-        let k = axis_ratio(curvature_ratio);
-        return (k, complete_integrals(k).1);
-    }
     let square = ln_curvatures * ln_curvatures;
     let sum = |c: [f64; 4]| c[0] + square * (c[1] + square * (c[2] + square * c[3]));
-    let k = (ln_curvatures * sum(POWER_ABOVE) / sum(POWER_BELOW))
+    let mut k = (ln_curvatures * sum(POWER_ABOVE) / sum(POWER_BELOW))
         .exp()
         .min(1.0);
-    let (k_integral, d) = complete_integrals(k);
-    let rest = k_integral - d;
-    let m = (1.0 - k) * (1.0 + k);
-    let r = k * k * d / rest;
-    // (1 − r)/m, which is 3/4 at the circle.
-    let share = if m > 1e-8 { (1.0 - r) / m } else { 0.75 };
-    let off = curvature_ratio / r - 1.0;
-    let ln_off = 2.0 * off / (2.0 + off);
-    let step = ln_off / (3.0 - share * (1.0 + rest / d));
-    (
-        (k * (1.0 + step + 0.5 * step * step)).min(1.0),
-        d - rest * share * step,
-    )
+    let mut d = 0.0;
+    for _ in 0..STEPS_MAX {
+        let (k_integral, found) = complete_integrals(k);
+        let rest = k_integral - found;
+        let m = (1.0 - k) * (1.0 + k);
+        let r = k * k * found / rest;
+        // (1 − r)/m, which is 3/4 at the circle.
+        let share = if m > 1e-8 { (1.0 - r) / m } else { 0.75 };
+        let off = curvature_ratio / r - 1.0;
+        let ln_off = 2.0 * off / (2.0 + off);
+        let step = ln_off / (3.0 - share * (1.0 + rest / found));
+        k = (k * (1.0 + step + 0.5 * step * step)).min(1.0);
+        d = found - rest * share * step;
+        // What is left is of the second order.
+        if step.abs() < 1e-8 {
+            break;
+        }
+    }
+    (k, d)
 }
 
-/// The smallest ratio of curvatures that the quotient below was fitted to is exp of minus this.
-const LN_CURVATURES_FITTED: f64 = 10.0;
 /// For A/B from exp(−10) to 1, `ln k/ln(A/B)` is 2/3 at the circle and falls slowly: a quotient of two polynomials of `ln²(A/B)`, fitted
-/// to our own inverse of A/B so that the largest error of ln k (1.0e-6) is least. How good the guess is decides the error after the one step that follows, which
-/// `one_evaluation_gives_the_axis_ratio_and_the_integral` holds below 2e-12. The numerator.
+/// to our own inverse of A/B so that the largest error of ln k (1.0e-6) is least. The numerator.
 const POWER_ABOVE: [f64; 4] = [
     2.0 / 3.0,
     0.052_821_991_585_557_69,
@@ -350,28 +316,6 @@ const POWER_BELOW: [f64; 4] = [
     1.600_879_939_140_760_7e-3,
     4.910_379_437_887_814_5e-6,
 ];
-
-/// Ratio of the semi-axes (smaller to larger) for the ratio A/B of the curvatures, both from 0 to 1.
-///
-/// Solves `k² D(k)/(K(k) − D(k)) = A/B` by iterating `k = √(A/B (K − D)/D)`. The bracket varies slowly with k: each
-/// step reduces the error at least fourfold, from the circle (where `A/B ≈ k^{3/2}`) to any slender ellipse.
-pub(crate) fn axis_ratio(curvature_ratio: f64) -> f64 {
-    const STEPS_MAX: usize = 40;
-    let mut k = curvature_ratio.powf(2.0 / 3.0);
-    for _ in 0..STEPS_MAX {
-        let (k_integral, d_integral) = complete_integrals(k);
-        let next = (curvature_ratio * (k_integral - d_integral) / d_integral)
-            .sqrt()
-            .min(1.0);
-        let change = (next - k).abs();
-        k = next;
-        if change <= f64::EPSILON * k {
-            break;
-        }
-    }
-    // A quarter to the power of the steps is 1e-24: the loop has converged for every ratio that a case may have.
-    k
-}
 
 /// Complete elliptic integrals K and `D = (K − E)/m` of parameter m = 1 − k², for 0 < k ≤ 1.
 ///
@@ -400,19 +344,6 @@ pub(crate) fn complete_integrals(k: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_shape_of_radii_has_the_semi_axes_of_the_ellipse() {
-        for exponent in -90..=90 {
-            let lateral = 300.0 * 10.0_f64.powf(f64::from(exponent) / 15.0);
-            let [a, b] = HertzShape::of_radii(300.0, lateral).semi_axes(9e4, 1.1e5);
-            let ellipse = Ellipse::of_radii(300.0, lateral, NormalLoad::Force(9e4), 1.1e5);
-            for (found, known) in [(a, ellipse.a), (b, ellipse.b)] {
-                let error = (found / known - 1.0).abs();
-                assert!(error < 1e-10, "{lateral}: {found} {known}");
-            }
-        }
-    }
 
     #[test]
     fn cells_of_a_chord_add_up_to_its_load() {
@@ -535,8 +466,9 @@ mod axis_ratio_tests {
     fn the_axis_ratio_inverts_the_curvature_ratio() {
         for exponent in -160..=0 {
             let ratio = 10.0_f64.powf(f64::from(exponent) / 10.0);
-            let k = axis_ratio(ratio);
+            let (k, own) = axis_ratio(ratio);
             let (k_integral, d) = complete_integrals(k);
+            assert!((own / d - 1.0).abs() < 1e-13, "A/B = {ratio}: {own} {d}");
             let back = k * k * d / (k_integral - d);
             assert!(
                 (back / ratio - 1.0).abs() < 1e-13,
@@ -545,25 +477,10 @@ mod axis_ratio_tests {
         }
         for distance in [0.0_f64, 1e-15, 1e-12, 1e-8, 1e-4] {
             // Near the circle A/B = k^{3/2} to first order.
-            let k = axis_ratio(1.0 - distance);
+            let (k, _) = axis_ratio(1.0 - distance);
             assert!(
                 (1.0 - k - distance * 2.0 / 3.0).abs() < 1e-15 + distance * distance,
                 "{distance}: {k}"
-            );
-        }
-    }
-
-    #[test]
-    fn one_evaluation_gives_the_axis_ratio_and_the_integral() {
-        for step in 0..=300 {
-            // Up to and beyond where the first guess is fitted.
-            let ratio = (-0.04 * f64::from(step)).exp();
-            let (k, d) = axis_ratio_and_integral(ratio);
-            let known = axis_ratio(ratio);
-            let errors = [k / known - 1.0, d / complete_integrals(known).1 - 1.0];
-            assert!(
-                errors.iter().all(|e| e.abs() < 2e-12),
-                "{ratio}: {errors:?}"
             );
         }
     }

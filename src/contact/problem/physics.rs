@@ -170,10 +170,8 @@ impl Problem {
     /// Does the table of creep forces cover the patch?
     pub(crate) fn is_in_table(&self) -> bool {
         let inside = |plain: PlainContact| {
-            let (_, ratio) = plain
-                .ellipse
-                .axes_of_rows(self.elasticity.contact_modulus());
-            outside(ratio).is_none()
+            let Ellipse { a, b, .. } = plain.ellipse;
+            outside(a / b).is_none()
         };
         self.plain().is_some_and(inside) && unlike(&self.elasticity).is_none()
     }

@@ -271,6 +271,16 @@ impl StripMesh {
         first.start..cells.next_back().map_or(first.end, |c| c.end)
     }
 
+    /// Values of the unknowns of a parity, along x then across, over the whole mesh.
+    pub(crate) fn expand(&self, parity: Option<Parity>, values: &[f64]) -> [Vec<f64>; 2] {
+        let (x, y) = values.split_at(values.len() / 2);
+        match parity {
+            None => [x, y].map(|values| values[..self.mesh.cells()].to_vec()),
+            Some(Parity::Longitudinal) => [self.unfold(x, 1.0), self.unfold(y, -1.0)],
+            Some(Parity::Lateral) => [self.unfold(x, -1.0), self.unfold(y, 1.0)],
+        }
+    }
+
     /// Values of the first half of the segments continued to the mirrored half: `sign` is that of the image.
     #[must_use]
     pub fn unfold(&self, half: &[f64], sign: f64) -> Vec<f64> {

@@ -25,6 +25,7 @@ use crate::contact::solution::words::answer::{
 };
 use crate::contact::solution::words::damage::ProfileUncertainty;
 use crate::contact::surface_fallback;
+use crate::contact::wheel_force_control::limit_and_law;
 use crate::contact::wheel_on_rail::SolvedWheel;
 use crate::contact::wheelset::kinematics;
 
@@ -37,8 +38,6 @@ const LEVEL_POOR: f64 = 1e-2;
 /// A torque is balanced to this part of the target of forces, and at least to this part of the friction limit.
 const TORQUE_OF_TARGET: f64 = 0.2;
 const TORQUE_LEAST: f64 = 1e-4;
-/// Kalker's coefficient C₁₁ of a circle at ν = 0.28, for the unit of creepage in the search for the angular velocity.
-const C11: f64 = 4.3;
 
 /// A wheelset that is to be solved in one position.
 pub(crate) struct WheelsetSolve<'a> {
@@ -183,7 +182,6 @@ impl WheelsetSolve<'_> {
         let radius = 0.5 * (rigid.touches[0].radius + rigid.touches[1].radius);
         let free = motion.speed / radius;
         let target = self.case.run.resolution.target_or_usual();
-        let modulus = self.case.problem.elasticity.shear_modulus;
         // What the search calls 1: the slip at which linear theory reaches the limit of friction.
         let (mut unit, mut last) = (None, None);
         let root = find_root(0.0, |place, tolerance: &mut f64| {
@@ -194,12 +192,8 @@ impl WheelsetSolve<'_> {
             };
             let both = self.level(pose, &moving)?;
             let patches = both.found.iter().flat_map(|found| &found.solution.patches);
-            let (mut limit, mut stiffness) = (0.0, 0.0);
-            for patch in patches {
-                limit += patch.friction_limit_n.unwrap_or(0.0);
-                stiffness += C11 * modulus * patch.area_mm2 / std::f64::consts::PI;
-            }
-            unit.get_or_insert(limit / stiffness);
+            let (limit, law) = limit_and_law(&self.case.problem, patches);
+            unit.get_or_insert(1.0 / law.stiffness[0]);
             let rails = torque_of_rails(&both.found, *pose, both.height());
             last = Some((both, velocity));
             *tolerance = (TORQUE_OF_TARGET * target).max(TORQUE_LEAST);

@@ -1,6 +1,5 @@
 //! What a step has done: friction work, elastic energy, and the record of a point.
 
-use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::rolling::answer::{Resultants, project_on_bound};
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan::{PointRecord, StepEquations, StepKind, weights};
@@ -142,11 +141,6 @@ impl LevelRun<'_> {
 
     /// Values of the unknowns over the whole mesh.
     pub(super) fn expand(&self, values: &[f64]) -> [Vec<f64>; 2] {
-        let (x, y) = values.split_at(values.len() / 2);
-        match self.parity {
-            None => [x, y].map(|v| v[..self.level.mesh.cells()].to_vec()),
-            Some(Parity::Longitudinal) => [self.level.unfold(x, 1.0), self.level.unfold(y, -1.0)],
-            Some(Parity::Lateral) => [self.level.unfold(x, -1.0), self.level.unfold(y, 1.0)],
-        }
+        self.level.expand(self.parity, values)
     }
 }

@@ -412,11 +412,6 @@ impl<'a> RuleSequence<'a> {
 
     /// Values of the unknowns (x then y) as two vectors over the whole mesh.
     pub(super) fn expand(&self, values: &[f64]) -> [Vec<f64>; 2] {
-        let (x, y) = values.split_at(values.len() / 2);
-        match self.parity {
-            None => [x, y].map(|v| v[..self.level.mesh.cells()].to_vec()),
-            Some(Parity::Longitudinal) => [self.level.unfold(x, 1.0), self.level.unfold(y, -1.0)],
-            Some(Parity::Lateral) => [self.level.unfold(x, -1.0), self.level.unfold(y, 1.0)],
-        }
+        self.level.expand(self.parity, values)
     }
 }

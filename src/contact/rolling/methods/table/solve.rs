@@ -8,7 +8,6 @@ use crate::contact::friction::path_dependent::Interface;
 use crate::contact::half_space::unlike_bodies::Elasticity;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
-use crate::contact::normal::hertz::Ellipse;
 use crate::contact::remark::kind::Rounded;
 use crate::contact::rolling::answer::{MotionAnswer, PatchGradients, Resultants, Work};
 use crate::contact::rolling::load_ellipse::LoadEllipse;
@@ -48,13 +47,9 @@ pub fn solve(
     let (mut of_all, mut limits) = (0.0, 0.0);
     let mut errors = Vec::with_capacity(patches.len() + 1);
     for (number, ellipse) in ellipses.iter().enumerate() {
-        let place = match task.footprint.ellipse() {
-            Some(hertz) => TableEllipse::of_hertz(hertz, task.elasticity),
-            None => TableEllipse::of_load(ellipse),
-        };
-        covers(number, ellipse.load_mismatch, place.ratio)?;
+        covers(number, ellipse.load_mismatch, ellipse.ratio())?;
         let limit = task.friction.limit(task.footprint, number);
-        let answer = on_ellipse(task, &place, limit, motion);
+        let answer = on_ellipse(task, ellipse, limit, motion);
         let mut error = answer.error;
         if ellipse.load_mismatch > 0.0 {
             error += PER_MISPLACED * ellipse.load_mismatch + ANY_SHAPE;
@@ -148,63 +143,32 @@ pub(crate) fn forces(
     if limit <= 0.0 {
         return [0.0; 2];
     }
-    let ellipse = TableEllipse::of_load(ellipse);
-    let creepage = dimensionless(shear_modulus, &ellipse, limit, motion);
-    let ratio = ellipse.ratio.clamp(RATIO_MIN, RATIO_MAX);
+    let creepage = dimensionless(shear_modulus, ellipse, limit, motion);
+    let ratio = ellipse.ratio().clamp(RATIO_MIN, RATIO_MAX);
     let at_ratio = table().ellipse(ratio, poisson_ratio);
     let Creep { force, .. } = at_ratio.interpolated(creepage);
     [limit * force[0], limit * force[1]]
 }
 
-/// An ellipse as the table takes it.
-#[derive(Debug, Clone, Copy)]
-struct TableEllipse {
-    /// Its centre in mm.
-    centre: [f64; 2],
-    /// c = √(ab) in mm.
-    length: f64,
-    /// a/b.
-    ratio: f64,
-}
-
-impl TableEllipse {
-    fn of_load(ellipse: &LoadEllipse) -> TableEllipse {
-        TableEllipse {
-            centre: ellipse.centre,
-            length: ellipse.length(),
-            ratio: ellipse.ratio(),
-        }
-    }
-
-    fn of_hertz(ellipse: &Ellipse, elasticity: &Elasticity) -> TableEllipse {
-        let ([a, b], ratio) = ellipse.axes_of_rows(elasticity.contact_modulus());
-        TableEllipse {
-            centre: [0.0; 2],
-            length: (a * b).sqrt(),
-            ratio,
-        }
-    }
-}
-
 /// `[F_x/(μN), F_y/(μN), M_z/(μN√(ab))]` about the centre of an ellipse as resultants about the origin of the case.
-fn about_origin(ellipse: &TableEllipse, limit: f64, force: [f64; 3]) -> Resultants {
+fn about_origin(ellipse: &LoadEllipse, limit: f64, force: [f64; 3]) -> Resultants {
     let [x, y] = ellipse.centre;
     let [force_x, force_y] = [force[0], force[1]].map(|part| limit * part);
     Resultants {
         force_x,
         force_y,
-        moment_z: limit * ellipse.length * force[2] + x * force_y - y * force_x,
+        moment_z: limit * ellipse.length() * force[2] + x * force_y - y * force_x,
     }
 }
 
 /// Creepages about the centre of an ellipse and spin, as the table has them.
 fn dimensionless(
     shear_modulus: f64,
-    ellipse: &TableEllipse,
+    ellipse: &LoadEllipse,
     limit: f64,
     motion: &Motion,
 ) -> [f64; 3] {
-    let c = ellipse.length;
+    let c = ellipse.length();
     let [x, y] = ellipse.centre;
     let unit = shear_modulus * c * c / limit;
     let spin = motion.spin_per_mm;
@@ -226,7 +190,7 @@ struct PatchAnswer {
 /// Forces in N on a patch that an ellipse stands for, about the origin of the case; `limit` is μN in N.
 fn on_ellipse(
     task: &RollingTask,
-    ellipse: &TableEllipse,
+    ellipse: &LoadEllipse,
     limit: f64,
     motion: &Motion,
 ) -> PatchAnswer {
@@ -238,12 +202,12 @@ fn on_ellipse(
             gradients: PatchGradients::default(),
         };
     }
-    let c = ellipse.length;
+    let c = ellipse.length();
     let [x, y] = ellipse.centre;
     let modulus = task.interface.reduction * task.elasticity.shear_modulus;
     let unit = modulus * c * c / limit;
     let creepage = dimensionless(modulus, ellipse, limit, motion);
-    let here = table().ellipse(ellipse.ratio, task.elasticity.poisson_ratio);
+    let here = table().ellipse(ellipse.ratio(), task.elasticity.poisson_ratio);
     let (
         Creep {
             force,
