@@ -391,11 +391,11 @@ impl<'a> WheelSolve<'a> {
         Ok(())
     }
 
-    /// The patches with their places on both bodies.
-    fn patches(&self, contact: &CurveContact) -> Result<Vec<WheelPatch>, SolveError> {
+    /// The patches with their places on both bodies; without `edges`, they end at their outermost samples.
+    fn patches(&self, contact: &CurveContact, edges: bool) -> Result<Vec<WheelPatch>, SolveError> {
         let mut patches = Vec::new();
         for strips in contact.parts(self.influence) {
-            let field = CurveContact::field(contact.patches(strips)?)?;
+            let field = CurveContact::field(contact.patches(strips, edges)?)?;
             for (number, patch) in field.patches().into_iter().enumerate() {
                 let centre = field.load_centre(Some(number));
                 let (place, wheel) = self.load_centre(contact, centre)?;
@@ -420,7 +420,7 @@ impl<'a> WheelSolve<'a> {
 
     /// The wheel at rest.
     fn wheel(&self, contact: &CurveContact) -> Result<WheelContact, SolveError> {
-        let patches = self.patches(contact)?;
+        let patches = self.patches(contact, true)?;
         self.check_ends(contact)?;
         let slender = patches.iter().map(WheelPatch::patch).find(|patch| {
             let [rear, front, low, high] = patch.extent;

@@ -4,6 +4,8 @@
 //! has the answer. Its strips lie at multiples of their width from the origin of the arc length, whatever the height is, and leave out what lies
 //! between the patches.
 
+use std::borrow::Cow;
+
 use crate::contact::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCurve, SPACING};
 use crate::contact::half_space::bent_surface::{
     BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
@@ -84,6 +86,8 @@ pub(crate) struct CurveContact {
     /// The gap in mm that tractions open at each cell, where any do.
     pub(crate) opened: Option<Vec<f64>>,
     over: WheelOverGrid,
+    /// Where the bodies overlap with the wheel's centre at some height in mm: ends of arc lengths in mm. Known of the coarse grid.
+    overlaps: (f64, Vec<[f64; 2]>),
     /// Strips whose deformed surfaces nearly touch.
     near: Vec<bool>,
     /// The pressures of the patches with their first strips.
@@ -162,7 +166,10 @@ impl CurveTask<'_> {
         };
         let mut last = None;
         for _ in 0..GRIDS_MAX {
-            let grid = self.over_overlaps(lowering)?;
+            // So that a little more than the lowering still fits.
+            let deepest = self.touch - 1.1 * lowering;
+            let overlaps = self.curve.overlaps(deepest);
+            let grid = self.over_overlaps(lowering, &overlaps)?;
             let centre = self.touch - lowering;
             let over = grid.over(self.curve, centre);
             let runs = match self.influence {
@@ -177,7 +184,7 @@ impl CurveTask<'_> {
                 runs,
                 pressure: vec![0.0; grid.x.len() * grid.places.len()],
                 operator: None,
-                over: None,
+                over: Some(over),
                 grid,
                 centre,
                 iterations: 0,
@@ -188,6 +195,10 @@ impl CurveTask<'_> {
             let close = (next / lowering - 1.0).abs() < 0.1;
             lowering = next.max(LOWERING_LEAST);
             let found = last.insert(found);
+            found.overlaps = (
+                deepest,
+                overlaps.iter().map(|overlap| ends(overlap)).collect(),
+            );
             if self.influence == Influence::HalfSpace {
                 found.runs = found.grid.joined(found.grid.runs(&found.pressure));
             }
@@ -218,11 +229,16 @@ impl CurveTask<'_> {
             .filter(|(_, near)| **near)
             .map(|(place, _)| [place.s - beside, place.s + beside])
             .collect();
-        // Overlaps narrower than a cell of the coarse grid.
-        for overlap in self.curve.overlaps(coarse.centre) {
-            let [low, high] = [0, overlap.len() - 1].map(|k| overlap[k].place.s);
-            if windows.iter().all(|[from, to]| *to < low || *from > high) {
-                windows.push([low - beside, high + beside]);
+        // Overlaps narrower than a cell of the coarse grid. At the present height there are no others than at a lower one.
+        let missed = |windows: &[[f64; 2]], [low, high]: [f64; 2]| {
+            windows.iter().all(|[from, to]| *to < low || *from > high)
+        };
+        let (deepest, overlaps) = &coarse.overlaps;
+        if coarse.centre < *deepest || overlaps.iter().any(|of| missed(&windows, *of)) {
+            for [low, high] in self.curve.overlaps(coarse.centre).iter().map(|o| ends(o)) {
+                if missed(&windows, [low, high]) {
+                    windows.push([low - beside, high + beside]);
+                }
             }
         }
         let grid = CurveGrid::new(self.curve, [first - margin, last + margin], &windows, step);
@@ -267,23 +283,24 @@ impl CurveTask<'_> {
             iterations: before.work.iterations,
         };
         let tolerance = self.fineness.tolerance;
-        self.settled(start, friction, tolerance, workspace, monitor)
+        let mut found = self.settled(start, friction, tolerance, workspace, monitor)?;
+        found.overlaps = before.overlaps;
+        Ok(found)
     }
 
-    /// A coarse grid over all places where the bodies overlap at a lowering in mm.
-    fn over_overlaps(&self, lowering: f64) -> Result<CurveGrid, NormalError> {
-        // So that a little more than the lowering still fits.
-        let centre = self.touch - 1.1 * lowering;
-        let overlaps = self.curve.overlaps(centre);
+    /// A coarse grid for a lowering in mm over all places where the bodies overlap.
+    fn over_overlaps(
+        &self,
+        lowering: f64,
+        overlaps: &[Vec<Nearest>],
+    ) -> Result<CurveGrid, NormalError> {
         let mut along = [f64::INFINITY, f64::NEG_INFINITY];
         let (mut widest, mut longest): (f64, f64) = (2.0 * SPACING, 0.0);
         let mut windows = Vec::with_capacity(overlaps.len());
         let [first, last] = self.curve.range();
-        for overlap in &overlaps {
-            let window = [
-                (overlap[0].place.s - SPACING).max(first),
-                (overlap[overlap.len() - 1].place.s + SPACING).min(last),
-            ];
+        for overlap in overlaps {
+            let [low, high] = ends(overlap);
+            let window = [(low - SPACING).max(first), (high + SPACING).min(last)];
             widest = widest.max(window[1] - window[0] - SPACING);
             windows.push(window);
             for Nearest { x, wheel, .. } in overlap {
@@ -494,6 +511,7 @@ impl CurveTask<'_> {
                 return Ok(CurveContact {
                     patches: LazyField::default(),
                     opened: None,
+                    overlaps: (f64::INFINITY, Vec::new()),
                     near: near.collect(),
                     gap: over.at(centre),
                     work: NormalWork {
@@ -520,6 +538,11 @@ impl CurveTask<'_> {
         }
         unreachable!("the last height ends the search")
     }
+}
+
+/// The ends of an overlap along the arc length in mm.
+fn ends(overlap: &[Nearest]) -> [f64; 2] {
+    [0, overlap.len() - 1].map(|k| overlap[k].place.s)
 }
 
 /// Why there is no answer where the force is missed by a part of it.
@@ -594,15 +617,25 @@ fn extent(contact: &CurveContact, axis: usize) -> [f64; 2] {
 }
 
 impl CurveContact {
-    /// The pressures of the patches in some strips, each as a field of its own, by increasing arc length; coordinates are x and s.
+    /// The pressures of the patches in some strips, each as a field of its own, by increasing arc length; coordinates are x and s. Without `edges`, they
+    /// are samples only, as [`GridPressure::of_samples`] has them.
     ///
     /// # Errors
-    /// As [`GridPressure::of_solution`].
+    /// As [`GridPressure::of_samples`].
     pub(crate) fn patches(
         &self,
         [first, last]: [usize; 2],
+        edges: bool,
     ) -> Result<Vec<GridPressure>, NormalError> {
-        let all = self.patches.get_or_make(|| self.all_patches());
+        let with_edges = || {
+            let mut all = self.all_patches();
+            all.iter_mut().for_each(|(_, patch)| patch.find_edges());
+            all
+        };
+        let all = match edges {
+            true => Cow::Borrowed(self.patches.get_or_make(with_edges)),
+            false => Cow::Owned(self.all_patches()),
+        };
         let inside = all
             .iter()
             .filter(|(strip, _)| (first..=last).contains(strip));
@@ -633,7 +666,7 @@ impl CurveContact {
             }
             let places = &self.grid.places[rows];
             let s: Vec<f64> = places.iter().map(|place| place.s).collect();
-            let found = GridPressure::of_solution(
+            let found = GridPressure::of_samples(
                 &self.grid.x[columns.clone()],
                 &s,
                 &squares(columns.len(), &pressure),

@@ -24,6 +24,9 @@ const ROUNDS_MAX: u32 = 16;
 const CHANGE: f64 = 0.1;
 /// Part by which the gap that tractions open is off if they are taken to be proportional to the pressure.
 const FORECAST_OFF: f64 = 0.3;
+/// Tractions that change the forces by less than this part of the target through the gap that they open are taken to open none. The table's estimate may
+/// be ten times too small.
+const OPENS: f64 = 0.01;
 /// Change of the forces relative to μN that ends the rounds on the coarse grid.
 const CHANGE_ROUGH: f64 = 0.02;
 /// When the rounds are used up, a change of the forces relative to μN up to this is answered with a remark, and is part of the error estimate. Where a strip at
@@ -63,6 +66,7 @@ impl WheelSolve<'_> {
             && !problem.friction.is_frictionless();
         let task = self.task();
         let (mut friction, coarse) = self.coarse(coupled, workspace)?;
+        let opens = friction.opened.is_some();
         let mut contact = task.fine(&coarse, &friction, workspace, self.watch)?;
         friction.opened.clone_from(&contact.opened);
         let first = self.wheel(&contact)?;
@@ -80,7 +84,13 @@ impl WheelSolve<'_> {
             let parts = self.tractions(&contact, &exact, open, workspace)?;
             let (mut next, mut change) = (Friction::default(), 0.0);
             if coupled {
-                next = self.friction(&contact, &parts, last, workspace);
+                next = match opens {
+                    true => self.friction(&contact, &parts, last, workspace),
+                    false => Friction {
+                        lift: self.lift(&contact, &parts, last),
+                        opened: None,
+                    },
+                };
                 let [by_lift, by_gap] = contact.change_by(&friction, &next, self.shared());
                 let by_gap = by_gap * contact.normal_force() / limit(&parts);
                 change = (by_lift / balance).max(by_gap / (CHANGE * target));
@@ -202,7 +212,8 @@ impl WheelSolve<'_> {
         let mut coarse = task.coarse(workspace, self.watch)?;
         let mut friction = Friction::default();
         let rough = with_tractions(&run.for_resultants(TARGET_ROUGH), &[]);
-        let enough = CHANGE * run.resolution.target_or_usual() / FORECAST_OFF;
+        let target = run.resolution.target_or_usual();
+        let enough = CHANGE * target / FORECAST_OFF;
         let mut by_table = problem.history.is_none() && can_estimate(problem);
         let mut earlier = None;
         for _ in 0..if coupled { ROUNDS_MAX } else { 0 } {
@@ -215,10 +226,14 @@ impl WheelSolve<'_> {
                 true => Some(self.estimate(&coarse, workspace)?),
                 false => None,
             };
-            let estimate = estimate.filter(|next| by_gap(&Friction::default(), next).1 <= enough);
+            let estimate = estimate.map(|next| (by_gap(&Friction::default(), &next).1, next));
+            let estimate = estimate.filter(|(opened, _)| *opened <= enough);
             by_table = estimate.is_some();
             let next = match estimate {
-                Some(next) => next,
+                Some((opened, Friction { lift, .. })) if opened <= OPENS * target => {
+                    Friction { lift, opened: None }
+                }
+                Some((_, next)) => next,
                 None => {
                     let parts = self.tractions(&coarse, &rough, 0.0, workspace)?;
                     self.friction(&coarse, &parts, problem.motions.len() - 1, workspace)
@@ -241,7 +256,8 @@ impl WheelSolve<'_> {
         contact: &CurveContact,
         workspace: &mut Workspace,
     ) -> Result<Friction, SolveError> {
-        let patches = self.patches(contact)?;
+        let edges = self.case.problem.friction.across().is_some();
+        let patches = self.patches(contact, edges)?;
         let mut forces = Vec::with_capacity(patches.len());
         for patch in &patches {
             let CheckedCase { problem, .. } = self.case;
@@ -306,16 +322,20 @@ impl WheelSolve<'_> {
         index: usize,
         workspace: &mut Workspace,
     ) -> Friction {
-        let lift = match self.is_vertical() {
-            true => {
-                let forces = self.forces(contact, parts, index);
-                forces.iter().flatten().map(|patch| patch.sheared[2]).sum()
-            }
-            false => 0.0,
-        };
         let traction = self.on_grid(contact, parts, index);
-        let opened = self.opened(contact, &traction, workspace);
-        Friction { lift, opened }
+        Friction {
+            lift: self.lift(contact, parts, index),
+            opened: self.opened(contact, &traction, workspace),
+        }
+    }
+
+    /// Vertical force on the rail in N of the tractions of all parts in a motion; 0 where the vertical force is not prescribed.
+    fn lift(&self, contact: &CurveContact, parts: &[Part], index: usize) -> f64 {
+        if !self.is_vertical() {
+            return 0.0;
+        }
+        let forces = self.forces(contact, parts, index);
+        forces.iter().flatten().map(|patch| patch.sheared[2]).sum()
     }
 
     /// Change of the tangential forces caused by a change of the pressures, relative to the normal force; 0 for equal bodies.

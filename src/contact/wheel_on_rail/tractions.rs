@@ -74,7 +74,9 @@ impl WheelSolve<'_> {
         let parts = contact.parts(self.influence);
         let motions = parts.len() * self.case.problem.motions.len();
         let watch = TimeLimit::new(self.watch, run.time_limit, motions);
-        let parts = parts.into_iter().map(|strips| contact.patches(strips));
+        let parts = parts
+            .into_iter()
+            .map(|strips| contact.patches(strips, true));
         let parts: Vec<Vec<GridPressure>> = parts.collect::<Result<_, _>>()?;
         let patches: usize = parts.iter().map(Vec::len).sum();
         if patches > PATCHES_MAX && !self.curve.is_flat() {

@@ -183,6 +183,23 @@ impl GridPressure {
         pressure: &[f64],
         approach: f64,
     ) -> Result<GridPressure, String> {
+        let mut field = GridPressure::of_samples(x, y, squares, pressure, approach)?;
+        field.find_edges();
+        Ok(field)
+    }
+
+    /// The same field before its edges are found: it has forces, load centres and spreads, its patches end at their outermost samples, and it gives no
+    /// pressures between samples.
+    ///
+    /// # Errors
+    /// As [`of_solution`](Self::of_solution).
+    pub(crate) fn of_samples(
+        x: &[f64],
+        y: &[f64],
+        squares: &[f64],
+        pressure: &[f64],
+        approach: f64,
+    ) -> Result<GridPressure, String> {
         let grid = SampleGrid {
             x: padded(x),
             y: padded(y),
@@ -215,7 +232,6 @@ impl GridPressure {
             shape.patch.pressure_max = peak;
             shape.patch.approach = Some(approach);
         }
-        field.find_edges();
         Ok(field)
     }
 

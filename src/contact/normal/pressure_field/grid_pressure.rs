@@ -366,7 +366,12 @@ impl GridPressure {
                         area: 0.0,
                         pressure_max: largest[label],
                         semi_axes: None,
-                        extent: [0.0; 4],
+                        extent: [
+                            self.grid.x[i0],
+                            self.grid.x[i1],
+                            self.grid.y[j0],
+                            self.grid.y[j1],
+                        ],
                     },
                     // Cells with these samples as corners, and one more cell on every side.
                     columns: i0 - 2..=i1 + 1,
