@@ -274,16 +274,7 @@ impl WheelSolve<'_> {
             let problem = problem.of_gap(friction, vec![motion]);
             forces.push((patch, patch_forces(&problem, patch, &motion)));
         }
-        let lift = match self.is_vertical() {
-            true => {
-                let lifts = forces
-                    .iter()
-                    .map(|(patch, force)| force[1] * patch.place.angle.sin());
-                lifts.sum()
-            }
-            false => 0.0,
-        };
-        let mut traction = [Vec::new(), Vec::new()];
+        let (mut traction, mut lift) = ([Vec::new(), Vec::new()], 0.0);
         let rows = contact.pressure.chunks_exact(contact.grid.x.len());
         for (row, place) in rows.zip(&contact.grid.places) {
             let far = |patch: &WheelPatch| (patch.place.s - place.s).abs();
@@ -295,6 +286,10 @@ impl WheelSolve<'_> {
             });
             for (traction, share) in traction.iter_mut().zip(share) {
                 traction.extend(row.iter().map(|p| share * p));
+            }
+            if self.is_vertical() {
+                lift +=
+                    share[1] * contact.grid.area() * row.iter().sum::<f64>() * place.angle.sin();
             }
         }
         let opened = self.opened(contact, &traction, workspace);
