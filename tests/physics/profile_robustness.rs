@@ -3,6 +3,7 @@
 use railhead::contact::case::solver::Limits;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Unmonitored;
+use railhead::contact::remark::kind::Figure;
 use railhead::contact::{check, solve};
 use serde_json::json;
 
@@ -45,8 +46,18 @@ fn random_wheelsets_are_balanced_or_refused_with_a_reason() {
         };
         let total = solution.total[0];
         let vertical = -total.force_z_n.expect("a vertical force");
+        // A wheel wedged by a hundred times its load may use up its rounds; then the remark says what is missed.
+        let rounds = solution
+            .remarks
+            .iter()
+            .find(|remark| remark.code == "iteration-inexact")
+            .map(|remark| &remark.figures["residual"]);
+        let told = match rounds {
+            Some(Figure::Number(residual)) => 1.1 * residual,
+            _ => 0.0,
+        };
         assert!(
-            (vertical / force - 1.0).abs() < 1e-3,
+            (vertical / force - 1.0).abs() < told.max(1e-3),
             "{k}: {vertical} for {force}"
         );
         for patch in &solution.patches {
