@@ -48,7 +48,7 @@ const COLUMNS: [(&str, Of); 43] = columns! {
     "area_mm2" Number |line| line.sum(|patch, _| Some(patch.area_mm2));
     "pressure_max_mpa" Number |line| line.largest(|patch, _| Some(patch.pressure_max_mpa));
     "target_met" Text |line| line.verdict(|point| point.target_met, false);
-    "remarks" Text |line| line.remarks();
+    "remarks" Text |line| Some(codes(&line.solution?.remarks, line.point, line.patch));
     "error" Text |line| Some(line.error.to_owned()).filter(|error| !error.is_empty());
     "patch" Place |line| line.patch.unwrap_or(0) as i64;
     "cached" Text |line| Some(line.item.job.cached.to_string());
@@ -217,10 +217,6 @@ impl TableLine<'_> {
         let own = patches.enumerate();
         let own = own.filter(|(place, _)| self.patch.is_none_or(|patch| patch == *place));
         own.filter_map(|(_, patch)| Some((patch, patch.points.get(self.point)?)))
-    }
-
-    fn remarks(&self) -> Option<String> {
-        Some(codes(&self.solution?.remarks, self.point, self.patch))
     }
 
     /// True if it is of all patches, or of any of them; nothing where it is not told.
