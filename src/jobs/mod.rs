@@ -4,7 +4,7 @@
 //!
 //! 1. **Check** ([`submit`]): stored [`profiles`] that the JSON names are put in place, and the [`engine`] turns it into a checked
 //!    case, off the threads that answer requests. Cases of a [`batch`] are checked while they arrive and
-//!    [staged](batch::staging) in a file, within the bounds of [`staged_bytes`].
+//!    staged in a file, within the bounds of [`staged_bytes`].
 //! 2. **Key and cache** ([`idempotency`], [`result_cache`]): a repeated idempotency key gives the job that it made; a
 //!    case that the tenant had solved before gives a job that has already succeeded with the same result.
 //! 3. **Insert** ([`store`]): one transaction decides key, quota and queue bound and inserts the job. Single

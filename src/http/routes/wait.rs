@@ -34,7 +34,7 @@ query! {
     }
 }
 
-/// The wait that a request asks for, and its place among the requests that wait. Handlers take it after the [`Caller`](crate::http::extract::caller::Caller).
+/// The wait that a request asks for, and its place among the requests that wait. Handlers take it after the [`Caller`].
 pub(crate) struct Wait {
     seconds: Option<u32>,
     preferred: bool,
