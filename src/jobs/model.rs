@@ -495,7 +495,7 @@ impl Batch {
     }
 }
 
-/// What is kept of a run beside its chunks.
+/// The stored record of a run, without its chunks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunRecord {
     /// Its template, as stored.

@@ -99,7 +99,7 @@ pub fn words(item: TokenStream) -> TokenStream {
     .into()
 }
 
-/// Gives a struct, or an enum of struct variants that `type` tells apart, the function `members`, which reads it from the members of a JSON
+/// Gives a struct, or an enum of struct variants with `type` as its tag, the function `members`, which reads it from the members of a JSON
 /// object with all of their faults. A member is needed unless its type is an `Option` or it has a default.
 ///
 /// `#[member(…)]` of a field takes: the range of a number, as `positive(most, "unit")` or `closed(least, most, "unit")`; that of a count, as

@@ -86,7 +86,7 @@ pub(crate) struct CurveContact {
     /// The gap in mm that tractions open at each cell, where any do.
     pub(crate) opened: Option<Vec<f64>>,
     over: WheelOverGrid,
-    /// Where the bodies overlap with the wheel's centre at some height in mm: ends of arc lengths in mm. Known of the coarse grid.
+    /// A height of the wheel's centre in mm, and the intervals of arc length in mm in which the bodies overlap at that height. Set on the coarse grid only.
     overlaps: (f64, Vec<[f64; 2]>),
     /// Strips whose deformed surfaces nearly touch.
     near: Vec<bool>,
@@ -229,7 +229,7 @@ impl CurveTask<'_> {
             .filter(|(_, near)| **near)
             .map(|(place, _)| [place.s - beside, place.s + beside])
             .collect();
-        // Overlaps narrower than a cell of the coarse grid. At the present height there are no others than at a lower one.
+        // Overlaps narrower than a cell of the coarse grid. A higher wheel overlaps in no other places than a lower one.
         let missed = |windows: &[[f64; 2]], [low, high]: [f64; 2]| {
             windows.iter().all(|[from, to]| *to < low || *from > high)
         };

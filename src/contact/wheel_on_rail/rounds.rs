@@ -24,8 +24,8 @@ const ROUNDS_MAX: u32 = 16;
 const CHANGE: f64 = 0.1;
 /// Part by which the gap that tractions open is off if they are taken to be proportional to the pressure.
 const FORECAST_OFF: f64 = 0.3;
-/// Tractions that change the forces by less than this part of the target through the gap that they open are taken to open none. The table's estimate may
-/// be ten times too small.
+/// The gap opened by tractions is neglected if the table estimates that it changes the forces by less than this part of the target. The estimate may be
+/// ten times too small.
 const OPENS: f64 = 0.01;
 /// Change of the forces relative to μN that ends the rounds on the coarse grid.
 const CHANGE_ROUGH: f64 = 0.02;

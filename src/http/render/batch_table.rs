@@ -27,7 +27,7 @@ macro_rules! columns {
     };
 }
 
-/// All columns besides labels, the usual ones first.
+/// All columns except labels, the default ones first.
 const COLUMNS: [(&str, Of); 43] = columns! {
     "index" Place |line| line.item.index.into();
     "id" Text |line| Some(line.item.job.id.to_string());

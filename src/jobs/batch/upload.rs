@@ -23,7 +23,7 @@ use crate::jobs::profiles::KnownSections;
 use crate::jobs::store::{NewBatch, StoredCase};
 use crate::jobs::submit::{cost_us, outputs_text};
 
-/// What the job table needs to know of a case besides its text.
+/// The columns of the job table for a case, without its text.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StagedCase {
     pub(crate) index: u32,

@@ -420,7 +420,7 @@ pub struct Claim {
     pub method: String,
     /// W3C trace context of its submission, if its trace is collected.
     pub traceparent: Option<String>,
-    /// What tells identical cases; `None` for a job that must be solved.
+    /// The key of identical cases in the result cache; `None` for a job that must be solved.
     pub cache_key: Option<CacheKey>,
     /// It ran together with others when their process died: it comes alone.
     pub suspect: bool,
@@ -564,7 +564,7 @@ pub struct ClusterView {
     pub workers: usize,
 }
 
-/// What a database knows of itself.
+/// Identity of a database, location of its large results, and number of its live nodes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Deployment {
     /// Random, given when the tables were made.
@@ -591,7 +591,7 @@ pub trait Cluster: Send + Sync + Debug {
     /// The clock of the store, epoch milliseconds.
     async fn now(&self) -> Result<i64, StoreError>;
 
-    /// Shows that a node lives, and tells how many do.
+    /// Records that a node is alive and returns its view of the cluster.
     async fn beat(&self, node: &Node) -> Result<ClusterView, StoreError>;
 
     /// The node is no more.
@@ -611,19 +611,19 @@ pub trait Cluster: Send + Sync + Debug {
     /// Brings what the database counts into a short form.
     async fn fold_counts(&self) -> Result<(), StoreError>;
 
-    /// What the database knows of itself.
+    /// Identity of the database, location of its large results, and number of its live nodes.
     async fn deployment(&self) -> Result<Deployment, StoreError>;
 
-    /// Notes the place of the results if it is still what it was before; says whether it was.
+    /// Replaces the recorded location of the results if it is still the expected one; returns whether it was.
     async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool, StoreError>;
 
-    /// Takes the turn to sweep results outside the database, unless somebody did so within a day; says whether it has it.
+    /// Claims the daily sweep of results outside the database; returns whether the claim succeeded.
     async fn take_sweep(&self) -> Result<bool, StoreError>;
 
     /// Where large results are kept that are in the database.
     fn objects(&self) -> Arc<dyn ObjectStore>;
 
-    /// Rings soon, together with what else is to be rung. Never waits.
+    /// Queues a notification, which is sent together with others. Never blocks.
     fn publish(&self, notification: Notification);
 
     /// Listens to the notifications of all nodes until the connection fails; for ever with [`NotifyMode::Off`].
@@ -922,7 +922,7 @@ pub enum ProfileKept {
     Full,
 }
 
-/// What a list says of a stored cross-section.
+/// The entry of a stored cross-section in a list.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProfileEntry {
     /// Its digest.
@@ -1063,7 +1063,7 @@ pub struct NewJob {
     pub cost_us: u32,
     /// That of its longest slice.
     pub slice_us: u32,
-    /// What tells later identical cases that this job's result is theirs too.
+    /// The key under which later identical cases find the result of this job.
     pub cache_key: Option<CacheKey>,
     /// A succeeded job whose result this one gets, instead of being queued, and the time at which it ends so.
     pub source: Option<(Uuid, i64)>,

@@ -334,7 +334,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
 
 /// Reads the member `load` of a case, which is needed or refused according to the type of the contact.
 ///
-/// Where the type itself is faulty, only what is written is checked.
+/// If `type` is faulty, only the members that are present are checked.
 pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
     let kind = case
         .value("contact")

@@ -114,7 +114,7 @@ pub(crate) fn faults_of_elastic(block: &mut Object, _: Option<&Elastic>) -> Opti
 
 /// Reads the member `thermal` of a case, which belongs to the output `temperature` and to friction that falls with temperature.
 ///
-/// The outer `None` says that a fault was found.
+/// Returns `None` if a fault was recorded.
 pub(crate) fn read_thermal(
     case: &mut Object,
     wanted: Option<bool>,

@@ -324,7 +324,7 @@ const COMPONENTS: [&str; 5] = [
     "force_x_n",
     "force_y_n",
 ];
-/// The member beside them.
+/// Rolling speed of a wheelset in mm/s, the only member that is no component of the motion.
 const SPEED_NAME: &str = "speed_mm_per_s";
 /// The lateral velocity of a wheelset, and the force that may stand in its place.
 const LATERAL_NAME: &str = "lateral_velocity_mm_per_s";
@@ -536,7 +536,7 @@ fn components_of(sweep: &Sweep) -> [Option<&Swept>; COMPONENTS.len()] {
     .map(Option::as_ref)
 }
 
-/// Refuses a creepage beside its force, and a motion without components.
+/// Refuses a motion that gives both a creepage and its force, or no component at all.
 pub(crate) fn faults_of_components<T>(block: &mut Object, _: Option<&T>) -> Option<()> {
     let mut sound = true;
     for (creepage, force) in [("creepage_x", "force_x_n"), ("creepage_y", "force_y_n")] {

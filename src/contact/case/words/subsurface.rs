@@ -256,7 +256,7 @@ const FIGURE: AllowedRange = AllowedRange::positive(1e12, "");
 
 /// Reads the member `damage` of a case, which belongs to the output of that name; left out, it has the default models.
 ///
-/// The outer `None` says that a fault was found. A method without fields gives no wear across.
+/// Returns `None` if a fault was recorded. A method without fields gives no wear across.
 pub(crate) fn read_damage(
     case: &mut Object,
     wanted: bool,
@@ -350,7 +350,7 @@ const PLACES: [&str; 3] = ["points_mm", "along_depth_at_mm", "plane"];
 
 /// Reads the member `subsurface` of a case, which belongs to the output of that name; left out, it asks for the worst point.
 ///
-/// The outer `None` says that a fault was found.
+/// Returns `None` if a fault was recorded.
 pub(crate) fn read_subsurface(case: &mut Object, wanted: bool) -> Option<Option<SubsurfaceWords>> {
     of_output(case, "subsurface", wanted, SubsurfaceWords::members)
 }

@@ -475,7 +475,7 @@ pub(crate) fn page_query(tenant: &str, filter: &Filter, after: Option<Uuid>) -> 
     query
 }
 
-/// Batches are few beside jobs: those of the tenant are walked from the newest.
+/// A tenant has far fewer batches than jobs, so its batches are scanned from the newest.
 fn push_page(
     query: &mut QueryBuilder,
     columns: &str,
