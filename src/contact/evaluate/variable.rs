@@ -34,68 +34,30 @@ pub enum Variable {
 /// Numbers of a row, in the order of [`VARIABLES`].
 pub type Row = [f64; VARIABLES.len()];
 
+const MODULUS: AllowedRange = AllowedRange::positive(1e12, "MPa");
+const RATIO: AllowedRange = AllowedRange::closed(0.0, 0.5, "");
+const COEFFICIENT: AllowedRange = AllowedRange::closed(0.0, 100.0, "");
+const RADIUS: AllowedRange = AllowedRange::positive(1e9, "mm");
+const AXIS: AllowedRange = AllowedRange::positive(1e6, "mm");
+const FORCE: AllowedRange = AllowedRange::positive(1e12, "N");
+const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");
+const SPIN: AllowedRange = AllowedRange::closed(-1e6, 1e6, "1/mm");
+
 /// Every variable with its place in the case and the numbers that it may have.
+#[rustfmt::skip]
 const VARIABLES: [(Variable, &str, AllowedRange); 12] = [
-    (
-        Variable::ShearModulus,
-        "/material/shear_modulus_mpa",
-        AllowedRange::positive(1e12, "MPa"),
-    ),
-    (
-        Variable::YoungModulus,
-        "/material/young_modulus_mpa",
-        AllowedRange::positive(1e12, "MPa"),
-    ),
-    (
-        Variable::PoissonRatio,
-        "/material/poisson_ratio",
-        AllowedRange::closed(0.0, 0.5, ""),
-    ),
-    (
-        Variable::Friction,
-        "/friction/coefficient",
-        AllowedRange::closed(0.0, 100.0, ""),
-    ),
-    (
-        Variable::Rolling,
-        "/contact/rolling_mm",
-        AllowedRange::positive(1e9, "mm"),
-    ),
-    (
-        Variable::Lateral,
-        "/contact/lateral_mm",
-        AllowedRange::positive(1e9, "mm"),
-    ),
-    (
-        Variable::SemiAxisA,
-        "/contact/a_mm",
-        AllowedRange::positive(1e6, "mm"),
-    ),
-    (
-        Variable::SemiAxisB,
-        "/contact/b_mm",
-        AllowedRange::positive(1e6, "mm"),
-    ),
-    (
-        Variable::NormalForce,
-        "/load/normal_force_n",
-        AllowedRange::positive(1e12, "N"),
-    ),
-    (
-        Variable::CreepageX,
-        "/motion/creepage_x",
-        AllowedRange::closed(-1e6, 1e6, ""),
-    ),
-    (
-        Variable::CreepageY,
-        "/motion/creepage_y",
-        AllowedRange::closed(-1e6, 1e6, ""),
-    ),
-    (
-        Variable::Spin,
-        "/motion/spin_per_mm",
-        AllowedRange::closed(-1e6, 1e6, "1/mm"),
-    ),
+    (Variable::ShearModulus, "/material/shear_modulus_mpa", MODULUS),
+    (Variable::YoungModulus, "/material/young_modulus_mpa", MODULUS),
+    (Variable::PoissonRatio, "/material/poisson_ratio", RATIO),
+    (Variable::Friction, "/friction/coefficient", COEFFICIENT),
+    (Variable::Rolling, "/contact/rolling_mm", RADIUS),
+    (Variable::Lateral, "/contact/lateral_mm", RADIUS),
+    (Variable::SemiAxisA, "/contact/a_mm", AXIS),
+    (Variable::SemiAxisB, "/contact/b_mm", AXIS),
+    (Variable::NormalForce, "/load/normal_force_n", FORCE),
+    (Variable::CreepageX, "/motion/creepage_x", CREEPAGE),
+    (Variable::CreepageY, "/motion/creepage_y", CREEPAGE),
+    (Variable::Spin, "/motion/spin_per_mm", SPIN),
 ];
 
 impl Variable {
