@@ -8,9 +8,8 @@ use std::time::Duration;
 
 use railhead::contact;
 use railhead::contact::case::solver::{KnownPair, Limits};
-use railhead::contact::evaluate::answer::{RowStatus, RowsAnswer};
+use railhead::contact::evaluate::answer::{ManyAnswer, RowStatus, RowsAnswer};
 use railhead::contact::evaluate::many::{ManyTask, solve_many};
-use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
 use railhead::contact::evaluate::rows::{Column, Rows};
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::{Monitor, Unmonitored};
@@ -351,7 +350,7 @@ fn runs(seed: u64) -> Class {
                     .collect()
             };
             let image = RUNS[1] - 1 - row;
-            let refused = all.status[row] == ManyStatus::Refused;
+            let refused = all.status[row] == RowStatus::Refused;
             if (row == faulty) != refused
                 || all.status[row] != reversed.status[image]
                 || bits(&all, row) != bits(&reversed, image)

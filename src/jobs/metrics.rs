@@ -11,7 +11,7 @@ use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::Registry;
 
 use crate::contact::case::words::solver::MethodName;
-use crate::contact::evaluate::many_answer::ManyAnswer;
+use crate::contact::evaluate::answer::ManyAnswer;
 use crate::contact::solution::words::answer::Solution;
 use crate::jobs::model::{FailureKind, State};
 use crate::jobs::store::Ending;

@@ -1,7 +1,7 @@
 //! A target relative to the tangential force: met by every kind of motion, or said to be missed; and what the answer says of a small force
 //! where the target is relative to the friction limit.
 
-use railhead::contact::evaluate::many_answer::{ManyStatus, NUMBER_NAMES};
+use railhead::contact::evaluate::answer::{NUMBER_NAMES, RowStatus};
 use railhead::contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
@@ -157,7 +157,7 @@ fn rows_by_the_table_count_their_bound_against_the_force() {
     let columns = [numbers("/motion/creepage_x", &[2e-5, 1e-4, 2e-3])];
     let found = solved(&case, &columns);
     for (row, status) in found.status.iter().enumerate() {
-        assert_eq!(*status, ManyStatus::Ok, "{row}");
+        assert_eq!(*status, RowStatus::Ok, "{row}");
         let of = |name: &str| {
             let column = NUMBER_NAMES.iter().position(|known| *known == name);
             found.numbers[column.expect("a column")][row]

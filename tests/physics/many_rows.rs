@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use railhead::contact;
 use railhead::contact::case::solver::{KnownPair, Limits};
+use railhead::contact::evaluate::answer::{ManyAnswer, RowStatus};
 use railhead::contact::evaluate::many::{ManyTask, RowSolver, solve_many};
-use railhead::contact::evaluate::many_answer::{ManyAnswer, ManyStatus};
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::Unmonitored;
 use railhead::contact::rolling::operator_store::OperatorStore;
@@ -129,7 +129,7 @@ fn auto_takes_the_table_where_its_bound_meets_the_target_and_solves_the_rest() {
         methods.filter(|method| method.name() == "table").count()
     };
     assert!(by_table(&answer) > 0, "{:?}", answer.method);
-    assert_eq!(answer.status, [ManyStatus::Ok; 6]);
+    assert_eq!(answer.status, [RowStatus::Ok; 6]);
     // The bound of the table is never as small as this.
     case["solver"]["target_error"] = json!(0.0005);
     let exact = solved(&case, &columns()[1..]);
@@ -147,7 +147,7 @@ fn a_row_that_cannot_be_solved_has_a_status_and_costs_no_other_row() {
         &case,
         &[numbers("/contact/rolling_mm", &[460.0, -1.0, 500.0])],
     );
-    let refused = [ManyStatus::Ok, ManyStatus::Refused, ManyStatus::Ok];
+    let refused = [RowStatus::Ok, RowStatus::Refused, RowStatus::Ok];
     assert_eq!(answer.status, refused);
     assert!(answer.numbers[1][1].is_nan() && answer.method[1].is_none());
     assert_eq!(answer.without_answer(), 1);
@@ -169,7 +169,7 @@ fn a_row_on_a_rough_profile_has_the_reason_of_its_refusal() {
     case["outputs"] = json!(["resultants"]);
     let load = numbers("/load/vertical_force_n", &[7.5e4]);
     let answer = solved(&case, &[load]);
-    assert_eq!(answer.status, [ManyStatus::Unsolvable]);
+    assert_eq!(answer.status, [RowStatus::Unsolvable]);
     assert!(
         answer.reason[0].contains("/contact/rail"),
         "{:?}",

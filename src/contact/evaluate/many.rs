@@ -18,9 +18,8 @@ use crate::contact::case::solve_time::TABLE_SECONDS;
 use crate::contact::case::solver::{KnownPair, Limits};
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::error::{CaseError, Fault, SolveError};
-use crate::contact::evaluate::answer::{RowStatus, RowsAnswer};
-use crate::contact::evaluate::many_answer::{
-    ManyAnswer, ManyStatus, NumberColumns, RowFailure, RowNumbers, SolvedRow,
+use crate::contact::evaluate::answer::{
+    ManyAnswer, NumberColumns, RowFailure, RowNumbers, RowStatus, RowsAnswer, SolvedRow,
 };
 use crate::contact::evaluate::rows::{Column, Rows};
 use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
@@ -186,10 +185,7 @@ fn to_solve(status: RowStatus, method: MethodName) -> bool {
     match status {
         RowStatus::Ok | RowStatus::TargetMissed => false,
         RowStatus::NotCovered => method == MethodName::Auto,
-        RowStatus::NeedsSolver
-        | RowStatus::Refused
-        | RowStatus::NotFinite
-        | RowStatus::Failed(_) => true,
+        _ => true,
     }
 }
 
@@ -212,7 +208,7 @@ fn take(
         answer.set(
             row,
             Err(RowFailure {
-                status: ManyStatus::NotCovered,
+                status: RowStatus::NotCovered,
                 reason,
             }),
         );
@@ -348,7 +344,7 @@ impl<'a> RowsInWork<'a> {
             Ok(Ok(solution)) => Ok(solution),
             Ok(Err(error)) => Err(RowFailure::of(&error).map_or(RowEnd::Stopped, RowEnd::Failed)),
             Err(_) => Err(RowEnd::Failed(RowFailure {
-                status: ManyStatus::SolverFailed,
+                status: RowStatus::SolverFailed,
                 reason: "the solver stopped on a defect of its own".to_owned(),
             })),
         }

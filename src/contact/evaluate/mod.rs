@@ -3,7 +3,6 @@
 
 pub mod answer;
 pub mod many;
-pub mod many_answer;
 pub mod rows;
 pub mod variable;
 pub mod varied;

@@ -7,8 +7,8 @@ use serde_json::Value;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
+use crate::contact::evaluate::answer::NumberColumns;
 use crate::contact::evaluate::many::{ManyTask, expected_seconds};
-use crate::contact::evaluate::many_answer::NumberColumns;
 use crate::contact::evaluate::varied::{Values, VariedColumn, column_pointer, of_values};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::batch::upload::BatchUpload;
