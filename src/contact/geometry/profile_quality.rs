@@ -219,17 +219,8 @@ fn explained(points: Points, [first, last]: [usize; 2]) -> Option<Oddity> {
     }
     let from = first.saturating_sub(ODD_SOUND);
     let to = (last + ODD_SOUND + 1).min(points.at.len());
-    let (start, end) = (points.at[from], points.at[to - 1]);
-    let chord = [end[0] - start[0], end[1] - start[1]];
-    let length = chord[0].hypot(chord[1]).max(f64::MIN_POSITIVE);
-    let axis = chord.map(|part| part / length);
-    let local: Vec<[f64; 2]> = points.at[from..to]
-        .iter()
-        .map(|at| {
-            let [y, z] = [at[0] - start[0], at[1] - start[1]];
-            [axis[0] * y + axis[1] * z, axis[0] * z - axis[1] * y]
-        })
-        .collect();
+    let (to_chord, length) = chord_axes(&points.at[from..to]);
+    let local: Vec<[f64; 2]> = points.at[from..to].iter().map(to_chord).collect();
     let inside = |k: usize| (first..=last).contains(&(from + k));
     let off = |k: usize| {
         let t = local[k][0];
@@ -369,33 +360,26 @@ pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
 /// The digits that points were given with: the coarser of the steps in mm of which all y and all z are multiples, and at least 1e-9 mm.
 #[must_use]
 pub fn digits(given: &[[f64; 2]]) -> f64 {
-    let of = |part: usize| {
-        let multiples = |places: f64| {
-            given.iter().all(|at| {
-                let scaled = at[part] * places;
-                (scaled - scaled.round()).abs() < 1e-4
-            })
-        };
-        let places = (1..=DIGITS_MAX).map(|places| 10.0_f64.powi(places));
-        let found = places.into_iter().find(|places| multiples(*places));
-        found.map_or(DIGITS_LEAST, f64::recip)
-    };
+    let of = |part| step_of(given, part, DIGITS_MAX, 1e-4).unwrap_or(DIGITS_LEAST);
     of(0).max(of(1))
+}
+
+/// The largest power of ten, 0.1 or less, of which all coordinates in one direction are multiples.
+fn step_of(given: &[[f64; 2]], part: usize, digits: i32, tolerance: f64) -> Option<f64> {
+    let multiples = |places: &f64| {
+        given.iter().all(|at| {
+            let scaled = at[part] * places;
+            (scaled - scaled.round()).abs() < tolerance
+        })
+    };
+    let mut places = (1..=digits).map(|places| 10.0_f64.powi(places));
+    places.find(multiples).map(f64::recip)
 }
 
 /// The step in mm of which every height is a multiple (0.1, 0.01 or 0.001), if there is one.
 #[must_use]
 pub fn rounding(given: &[[f64; 2]]) -> Option<f64> {
-    let multiples = |places: f64| {
-        given.iter().all(|at| {
-            let scaled = at[1] * places;
-            (scaled - scaled.round()).abs() < 1e-6
-        })
-    };
-    [10.0, 100.0, 1000.0]
-        .into_iter()
-        .find(|places| multiples(*places))
-        .map(|places| 1.0 / places)
+    step_of(given, 1, 3, 1e-6)
 }
 
 /// So many points from one on, if there are as many.
@@ -405,14 +389,21 @@ fn window_at<const N: usize>(points: Points<'_>, first: usize) -> Option<&[[f64;
 
 /// The points in axes along and perpendicular to the chord from the first to the last of them.
 fn in_chord<const N: usize>(window: &[[f64; 2]; N]) -> [[f64; 2]; N] {
-    let (from, to) = (window[0], window[N - 1]);
+    let (to_chord, _) = chord_axes(window);
+    window.map(|at| to_chord(&at))
+}
+
+/// Axes along and perpendicular to the chord from the first to the last point, and its length.
+fn chord_axes(window: &[[f64; 2]]) -> (impl Fn(&[f64; 2]) -> [f64; 2] + use<>, f64) {
+    let (from, to) = (window[0], window[window.len() - 1]);
     let chord = [to[0] - from[0], to[1] - from[1]];
     let length = chord[0].hypot(chord[1]).max(f64::MIN_POSITIVE);
     let axis = chord.map(|part| part / length);
-    window.map(|at| {
+    let to_chord = move |at: &[f64; 2]| {
         let [y, z] = [at[0] - from[0], at[1] - from[1]];
         [axis[0] * y + axis[1] * z, axis[0] * z - axis[1] * y]
-    })
+    };
+    (to_chord, length)
 }
 
 /// Value at `t` of the least-squares polynomial with `N` coefficients through points `[t, h]`.

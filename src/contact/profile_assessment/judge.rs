@@ -123,6 +123,28 @@ impl<'a> Under<'a> {
         }
     }
 
+    /// A finding under a patch that refuses nothing.
+    fn finding(&self, patch: FoundPatch, cause: Cause) -> Finding {
+        let found = &self.found;
+        Finding {
+            body: self.body,
+            patch: patch.number,
+            y: self.contact.map(|s| self.y(s)),
+            pressure: self.rough(),
+            share: 0.0,
+            left: 0.0,
+            load_share: patch.load_share,
+            everywhere: 0.0,
+            chord: found.chord.map(|s| self.y(s)),
+            chord_length: found.chord[1] - found.chord[0],
+            over_width: found.over_width,
+            smoothing: self.profile.smoothing(),
+            advised: 0.0,
+            refused: false,
+            cause,
+        }
+    }
+
     fn grain(&self) -> Grain {
         Grain {
             noise: self.found.noise.unwrap_or(0.0),
@@ -198,22 +220,13 @@ fn roughness(
         advised
     };
     Finding {
-        body: own.body,
-        patch: patch.number,
-        y: [own.y(own.contact[0]), own.y(own.contact[1])],
-        pressure: own.rough(),
         share: both / patch.pressure.max(PRESSURE_LIGHT),
         left: own.noise_left(modulus) / patch.pressure,
-        load_share: patch.load_share,
         everywhere: found.roughness.everywhere / patch.pressure,
-        chord: found.chord.map(|s| own.y(s)),
-        chord_length: found.chord[1] - found.chord[0],
-        over_width: found.over_width,
-        smoothing,
         advised: more,
         refused: patch.load_share > LIGHT
             && found.roughness.ambiguity > AMBIGUOUS_MAX * patch.pressure.max(PRESSURE_LIGHT),
-        cause: own.cause(advised > 0.0),
+        ..own.finding(patch, own.cause(advised > 0.0))
     }
 }
 
@@ -231,21 +244,9 @@ fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
     let wide = found.over_width > COARSE && open || found.over_width > COARSE_MAX && hides_arc;
     let wide = wide && length > CHORD_MIN;
     wide.then(|| Finding {
-        body: own.body,
-        patch: patch.number,
-        y: [own.y(own.contact[0]), own.y(own.contact[1])],
-        pressure: own.rough(),
         share: own.rough() / patch.pressure,
-        left: 0.0,
-        load_share: patch.load_share,
-        everywhere: 0.0,
-        chord: found.chord.map(|s| own.y(s)),
-        chord_length: found.chord[1] - found.chord[0],
-        over_width: found.over_width,
-        smoothing: own.profile.smoothing(),
-        advised: 0.0,
         refused: patch.load_share > LIGHT && found.over_width > COARSE_MAX,
-        cause: Cause::Spacing,
+        ..own.finding(patch, Cause::Spacing)
     })
 }
 
@@ -253,7 +254,6 @@ fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
 fn place(own: &Under, patch: FoundPatch) -> Option<Finding> {
     let [first, last] = own.profile.range();
     let [low, high] = own.contact;
-    let y = [own.y(low), own.y(high)];
     let middle = own.y(0.5 * (low + high));
     let tip = match own.body {
         Body::Rail => None,
@@ -269,22 +269,10 @@ fn place(own: &Under, patch: FoundPatch) -> Option<Finding> {
     } else {
         return None;
     };
+    // Where the contact is does not depend on its points: this is no worse than another place.
     Some(Finding {
-        body: own.body,
-        patch: patch.number,
-        y,
-        pressure: 0.0,
-        share: 0.0,
-        left: 0.0,
-        load_share: patch.load_share,
-        everywhere: 0.0,
-        chord: y,
         chord_length: 0.0,
-        over_width: 0.0,
-        smoothing: own.profile.smoothing(),
-        advised: 0.0,
-        refused: false,
-        cause,
+        ..own.finding(patch, cause)
     })
 }
 
