@@ -44,10 +44,17 @@ const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");
 const SPIN: AllowedRange = AllowedRange::closed(-1e6, 1e6, "1/mm");
 
 /// Every variable with its place in the case and the numbers that it may have.
-#[rustfmt::skip]
 const VARIABLES: [(Variable, &str, AllowedRange); 12] = [
-    (Variable::ShearModulus, "/material/shear_modulus_mpa", MODULUS),
-    (Variable::YoungModulus, "/material/young_modulus_mpa", MODULUS),
+    (
+        Variable::ShearModulus,
+        "/material/shear_modulus_mpa",
+        MODULUS,
+    ),
+    (
+        Variable::YoungModulus,
+        "/material/young_modulus_mpa",
+        MODULUS,
+    ),
     (Variable::PoissonRatio, "/material/poisson_ratio", RATIO),
     (Variable::Friction, "/friction/coefficient", COEFFICIENT),
     (Variable::Rolling, "/contact/rolling_mm", RADIUS),

@@ -10,8 +10,8 @@ use tokio::sync::OwnedMutexGuard;
 use tokio_util::sync::CancellationToken;
 
 use crate::contact::error::SolveError;
-use crate::contact::evaluate::many::{ManyTask, solve_many};
 use crate::contact::evaluate::answer::ManyAnswer;
+use crate::contact::evaluate::many::{ManyTask, solve_many};
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::words::answer::{Fields, PatchFields, Solution};
