@@ -521,6 +521,17 @@ pub struct BatchItem {
     pub result: Option<ItemResult>,
 }
 
+impl BatchItem {
+    /// The key of a result that lies outside the table.
+    #[must_use]
+    pub fn key(&self) -> Option<&str> {
+        match &self.result {
+            Some(ItemResult::Stored(key)) => Some(key),
+            _ => None,
+        }
+    }
+}
+
 /// The result of one job of a batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ItemResult {

@@ -4,7 +4,8 @@ use std::error::Error;
 use std::fmt::Write;
 use std::ops::Range;
 
-use axum::body::Body;
+use axum::body::{Body, Bytes};
+use futures_util::stream::{Stream, StreamExt, TryStreamExt, iter, try_unfold};
 
 use crate::contact::evaluate::answer::RowsAnswer;
 use crate::http::render::csv::{self, Precision, text_field, write_number};
@@ -13,9 +14,18 @@ use crate::http::render::pieces::{JsonColumn, body, json_columns};
 use crate::jobs::codec::arrow::ArrowWriter;
 use crate::jobs::codec::parquet::TableWriter;
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
+use crate::jobs::sync::blocking;
 
 /// Why a table cannot be written.
 pub(crate) type WriteError = Box<dyn Error + Send + Sync>;
+
+/// Some rows of a table.
+pub(crate) enum Piece {
+    /// As they are sent.
+    Text(Bytes),
+    /// Yet to be written.
+    Table(RowTable),
+}
 
 /// Writes tables with the same columns, one after the other.
 pub(crate) enum RowWriter {
@@ -57,6 +67,37 @@ impl RowWriter {
             .collect();
         let mut writer = RowWriter::new(format, &columns)?;
         Ok([writer.head()?, writer.write(table)?, writer.finish()?].concat())
+    }
+
+    /// Tables of these columns that are written as they come, with what stands before and after them.
+    ///
+    /// # Errors
+    /// The stream or the file cannot be begun.
+    pub(crate) fn stream<P: Stream<Item = Result<Piece, WriteError>> + Send>(
+        format: Format,
+        columns: &[(String, TableKind)],
+        pieces: P,
+    ) -> Result<impl Stream<Item = Result<Bytes, WriteError>> + Send + use<P>, WriteError> {
+        let mut writer = RowWriter::new(format, columns)?;
+        let head = Bytes::from(writer.head()?);
+        let state = Some((Box::pin(pieces), writer));
+        let text = try_unfold(state, async |state| {
+            let Some((mut pieces, mut writer)) = state else {
+                return Ok(None);
+            };
+            let text = match pieces.try_next().await? {
+                Some(Piece::Text(text)) => text,
+                Some(Piece::Table(table)) => {
+                    let written = blocking(move || (writer.write(table), writer));
+                    let (text, back) = written.await?;
+                    writer = back;
+                    text?.into()
+                }
+                None => return Ok(Some((writer.finish()?.into(), None))),
+            };
+            Ok(Some((text, Some((pieces, writer)))))
+        });
+        Ok(iter([Ok(head)]).chain(text))
     }
 
     /// What comes before the first table.

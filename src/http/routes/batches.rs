@@ -1,8 +1,7 @@
 //! `/v1/batches`: many cases in one request, and their results line by line.
-use std::collections::VecDeque;
 use std::sync::Arc;
 
-use axum::body::{Body, Bytes};
+use axum::body::Bytes;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
@@ -18,7 +17,7 @@ use crate::contact::solution::words::answer::Solution;
 use crate::http::dto::{Cases, JobResult};
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::batch::{form, read_draft};
-use crate::http::extract::caller::{BatchId, Caller, Credential, revoked, until_revoked};
+use crate::http::extract::caller::{BatchId, Caller, Credential};
 use crate::http::extract::query::{Parameters, Repeated, id, query, reader, word};
 use crate::http::extract::rows::{TableUpload, separate_template};
 use crate::http::layers::response::StreamedUnbuffered;
@@ -27,11 +26,12 @@ use crate::http::options::HttpOptions;
 use crate::http::problem::{ApiError, Fault, ProblemBody, ProblemKind, problems};
 use crate::http::render::batch_table::Columns;
 use crate::http::render::format::Format;
-use crate::http::render::row_tables::RowWriter;
+use crate::http::render::row_tables::Piece;
 use crate::http::routes::submission::{BatchAccepted, NamedQuery, Submission, SubmitParameters};
 use crate::http::routes::wait::{Wait, WaitQuery};
+use crate::http::routes::work::{RESULT_FORMATS, table_answer};
 use crate::jobs::Jobs;
-use crate::jobs::batch::control::{OpenedItem, PAGE_BYTES};
+use crate::jobs::batch::control::{Items, OpenedItem, PAGE_BYTES};
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::codec::table::RowTable;
 use crate::jobs::error::JobsError;
@@ -144,130 +144,58 @@ fn faults(draft: &BatchUpload) -> Vec<Fault> {
 }
 
 /// What a reader holds of small results: those of a page, and the text written of them.
-pub(crate) const STREAM_BYTES: usize = 2 * PAGE_BYTES;
-/// How many jobs are read the first time.
-pub(crate) const FIRST_PAGE_JOBS: u32 = 50;
-/// Most jobs read at once.
-const PAGE_JOBS: u32 = 500;
+const STREAM_BYTES: usize = 2 * PAGE_BYTES;
 /// Motions of a large result written at once.
 const POINTS: usize = 64;
 
 /// What lines are made from.
-pub(crate) struct Source {
-    pub jobs: Jobs,
-    pub memory: Memory,
+struct Source {
+    jobs: Jobs,
+    memory: Memory,
     /// Columns of the table; none for NDJSON.
-    pub columns: Option<Arc<Columns>>,
-}
-
-/// Some lines.
-pub(crate) enum Piece {
-    Text(Bytes),
-    Table(RowTable),
+    columns: Option<Arc<Columns>>,
 }
 
 type Pieces = BoxStream<'static, Result<Piece, BoxError>>;
 
-/// The lines of a batch from some place on.
-pub(crate) struct Lines {
-    pub source: Source,
-    pub batch: Uuid,
-    /// Until then jobs that have not ended are waited for.
-    pub until: Option<Instant>,
-    /// The job of the last line.
-    pub after: Option<Uuid>,
-    /// States of the jobs that have lines; all if there is none.
-    pub states: Vec<JobState>,
-    /// Jobs to read at once.
-    pub page: u32,
-    /// Jobs that have been read and not yet been written.
-    pub read: VecDeque<BatchItem>,
-    /// The rest of a large line.
-    pub large: Option<Pieces>,
-}
-
-impl Lines {
-    /// The text, written by `writer`.
-    pub(crate) fn text(
-        self,
-        writer: RowWriter,
-    ) -> impl Stream<Item = Result<Bytes, BoxError>> + Send {
-        let pieces = Box::pin(try_unfold(self, Lines::next));
-        try_unfold(Some((pieces, writer)), async |state| {
-            let Some((mut pieces, mut writer)) = state else {
-                return Ok(None);
-            };
-            let (text, rest) = match pieces.try_next().await? {
-                Some(Piece::Text(text)) => (text, Some((pieces, writer))),
-                Some(Piece::Table(table)) => (writer.write(table)?.into(), Some((pieces, writer))),
-                None => (writer.finish()?.into(), None),
-            };
-            Ok(Some((text, rest)))
-        })
-    }
-
-    async fn next(mut self) -> Result<Option<(Piece, Lines)>, BoxError> {
-        loop {
-            if let Some(large) = &mut self.large {
-                match large.try_next().await? {
-                    Some(piece) => return Ok(Some((piece, self))),
-                    None => self.large = None,
-                }
-            }
-            let large = |item: &BatchItem| matches!(item.result, Some(ItemResult::Stored(_)));
-            if self.read.is_empty() && !self.read_page().await? {
-                return Ok(None);
-            }
-            match self.read.front() {
-                None => {}
-                Some(item) if large(item) => {
-                    if let Some(item) = self.read.pop_front() {
-                        self.large = Some(self.source.open_large(item).await?);
-                    }
-                }
-                Some(_) => {
-                    let small = self.read.iter().take_while(|item| !large(item)).count();
-                    let small: Vec<BatchItem> = self.read.drain(..small).collect();
-                    let columns = self.source.columns.clone();
-                    let written = blocking(move || match columns {
-                        Some(columns) => Ok(Piece::Table(table_of_small(&columns, &small))),
-                        None => Ok(Piece::Text(write_ndjson(&small)?.into())),
-                    });
-                    let written: Result<_, JobsError> = written.await?;
-                    return Ok(Some((written?, self)));
-                }
-            }
+/// The lines of jobs.
+fn lines(source: Source, items: Items) -> impl Stream<Item = Result<Piece, BoxError>> + Send {
+    let pieces = try_unfold((source, items), async |(source, mut items)| {
+        if !items.fill().await? {
+            return Ok(None);
         }
-    }
-
-    /// Reads more jobs; false at the end of the batch.
-    async fn read_page(&mut self) -> Result<bool, JobsError> {
-        let (items, last) = self
-            .source
-            .jobs
-            .batch_items(self.batch, self.after, self.page, self.until, &self.states)
-            .await?;
-        let Some(last) = last else {
-            return Ok(false);
+        let small = items.read.iter().take_while(|item| item.key().is_none());
+        let pieces = match small.count() {
+            0 => match items.read.pop_front() {
+                Some(item) => source.open_large(item).await?,
+                None => return Ok(None),
+            },
+            small => one(source
+                .write_small(items.read.drain(..small).collect())
+                .await?),
         };
-        self.after = Some(last);
-        let read = u32::try_from(items.len()).unwrap_or(PAGE_JOBS);
-        self.page = match self.states.is_empty() {
-            true => (2 * read).clamp(4, PAGE_JOBS),
-            false => PAGE_JOBS,
-        };
-        self.read = items.into();
-        Ok(true)
-    }
+        Ok::<_, BoxError>(Some((pieces, (source, items))))
+    });
+    pieces.try_flatten()
 }
 
 impl Source {
+    /// The lines of jobs with small results.
+    async fn write_small(&self, items: Vec<BatchItem>) -> Result<Piece, JobsError> {
+        let columns = self.columns.clone();
+        let written = blocking(move || match columns {
+            Some(columns) => Ok(Piece::Table(table_of_small(&columns, &items))),
+            None => Ok(Piece::Text(write_ndjson(&items)?.into())),
+        });
+        written.await?
+    }
+
     /// The lines of a job whose result is large.
     async fn open_large(&self, item: BatchItem) -> Result<Pieces, BoxError> {
         let id = item.job.id;
-        let opened = match &item.result {
-            Some(ItemResult::Stored(key)) => self.jobs.open_item(id, key).await,
-            _ => Err(ItemFault::Unreadable),
+        let opened = match item.key() {
+            Some(key) => self.jobs.open_item(id, key).await,
+            None => Err(ItemFault::Unreadable),
         };
         let without = |error: ProblemBody| match &self.columns {
             Some(columns) => {
@@ -503,9 +431,6 @@ pub(crate) struct BatchLine {
     error: Option<ProblemBody>,
 }
 
-/// The forms that the results of a batch come in.
-const LINE_FORMATS: &[Format] = &[Format::Ndjson, Format::Csv, Format::Arrow, Format::Parquet];
-
 query! {
     /// Parameters of the results of a batch.
     BatchResultsQuery(() => ()) {
@@ -520,7 +445,7 @@ query! {
         columns: Columns as String = reader(Columns::allowed(), Columns::read);
         /// `ndjson`, `csv`, `arrow` or `parquet`; overrides `Accept`
         #[param(pattern = "^(ndjson|csv|arrow|parquet)$", example = "csv")]
-        format: Format as String = one_of(LINE_FORMATS);
+        format: Format as String = one_of(RESULT_FORMATS);
     }
 }
 
@@ -562,7 +487,7 @@ pub(crate) async fn results(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let (query, _) = <(BatchResultsQuery, WaitQuery)>::read(&uri, &())?;
-    let format = choose(&headers, query.format, LINE_FORMATS)?;
+    let format = choose(&headers, query.format, RESULT_FORMATS)?;
     let is_table = format != Format::Ndjson;
     if query.columns.is_some() && !is_table {
         let detail =
@@ -571,8 +496,11 @@ pub(crate) async fn results(
     }
     // Unknown batches are answered before the stream begins.
     jobs.batch(Kind::Cases, id).await?;
-    let until = wait.at_most().map(|at_most| Instant::now() + at_most);
-    let waits = until.is_some();
+    let mut items = jobs.items(id);
+    items.until = wait.at_most().map(|at_most| Instant::now() + at_most);
+    items.after = query.after;
+    items.states = query.state.unwrap_or_default();
+    let waits = items.until.is_some();
     // What a reader holds of small results; large ones are counted one by one.
     let share = memory.ready_answer(jobs.tenant(), STREAM_BYTES)?;
     let columns = match (is_table, query.columns) {
@@ -586,26 +514,13 @@ pub(crate) async fn results(
     let kinds = columns
         .as_ref()
         .map_or_else(Vec::new, |columns| columns.kinds());
-    let writer = RowWriter::new(format, &kinds).and_then(|mut writer| Ok((writer.head()?, writer)));
-    let (head, writer) = writer.map_err(|error| ApiError::internal(&*error))?;
-    let lines = Lines {
-        source: Source {
-            jobs: jobs.clone(),
-            memory,
-            columns,
-        },
-        batch: id,
-        until,
-        after: query.after,
-        states: query.state.unwrap_or_default(),
-        page: FIRST_PAGE_JOBS,
-        read: VecDeque::new(),
-        large: None,
+    let source = Source {
+        jobs: jobs.clone(),
+        memory,
+        columns,
     };
-    let revoked = revoked(jobs, key.map(|Extension(key)| key));
-    let head = stream::iter([Ok(Bytes::from(head))]);
-    let body = Body::from_stream(until_revoked(head.chain(lines.text(writer)), revoked));
-    let mut response = format.answer(&format!("batch-{id}"), body);
+    let form = (format, &*format!("batch-{id}"));
+    let mut response = table_answer((jobs, key), form, &kinds, lines(source, items))?;
     if waits {
         response.extensions_mut().insert(StreamedUnbuffered);
     }

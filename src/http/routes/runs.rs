@@ -1,13 +1,12 @@
 //! `/v1/runs`: many rows over one case, their answers and totals.
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
-use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use axum::{Extension, Json};
-use futures_util::stream::{self, StreamExt, try_unfold};
+use futures_util::stream::{self, Stream, StreamExt, TryStreamExt, try_unfold};
 use railhead_macros::none_is_absent;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -16,7 +15,7 @@ use uuid::Uuid;
 
 use crate::http::dto::{AnswerColumn, RunRequest, answer_columns};
 use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::caller::{Caller, Credential, RunId, RunRowId, revoked, until_revoked};
+use crate::http::extract::caller::{Caller, Credential, RunId, RunRowId};
 use crate::http::extract::query::{Parameters, Reader, Repeated, id, query, reader};
 use crate::http::extract::rows::{TableUpload, form, read_run, separate_template};
 use crate::http::extract::titles::{NamedColumns, named_column};
@@ -24,15 +23,14 @@ use crate::http::limits::{Memory, hold_while_sent};
 use crate::http::options::HttpOptions;
 use crate::http::problem::{ApiError, ProblemKind, problems};
 use crate::http::render::format::Format;
-use crate::http::render::row_tables::{RowWriter, WriteError};
+use crate::http::render::row_tables::{Piece, RowWriter, WriteError};
 use crate::http::routes::submission::{NamedQuery, RunAccepted, Submission, SubmitParameters};
 use crate::http::routes::wait::{Wait, WaitQuery};
-use crate::http::routes::work::await_end;
+use crate::http::routes::work::{RESULT_FORMATS, await_end, table_answer};
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
 use crate::jobs::model::Kind;
 use crate::jobs::run::draft::RunOptions;
 use crate::jobs::run::model::Run;
-use crate::jobs::run::results::ChunkRef;
 use crate::jobs::sync::blocking;
 use crate::jobs::{Jobs, JobsError};
 
@@ -118,9 +116,6 @@ pub(crate) async fn submit(
 /// What a reader of answers holds: a chunk as columns and as text.
 const STREAM_BYTES: usize = 12 << 20;
 
-/// The forms that answers come in.
-const FORMATS: &[Format] = &[Format::Ndjson, Format::Csv, Format::Arrow, Format::Parquet];
-
 query! {
     /// Parameters of the results of a run.
     RunResultsQuery(() => ()) {
@@ -132,7 +127,7 @@ query! {
         rows: Range<u64> as String = reader("two row numbers with a colon between, such as `1000:2000`; either may be left out", row_range);
         /// `ndjson`, `csv`, `arrow` or `parquet`; overrides `Accept`
         #[param(pattern = "^(ndjson|csv|arrow|parquet)$", example = "parquet")]
-        format: Format as String = one_of(FORMATS);
+        format: Format as String = one_of(RESULT_FORMATS);
     }
 }
 
@@ -207,51 +202,29 @@ pub(crate) async fn results(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let (query, _) = <(RunResultsQuery, WaitQuery)>::read(&uri, &())?;
-    let format = choose(&headers, query.format, FORMATS)?;
+    let format = choose(&headers, query.format, RESULT_FORMATS)?;
     await_end(&jobs.of_kind(Kind::Rows), id, &wait).await?;
     let run = jobs.run(id).await?;
     require_ended(&run)?;
     let columns = selected(&run, query.columns)?;
     let share = memory.ready_answer(jobs.tenant(), STREAM_BYTES)?;
-    let mut writer =
-        RowWriter::new(format, &columns).map_err(|error| ApiError::internal(&error))?;
-    let head = writer.head().map_err(|error| ApiError::internal(&error))?;
     let rows = query.rows.unwrap_or(0..u64::MAX);
-    let mut answers = Answers {
-        rows: rows.start..rows.end.min(run.head.rows),
-        wanted: columns.into_iter().map(|(name, _)| name).collect(),
-        source: ChunkSource::new(jobs.clone(), run),
-    };
+    let wanted = columns.iter().map(|(name, _)| name.clone()).collect();
+    let mut answers = Box::pin(answers(jobs.clone(), run, rows, wanted));
     // Answers that cannot be read are an error as long as the head has not been sent.
-    let (first, writer) = answers.next(writer).await.map_err(unreadable)?;
-    let rest = writer.map(|writer| (answers, writer));
-    let rest = try_unfold(rest, |state| async move {
-        let Some((mut answers, writer)) = state else {
-            return Ok(None);
-        };
-        let next = answers.next(writer).await.inspect_err(|error| {
-            tracing::error!(%error, run = %answers.source.run.chunks.id, "answers of a run cannot be read");
-        });
-        let (piece, writer) = next?;
-        Ok(Some((piece, writer.map(|writer| (answers, writer)))))
-    });
-    let begin = stream::iter([Ok::<_, WriteError>(Bytes::from(head)), Ok(first)]);
-    let revoked = revoked(jobs, key.map(|Extension(key)| key));
-    let body = Body::from_stream(until_revoked(begin.chain(rest), revoked));
-    let response = format.answer(&format!("run-{id}"), body);
+    let first = answers.try_next().await?;
+    let rest = answers.inspect_err(
+        move |error| tracing::error!(%error, run = %id, "answers of a run cannot be read"),
+    );
+    let pieces = stream::iter(first.map(Ok)).chain(rest);
+    let pieces = pieces.map_ok(Piece::Table).map_err(WriteError::from);
+    let form = (format, &*format!("run-{id}"));
+    let response = table_answer((jobs, key), form, &columns, pieces)?;
     Ok(hold_while_sent(wait.tell_applied(response), share))
 }
 
-/// Why answers cannot be read.
-fn unreadable(error: WriteError) -> ApiError {
-    match error.downcast::<JobsError>() {
-        Ok(error) => ApiError::from(*error),
-        Err(error) => ApiError::internal(&error),
-    }
-}
-
 /// A run has answers once it has ended.
-pub(crate) fn require_ended(run: &Run) -> Result<(), ApiError> {
+fn require_ended(run: &Run) -> Result<(), ApiError> {
     match run.state() {
         state if state.ended() => Ok(()),
         state => Err(ApiError::new(
@@ -267,10 +240,7 @@ pub(crate) fn require_ended(run: &Run) -> Result<(), ApiError> {
 }
 
 /// The columns that are wanted, in the order of the answers.
-pub(crate) fn selected(
-    run: &Run,
-    wanted: Option<Vec<String>>,
-) -> Result<Vec<(String, TableKind)>, ApiError> {
+fn selected(run: &Run, wanted: Option<Vec<String>>) -> Result<Vec<(String, TableKind)>, ApiError> {
     let mut columns = run.head.answers();
     let Some(wanted) = wanted else {
         return Ok(columns);
@@ -292,82 +262,29 @@ pub(crate) fn selected(
     Ok(columns)
 }
 
-/// The chunks of a run, one after the other.
-pub(crate) struct ChunkSource {
+/// The answers to these rows of a run, a chunk at a time.
+fn answers(
     jobs: Jobs,
-    /// The run.
-    pub run: Run,
-    read: VecDeque<ChunkRef>,
-    last: Option<Uuid>,
-    over: bool,
-}
-
-impl ChunkSource {
-    /// The chunks of a run from the first on.
-    pub(crate) fn new(jobs: Jobs, run: Run) -> ChunkSource {
-        ChunkSource {
-            jobs,
-            run,
-            read: VecDeque::new(),
-            last: None,
-            over: false,
-        }
-    }
-
-    /// The next chunk.
-    pub(crate) async fn next(&mut self) -> Result<Option<ChunkRef>, JobsError> {
-        if self.read.is_empty() && !self.over {
-            let more = self.jobs.run_chunks(self.run.chunks.id, self.last).await?;
-            self.last = more.last().map(|chunk| chunk.job);
-            self.over = more.is_empty();
-            self.read.extend(more);
-        }
-        Ok(self.read.pop_front())
-    }
-
-    /// The answers of a chunk.
-    pub(crate) async fn answers(
-        &self,
-        chunk: &ChunkRef,
-        wanted: Vec<String>,
-    ) -> Result<RowTable, JobsError> {
-        self.jobs
-            .chunk_answers(&self.run.head, chunk, Some(wanted))
-            .await
-    }
-}
-
-/// Answers under way to a client.
-struct Answers {
-    source: ChunkSource,
+    run: Run,
     rows: Range<u64>,
     wanted: Vec<String>,
-}
-
-impl Answers {
-    /// The next piece, and the writer if there is more to come.
-    async fn next(
-        &mut self,
-        mut writer: RowWriter,
-    ) -> Result<(Bytes, Option<RowWriter>), WriteError> {
-        while let Some(chunk) = self.source.next().await? {
-            let own = self.source.run.head.rows_of(chunk.index);
-            let common = own.start.max(self.rows.start)..own.end.min(self.rows.end);
+) -> impl Stream<Item = Result<RowTable, JobsError>> {
+    let state = (jobs.items(run.chunks.id), jobs, run, rows, wanted);
+    try_unfold(state, async |mut state| {
+        let (chunks, jobs, run, rows, wanted) = &mut state;
+        while let Some(chunk) = chunks.next().await? {
+            let own = run.head.rows_of(chunk.index);
+            let common = own.start.max(rows.start)..own.end.min(rows.end);
             if common.is_empty() {
                 continue;
             }
-            let table = self.source.answers(&chunk, self.wanted.clone()).await?;
+            let answers = jobs.chunk_answers(&run.head, &chunk, Some(wanted.clone()));
             let place = |row: u64| usize::try_from(row - own.start).unwrap_or(usize::MAX);
             let cut = place(common.start)..place(common.end);
-            let written = blocking(move || {
-                let piece = writer.write(table.cut(&cut));
-                (piece, writer)
-            });
-            let (piece, writer) = written.await?;
-            return Ok((Bytes::from(piece?), Some(writer)));
+            return Ok(Some((answers.await?.cut(&cut), state)));
         }
-        Ok((Bytes::from(writer.finish()?), None))
-    }
+        Ok(None)
+    })
 }
 
 /// The files of an ended run, for programs that read them in place.
@@ -413,10 +330,10 @@ pub(crate) async fn manifest(
     let run = jobs.run(id).await?;
     require_ended(&run)?;
     let (rows, columns) = (run.head.rows, answer_columns(&run));
-    let mut source = ChunkSource::new(jobs, run);
+    let mut chunks = jobs.items(id);
     let mut files = Vec::new();
-    while let Some(chunk) = source.next().await? {
-        let rows = source.run.head.rows_of(chunk.index);
+    while let Some(chunk) = chunks.next().await? {
+        let rows = run.head.rows_of(chunk.index);
         files.push(RunFile {
             url: format!(
                 "/v1/runs/{id}/results?format=parquet&rows={}:{}",
@@ -424,7 +341,7 @@ pub(crate) async fn manifest(
             ),
             first_row: rows.start,
             rows: rows.end - rows.start,
-            key: chunk.key.map(|folder| format!("{folder}/rows.parquet")),
+            key: chunk.key().map(|folder| format!("{folder}/rows.parquet")),
         });
     }
     Ok(Json(RunManifest {
@@ -622,9 +539,8 @@ pub(crate) async fn totals(
         all: Numbers::default(),
         sections: BTreeMap::new(),
     };
-    let mut source = ChunkSource::new(jobs, run);
-    while let Some(chunk) = source.next().await? {
-        let table = source.answers(&chunk, wanted.clone()).await?;
+    let mut answers = Box::pin(answers(jobs, run, 0..u64::MAX, wanted));
+    while let Some(table) = answers.try_next().await? {
         gathered.add(&table)?;
     }
     let percentiles = query.percentiles.unwrap_or_else(|| PERCENTILES.to_vec());

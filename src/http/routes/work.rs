@@ -1,14 +1,14 @@
 //! Jobs, batches, runs and evolutions: read, followed, cancelled and deleted by the same handlers, one router for each kind.
 use std::convert::Infallible;
 
-use axum::Json;
+use axum::body::Body;
 use axum::extract::Path;
 use axum::http::StatusCode;
 use axum::response::sse::Event;
 use axum::response::{IntoResponse, Response};
 use axum::routing::{MethodRouter, delete, get, post};
-use futures_util::StreamExt;
-use futures_util::stream::{once, unfold};
+use axum::{Extension, Json};
+use futures_util::stream::{Stream, StreamExt, once, unfold};
 use serde::Serialize;
 use serde_json::json;
 use utoipa::openapi::extensions::Extensions;
@@ -23,12 +23,14 @@ use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter};
 use uuid::Uuid;
 
 use crate::http::dto::{BatchAnswer, BatchReceipt, JobAnswer, RunAnswer};
-use crate::http::extract::caller::{Caller, parsed};
+use crate::http::extract::caller::{Caller, Credential, parsed, revoked, until_revoked};
 use crate::http::problem::{ApiError, PlainProblems, ProblemKind, describe};
 use crate::http::render::format::Format;
+use crate::http::render::row_tables::{Piece, RowWriter, WriteError};
 use crate::http::routes::wait::{EventRequest, Wait, WaitQuery, changed, event};
 use crate::http::state::AppState;
 use crate::jobs::Jobs;
+use crate::jobs::codec::table::TableKind;
 use crate::jobs::model::{Kind, State as JobState};
 use crate::jobs::work::{Follower, Work};
 
@@ -138,6 +140,26 @@ pub(crate) async fn await_end(jobs: &Jobs, id: Uuid, wait: &Wait) -> Result<(), 
         ended?;
     }
     Ok(())
+}
+
+/// The forms that the results of batches and runs come in.
+pub(crate) const RESULT_FORMATS: &[Format] =
+    &[Format::Ndjson, Format::Csv, Format::Arrow, Format::Parquet];
+
+/// Answers with a table that is written as it comes, until the key of the request is revoked. `name` is that of the file.
+///
+/// # Errors
+/// The table cannot be begun.
+pub(crate) fn table_answer(
+    (jobs, key): (Jobs, Option<Extension<Credential>>),
+    (format, name): (Format, &str),
+    columns: &[(String, TableKind)],
+    pieces: impl Stream<Item = Result<Piece, WriteError>> + Send + 'static,
+) -> Result<Response, ApiError> {
+    let text = RowWriter::stream(format, columns, pieces);
+    let text = text.map_err(|error| ApiError::internal(&error))?;
+    let revoked = revoked(jobs, key.map(|Extension(key)| key));
+    Ok(format.answer(name, Body::from_stream(until_revoked(text, revoked))))
 }
 
 /// `POST …/cancel`.

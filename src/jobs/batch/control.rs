@@ -1,4 +1,5 @@
 //! Batches in the job table: filled, read, cancelled, deleted, and given up.
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -322,59 +323,102 @@ impl Jobs {
 /// Small solutions read at once: once they are this large together, the rest is left for the next page.
 pub const PAGE_BYTES: usize = 256 << 10;
 
+/// Jobs that are read the first time.
+const FIRST_PAGE_JOBS: u32 = 50;
+/// Most jobs that are read at once.
+const PAGE_JOBS: u32 = 500;
+
 /// Pause between two reads of a job that a reader of results waits for.
 const REREAD_PAUSE: Duration = Duration::from_millis(10);
 
 /// Size of a solution, and its text without the closing brace.
 pub type OpenedItem = (usize, BoxStream<'static, Result<Bytes, JobsError>>);
 
-impl Jobs {
-    /// The next jobs of a batch after the job `after`, in the order they were sent, at most `limit`, fewer once
-    /// the small results, which are read with them, come to [`PAGE_BYTES`]; large ones are left to [`Jobs::open_item`]. With `until`, only jobs that have ended are returned as long as that time is not reached, and at
-    /// least one is waited for. Of these, the ones in one of `states` are returned (all if there is none), with the job after which to go on;
-    /// nothing at the end of the batch.
+/// The jobs of a batch or the chunks of a run in the order in which they were sent, read page by page.
+#[derive(Debug)]
+pub struct Items {
+    jobs: Jobs,
+    batch: Uuid,
+    page: u32,
+    /// The job after which to go on.
+    pub after: Option<Uuid>,
+    /// Jobs that have not ended are waited for until then.
+    pub until: Option<Instant>,
+    /// States of the jobs that are returned; all if there is none.
+    pub states: Vec<State>,
+    /// What was read and not taken yet.
+    pub read: VecDeque<BatchItem>,
+}
+
+impl Items {
+    /// The next job; nothing at the end of the batch.
     ///
     /// # Errors
     /// A failed database.
-    pub async fn batch_items(
-        &self,
-        id: Uuid,
-        after: Option<Uuid>,
-        limit: u32,
-        until: Option<Instant>,
-        states: &[State],
-    ) -> Result<(Vec<BatchItem>, Option<Uuid>), JobsError> {
-        let until = until.unwrap_or_else(Instant::now);
-        loop {
-            let mut lines = self
-                .shared
-                .store
-                .batch_items(&self.tenant, id, after, limit, PAGE_BYTES)
-                .await?;
-            lines.retain(|line| *line.job.tenant == *self.tenant);
-            let waiting = Instant::now() < until && !self.shared.draining.is_cancelled();
-            if waiting {
-                let done = lines
-                    .iter()
-                    .take_while(|line| line.job.state.ended())
-                    .count();
-                if done == 0
-                    && let Some(first) = lines.first().map(|line| line.job.id)
-                {
-                    let left = until.saturating_duration_since(Instant::now());
-                    // If it is gone, the lines are read again.
-                    let _ = self.of_kind(Kind::Case).wait_for(first, left).await;
+    pub async fn next(&mut self) -> Result<Option<BatchItem>, JobsError> {
+        self.fill().await?;
+        Ok(self.read.pop_front())
+    }
+
+    /// Reads the next page if nothing is left of the last one; false at the end of the batch. Small results are read with their jobs, and a page
+    /// ends once they come to [`PAGE_BYTES`]; large ones are left to [`Jobs::open_item`]. With `until`, only jobs that have ended are
+    /// read as long as that time is not reached, and at least one is waited for.
+    ///
+    /// # Errors
+    /// A failed database.
+    pub async fn fill(&mut self) -> Result<bool, JobsError> {
+        let shared = &self.jobs.shared;
+        while self.read.is_empty() {
+            let items = shared.store.batch_items(
+                &self.jobs.tenant,
+                self.batch,
+                self.after,
+                self.page,
+                PAGE_BYTES,
+            );
+            let mut items = items.await?;
+            let now = Instant::now();
+            let until = self.until.filter(|until| now < *until);
+            if let Some(until) = until.filter(|_| !shared.draining.is_cancelled()) {
+                let ended = items.iter().take_while(|item| item.job.state.ended());
+                let ended = ended.count();
+                if let Some(first) = items.first().filter(|_| ended == 0) {
+                    // If it is gone, the page is read again.
+                    let jobs = self.jobs.of_kind(Kind::Case);
+                    let _ = jobs.wait_for(first.job.id, until - now).await;
                     // Many jobs end in the same moment; one read serves all of them.
                     tokio::time::sleep(REREAD_PAUSE).await;
                     continue;
                 }
-                lines.truncate(done);
+                items.truncate(ended);
             }
-            let last = lines.last().map(|line| line.job.id);
-            if !states.is_empty() {
-                lines.retain(|line| states.contains(&line.job.state));
-            }
-            return Ok((lines, last));
+            let Some(last) = items.last() else {
+                return Ok(false);
+            };
+            self.after = Some(last.job.id);
+            self.page = match self.states.is_empty() {
+                true => (2 * u32::try_from(items.len()).unwrap_or(PAGE_JOBS)).clamp(4, PAGE_JOBS),
+                false => PAGE_JOBS,
+            };
+            items.retain(|item| self.states.is_empty() || self.states.contains(&item.job.state));
+            self.read = items.into();
+        }
+        Ok(true)
+    }
+}
+
+impl Jobs {
+    /// The jobs of a batch or the chunks of a run.
+    #[must_use]
+    pub fn items(&self, batch: Uuid) -> Items {
+        Items {
+            jobs: self.clone(),
+            batch,
+            page: FIRST_PAGE_JOBS,
+            after: None,
+            until: None,
+            states: Vec::new(),
+            read: VecDeque::new(),
         }
     }
 

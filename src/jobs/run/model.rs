@@ -215,9 +215,9 @@ impl RunHead {
 
     /// The rows of a chunk.
     #[must_use]
-    pub fn rows_of(&self, chunk: u64) -> std::ops::Range<u64> {
+    pub fn rows_of(&self, chunk: u32) -> std::ops::Range<u64> {
         let each = u64::from(self.chunk_rows);
-        let begin = (chunk * each).min(self.rows);
+        let begin = (u64::from(chunk) * each).min(self.rows);
         begin..(begin + each).min(self.rows)
     }
 }

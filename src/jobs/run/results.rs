@@ -8,7 +8,7 @@ use crate::jobs::codec::parquet::TableReader;
 use crate::jobs::codec::table::{RowTable, TableColumn};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::{Batch, ItemResult, Kind, State};
+use crate::jobs::model::{Batch, BatchItem, Kind, State};
 use crate::jobs::run::model::{Run, RunChunk, RunHead, parted, table_column};
 use crate::jobs::sync::blocking;
 
@@ -39,58 +39,7 @@ impl Jobs {
     }
 }
 
-/// Chunks that are read from the table of jobs at once. Chosen by judgement: one statement for so many files, which take far longer.
-const AT_ONCE: u32 = 64;
-
-/// A chunk of a run and where its answers are.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ChunkRef {
-    /// Its place among the chunks, from 0.
-    pub index: u64,
-    /// The job that it is.
-    pub job: Uuid,
-    /// Where it stands.
-    pub state: State,
-    /// Why it has no answers, as a word; nothing if it has.
-    pub why: Option<&'static str>,
-    /// The key of its answers, if it has any.
-    pub key: Option<String>,
-}
-
 impl Jobs {
-    /// The chunks of a run from this one on, some of them; none behind the last.
-    ///
-    /// # Errors
-    /// A failed database.
-    pub async fn run_chunks(
-        &self,
-        run: Uuid,
-        after: Option<Uuid>,
-    ) -> Result<Vec<ChunkRef>, JobsError> {
-        let store = &self.shared.store;
-        let items = store.batch_items(&self.tenant, run, after, AT_ONCE, usize::MAX);
-        let items = items.await?;
-        let chunks = items.into_iter().map(|item| ChunkRef {
-            index: u64::from(item.index),
-            job: item.job.id,
-            state: item.job.state,
-            why: match item.job.state {
-                State::Succeeded => None,
-                State::Failed => Some(
-                    item.job
-                        .failure
-                        .map_or("failed", |failure| failure.kind.name()),
-                ),
-                other => Some(other.name()),
-            },
-            key: match item.result {
-                Some(ItemResult::Stored(key)) => Some(key),
-                _ => None,
-            },
-        });
-        Ok(chunks.collect())
-    }
-
     /// The case that a row of a run stands for, and its answer as a table of one row if it is there.
     ///
     /// # Errors
@@ -101,23 +50,22 @@ impl Jobs {
         row: u64,
     ) -> Result<(Value, Option<RowTable>), JobsError> {
         let head = &run.head;
-        let index = row / u64::from(head.chunk_rows.max(1));
-        let mut last = None;
-        let chunk = loop {
-            let chunks = self.run_chunks(run.chunks.id, last).await?;
-            last = Some(chunks.last().ok_or(JobsError::Expired)?.job);
-            if let Some(chunk) = chunks.into_iter().find(|chunk| chunk.index == index) {
-                break chunk;
+        let mut chunks = self.items(run.chunks.id);
+        let (chunk, place) = loop {
+            let chunk = chunks.next().await?.ok_or(JobsError::Expired)?;
+            let rows = head.rows_of(chunk.index);
+            if rows.contains(&row) {
+                let place = usize::try_from(row - rows.start).unwrap_or(0);
+                break (chunk, place);
             }
         };
-        let place = usize::try_from(row - head.rows_of(index).start).unwrap_or(0);
-        let sent = self.chunk_rows(head, chunk.job).await?;
+        let sent = self.chunk_rows(head, chunk.job.id).await?;
         let (varied, _) = parted(head, sent);
         let case = case_of_row(&head.case, &varied, &head.profiles, place);
         let case = case.map_err(|(pointer, reason)| {
             JobsError::Damaged(format!("row {row} of a run: {pointer}: {reason}"))
         })?;
-        let answer = match chunk.state.ended() {
+        let answer = match chunk.job.state.ended() {
             true => Some(self.chunk_answers(head, &chunk, None).await?),
             false => None,
         };
@@ -131,10 +79,10 @@ impl Jobs {
     pub async fn chunk_answers(
         &self,
         head: &RunHead,
-        chunk: &ChunkRef,
+        chunk: &BatchItem,
         wanted: Option<Vec<String>>,
     ) -> Result<RowTable, JobsError> {
-        let Some(key) = &chunk.key else {
+        let Some(key) = chunk.key() else {
             return self.without_answers(head, chunk, wanted.as_deref()).await;
         };
         let file = self.shared.blobs.chunk_answers(key).await?;
@@ -144,12 +92,17 @@ impl Jobs {
     async fn without_answers(
         &self,
         head: &RunHead,
-        chunk: &ChunkRef,
+        chunk: &BatchItem,
         wanted: Option<&[String]>,
     ) -> Result<RowTable, JobsError> {
         let rows = head.rows_of(chunk.index);
-        let sent = self.chunk_rows(head, chunk.job).await?;
+        let sent = self.chunk_rows(head, chunk.job.id).await?;
         let count = usize::try_from(rows.end - rows.start).unwrap_or(0);
+        let status = match (chunk.job.state, &chunk.job.failure) {
+            (State::Succeeded, _) => "lost",
+            (State::Failed, Some(failure)) => failure.kind.name(),
+            (state, _) => state.name(),
+        };
         let mut columns = Vec::new();
         for (name, kind) in head.answers() {
             if wanted.is_some_and(|wanted| !wanted.contains(&name)) {
@@ -158,9 +111,7 @@ impl Jobs {
             let place = head.columns.iter().position(|column| column.name == name);
             let column = match (name.as_str(), place) {
                 ("row", _) => TableColumn::Integers(rows.clone().map(u64::cast_signed).collect()),
-                ("status", _) => {
-                    TableColumn::Texts(vec![Some(chunk.why.unwrap_or("lost").to_owned()); count])
-                }
+                ("status", _) => TableColumn::Texts(vec![Some(status.to_owned()); count]),
                 (_, Some(place)) if head.columns[place].pointer.is_none() => {
                     table_column(sent.columns[place].clone())
                 }
