@@ -1,38 +1,30 @@
 //! Checks that every number a client can read in an answer is finite, and names the first that is not.
 
-use std::io::{Error, Result, Write, sink};
+use std::fmt::{self, Display};
 
-use serde::Serialize;
-use serde_json::ser::{Formatter, Serializer};
+use serde::ser::{
+    Error, Impossible, Serialize, SerializeMap, SerializeSeq, SerializeStruct, SerializeTuple,
+    Serializer,
+};
 
 use crate::contact::error::SolveError;
 use crate::contact::solution::words::answer::{
     Fields, PatchCells, PatchFields, PointFields, Solution,
 };
 
-/// Members that are `null` where there is nothing to say, with those around them.
-const NULLS: [&str; 4] = [
-    "error_estimate",
-    "normalised.creepage_x",
-    "normalised.creepage_y",
-    "normalised.spin",
-];
-
 /// Refuses an answer that holds a number that is not finite.
 ///
 /// # Errors
 /// [`SolveError::NotFinite`] with the first such quantity.
-pub fn require(solution: &Solution, fields: &Fields) -> std::result::Result<(), SolveError> {
+pub fn require(solution: &Solution, fields: &Fields) -> Result<(), SolveError> {
     let found = first_in(solution).or_else(|| first_in_fields(fields));
     found.map_or(Ok(()), |quantity| Err(SolveError::NotFinite { quantity }))
 }
 
-/// The path of the first number of a value that is not finite: JSON has no such numbers, and has `null` in their place.
+/// The path of the first number of a value that is not finite.
 fn first_in(value: &impl Serialize) -> Option<String> {
-    let mut path = Path::default();
-    let finder = Finder(&mut path);
-    let written = value.serialize(&mut Serializer::with_formatter(sink(), finder));
-    written.err().map(|_| path.name())
+    let found = value.serialize(Finder).err()?;
+    Some(found.0.trim_start_matches('.').to_owned())
 }
 
 fn first_in_fields(fields: &Fields) -> Option<String> {
@@ -81,98 +73,228 @@ fn first_of(all: &[(&str, Option<&Vec<f64>>)]) -> Option<String> {
     })
 }
 
-/// The way to the value that is being written.
-#[derive(Default)]
-struct Path {
-    steps: Vec<Step>,
-    /// The names of the members on the way, one behind the other.
-    names: String,
-    /// The name of a member is being written.
-    in_name: bool,
-}
-
-enum Step {
-    /// A member, and where its name begins.
-    Member(usize),
-    /// A place in an array.
-    Item(usize),
-}
+/// The path to a number that is not finite; assembled from the innermost name outwards.
+#[derive(Debug)]
+struct Path(String);
 
 impl Path {
-    fn name(&self) -> String {
-        let mut name = String::new();
-        let mut end = self.names.len();
-        for step in self.steps.iter().rev() {
-            let step = match step {
-                Step::Member(start) => format!(
-                    ".{}",
-                    &self.names[*start..std::mem::replace(&mut end, *start)]
-                ),
-                Step::Item(place) => format!("[{place}]"),
-            };
-            name.insert_str(0, &step);
-        }
-        name.trim_start_matches('.').to_owned()
+    fn under(self, step: impl Display) -> Path {
+        Path(format!("{step}{}", self.0))
     }
 }
 
-/// Writes nothing, and stops at a `null` that stands for a number.
-struct Finder<'a>(&'a mut Path);
+impl Display for Path {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
 
-impl Formatter for Finder<'_> {
-    fn write_null<W: ?Sized + Write>(&mut self, _: &mut W) -> Result<()> {
-        let name = self.0.name();
-        match NULLS.iter().any(|member| name.ends_with(member)) {
-            true => Ok(()),
-            false => Err(Error::other("a number that is not finite")),
+impl std::error::Error for Path {}
+
+impl Error for Path {
+    fn custom<T: Display>(message: T) -> Path {
+        Path(message.to_string())
+    }
+}
+
+/// A serializer that writes nothing and fails at the first number that is not finite.
+struct Finder;
+
+/// A list, map or structure being searched: the index of the next item, or the name of the next value.
+#[derive(Default)]
+struct Members {
+    next: usize,
+    key: String,
+}
+
+impl Members {
+    fn item<T: Serialize + ?Sized>(&mut self, item: &T) -> Result<(), Path> {
+        let number = self.next;
+        self.next += 1;
+        let visited = item.serialize(Finder);
+        visited.map_err(|path| path.under(format_args!("[{number}]")))
+    }
+}
+
+fn member<T: Serialize + ?Sized>(name: &str, value: &T) -> Result<(), Path> {
+    let visited = value.serialize(Finder);
+    visited.map_err(|path| path.under(format_args!(".{name}")))
+}
+
+/// Lists and tuples are searched in the same way.
+macro_rules! items {
+    ($($kind:ident),+) => {
+        $(impl $kind for Members {
+            type Ok = ();
+            type Error = Path;
+
+            fn serialize_element<T: Serialize + ?Sized>(&mut self, item: &T) -> Result<(), Path> {
+                self.item(item)
+            }
+
+            fn end(self) -> Result<(), Path> {
+                Ok(())
+            }
+        })+
+    };
+}
+
+items!(SerializeSeq, SerializeTuple);
+
+impl SerializeMap for Members {
+    type Ok = ();
+    type Error = Path;
+
+    fn serialize_key<T: Serialize + ?Sized>(&mut self, key: &T) -> Result<(), Path> {
+        let key = serde_json::to_value(key).map_err(Path::custom)?;
+        self.key = key.as_str().unwrap_or_default().to_owned();
+        Ok(())
+    }
+
+    fn serialize_value<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Path> {
+        member(&self.key, value)
+    }
+
+    fn end(self) -> Result<(), Path> {
+        Ok(())
+    }
+}
+
+impl SerializeStruct for Members {
+    type Ok = ();
+    type Error = Path;
+
+    fn serialize_field<T: Serialize + ?Sized>(
+        &mut self,
+        name: &'static str,
+        value: &T,
+    ) -> Result<(), Path> {
+        member(name, value)
+    }
+
+    fn end(self) -> Result<(), Path> {
+        Ok(())
+    }
+}
+
+/// Kinds of values that cannot contain a number that is not finite.
+macro_rules! passed {
+    ($($method:ident: $kind:ty),+ $(,)?) => {
+        $(fn $method(self, _: $kind) -> Result<(), Path> { Ok(()) })+
+    };
+}
+
+impl Serializer for Finder {
+    type Ok = ();
+    type Error = Path;
+    type SerializeSeq = Members;
+    type SerializeTuple = Members;
+    type SerializeTupleStruct = Impossible<(), Path>;
+    type SerializeTupleVariant = Impossible<(), Path>;
+    type SerializeMap = Members;
+    type SerializeStruct = Members;
+    type SerializeStructVariant = Impossible<(), Path>;
+
+    passed! {
+        serialize_bool: bool, serialize_i8: i8, serialize_i16: i16, serialize_i32: i32,
+        serialize_i64: i64, serialize_u8: u8, serialize_u16: u16, serialize_u32: u32,
+        serialize_u64: u64, serialize_char: char, serialize_str: &str, serialize_bytes: &[u8],
+        serialize_unit_struct: &'static str,
+    }
+
+    fn serialize_f32(self, value: f32) -> Result<(), Path> {
+        self.serialize_f64(value.into())
+    }
+
+    fn serialize_f64(self, value: f64) -> Result<(), Path> {
+        if value.is_finite() {
+            return Ok(());
         }
+        Err(Path(String::new()))
     }
 
-    fn begin_array<W: ?Sized + Write>(&mut self, _: &mut W) -> Result<()> {
-        self.0.steps.push(Step::Item(0));
+    fn serialize_none(self) -> Result<(), Path> {
         Ok(())
     }
 
-    fn end_array_value<W: ?Sized + Write>(&mut self, _: &mut W) -> Result<()> {
-        if let Some(Step::Item(place)) = self.0.steps.last_mut() {
-            *place += 1;
-        }
+    fn serialize_some<T: Serialize + ?Sized>(self, value: &T) -> Result<(), Path> {
+        value.serialize(self)
+    }
+
+    fn serialize_unit(self) -> Result<(), Path> {
         Ok(())
     }
 
-    fn end_array<W: ?Sized + Write>(&mut self, _: &mut W) -> Result<()> {
-        self.0.steps.pop();
+    fn serialize_unit_variant(self, _: &'static str, _: u32, _: &'static str) -> Result<(), Path> {
         Ok(())
     }
 
-    fn begin_object_key<W: ?Sized + Write>(&mut self, _: &mut W, _: bool) -> Result<()> {
-        self.0.steps.push(Step::Member(self.0.names.len()));
-        self.0.in_name = true;
-        Ok(())
+    fn serialize_newtype_struct<T: Serialize + ?Sized>(
+        self,
+        _: &'static str,
+        value: &T,
+    ) -> Result<(), Path> {
+        value.serialize(self)
     }
 
-    fn write_string_fragment<W: ?Sized + Write>(&mut self, _: &mut W, part: &str) -> Result<()> {
-        if self.0.in_name {
-            self.0.names.push_str(part);
-        }
-        Ok(())
+    fn serialize_newtype_variant<T: Serialize + ?Sized>(
+        self,
+        _: &'static str,
+        _: u32,
+        name: &'static str,
+        value: &T,
+    ) -> Result<(), Path> {
+        member(name, value)
     }
 
-    fn end_object_key<W: ?Sized + Write>(&mut self, _: &mut W) -> Result<()> {
-        self.0.in_name = false;
-        Ok(())
+    fn serialize_seq(self, _: Option<usize>) -> Result<Members, Path> {
+        Ok(Members::default())
     }
 
-    fn end_object_value<W: ?Sized + Write>(&mut self, _: &mut W) -> Result<()> {
-        if let Some(Step::Member(start)) = self.0.steps.pop() {
-            self.0.names.truncate(start);
-        }
-        Ok(())
+    fn serialize_tuple(self, _: usize) -> Result<Members, Path> {
+        Ok(Members::default())
     }
 
-    fn write_f64<W: ?Sized + Write>(&mut self, _: &mut W, _: f64) -> Result<()> {
-        Ok(())
+    fn serialize_tuple_struct(
+        self,
+        name: &'static str,
+        _: usize,
+    ) -> Result<Self::SerializeTupleStruct, Path> {
+        Err(unvisited(name))
     }
+
+    fn serialize_tuple_variant(
+        self,
+        name: &'static str,
+        _: u32,
+        _: &'static str,
+        _: usize,
+    ) -> Result<Self::SerializeTupleVariant, Path> {
+        Err(unvisited(name))
+    }
+
+    fn serialize_map(self, _: Option<usize>) -> Result<Members, Path> {
+        Ok(Members::default())
+    }
+
+    fn serialize_struct(self, _: &'static str, _: usize) -> Result<Members, Path> {
+        Ok(Members::default())
+    }
+
+    fn serialize_struct_variant(
+        self,
+        name: &'static str,
+        _: u32,
+        _: &'static str,
+        _: usize,
+    ) -> Result<Self::SerializeStructVariant, Path> {
+        Err(unvisited(name))
+    }
+}
+
+/// A type that answers do not contain yet. It is reported as an error, so that the search is extended when one does.
+fn unvisited(name: &str) -> Path {
+    Path(format!(" (the search does not enter the type {name})"))
 }
 
 #[cfg(test)]
@@ -183,9 +305,7 @@ mod tests {
     #[derive(serde::Serialize)]
     struct Inner {
         pair: [f64; 2],
-        #[serde(skip_serializing_if = "Option::is_none")]
         maybe: Option<f64>,
-        error_estimate: Option<f64>,
         remark: crate::contact::remark::entry::RemarkEntry,
     }
 
@@ -199,7 +319,6 @@ mod tests {
         let inner = |pair, maybe| Inner {
             pair,
             maybe,
-            error_estimate: None,
             remark: Remark::OnPlanes {
                 reason: String::new(),
             }
