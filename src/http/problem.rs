@@ -103,6 +103,26 @@ kinds! {
 }
 
 impl ProblemKind {
+    /// There is no work of this kind with an id.
+    #[must_use]
+    pub fn not_found(kind: Kind) -> ProblemKind {
+        match kind {
+            Kind::Case | Kind::Evolution => ProblemKind::JobNotFound,
+            Kind::Cases => ProblemKind::BatchNotFound,
+            Kind::Rows => ProblemKind::RunNotFound,
+        }
+    }
+
+    /// Work of this kind has not ended.
+    #[must_use]
+    pub fn not_ended(kind: Kind) -> ProblemKind {
+        match kind {
+            Kind::Case | Kind::Evolution => ProblemKind::JobNotEnded,
+            Kind::Cases => ProblemKind::BatchNotEnded,
+            Kind::Rows => ProblemKind::RunNotEnded,
+        }
+    }
+
     /// Does it pass with time, so that the answer carries `Retry-After`?
     #[must_use]
     pub fn passes(self) -> bool {
@@ -538,9 +558,7 @@ impl From<JobsError> for ApiError {
                 return ApiError::bad_parameter("point", error.to_string());
             }
             JobsError::BadCursor => return ApiError::bad_parameter("cursor", error.to_string()),
-            JobsError::NotFound => ProblemKind::JobNotFound,
-            JobsError::BatchNotFound(Kind::Rows) => ProblemKind::RunNotFound,
-            JobsError::BatchNotFound(_) => ProblemKind::BatchNotFound,
+            JobsError::NotFound(kind) => ProblemKind::not_found(kind),
             JobsError::ProfileNotFound => ProblemKind::ProfileNotFound,
             JobsError::Expired => ProblemKind::Expired,
             JobsError::NotReady(_) => ProblemKind::ResultNotReady,
@@ -548,9 +566,7 @@ impl From<JobsError> for ApiError {
                 ProblemKind::JobCancelled
             }
             JobsError::NotSucceeded(_) => ProblemKind::JobFailed,
-            JobsError::NotEnded(_) => ProblemKind::JobNotEnded,
-            JobsError::BatchNotEnded(Kind::Rows, _) => ProblemKind::RunNotEnded,
-            JobsError::BatchNotEnded(..) => ProblemKind::BatchNotEnded,
+            JobsError::NotEnded(kind) => ProblemKind::not_ended(kind),
             JobsError::IdempotencyConflict => ProblemKind::IdempotencyConflict,
             JobsError::QueueFull { .. } | JobsError::StagingFull { .. } => ProblemKind::QueueFull,
             JobsError::QuotaExceeded { .. } | JobsError::StagingQuotaExceeded { .. } => {

@@ -118,18 +118,15 @@ pub enum JobsError {
     /// The idempotency key was used before with another case, or with other options.
     #[error("this `Idempotency-Key` was used before with a different case")]
     IdempotencyConflict,
-    /// There is no such job.
-    #[error("no job has this id")]
-    NotFound,
+    /// There is no work of this kind with this id.
+    #[error("no {} has this id", .0.noun())]
+    NotFound(Kind),
     /// There was such a job or batch, but its time is over.
     #[error("ended longer ago than this service keeps ended jobs, so it was removed")]
     Expired,
-    /// There is no batch, or no run for [`Kind::Rows`], with this id.
-    #[error("no {} has this id", .0.noun())]
-    BatchNotFound(Kind),
-    /// The job must end first.
-    #[error("the job is queued or running; cancel it first, then delete it")]
-    NotEnded(State),
+    /// The work must end first.
+    #[error("the {} has not ended; cancel it first, then delete it", .0.noun())]
+    NotEnded(Kind),
     /// The key is bound to labels, and this concerns the whole tenant.
     #[error("this key is bound to {labels}; it may not {action}, use a key without labels")]
     BoundKey {
@@ -149,9 +146,6 @@ pub enum JobsError {
     /// The run has more rows than it may.
     #[error("the run has more than the {0} rows that are allowed (`--run-max-rows`)")]
     TooManyRows(u64),
-    /// This many jobs of the batch, or chunks of the run, must end first.
-    #[error("{}", not_ended(*.0, *.1))]
-    BatchNotEnded(Kind, u64),
     /// There is no result yet.
     #[error("the job is {}, so there is no result yet", .0.name())]
     NotReady(State),
@@ -257,18 +251,6 @@ pub enum JobsError {
     /// Something stored cannot be read back.
     #[error("stored data is damaged: {0}")]
     Damaged(String),
-}
-
-fn not_ended(kind: Kind, jobs: u64) -> String {
-    match kind {
-        Kind::Rows => {
-            "rows of the run are waiting or being solved; cancel it first, then delete it"
-                .to_owned()
-        }
-        _ => format!(
-            "{jobs} jobs of the batch are queued or running; cancel it first, then delete it"
-        ),
-    }
 }
 
 fn without_result(job: &Job) -> String {

@@ -19,7 +19,7 @@ impl Jobs {
         if let Some(batch) = &job.batch_id
             && self.shared.unfinished_batches().abandoned.contains(batch)
         {
-            return Err(JobsError::NotFound);
+            return Err(JobsError::NotFound(self.kind));
         }
         let now = self.shared.now_ms();
         let now = job
@@ -31,11 +31,11 @@ impl Jobs {
         }
     }
 
-    /// Why there is nothing with this id for this tenant: `unknown`, or that it has expired.
-    pub(crate) async fn missing(&self, id: Uuid, unknown: JobsError) -> JobsError {
+    /// Why there is nothing with this id for this tenant.
+    pub(crate) async fn missing(&self, id: Uuid) -> JobsError {
         match self.shared.store.has_expired(&self.tenant, id).await {
             Ok(true) => JobsError::Expired,
-            Ok(false) => unknown,
+            Ok(false) => JobsError::NotFound(self.kind),
             Err(error) => error.into(),
         }
     }

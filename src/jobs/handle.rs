@@ -4,26 +4,21 @@ use std::time::Duration;
 
 use serde_json::Value;
 use tokio::time::timeout;
-use uuid::Uuid;
 
 use crate::contact::case::solver::KnownPair;
 use crate::contact::error::{CaseError, Fault, FaultCode};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::attempts::attempt::StopReason;
 use crate::jobs::error::JobsError;
-use crate::jobs::model::{Job, Kind, Labels, QueuePlace, State};
+use crate::jobs::model::{Kind, Labels};
 use crate::jobs::options::Options;
 use crate::jobs::runtime_probe::{ProbedTime, probe};
 use crate::jobs::shared::Shared;
-use crate::jobs::store::{Deleted, Notification, Usage};
+use crate::jobs::store::Usage;
 
 /// Longest list page.
 pub const PAGE_MAX: u32 = 1000;
 /// Longest list page of batches, whose jobs are counted.
 pub const BATCH_PAGE_MAX: u32 = 100;
-
-/// Beyond this place in the queue the place of a job is not given.
-const PLACES_COUNTED: u32 = 10_000;
 
 /// How long a readiness check waits for the database.
 const READY_WITHIN: Duration = Duration::from_secs(2);
@@ -109,48 +104,6 @@ impl Jobs {
         })
     }
 
-    /// A job.
-    ///
-    /// # Errors
-    /// [`JobsError::NotFound`], [`JobsError::Expired`], or a failed database.
-    pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
-        let job = self.shared.store.job(&self.tenant, id).await?;
-        match job {
-            Some(job) if !self.sees(&job.labels) || job.kind != self.kind => {
-                Err(JobsError::NotFound)
-            }
-            Some(job) => self.unexpired(job),
-            None => Err(self.missing(id, JobsError::NotFound).await),
-        }
-    }
-
-    /// As [`Jobs::get`], with the place of a queued job among the others; without it where too many come before.
-    ///
-    /// # Errors
-    /// As [`Jobs::get`].
-    pub async fn get_with_queue_place(&self, id: Uuid) -> Result<Job, JobsError> {
-        let mut job = self.get(id).await?;
-        if job.state != State::Queued {
-            return Ok(job);
-        }
-        let store = &self.shared.store;
-        let ahead = store.queued_before(&job, PLACES_COUNTED).await?;
-        if let Ok(position) = u32::try_from(ahead.jobs)
-            && position < PLACES_COUNTED
-        {
-            #[expect(clippy::cast_precision_loss, reason = "rough")]
-            let seconds = ahead.cost_us as f64 * 1e-6;
-            // Each of the tenants has as much solver time as this one, until its own queue is empty.
-            #[expect(clippy::cast_precision_loss, reason = "rough")]
-            let share = ahead.tenants.max(1) as f64 / self.shared.all_workers().max(1) as f64;
-            job.queue = Some(QueuePlace {
-                position,
-                starts_in_s: seconds * share,
-            });
-        }
-        Ok(job)
-    }
-
     /// What the tenant has here.
     ///
     /// # Errors
@@ -161,50 +114,6 @@ impl Jobs {
             staged_bytes: self.shared.staged.of(&self.tenant),
             ..usage
         })
-    }
-
-    /// Cancels a job: a queued one ends at once, a running one at the next tick of its solver, an ended one stays as
-    /// it is. Returns the job as it then is.
-    ///
-    /// # Errors
-    /// [`JobsError::NotFound`], or a failed database.
-    pub async fn cancel(&self, id: Uuid) -> Result<Job, JobsError> {
-        self.get(id).await?;
-        let now = self.shared.now_ms();
-        let job = self
-            .shared
-            .store
-            .cancel(&self.tenant, id, now)
-            .await?
-            .ok_or(JobsError::NotFound)?;
-        if job.state.ended() {
-            if job.state == State::Cancelled && job.ended_at == Some(now) {
-                self.shared.metrics.ended(State::Cancelled, 1);
-            }
-            self.shared.announce(id);
-        } else if let Some(control) = self.shared.running.get(id) {
-            // A worker that lists its attempt later reads the request from the store.
-            control.stop(StopReason::Cancel);
-        } else {
-            self.shared.publish(Notification::Cancel(id));
-        }
-        Ok(self.dated(job))
-    }
-
-    /// Removes an ended job with its case and results.
-    ///
-    /// # Errors
-    /// [`JobsError::NotEnded`], [`JobsError::NotFound`], or a failed database.
-    pub async fn delete(&self, id: Uuid) -> Result<(), JobsError> {
-        self.get(id).await?;
-        match self.shared.store.delete(&self.tenant, id).await? {
-            Deleted::NotEnded(state) => Err(JobsError::NotEnded(state)),
-            Deleted::NotFound => Err(JobsError::NotFound),
-            Deleted::Done => {
-                self.shared.collect_blobs().await;
-                Ok(())
-            }
-        }
     }
 
     /// Can this service take requests? A round trip to the database, which must also take data.

@@ -198,6 +198,28 @@ pub struct SubmitOptions {
     pub bypass_cache: bool,
 }
 
+/// What a submission says of its work, besides what is to be solved.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct WorkOptions {
+    /// Free text of the client; that of a single case is in the case.
+    pub name: Option<String>,
+    /// Labels of the client; those of a single case are in the case.
+    pub labels: Labels,
+    /// Priority, deadline and use of earlier results.
+    pub submit: SubmitOptions,
+    /// The client's idempotency key.
+    pub idempotency_key: Option<String>,
+}
+
+impl From<SubmitOptions> for WorkOptions {
+    fn from(submit: SubmitOptions) -> WorkOptions {
+        WorkOptions {
+            submit,
+            ..WorkOptions::default()
+        }
+    }
+}
+
 /// Options that one case of a batch has for itself, in place of those of the batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CaseOptions {

@@ -195,7 +195,7 @@ impl Jobs {
         }
         match self.get(id).await {
             Ok(_) => error,
-            Err(JobsError::NotFound | JobsError::Expired) => JobsError::Expired,
+            Err(JobsError::NotFound(_) | JobsError::Expired) => JobsError::Expired,
             Err(failed) => failed,
         }
     }
@@ -204,10 +204,10 @@ impl Jobs {
     async fn stored(&self, id: Uuid) -> Result<(Job, ResultRef), JobsError> {
         let found = self.shared.store.result(&self.tenant, id).await?;
         let Some((job, stored)) = found else {
-            return Err(self.missing(id, JobsError::NotFound).await);
+            return Err(self.missing(id).await);
         };
         if !self.sees(&job.labels) || job.kind != self.kind {
-            return Err(JobsError::NotFound);
+            return Err(JobsError::NotFound(self.kind));
         }
         let job = self.unexpired(job)?;
         match stored {

@@ -153,6 +153,7 @@ impl Drop for WaitingWriter<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jobs::model::Kind;
 
     #[test]
     fn places_fail_and_recover_one_by_one() {
@@ -209,6 +210,6 @@ mod tests {
             source: Box::new(io::Error::from(io::ErrorKind::NotFound)),
         });
         assert_eq!(gone.storage_fault(), None);
-        assert_eq!(JobsError::NotFound.storage_fault(), None);
+        assert_eq!(JobsError::NotFound(Kind::Case).storage_fault(), None);
     }
 }

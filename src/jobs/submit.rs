@@ -1,6 +1,5 @@
 //! Submission of single jobs: check, idempotency key, cached result, queue.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bytes::Bytes;
@@ -14,7 +13,7 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
-use crate::jobs::model::{Job, Kind, SubmitOptions, created_at};
+use crate::jobs::model::{Job, Kind, WorkOptions, created_at};
 use crate::jobs::store::{Enqueued, NewJob, QueueBounds, Refusal};
 use crate::jobs::sync::blocking;
 use crate::jobs::trace::KeyValue;
@@ -34,7 +33,11 @@ impl Jobs {
         case: Value,
         idempotency_key: Option<String>,
     ) -> Result<Job, JobsError> {
-        let submitted = self.submit_with(case, idempotency_key, SubmitOptions::default());
+        let options = WorkOptions {
+            idempotency_key,
+            ..WorkOptions::default()
+        };
+        let submitted = self.submit_with(case, options);
         submitted.await.map(|(job, _)| job)
     }
 
@@ -46,8 +49,7 @@ impl Jobs {
     pub async fn submit_with(
         &self,
         case: Value,
-        idempotency_key: Option<String>,
-        options: SubmitOptions,
+        options: WorkOptions,
     ) -> Result<(Job, bool), JobsError> {
         let check = |jobs: &Jobs, case: &Value| {
             let mut checked = jobs.check(case)?;
@@ -56,8 +58,7 @@ impl Jobs {
         };
         let case = self.with_profiles(case).await?;
         let small = is_small(&case);
-        self.submit_work(case, small, check, idempotency_key, options)
-            .await
+        self.submit_work(case, small, check, options).await
     }
 
     /// Checks an evolution and queues it, as [`Jobs::submit_with`] does with a case; its columns are named by JSON pointers into its template.
@@ -67,10 +68,10 @@ impl Jobs {
     pub async fn submit_evolution(
         &self,
         mut request: Value,
-        (name, labels): (Option<String>, BTreeMap<String, String>),
-        idempotency_key: Option<String>,
-        options: SubmitOptions,
+        mut options: WorkOptions,
     ) -> Result<(Job, bool), JobsError> {
+        let name = options.name.take();
+        let labels = std::mem::take(&mut options.labels);
         if let Some(template) = request.get_mut("template") {
             let filled = self.with_profiles(template.take()).await;
             *template = filled.map_err(|error| match error {
@@ -92,8 +93,7 @@ impl Jobs {
                 ..jobs.blank_job()
             })
         };
-        self.submit_work(request, false, check, idempotency_key, options)
-            .await
+        self.submit_work(request, false, check, options).await
     }
 
     /// Checks work and queues it.
@@ -102,17 +102,11 @@ impl Jobs {
         request: Value,
         small: bool,
         check: impl FnOnce(&Jobs, &Value) -> Result<NewJob, JobsError> + Send + 'static,
-        idempotency_key: Option<String>,
-        options: SubmitOptions,
+        options: WorkOptions,
     ) -> Result<(Job, bool), JobsError> {
         let span = self.submit_span();
         let traceparent = span.traceparent();
-        let submitted = self.store_work(
-            request,
-            small,
-            check,
-            (idempotency_key, options, traceparent),
-        );
+        let submitted = self.store_work(request, small, check, (options, traceparent));
         span.end(submitted.await, |(job, _)| {
             vec![
                 KeyValue::new("railhead.job.id", job.id.to_string()),
@@ -126,15 +120,16 @@ impl Jobs {
         request: Value,
         small: bool,
         check: impl FnOnce(&Jobs, &Value) -> Result<NewJob, JobsError> + Send + 'static,
-        (idempotency_key, options, traceparent): (Option<String>, SubmitOptions, Option<Arc<str>>),
+        (options, traceparent): (WorkOptions, Option<Arc<str>>),
     ) -> Result<(Job, bool), JobsError> {
+        let (key, options) = (options.idempotency_key, options.submit);
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
         let jobs = self.clone();
         let read = move || {
             let digest = || jobs.bound_digest(options.digest(&idempotency::digest(&request)));
-            let idempotency = idempotency_key.map(|key| (key, digest()));
+            let idempotency = key.map(|key| (key, digest()));
             (
                 check(&jobs, &request),
                 serde_json::to_vec(&request),

@@ -1,16 +1,18 @@
 //! Jobs, batches and runs alike: read, listed, waited for, followed, cancelled and deleted.
 use std::collections::{HashMap, VecDeque};
+use std::future::pending;
 use std::time::Duration;
 
 use tokio::time::{Instant, sleep, timeout_at};
 use uuid::Uuid;
 
+use crate::jobs::attempts::attempt::StopReason;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
-use crate::jobs::model::{Batch, Job, Kind, State};
-use crate::jobs::run::model::Run;
+use crate::jobs::model::{Batch, Job, Kind, Labels, QueuePlace, State};
+use crate::jobs::run::model::{Run, RunHead};
 use crate::jobs::shared::POLL_INTERVAL;
-use crate::jobs::store::{Change, Filter, Membership, Page};
+use crate::jobs::store::{Deleted, Filter, Membership, Notification, Page};
 
 /// Time between two reads of a job or batch of which no change is announced. Within it, what another request has read serves.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -18,110 +20,14 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Time between two reads of a batch for each of its jobs: counting them takes time.
 const PAUSE_PER_JOB: Duration = Duration::from_micros(10);
 
-impl Jobs {
-    /// Waits until a job is at another version than `seen` and returns it; at once if it is, or if nothing was seen yet.
-    /// `None` when nothing more will come: the job had ended, or the service is about to stop.
-    ///
-    /// # Errors
-    /// [`JobsError::NotFound`], or a failed database.
-    pub(crate) async fn job_changed_since(
-        &self,
-        id: Uuid,
-        seen: Option<u64>,
-    ) -> Result<Option<Job>, JobsError> {
-        // Subscribe first, then read: what ends in between is announced.
-        let mut ended = self.shared.ended.subscribe();
-        let mut announced = true;
-        loop {
-            // What others read a moment ago serves, unless something was announced since.
-            let job = match announced {
-                true => self.get(id).await?,
-                false => self.recent(id, PAUSE).await?,
-            };
-            if seen != Some(job.version) {
-                return Ok(Some(job));
-            }
-            if job.state.ended() {
-                return Ok(None);
-            }
-            let again = Instant::now() + POLL_INTERVAL;
-            let end = async {
-                // A lagging receiver may have missed the announcement, so it reads again as well.
-                while ended.recv().await.is_ok_and(|ended| ended != id) {}
-            };
-            tokio::select! {
-                end = timeout_at(again, end) => announced = end.is_ok(),
-                () = self.shared.draining.cancelled() => return Ok(None),
-            }
-        }
-    }
+/// Beyond this place in the queue the place of a job is not given.
+const PLACES_COUNTED: u32 = 10_000;
 
-    /// Waits until the jobs of a batch or run are in other states than `seen` says and returns it; at once if they are, or if
-    /// nothing was seen yet. `None` when nothing more will come: all jobs had ended, or the service is about to stop.
-    ///
-    /// # Errors
-    /// [`JobsError::BatchNotFound`], or a failed database.
-    pub(crate) async fn batch_changed_since(
-        &self,
-        kind: Kind,
-        id: Uuid,
-        seen: Option<&str>,
-    ) -> Result<Option<Batch>, JobsError> {
-        let mut pause = PAUSE;
-        loop {
-            let batch = match seen {
-                None => self.batch(kind, id).await?,
-                Some(_) => self.recent_batch(kind, id, pause).await?,
-            };
-            if seen != Some(&batch.change_tag()) {
-                return Ok(Some(batch));
-            }
-            let (ended, all) = batch.ended();
-            if ended == all {
-                return Ok(None);
-            }
-            pause = PAUSE_PER_JOB.saturating_mul(batch.count).max(PAUSE);
-            tokio::select! {
-                () = sleep(pause) => {}
-                () = self.shared.draining.cancelled() => return Ok(None),
-            }
-        }
-    }
+/// Jobs that are removed in one transaction.
+pub(crate) const DELETED_AT_ONCE: u32 = 500;
 
-    /// As [`Jobs::get`], as the job was a moment ago: one read serves all who follow it.
-    ///
-    /// # Errors
-    /// As [`Jobs::get`].
-    pub(crate) async fn recent(&self, id: Uuid, age: Duration) -> Result<Job, JobsError> {
-        let read = self.shared.store.job(&self.tenant, id);
-        let job = self
-            .shared
-            .recent_jobs
-            .at(&self.tenant, id, age, read)
-            .await?;
-        match job {
-            Some(job) if !self.sees(&job.labels) => Err(JobsError::NotFound),
-            Some(job) => self.unexpired(job),
-            None => Err(self.missing(id, JobsError::NotFound).await),
-        }
-    }
-
-    /// As [`Jobs::batch`], as the batch was a moment ago.
-    pub(crate) async fn recent_batch(
-        &self,
-        kind: Kind,
-        id: Uuid,
-        age: Duration,
-    ) -> Result<Batch, JobsError> {
-        let read = self.shared.store.batch(&self.tenant, kind, id);
-        let batch = self
-            .shared
-            .recent_batches
-            .at(&self.tenant, id, age, read)
-            .await?;
-        self.visible(kind, id, batch).await
-    }
-}
+/// Jobs of a batch that are cancelled in one transaction.
+const CANCELLED_AT_ONCE: u32 = 2000;
 
 /// What a client has submitted and follows.
 #[derive(Debug, Clone)]
@@ -146,12 +52,6 @@ impl From<Batch> for Work {
     }
 }
 
-impl From<Run> for Work {
-    fn from(run: Run) -> Work {
-        Work::Run(Box::new(run))
-    }
-}
-
 impl Work {
     /// UUIDv7.
     #[must_use]
@@ -168,23 +68,30 @@ impl Work {
     pub fn kind(&self) -> Kind {
         match self {
             Work::Job(job) => job.kind,
-            Work::Batch(_) => Kind::Cases,
+            Work::Batch(batch) => batch.kind,
             Work::Run(_) => Kind::Rows,
+        }
+    }
+
+    /// Its labels.
+    #[must_use]
+    pub fn labels(&self) -> &Labels {
+        match self {
+            Work::Job(job) => &job.labels,
+            Work::Batch(batch) => &batch.labels,
+            Work::Run(run) => &run.chunks.labels,
         }
     }
 
     /// Whether nothing of it will change any more.
     #[must_use]
     pub fn ended(&self) -> bool {
-        let all_ended = |batch: &Batch| {
-            let (ended, all) = batch.ended();
-            ended == all
+        let (ended, all) = match self {
+            Work::Job(job) => return job.state.ended(),
+            Work::Batch(batch) => batch.ended(),
+            Work::Run(run) => run.chunks.ended(),
         };
-        match self {
-            Work::Job(job) => job.state.ended(),
-            Work::Batch(batch) => all_ended(batch),
-            Work::Run(run) => all_ended(&run.chunks),
-        }
+        ended == all
     }
 
     /// A short text that differs between any two states that a client can tell apart, progress aside.
@@ -196,63 +103,113 @@ impl Work {
             Work::Run(run) => run.chunks.change_tag(),
         }
     }
+
+    /// The job or evolution that it is.
+    ///
+    /// # Errors
+    /// [`JobsError::NotFound`]: it is neither.
+    pub fn job(self) -> Result<Job, JobsError> {
+        match self {
+            Work::Job(job) => Ok(*job),
+            _ => Err(JobsError::NotFound(Kind::Case)),
+        }
+    }
 }
 
 impl Jobs {
-    /// Work as it is now; a queued job with its place in the queue.
-    ///
-    /// # Errors
-    /// [`JobsError::NotFound`], [`JobsError::BatchNotFound`], [`JobsError::Expired`], or a failed database.
-    pub async fn work(&self, id: Uuid) -> Result<Work, JobsError> {
-        match self.kind {
-            Kind::Case | Kind::Evolution => Ok(self.get_with_queue_place(id).await?.into()),
-            kind => self.work_of(self.batch(kind, id).await?).await,
+    /// Work as it is stored, or was not longer than `age` ago: one read serves all who follow it. A run is a batch here.
+    async fn read(&self, id: Uuid, age: Duration) -> Result<Work, JobsError> {
+        let (shared, tenant) = (&self.shared, &self.tenant);
+        let found = match self.kind {
+            Kind::Case | Kind::Evolution => {
+                let read = shared.store.job(tenant, id);
+                let job = shared.recent_jobs.at(tenant, id, age, read);
+                job.await?.map(Work::from)
+            }
+            kind => {
+                let read = shared.store.batch(tenant, kind, id);
+                let batch = shared.recent_batches.at(tenant, id, age, read);
+                batch.await?.map(Work::from)
+            }
+        };
+        match found {
+            Some(work) if work.kind() != self.kind || !self.sees(work.labels()) => {
+                Err(JobsError::NotFound(self.kind))
+            }
+            Some(Work::Job(job)) => Ok(self.unexpired(*job)?.into()),
+            Some(work) => Ok(work),
+            None => Err(self.missing(id).await),
         }
     }
 
-    /// The batch, or the run that it is.
-    pub(crate) async fn work_of(&self, batch: Batch) -> Result<Work, JobsError> {
-        match batch.kind {
-            Kind::Rows => Ok(self.with_head(batch).await?.into()),
-            _ => Ok(batch.into()),
+    /// Work as clients see it: a job unless it has expired, a run with its head.
+    async fn shown(&self, work: Work) -> Result<Work, JobsError> {
+        let batch = match work {
+            Work::Job(job) => return Ok(self.unexpired(*job)?.into()),
+            Work::Batch(batch) if batch.kind == Kind::Rows => *batch,
+            work => return Ok(work),
+        };
+        let (_, there) = batch.ended();
+        if there < u64::from(batch.count) {
+            // Its first chunks have expired, or it is being deleted.
+            return Err(JobsError::Expired);
         }
+        let record = self.shared.store.run(&self.tenant, batch.id).await?;
+        let record = record.ok_or(JobsError::NotFound(Kind::Rows))?;
+        let head = RunHead::read(&record.template, record.head.as_deref())?;
+        Ok(Work::Run(Box::new(Run::new(batch, head, &record))))
+    }
+
+    /// A job.
+    ///
+    /// # Errors
+    /// As [`Jobs::work`].
+    pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
+        self.read(id, Duration::ZERO).await?.job()
+    }
+
+    /// A run.
+    ///
+    /// # Errors
+    /// As [`Jobs::work`].
+    pub async fn run(&self, id: Uuid) -> Result<Run, JobsError> {
+        match self.of_kind(Kind::Rows).work(id).await? {
+            Work::Run(run) => Ok(*run),
+            _ => Err(JobsError::NotFound(Kind::Rows)),
+        }
+    }
+
+    /// Work as it is now; a queued job with its place among the others, unless too many come before it.
+    ///
+    /// # Errors
+    /// [`JobsError::NotFound`], [`JobsError::Expired`], or a failed database.
+    pub async fn work(&self, id: Uuid) -> Result<Work, JobsError> {
+        let mut work = self.read(id, Duration::ZERO).await?;
+        if let Work::Job(job) = &mut work
+            && job.state == State::Queued
+        {
+            job.queue = self.queue_place(job).await?;
+        }
+        self.shown(work).await
+    }
+
+    async fn queue_place(&self, job: &Job) -> Result<Option<QueuePlace>, JobsError> {
+        let store = &self.shared.store;
+        let ahead = store.queued_before(job, PLACES_COUNTED).await?;
+        let position = u32::try_from(ahead.jobs).ok();
+        #[expect(clippy::cast_precision_loss, reason = "rough")]
+        let seconds = ahead.cost_us as f64 * 1e-6;
+        // Each of the tenants has as much solver time as this one, until its own queue is empty.
+        #[expect(clippy::cast_precision_loss, reason = "rough")]
+        let share = ahead.tenants.max(1) as f64 / self.shared.all_workers().max(1) as f64;
+        let position = position.filter(|position| *position < PLACES_COUNTED);
+        Ok(position.map(|position| QueuePlace {
+            position,
+            starts_in_s: seconds * share,
+        }))
     }
 
     /// One page of a list, newest first. A page has at most [`PAGE_MAX`] jobs or [`BATCH_PAGE_MAX`] batches.
-    ///
-    /// # Errors
-    /// [`JobsError::BadCursor`], or a failed database.
-    pub async fn works(
-        &self,
-        filter: &Filter,
-        cursor: Option<&str>,
-        limit: u32,
-    ) -> Result<Page<Work>, JobsError> {
-        if matches!(self.kind, Kind::Case | Kind::Evolution) {
-            let page = self.list(filter, cursor, limit).await?;
-            return Ok(page.map(Work::from));
-        }
-        let (filter, after) = self.narrowed_page(filter, cursor)?;
-        let limit = limit.clamp(1, BATCH_PAGE_MAX);
-        let store = &self.shared.store;
-        let page = store.batches(&self.tenant, &filter, after, limit).await?;
-        let mut entries = Vec::with_capacity(page.entries.len());
-        for batch in page.entries {
-            match self.work_of(batch).await {
-                Ok(work) => entries.push(work),
-                // Deleted meanwhile, or about to be removed.
-                Err(JobsError::BatchNotFound(_) | JobsError::Expired) => {}
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(Page {
-            entries,
-            next_cursor: page.next_cursor,
-            total: page.total,
-        })
-    }
-
-    /// One page of the jobs, newest first; `limit` is brought into 1 to [`PAGE_MAX`].
     ///
     /// # Errors
     /// [`JobsError::BadCursor`], or a failed database.
@@ -261,24 +218,8 @@ impl Jobs {
         filter: &Filter,
         cursor: Option<&str>,
         limit: u32,
-    ) -> Result<Page<Job>, JobsError> {
-        let (filter, after) = self.narrowed_page(filter, cursor)?;
-        let store = &self.shared.store;
-        let mut page = store
-            .list(&self.tenant, &filter, after, limit.clamp(1, PAGE_MAX))
-            .await?;
-        let jobs = page.entries.into_iter();
-        page.entries = jobs.filter_map(|job| self.unexpired(job).ok()).collect();
-        Ok(page)
-    }
-
-    /// The filter, narrowed to what this handle sees, and the entry after which the page begins. The store makes cursors for the narrowed
-    /// filter.
-    fn narrowed_page(
-        &self,
-        filter: &Filter,
-        cursor: Option<&str>,
-    ) -> Result<(Filter, Option<Uuid>), JobsError> {
+    ) -> Result<Page<Work>, JobsError> {
+        // The store makes cursors for the narrowed filter.
         let filter = Filter {
             kind: self.kind,
             labels: self.narrowed(&filter.labels),
@@ -288,7 +229,28 @@ impl Jobs {
             Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
             None => None,
         };
-        Ok((filter, after))
+        let (store, tenant) = (&self.shared.store, &self.tenant);
+        let mut page = match self.kind {
+            Kind::Case | Kind::Evolution => {
+                let limit = limit.clamp(1, PAGE_MAX);
+                let page = store.list(tenant, &filter, after, limit).await?;
+                page.map(Work::from)
+            }
+            _ => {
+                let limit = limit.clamp(1, BATCH_PAGE_MAX);
+                let page = store.batches(tenant, &filter, after, limit).await?;
+                page.map(Work::from)
+            }
+        };
+        for work in std::mem::take(&mut page.entries) {
+            match self.shown(work).await {
+                Ok(work) => page.entries.push(work),
+                // Deleted meanwhile, or about to be removed.
+                Err(JobsError::NotFound(_) | JobsError::Expired) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(page)
     }
 
     /// Waits until work has ended, but not longer than `at_most`, and returns it as it then is. Returns at once when the service is about to
@@ -306,11 +268,9 @@ impl Jobs {
             }
             seen = Some(work.version());
         }
-        match self.kind {
-            // Its place in the queue is for those who look at it.
-            Kind::Case | Kind::Evolution => Ok(self.get(id).await?.into()),
-            _ => self.work(id).await,
-        }
+        // The place in the queue is for those who look at it.
+        let work = self.read(id, Duration::ZERO).await?;
+        self.shown(work).await
     }
 
     /// As [`Jobs::wait_for`], for a job.
@@ -318,10 +278,7 @@ impl Jobs {
     /// # Errors
     /// As [`Jobs::get`].
     pub async fn wait(&self, id: Uuid, at_most: Duration) -> Result<Job, JobsError> {
-        match self.wait_for(id, at_most).await? {
-            Work::Job(job) => Ok(*job),
-            _ => Err(JobsError::NotFound),
-        }
+        self.wait_for(id, at_most).await?.job()
     }
 
     /// Waits until work is at another version than `seen` and returns it; at once if it is, or if nothing was seen yet. `None` when nothing more will
@@ -334,15 +291,40 @@ impl Jobs {
         id: Uuid,
         seen: Option<&str>,
     ) -> Result<Option<Work>, JobsError> {
-        match self.kind {
-            Kind::Case | Kind::Evolution => {
-                let seen = seen.and_then(|text| text.parse().ok());
-                Ok(self.job_changed_since(id, seen).await?.map(Work::from))
+        // Subscribe first, then read: the end of a job in between is announced. Nothing announces changes of batches.
+        let mut ended = self.shared.ended.subscribe();
+        let mut age = match (self.kind, seen) {
+            (Kind::Cases | Kind::Rows, Some(_)) => PAUSE,
+            _ => Duration::ZERO,
+        };
+        loop {
+            let work = self.read(id, age).await?;
+            if seen != Some(&work.version()) {
+                return self.shown(work).await.map(Some);
             }
-            kind => match self.batch_changed_since(kind, id, seen).await? {
-                Some(batch) => self.work_of(batch).await.map(Some),
-                None => Ok(None),
-            },
+            if work.ended() {
+                return Ok(None);
+            }
+            let pause = match &work {
+                Work::Batch(batch) => PAUSE_PER_JOB.saturating_mul(batch.count).max(PAUSE),
+                _ => POLL_INTERVAL,
+            };
+            let announced = async {
+                match &work {
+                    // A lagging receiver may have missed the announcement, so it reads again as well.
+                    Work::Job(_) => while ended.recv().await.is_ok_and(|ended| ended != id) {},
+                    _ => pending().await,
+                }
+            };
+            tokio::select! {
+                // What others read a moment ago serves, unless something was announced since.
+                announced = timeout_at(Instant::now() + pause, announced) => age = match (announced, &work) {
+                    (Ok(()), _) => Duration::ZERO,
+                    (_, Work::Job(_)) => PAUSE,
+                    _ => pause,
+                },
+                () = self.shared.draining.cancelled() => return Ok(None),
+            }
         }
     }
 
@@ -350,22 +332,74 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::work`].
-    pub async fn cancel_work(&self, id: Uuid) -> Result<Work, JobsError> {
-        match self.kind {
-            Kind::Case | Kind::Evolution => Ok(self.cancel(id).await?.into()),
-            kind => self.work_of(self.cancel_batch(kind, id).await?).await,
+    pub async fn cancel(&self, id: Uuid) -> Result<Work, JobsError> {
+        let (store, tenant) = (&self.shared.store, &self.tenant);
+        let now = self.shared.now_ms();
+        if let Work::Job(_) = self.read(id, Duration::ZERO).await? {
+            let job = store.cancel(tenant, id, now).await?;
+            let job = job.ok_or(JobsError::NotFound(self.kind))?;
+            let ends_now = job.state == State::Cancelled && job.ended_at == Some(now);
+            if ends_now || !job.state.ended() {
+                self.tell_cancelled(id, job.state);
+            }
+            return Ok(self.dated(job).into());
+        }
+        loop {
+            let changed = store
+                .cancel_batch(tenant, id, CANCELLED_AT_ONCE, now)
+                .await?;
+            for (job, state) in &changed {
+                self.tell_cancelled(*job, *state);
+            }
+            if changed.len() < CANCELLED_AT_ONCE as usize {
+                return self.work(id).await;
+            }
         }
     }
 
-    /// Removes ended work with all that belongs to it.
+    /// Tells those who wait for a cancelled job, or who solve it.
+    fn tell_cancelled(&self, job: Uuid, state: State) {
+        let shared = &self.shared;
+        if state.ended() {
+            shared.metrics.ended(state, 1);
+            shared.announce(job);
+        } else if let Some(control) = shared.running.get(job) {
+            // A worker that lists its attempt later reads the request from the store.
+            control.stop(StopReason::Cancel);
+        } else {
+            shared.publish(Notification::Cancel(job));
+        }
+    }
+
+    /// Removes ended work with its jobs, their cases and their results. Jobs of a batch go in portions, so that other writers are not held up; if
+    /// the process dies meanwhile, the rest is still there and can be removed again.
     ///
     /// # Errors
-    /// [`JobsError::NotEnded`], [`JobsError::BatchNotEnded`], else as [`Jobs::work`].
-    pub async fn delete_work(&self, id: Uuid) -> Result<(), JobsError> {
-        match self.kind {
-            Kind::Case | Kind::Evolution => self.delete(id).await,
-            kind => self.delete_batch(kind, id).await,
+    /// [`JobsError::NotEnded`], else as [`Jobs::work`].
+    pub async fn delete(&self, id: Uuid) -> Result<(), JobsError> {
+        let (shared, tenant) = (&self.shared, &self.tenant);
+        let work = self.read(id, Duration::ZERO).await?;
+        if !work.ended() {
+            return Err(JobsError::NotEnded(self.kind));
         }
+        if let Work::Job(_) = work {
+            match shared.store.delete(tenant, id).await? {
+                Deleted::NotEnded(_) => return Err(JobsError::NotEnded(self.kind)),
+                Deleted::NotFound => return Err(JobsError::NotFound(self.kind)),
+                Deleted::Done => {}
+            }
+        } else {
+            while !shared
+                .store
+                .delete_batch(tenant, id, DELETED_AT_ONCE)
+                .await?
+            {
+                shared.collect_blobs().await;
+            }
+            tracing::info!(batch = %id, "batch deleted");
+        }
+        shared.collect_blobs().await;
+        Ok(())
     }
 }
 
@@ -441,68 +475,54 @@ impl Follower {
 
     async fn poll_changes(&mut self, mut from: i64) -> Result<(), JobsError> {
         let mut after = None;
-        let mut batches: HashMap<(Kind, Uuid), i64> = HashMap::new();
+        let mut changed: HashMap<(Kind, Uuid), i64> = HashMap::new();
         loop {
             let store = &self.jobs.shared.store;
             let changes = store
                 .changes(&self.jobs.tenant, from, after, AT_ONCE)
                 .await?;
             for change in &changes {
-                match change.batch {
-                    Some(batch) => {
-                        let latest = batches.entry((change.kind, batch)).or_insert(change.at);
-                        *latest = change.at.max(*latest);
-                    }
-                    None => self.tell_job(*change).await?,
-                }
-                self.since = self.since.max(change.at);
+                let work = match (change.batch, change.kind) {
+                    (None, kind) => (kind, change.id),
+                    (Some(run), Kind::Rows) => (Kind::Rows, run),
+                    (Some(batch), _) => (Kind::Cases, batch),
+                };
+                let latest = changed.entry(work).or_insert(change.at);
+                *latest = change.at.max(*latest);
             }
             let Some(last) = changes.last().filter(|_| changes.len() == AT_ONCE as usize) else {
                 break;
             };
             (from, after) = (last.at, Some(last.id));
         }
-        for ((of_job, batch), at) in batches {
-            let kind = match of_job {
-                Kind::Rows => Kind::Rows,
-                _ => Kind::Cases,
-            };
-            self.emit_batch(kind, batch, at).await?;
+        let mut changed: Vec<_> = changed.into_iter().collect();
+        changed.sort_unstable_by_key(|(_, at)| *at);
+        for ((kind, id), at) in changed {
+            self.since = self.since.max(at);
+            match self.read_changed(kind, id).await {
+                Ok((tag, work)) => self.tell(id, at, tag, work),
+                // Not acknowledged yet, or gone.
+                Err(JobsError::NotFound(_) | JobsError::Expired) => {}
+                Err(error) => return Err(error),
+            }
         }
         Ok(())
     }
 
-    async fn tell_job(&mut self, change: Change) -> Result<(), JobsError> {
-        let job = match self.jobs.recent(change.id, POLL_PAUSE).await {
-            Ok(job) => job,
-            Err(JobsError::NotFound | JobsError::Expired) => return Ok(()),
-            Err(error) => return Err(error),
-        };
-        self.tell(job.id, change.at, tag(&job), job.into());
-        Ok(())
-    }
-
-    async fn emit_batch(&mut self, kind: Kind, id: Uuid, at: i64) -> Result<(), JobsError> {
-        // Not acknowledged yet, or gone.
-        let gone = |error| match error {
-            JobsError::BatchNotFound(_) | JobsError::Expired => Ok(()),
-            error => Err(error),
-        };
-        let batch = match self.jobs.recent_batch(kind, id, POLL_PAUSE).await {
-            Ok(batch) => batch,
-            Err(error) => return gone(error),
-        };
-        let tag = batch.change_tag();
-        if self.is_known(id, &tag) {
-            // The head of a run need not be read.
-            self.known.insert(id, (at, tag));
-            return Ok(());
+    /// What changed, and its tag; nothing but the tag if that was told.
+    async fn read_changed(
+        &self,
+        kind: Kind,
+        id: Uuid,
+    ) -> Result<(String, Option<Work>), JobsError> {
+        let jobs = self.jobs.of_kind(kind);
+        let work = jobs.read(id, POLL_PAUSE).await?;
+        let tag = tag(&work);
+        let known = self.known.get(&id).is_some_and(|(_, known)| *known == tag);
+        match known {
+            true => Ok((tag, None)),
+            false => Ok((tag, Some(jobs.shown(work).await?))),
         }
-        match self.jobs.work_of(batch).await {
-            Ok(work) => self.tell(id, at, tag, work),
-            Err(error) => return gone(error),
-        }
-        Ok(())
     }
 
     async fn tell_progress(&mut self) -> Result<(), JobsError> {
@@ -513,28 +533,31 @@ impl Follower {
         };
         for kind in [Kind::Case, Kind::Evolution] {
             let jobs = self.jobs.of_kind(kind);
-            let running = jobs.list(&filter, None, RUNNING_MAX).await?.entries;
-            for job in running {
-                let at = self.since.max(job.updated_at);
-                self.tell(job.id, at, tag(&job), job.into());
+            for work in jobs.list(&filter, None, RUNNING_MAX).await?.entries {
+                let job = work.job()?;
+                let (id, at) = (job.id, self.since.max(job.updated_at));
+                let work = Work::from(job);
+                self.tell(id, at, tag(&work), Some(work));
             }
         }
         Ok(())
     }
 
-    fn is_known(&self, id: Uuid, tag: &str) -> bool {
-        self.known.get(&id).is_some_and(|(_, known)| known == tag)
-    }
-
-    fn tell(&mut self, id: Uuid, at: i64, tag: String, changed: Work) {
-        let known = self.is_known(id, &tag);
-        self.known.insert(id, (at, tag));
-        if !known {
-            self.told.push_back((changed, self.since));
+    /// Notes the state of work and tells of it, unless that was told before.
+    fn tell(&mut self, id: Uuid, at: i64, tag: String, work: Option<Work>) {
+        let before = self.known.insert(id, (at, tag.clone()));
+        if before.is_none_or(|(_, known)| known != tag)
+            && let Some(work) = work
+        {
+            self.told.push_back((work, self.since));
         }
     }
 }
 
-fn tag(job: &Job) -> String {
-    format!("{} {:.2}", job.version, job.progress)
+/// A text that differs between any two states that are told.
+fn tag(work: &Work) -> String {
+    match work {
+        Work::Job(job) => format!("{} {:.2}", job.version, job.progress),
+        work => work.version(),
+    }
 }

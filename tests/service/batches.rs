@@ -387,7 +387,7 @@ async fn an_incomplete_batch_is_gone_after_a_restart() {
     store.close().await;
     let jobs = open(Options::new(folder.path()), solve).await;
     assert!(jobs.get(id).await.is_err());
-    assert!(jobs.batch(Kind::Cases, new.id).await.is_err());
+    assert!(jobs.of_kind(Kind::Cases).work(new.id).await.is_err());
     jobs.shutdown(Duration::ZERO).await;
 }
 

@@ -95,7 +95,10 @@ async fn an_ended_job_says_when_it_will_go_and_goes_then() {
         assert_eq!(files_below(&results), 0);
         let id = path.rsplit('/').next().unwrap().parse().unwrap();
         let foreign = server.jobs.of("another".into()).get(id).await;
-        assert!(matches!(foreign, Err(JobsError::NotFound)), "{foreign:?}");
+        assert!(
+            matches!(foreign, Err(JobsError::NotFound(_))),
+            "{foreign:?}"
+        );
 
         // The id is remembered for 30 days more.
         turned.turn(29);

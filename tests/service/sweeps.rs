@@ -183,7 +183,7 @@ async fn a_sweep_that_ends_before_its_time_leaves_no_parts() {
             ends_within: ends_by_itself.then_some(Duration::from_secs(1)),
             ..Default::default()
         };
-        let submitted = jobs.submit_with(sweep("held", 11), None, options).await;
+        let submitted = jobs.submit_with(sweep("held", 11), options.into()).await;
         let id = submitted.unwrap().0.id;
         if !ends_by_itself {
             until_slices(&jobs, id, 0.3).await;

@@ -261,7 +261,7 @@ async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
         ..Default::default()
     };
     let long = jobs
-        .submit_with(case("long"), None, options)
+        .submit_with(case("long"), options.into())
         .await
         .unwrap()
         .0

@@ -14,7 +14,7 @@ use crate::http::layers::auth::{Access, bearer, unauthorized};
 use crate::http::limits::{ConcurrencyLimits, HeldPermits};
 use crate::http::problem::{ApiError, ProblemKind};
 use crate::jobs::Jobs;
-use crate::jobs::model::{ANONYMOUS, OPERATOR};
+use crate::jobs::model::{ANONYMOUS, Kind, OPERATOR};
 
 /// Whose request it is, once that is known; in its extensions.
 #[derive(Debug, Clone)]
@@ -122,7 +122,7 @@ where
 
 /// Declares the id in the path of a resource. A text that is no id names nothing, so it is answered like an unknown one.
 macro_rules! id {
-    ($(#[doc = $doc:literal])* $name:ident: $problem:ident, $noun:literal) => {
+    ($(#[doc = $doc:literal])* $name:ident: $kind:ident) => {
         $(#[doc = $doc])*
         #[derive(Debug, Clone, Copy)]
         pub struct $name(pub Uuid);
@@ -131,7 +131,7 @@ macro_rules! id {
             type Rejection = ApiError;
 
             async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
-                read_id(parts, state, ProblemKind::$problem, $noun).await.map($name)
+                read_id(parts, state, Kind::$kind).await.map($name)
             }
         }
     };
@@ -139,15 +139,15 @@ macro_rules! id {
 
 id! {
     /// The id of a job or an evolution.
-    JobId: JobNotFound, "job"
+    JobId: Case
 }
 id! {
     /// The id of a batch.
-    BatchId: BatchNotFound, "batch"
+    BatchId: Cases
 }
 id! {
     /// The id of a run.
-    RunId: RunNotFound, "run"
+    RunId: Rows
 }
 
 /// The id of a run in the path, and the number of one of its rows.
@@ -161,7 +161,7 @@ impl<S: Send + Sync> FromRequestParts<S> for RunRowId {
         let path = Path::<(String, String)>::from_request_parts(parts, state).await;
         let Path((id, row)) = path
             .map_err(|rejection| ApiError::new(ProblemKind::RunNotFound, rejection.body_text()))?;
-        let id = parsed(&id, ProblemKind::RunNotFound, "run")?;
+        let id = work_id(Kind::Rows, &id)?;
         let number = row.parse().map_err(|_| {
             let detail = format!("`{row}` is no number of a row; rows are counted from 0");
             ApiError::new(ProblemKind::RowNotFound, detail)
@@ -173,24 +173,25 @@ impl<S: Send + Sync> FromRequestParts<S> for RunRowId {
 async fn read_id<S: Send + Sync>(
     parts: &mut Parts,
     state: &S,
-    kind: ProblemKind,
-    what: &str,
+    kind: Kind,
 ) -> Result<Uuid, ApiError> {
-    let Path(text) = Path::<String>::from_request_parts(parts, state)
-        .await
-        .map_err(|rejection| ApiError::new(kind, rejection.body_text()))?;
-    let id = parsed(&text, kind, what)?;
-    if kind == ProblemKind::JobNotFound {
+    let path = Path::<String>::from_request_parts(parts, state).await;
+    let Path(text) = path
+        .map_err(|rejection| ApiError::new(ProblemKind::not_found(kind), rejection.body_text()))?;
+    work_id(kind, &text)
+}
+
+/// The id of work of this kind that a text is.
+///
+/// # Errors
+/// The text is none, so it names no work.
+pub(crate) fn work_id(kind: Kind, text: &str) -> Result<Uuid, ApiError> {
+    let id = Uuid::try_parse(text).map_err(|_| {
+        let detail = format!("`{text}` is no {} id; ids are UUIDs", kind.noun());
+        ApiError::new(ProblemKind::not_found(kind), detail)
+    })?;
+    if ProblemKind::not_found(kind) == ProblemKind::JobNotFound {
         tracing::Span::current().record("job", tracing::field::display(id));
     }
     Ok(id)
-}
-
-/// The id that a text is.
-///
-/// # Errors
-/// The text is none: `kind`.
-pub(crate) fn parsed(text: &str, kind: ProblemKind, what: &str) -> Result<Uuid, ApiError> {
-    Uuid::try_parse(text)
-        .map_err(|_| ApiError::new(kind, format!("`{text}` is no {what} id; ids are UUIDs")))
 }

@@ -84,31 +84,25 @@ pub(crate) async fn submit(
     Submission {
         jobs,
         own: (own, named),
-        options: submit_options,
-        idempotency_key,
+        options: mut work,
         reply,
     }: Submission<(BatchQuery, NamedQuery)>,
     State(options): State<HttpOptions>,
     State(memory): State<Memory>,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let (name, labels) = named.read_for(&jobs)?;
+    named.read_into(&mut work, &jobs)?;
     let (request, template) =
         separate_template(&jobs, &memory, &options, own.template, request).await?;
     let (form, template_share) = form(&jobs, request.headers(), template).await?;
-    let mut draft = read_draft(&jobs, &memory, &options, form, request).await?;
+    let draft = read_draft(&jobs, &memory, &options, form, request).await?;
     drop(template_share);
-    draft.options = submit_options;
-    draft.name = name;
-    draft.labels = labels;
     if draft.cases == draft.rejected || (draft.rejected > 0 && !own.on_invalid.unwrap_or(false)) {
         return Err(refusal(&draft));
     }
     let errors = faults(&draft);
-    let (batch, replayed) = jobs.submit_batch(draft, idempotency_key).await?;
-    reply
-        .send(&jobs, &memory, (batch.into(), replayed), Some(errors))
-        .await
+    let batch = jobs.submit_batch(draft, work).await?;
+    reply.send(&jobs, &memory, batch, Some(errors)).await
 }
 
 /// Why a batch is not taken.
@@ -495,7 +489,7 @@ pub(crate) async fn results(
         return Err(ApiError::bad_parameter("columns", detail));
     }
     // Unknown batches are answered before the stream begins.
-    jobs.batch(Kind::Cases, id).await?;
+    jobs.of_kind(Kind::Cases).work(id).await?;
     let mut items = jobs.items(id);
     items.until = wait.at_most().map(|at_most| Instant::now() + at_most);
     items.after = query.after;

@@ -11,7 +11,7 @@ use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::varied::column_pointer;
 use crate::contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord, WornBody};
 use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::caller::{Caller, JobId, parsed};
+use crate::http::extract::caller::{Caller, JobId, work_id};
 use crate::http::extract::json::JsonBody;
 use crate::http::extract::query::{Parameters, count, query, word};
 use crate::http::extract::titles::{Place, place, question};
@@ -47,17 +47,16 @@ pub(crate) async fn submit(
     Submission {
         jobs,
         own: named,
-        options,
-        idempotency_key,
+        mut options,
         reply,
     }: Submission<NamedQuery>,
     State(memory): State<Memory>,
     JsonBody { mut value, room }: JsonBody,
 ) -> Result<Response, ApiError> {
     let jobs = jobs.of_kind(Kind::Evolution);
-    let named = named.read_for(&jobs)?;
+    named.read_into(&mut options, &jobs)?;
     let titles = name_columns(&mut value)?;
-    let submitted = jobs.submit_evolution(value, named, idempotency_key, options);
+    let submitted = jobs.submit_evolution(value, options);
     let (job, replayed) = submitted.await.map_err(|error| by_title(error, &titles))?;
     drop(room);
     reply
@@ -256,7 +255,7 @@ pub(crate) async fn section(
     State(memory): State<Memory>,
 ) -> Result<Response, ApiError> {
     let query = SectionQuery::read(&uri, &())?;
-    let id = parsed(&id, ProblemKind::JobNotFound, "evolution")?;
+    let id = work_id(Kind::Evolution, &id)?;
     let Some(k) = BODIES.iter().position(|(name, _)| *name == body) else {
         let detail = format!("`{body}` is no body; allowed: rail, wheel");
         return Err(ApiError::new(ProblemKind::JobNotFound, detail));

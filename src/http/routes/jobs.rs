@@ -36,13 +36,12 @@ pub(crate) async fn submit(
         jobs,
         own: (),
         options,
-        idempotency_key,
         reply,
     }: Submission<()>,
     State(memory): State<Memory>,
     JsonBody { value, room }: JsonBody,
 ) -> Result<Response, ApiError> {
-    let (job, replayed) = jobs.submit_with(value, idempotency_key, options).await?;
+    let (job, replayed) = jobs.submit_with(value, options).await?;
     drop(room);
     reply
         .send(&jobs, &memory, (job.into(), replayed), None)

@@ -199,7 +199,7 @@ async fn list_work(kind: Kind, Caller(jobs): Caller, uri: &Uri) -> Result<Respon
     };
     let jobs = jobs.of_kind(kind);
     let limit = limit.unwrap_or(LIMIT_DEFAULT);
-    let page = jobs.works(&filter, cursor.as_deref(), limit).await?;
+    let page = jobs.list(&filter, cursor.as_deref(), limit).await?;
     let entries = page.entries.into_iter().map(|work| {
         let mut entry = serde_json::to_value(WorkAnswer::from(work))?;
         if let (Some(fields), Value::Object(members)) = (&own.fields, &mut entry) {

@@ -29,7 +29,6 @@ use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::http::routes::work::{RESULT_FORMATS, await_end, table_answer};
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
 use crate::jobs::model::Kind;
-use crate::jobs::run::draft::RunOptions;
 use crate::jobs::run::model::Run;
 use crate::jobs::sync::blocking;
 use crate::jobs::{Jobs, JobsError};
@@ -84,21 +83,14 @@ pub(crate) async fn submit(
     Submission {
         jobs,
         own: (run, named),
-        options: submit,
-        idempotency_key,
+        options: mut work,
         reply,
     }: Submission<(RunQuery, NamedQuery)>,
     State(options): State<HttpOptions>,
     State(memory): State<Memory>,
     request: Request,
 ) -> Result<Response, ApiError> {
-    let (name, labels) = named.read_for(&jobs)?;
-    let options_of_run = RunOptions {
-        name,
-        labels,
-        submit,
-        idempotency_key,
-    };
+    named.read_into(&mut work, &jobs)?;
     let (request, template) =
         separate_template(&jobs, &memory, &options, run.template, request).await?;
     let table = form(request.headers(), template)?;
@@ -107,10 +99,8 @@ pub(crate) async fn submit(
     let named = named.chain(carried.map(|title| (title, String::new())));
     let read = (table, NamedColumns(named.collect()));
     let draft = read_run(&jobs, &memory, &options, read, request).await?;
-    let (run, replayed) = jobs.submit_run(draft, options_of_run).await?;
-    reply
-        .send(&jobs, &memory, (run.into(), replayed), None)
-        .await
+    let run = jobs.submit_run(draft, work).await?;
+    reply.send(&jobs, &memory, run, None).await
 }
 
 /// What a reader of answers holds: a chunk as columns and as text.

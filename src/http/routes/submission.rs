@@ -25,7 +25,7 @@ use crate::http::routes::results::result_text;
 use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::http::routes::work::{WorkAnswer, header_parameter, prefer, text_header};
 use crate::jobs::Jobs;
-use crate::jobs::model::{Kind, State as JobState, SubmitOptions};
+use crate::jobs::model::{Kind, Labels, State as JobState, WorkOptions};
 use crate::jobs::work::Work;
 
 /// Longest idempotency key in characters.
@@ -47,17 +47,14 @@ query! {
 }
 
 impl NamedQuery {
-    /// The name and the labels, with those of the key of the request.
+    /// Reads the name and the labels into the options, with the labels of the key of the request.
     ///
     /// # Errors
     /// There are too many labels, two have the same key, or one contradicts the key of the request.
-    pub(crate) fn read_for(
-        self,
-        jobs: &Jobs,
-    ) -> Result<(Option<String>, BTreeMap<String, String>), ApiError> {
+    pub(crate) fn read_into(self, options: &mut WorkOptions, jobs: &Jobs) -> Result<(), ApiError> {
         let given = self.label.unwrap_or_default();
         let number = given.len();
-        let mut labels: BTreeMap<String, String> = given.into_iter().collect();
+        let mut labels: Labels = given.into_iter().collect();
         if labels.len() < number || number > LABELS_MAX {
             let detail = format!(
                 "{number} labels are given; at most {LABELS_MAX} with different keys are allowed"
@@ -66,7 +63,8 @@ impl NamedQuery {
         }
         jobs.bind(&mut labels)
             .map_err(|faults| ApiError::bad_parameter("label", faults[0].detail.clone()))?;
-        Ok((self.name, labels))
+        (options.name, options.labels) = (self.name, labels);
+        Ok(())
     }
 }
 
@@ -74,8 +72,7 @@ impl NamedQuery {
 pub(crate) struct Submission<P> {
     pub(crate) jobs: Jobs,
     pub(crate) own: P,
-    pub(crate) options: SubmitOptions,
-    pub(crate) idempotency_key: Option<String>,
+    pub(crate) options: WorkOptions,
     pub(crate) reply: Reply,
 }
 
@@ -96,8 +93,10 @@ where
         let ((own, submit), _) = <((P, SubmitQuery), WaitQuery)>::read(&parts.uri, &())?;
         Ok(Submission {
             own,
-            options: submit.options(&parts.headers),
-            idempotency_key,
+            options: WorkOptions {
+                idempotency_key,
+                ..submit.options(&parts.headers).into()
+            },
             reply: Reply(wait),
             jobs,
         })

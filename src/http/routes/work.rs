@@ -23,7 +23,7 @@ use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter};
 use uuid::Uuid;
 
 use crate::http::dto::{BatchAnswer, BatchReceipt, JobAnswer, RunAnswer};
-use crate::http::extract::caller::{Caller, Credential, parsed, revoked, until_revoked};
+use crate::http::extract::caller::{Caller, Credential, revoked, until_revoked, work_id};
 use crate::http::problem::{ApiError, PlainProblems, ProblemKind, describe};
 use crate::http::render::format::Format;
 use crate::http::render::row_tables::{Piece, RowWriter, WriteError};
@@ -68,42 +68,17 @@ pub(crate) struct JobEvent {
     version: u64,
 }
 
-/// The id in a path; what is no id names no work.
-fn read_id(kind: Kind, text: &str) -> Result<Uuid, ApiError> {
-    let id = parsed(text, not_found(kind), kind.noun())?;
-    if kind.of_job() != Kind::Rows && kind != Kind::Cases {
-        tracing::Span::current().record("job", tracing::field::display(id));
-    }
-    Ok(id)
-}
-
-fn not_found(kind: Kind) -> ProblemKind {
-    match kind {
-        Kind::Case | Kind::Evolution => ProblemKind::JobNotFound,
-        Kind::Cases => ProblemKind::BatchNotFound,
-        Kind::Rows => ProblemKind::RunNotFound,
-    }
-}
-
-fn not_ended(kind: Kind) -> ProblemKind {
-    match kind {
-        Kind::Case | Kind::Evolution => ProblemKind::JobNotEnded,
-        Kind::Cases => ProblemKind::BatchNotEnded,
-        Kind::Rows => ProblemKind::RunNotEnded,
-    }
-}
-
 /// `GET` and `DELETE` of one piece of work.
 pub(crate) fn one(kind: Kind) -> OpenApiRouter<AppState> {
     let read = move |Caller(jobs): Caller, Path(id): Path<String>, wait: Wait| async move {
-        let id = read_id(kind, &id)?;
+        let id = work_id(kind, &id)?;
         let jobs = jobs.of_kind(kind);
         await_end(&jobs, id, &wait).await?;
         let work = jobs.work(id).await?;
         Ok::<_, ApiError>(wait.tell_applied(Json(WorkAnswer::from(work)).into_response()))
     };
     let remove = move |Caller(jobs): Caller, Path(id): Path<String>| async move {
-        jobs.of_kind(kind).delete_work(read_id(kind, &id)?).await?;
+        jobs.of_kind(kind).delete(work_id(kind, &id)?).await?;
         Ok::<_, ApiError>(StatusCode::NO_CONTENT)
     };
     let noun = kind.noun();
@@ -117,8 +92,8 @@ pub(crate) fn one(kind: Kind) -> OpenApiRouter<AppState> {
     let summary = format!(
         "Removes an ended {noun} with all that belongs to it: jobs or rows, cases and results."
     );
-    let removing =
-        operation(kind, "delete", &summary, &[not_ended(kind)]).response("204", gone.build());
+    let removing = operation(kind, "delete", &summary, &[ProblemKind::not_ended(kind)])
+        .response("204", gone.build());
     OpenApiRouter::new()
         .routes(route(kind, "/{id}", HttpMethod::Get, reading, get(read)))
         .routes(route(
@@ -165,7 +140,7 @@ pub(crate) fn table_answer(
 /// `POST …/cancel`.
 pub(crate) fn cancel(kind: Kind) -> OpenApiRouter<AppState> {
     let stop = move |Caller(jobs): Caller, Path(id): Path<String>| async move {
-        let work = jobs.of_kind(kind).cancel_work(read_id(kind, &id)?).await?;
+        let work = jobs.of_kind(kind).cancel(work_id(kind, &id)?).await?;
         let status = match work.ended() {
             true => StatusCode::OK,
             false => StatusCode::ACCEPTED,
@@ -198,7 +173,7 @@ pub(crate) fn cancel(kind: Kind) -> OpenApiRouter<AppState> {
 /// seen, so `Last-Event-ID` resumes over lost connections and restarts of the service alike.
 pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
     let follow = move |request: EventRequest, Path(id): Path<String>| async move {
-        follow(request, kind, read_id(kind, &id)?).await
+        follow(request, kind, work_id(kind, &id)?).await
     };
     let noun = kind.noun();
     let about = match kind {
@@ -349,7 +324,7 @@ fn operation(kind: Kind, verb: &str, summary: &str, more: &[ProblemKind]) -> Ope
         .required(Required::True)
         .description(Some(format!("Id of the {}", kind.noun())))
         .schema(Some(id));
-    let problems = [&[ProblemKind::BadQuery, not_found(kind)], more].concat();
+    let problems = [&[ProblemKind::BadQuery, ProblemKind::not_found(kind)], more].concat();
     let mut operation = OperationBuilder::new()
         .operation_id(Some(format!("{verb}_{}", kind.noun())))
         .tag(kind.nouns())

@@ -8,99 +8,16 @@ use futures_util::stream::BoxStream;
 use tokio::time::Instant;
 use uuid::Uuid;
 
-use crate::jobs::attempts::attempt::StopReason;
 use crate::jobs::batch::upload::{BatchUpload, StagedCase};
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::{Batch, BatchItem, ItemFault, Kind, State, SubmitOptions};
+use crate::jobs::model::{BatchItem, ItemFault, Kind, State, SubmitOptions, WorkOptions};
 use crate::jobs::shared::Shared;
 use crate::jobs::storage_fault::StoragePlace;
-use crate::jobs::store::{BatchBegun, NewBatch, NewJob, Notification};
+use crate::jobs::store::{BatchBegun, NewBatch, NewJob};
 use crate::jobs::sync::blocking;
 use crate::jobs::trace::KeyValue;
-
-/// Jobs removed in one transaction.
-pub(crate) const DELETED_AT_ONCE: u32 = 500;
-
-/// Jobs cancelled in one transaction.
-const CANCELLED_AT_ONCE: u32 = 2000;
-
-impl Jobs {
-    /// A batch or a run with the counts of its jobs.
-    ///
-    /// # Errors
-    /// [`JobsError::BatchNotFound`], [`JobsError::Expired`], or a failed database.
-    pub async fn batch(&self, kind: Kind, id: Uuid) -> Result<Batch, JobsError> {
-        let batch = self.shared.store.batch(&self.tenant, kind, id).await?;
-        self.visible(kind, id, batch).await
-    }
-
-    /// A batch that was read, if this handle may see it.
-    pub(crate) async fn visible(
-        &self,
-        kind: Kind,
-        id: Uuid,
-        batch: Option<Batch>,
-    ) -> Result<Batch, JobsError> {
-        match batch {
-            Some(batch) if batch.kind == kind && self.sees(&batch.labels) => Ok(batch),
-            Some(_) => Err(JobsError::BatchNotFound(kind)),
-            None => Err(self.missing(id, JobsError::BatchNotFound(kind)).await),
-        }
-    }
-
-    /// Cancels every job of a batch or run that has not ended: queued ones end at once, running ones at the next tick of
-    /// their solvers. Returns the batch as it then is.
-    ///
-    /// # Errors
-    /// [`JobsError::BatchNotFound`], or a failed database.
-    pub async fn cancel_batch(&self, kind: Kind, id: Uuid) -> Result<Batch, JobsError> {
-        self.batch(kind, id).await?;
-        loop {
-            let now = self.shared.now_ms();
-            let store = &self.shared.store;
-            let changed = store
-                .cancel_batch(&self.tenant, id, CANCELLED_AT_ONCE, now)
-                .await?;
-            for (job, state) in &changed {
-                if state.ended() {
-                    self.shared.metrics.ended(*state, 1);
-                    self.shared.announce(*job);
-                } else if let Some(control) = self.shared.running.get(*job) {
-                    control.stop(StopReason::Cancel);
-                } else {
-                    self.shared.publish(Notification::Cancel(*job));
-                }
-            }
-            if changed.len() < CANCELLED_AT_ONCE as usize {
-                break;
-            }
-        }
-        self.batch(kind, id).await
-    }
-
-    /// Removes a batch or run of which every job has ended, with its jobs, their cases and their results. The jobs go in portions, so that
-    /// other writers are not held up; if the process dies meanwhile, the rest is still there and can be removed again.
-    ///
-    /// # Errors
-    /// [`JobsError::BatchNotEnded`], [`JobsError::BatchNotFound`], or a failed database.
-    pub async fn delete_batch(&self, kind: Kind, id: Uuid) -> Result<(), JobsError> {
-        let (ended, all) = self.batch(kind, id).await?.ended();
-        if ended < all {
-            return Err(JobsError::BatchNotEnded(kind, all - ended));
-        }
-        let store = &self.shared.store;
-        while !store
-            .delete_batch(&self.tenant, id, DELETED_AT_ONCE)
-            .await?
-        {
-            self.shared.collect_blobs().await;
-        }
-        self.shared.collect_blobs().await;
-        tracing::info!(batch = %id, jobs = all, "batch deleted");
-        Ok(())
-    }
-}
+use crate::jobs::work::{DELETED_AT_ONCE, Work};
 
 impl Shared {
     /// From now on this batch is not filled, its jobs are not shown, and no worker takes one.
@@ -160,15 +77,15 @@ impl Jobs {
     pub async fn submit_batch(
         &self,
         draft: BatchUpload,
-        idempotency_key: Option<String>,
-    ) -> Result<(Batch, bool), JobsError> {
+        options: WorkOptions,
+    ) -> Result<(Work, bool), JobsError> {
         let span = self.submit_span();
-        let traceparent = span.traceparent();
-        let submitted = self.store_batch(draft, idempotency_key, traceparent);
+        let jobs = draft.cases - draft.rejected;
+        let submitted = self.store_batch(draft, options, span.traceparent());
         span.end(submitted.await, |(batch, _)| {
             vec![
-                KeyValue::new("railhead.batch.id", batch.id.to_string()),
-                KeyValue::new("railhead.batch.jobs", i64::from(batch.count)),
+                KeyValue::new("railhead.batch.id", batch.id().to_string()),
+                KeyValue::new("railhead.batch.jobs", i64::from(jobs)),
             ]
         })
     }
@@ -176,11 +93,11 @@ impl Jobs {
     async fn store_batch(
         &self,
         mut draft: BatchUpload,
-        idempotency_key: Option<String>,
+        options: WorkOptions,
         traceparent: Option<Arc<str>>,
-    ) -> Result<(Batch, bool), JobsError> {
-        let (kind, id) = (draft.kind, draft.id);
-        let new = draft.as_new(idempotency_key);
+    ) -> Result<(Work, bool), JobsError> {
+        let (kind, id, submit) = (draft.kind, draft.id, options.submit);
+        let new = draft.as_new(options);
         let filled_here = |id| self.shared.unfinished_batches().living.contains(&id);
         let mut pause = FILLING_PAUSE.0;
         loop {
@@ -200,7 +117,7 @@ impl Jobs {
             };
             match begun {
                 BatchBegun::Created => break,
-                BatchBegun::Existing(id) => return Ok((self.batch(new.kind, id).await?, true)),
+                BatchBegun::Existing(id) => return Ok((self.of_kind(kind).work(id).await?, true)),
                 BatchBegun::Conflict => return Err(JobsError::IdempotencyConflict),
                 BatchBegun::Refused(refusal) => {
                     self.give_up(draft).await;
@@ -213,7 +130,7 @@ impl Jobs {
         // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
         let jobs = self.clone();
         let filled = self.shared.tasks.spawn(async move {
-            let filled = jobs.fill(&new, &mut draft, traceparent).await;
+            let filled = jobs.fill(&new, &mut draft, (submit, traceparent)).await;
             match &filled {
                 Ok(()) => {
                     draft.settle();
@@ -229,16 +146,15 @@ impl Jobs {
             .await
             .map_err(|error| JobsError::Damaged(error.to_string()))?;
         self.observe_write(filled)?;
-        Ok((self.batch(kind, id).await?, false))
+        Ok((self.of_kind(kind).work(id).await?, false))
     }
 
     async fn fill(
         &self,
         new: &NewBatch,
         draft: &mut BatchUpload,
-        traceparent: Option<Arc<str>>,
+        (options, traceparent): (SubmitOptions, Option<Arc<str>>),
     ) -> Result<(), JobsError> {
-        let options = draft.options;
         let Some(staging) = draft.staging.take() else {
             return Ok(());
         };

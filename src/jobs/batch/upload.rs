@@ -18,7 +18,7 @@ use crate::jobs::disk_reserve::nameless;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
-use crate::jobs::model::{CaseOptions, Kind, SubmitOptions, created_at};
+use crate::jobs::model::{CaseOptions, Kind, SubmitOptions, WorkOptions, created_at};
 use crate::jobs::profiles::KnownSections;
 use crate::jobs::store::{NewBatch, StoredCase};
 use crate::jobs::submit::{cost_us, outputs_text};
@@ -236,12 +236,6 @@ pub struct BatchUpload {
     pub rejected: u32,
     /// The first faulty ones.
     pub faulty: Vec<FaultyCase>,
-    /// Options of all its jobs.
-    pub options: SubmitOptions,
-    /// Free text of the client.
-    pub name: Option<String>,
-    /// Labels of the client, of the batch as a whole.
-    pub labels: BTreeMap<String, String>,
     /// Places in the queue reserved so far.
     reserved: u32,
     /// Bytes counted so far.
@@ -548,9 +542,15 @@ impl BatchUpload {
         Ok(())
     }
 
-    /// The batch as it is to be stored.
-    pub(crate) fn as_new(&mut self, idempotency_key: Option<String>) -> NewBatch {
-        let digest = self.digest();
+    /// The batch as it is to be stored. Its digest is that of all cases, with its name, its labels and its options.
+    pub(crate) fn as_new(&mut self, options: WorkOptions) -> NewBatch {
+        let (name, labels) = (options.name, options.labels);
+        if name.is_some() || !labels.is_empty() {
+            // Quotes say where a text ends.
+            self.digest
+                .update(format!("{name:?} {labels:?}").as_bytes());
+        }
+        let digest = options.submit.digest(self.digest.finalize().as_bytes());
         NewBatch {
             id: self.id,
             tenant: self.jobs.tenant.clone(),
@@ -558,23 +558,13 @@ impl BatchUpload {
             created_at: created_at(self.id),
             count: self.cases - self.rejected,
             rejected: self.rejected,
-            name: self.name.clone(),
-            labels: self.labels.clone(),
+            name,
+            labels,
             template: self.template.clone(),
             head: self.head.clone(),
             bytes: self.kept,
-            idempotency: idempotency_key.map(|key| (key, digest)),
+            idempotency: options.idempotency_key.map(|key| (key, digest)),
         }
-    }
-
-    /// Digest of all cases, with the name, the labels and the options of the batch.
-    fn digest(&mut self) -> [u8; 32] {
-        if self.name.is_some() || !self.labels.is_empty() {
-            // Quotes say where a text ends.
-            let words = format!("{:?} {:?}", self.name, self.labels);
-            self.digest.update(words.as_bytes());
-        }
-        self.options.digest(self.digest.finalize().as_bytes())
     }
 
     /// Nothing of it is left to be given back but its bytes.
@@ -626,9 +616,6 @@ impl Jobs {
             cases: 0,
             rejected: 0,
             faulty: Vec::new(),
-            options: SubmitOptions::default(),
-            name: None,
-            labels: BTreeMap::new(),
             reserved: 0,
             staged: 0,
             profiles: KnownSections::new(),

@@ -16,11 +16,12 @@ use crate::jobs::codec::table::COLUMNS_MAX;
 use crate::jobs::disk_reserve::nameless;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
-use crate::jobs::model::{Kind, SubmitOptions};
+use crate::jobs::model::{Kind, WorkOptions};
 use crate::jobs::profiles::KnownSections;
-use crate::jobs::run::model::{REASON, Run, RunChunk, RunColumn, RunHead};
+use crate::jobs::run::model::{REASON, RunChunk, RunColumn, RunHead};
 use crate::jobs::submit::microseconds;
 use crate::jobs::sync::blocking;
+use crate::jobs::work::Work;
 
 /// Expected solve time of a chunk in s: much longer than a claim takes, shorter than a lease, and soon done again.
 const CHUNK_SECONDS: f64 = 3.0;
@@ -57,19 +58,6 @@ struct Begun {
     /// Places and values of the first row.
     first_row: Vec<(String, Value)>,
     row_seconds: f64,
-}
-
-/// What a submission says of a run beside its rows.
-#[derive(Debug, Clone, Default)]
-pub struct RunOptions {
-    /// Free text of the client.
-    pub name: Option<String>,
-    /// Labels of the client.
-    pub labels: BTreeMap<String, String>,
-    /// Priority and deadline.
-    pub submit: SubmitOptions,
-    /// The client's idempotency key.
-    pub idempotency_key: Option<String>,
 }
 
 impl Jobs {
@@ -127,18 +115,12 @@ impl Jobs {
     pub async fn submit_run(
         &self,
         draft: RunDraft,
-        options: RunOptions,
-    ) -> Result<(Run, bool), JobsError> {
-        let mut upload = blocking(move || draft.finish()).await??;
-        upload.name = options.name;
-        upload.labels = options.labels;
-        upload.options = SubmitOptions {
-            // Rows have no digests to be found by.
-            bypass_cache: true,
-            ..options.submit
-        };
-        let (batch, replayed) = self.submit_batch(upload, options.idempotency_key).await?;
-        Ok((self.with_head(batch).await?, replayed))
+        mut options: WorkOptions,
+    ) -> Result<(Work, bool), JobsError> {
+        let upload = blocking(move || draft.finish()).await??;
+        // Rows have no digests to be found by.
+        options.submit.bypass_cache = true;
+        self.submit_batch(upload, options).await
     }
 }
 
