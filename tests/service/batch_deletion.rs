@@ -49,7 +49,7 @@ async fn batch_that_has_not_ended_cannot_be_deleted() {
         &server.delete(&path).await,
         409,
         "batch-not-ended",
-        "2 jobs",
+        "has not ended",
     );
     server.post(&format!("{path}/cancel"), &Value::Null).await;
     assert_eq!(server.delete(&path).await.status, 204);

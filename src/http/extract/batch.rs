@@ -5,19 +5,16 @@ use std::io::BufReader;
 
 use axum::body::Body;
 use axum::extract::Request;
-use axum::http::HeaderMap;
 use serde_json::Value;
 
 use crate::contact::error::Fault;
 use crate::contact::evaluate::varied::{Values, members};
 use crate::http::extract::json::{BodyReader, essence, read_strict, weigh_case};
 use crate::http::extract::query::DEADLINE_MAX_SECONDS;
-use crate::http::extract::rows::{Template, spool, template_missing};
-use crate::http::extract::tables::{
-    Chunk, CsvRows, TableForm, TableRows, TableSource, Title, unsupported,
-};
+use crate::http::extract::rows::{Table, read_spooled};
+use crate::http::extract::tables::{Chunk, CsvRows, TableForm, TableRows, TableSource, Title};
 use crate::http::extract::titles::{Place, faulty, is_text, number, place, question, short_names};
-use crate::http::limits::{Computation, Memory, Permit, SMALL_BYTES};
+use crate::http::limits::{Computation, Memory, Pace, SMALL_BYTES};
 use crate::http::options::HttpOptions;
 use crate::http::problem::{ApiError, ProblemKind};
 use crate::jobs::Jobs;
@@ -466,75 +463,37 @@ fn read_value(field: &str, factor: f64, decimal_comma: bool) -> Value {
 /// Cases are checked in portions of about this many bytes.
 const PORTION_BYTES: usize = 256 << 10;
 
-/// The form of a body.
-#[derive(Debug)]
-pub enum Form {
-    /// Cases one after the other, checked while they arrive.
-    Cases(Layout),
-    /// A table that fills a template.
-    Rows(TableForm, Value),
-}
-
-/// The form that a body is declared to have.
-///
-/// # Errors
-/// The content type is none of a batch, or the template of a table is missing, unknown or not wanted.
-pub async fn form(
-    jobs: &Jobs,
-    headers: &HeaderMap,
-    template: Option<Template>,
-) -> Result<(Form, Option<Permit>), ApiError> {
-    let essence = essence(headers);
-    let table = TableForm::of(&essence);
-    let (form, template) = match (table, template) {
-        (Some(form), Some(template)) => (form, template),
-        (table, template) => {
-            return match (essence.as_str(), table, template) {
-                ("application/json", _, None) => Ok((Form::Cases(Layout::Array), None)),
-                (_, Some(TableForm::Ndjson), None) => Ok((Form::Cases(Layout::Lines), None)),
-                (_, Some(_), None) => Err(template_missing()),
-                ("application/json", _, Some(_)) => Err(ApiError::bad_parameter(
-                    "template",
-                    "`template` belongs to a table, such as `text/csv`; an array has whole cases",
-                )),
-                _ => Err(unsupported(
-                    &essence,
-                    "an array with `application/json`, one case per line with `application/x-ndjson`",
-                )),
-            };
-        }
-    };
-    let (case, share) = template.case(jobs).await?;
-    let case = jobs.with_profiles(case).await?;
-    Ok((Form::Rows(form, case), share))
-}
-
-/// Reads and checks the body as it arrives.
+/// Reads and checks the body as it arrives: a table, or cases one after the other.
 ///
 /// # Errors
 /// The body is too large, too slow, broken, or not of its form; faults of single cases are kept in the draft.
 pub async fn read_draft(
-    jobs: &Jobs,
-    memory: &Memory,
-    options: &HttpOptions,
-    form: Form,
+    (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
+    table: Option<Table>,
     request: Request<Body>,
 ) -> Result<BatchUpload, ApiError> {
-    let mut reader = BodyReader::new(
-        options.body_timeout,
-        options.batch_max_bytes,
-        "one batch",
-        request,
-    )?;
+    let limits = (options.body_timeout, options.batch_max_bytes, "one batch");
     let mut draft = jobs.draft(Kind::Cases)?;
-    let layout = match form {
-        Form::Cases(layout) => layout,
-        Form::Rows(form, template) => {
-            draft.set_row_template(template);
-            let file = spool(jobs, reader).await?;
-            return read_rows((jobs, memory, options), draft, form, file).await;
-        }
+    if let Some(table) = table {
+        draft.set_row_template(jobs.with_profiles(table.template).await?);
+        // An archive is read as a whole, once packed and once as numbers.
+        let bytes = match table.form {
+            TableForm::Csv => options.body_max_bytes,
+            _ => 2 * options.evaluate_max_bytes,
+        };
+        let options = options.clone();
+        let read = move |file, pace: &mut Pace| {
+            let _held = table.share;
+            read_rows(draft, (table.form, file), &options, pace)
+        };
+        return read_spooled((jobs, memory), limits, bytes, request, read).await;
+    }
+    let layout = match essence(request.headers()).as_str() {
+        "application/json" => Layout::Array,
+        _ => Layout::Lines,
     };
+    let (timeout, most, what) = limits;
+    let mut reader = BodyReader::new(timeout, most, what, request)?;
     let mut splitter = Splitter::new(layout, options.body_max_bytes);
     let mut portion = Vec::new();
     let mut held = 0;
@@ -566,47 +525,35 @@ pub async fn read_draft(
 }
 
 /// Adds the rows of a table that has arrived.
-async fn read_rows(
-    (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
+fn read_rows(
     mut draft: BatchUpload,
-    form: TableForm,
-    file: File,
+    (form, file): (TableForm, File),
+    options: &HttpOptions,
+    pace: &mut Pace,
 ) -> Result<BatchUpload, ApiError> {
-    // An archive is read as a whole, once packed and once as numbers.
-    let bytes = match form {
-        TableForm::Csv => options.body_max_bytes,
-        _ => 2 * options.evaluate_max_bytes,
-    };
-    let share = memory.rows(jobs.tenant(), bytes).await?;
-    let mut computation = memory.computation(jobs.tenant());
-    let options = options.clone();
-    let read = computation.run(move |pace| {
-        let _held = share;
-        let told = |detail| vec![Fault::new("", detail)];
-        if form == TableForm::Csv {
-            let mut rows = CsvRows::new(BufReader::new(file), options.body_max_bytes)?;
-            let columns = columns_of(&rows.titles)?;
-            while let Some((line, record)) = rows.record()? {
-                pace.step()?;
-                let row = row_of(&columns, rows.decimal_comma, &record).map_err(told);
-                draft.add_row(Some(line), record.as_slice().as_bytes(), row)?;
-                require_count(&draft, &options)?;
-            }
-            return Ok(draft);
-        }
-        let source = TableSource::File(file);
-        let rows = TableRows::new(form, source, options.evaluate_max_bytes)?;
+    let told = |detail| vec![Fault::new("", detail)];
+    if form == TableForm::Csv {
+        let mut rows = CsvRows::new(BufReader::new(file), options.body_max_bytes)?;
         let columns = columns_of(&rows.titles)?;
-        for chunk in rows {
-            for row in rows_of(&columns, &chunk?) {
-                pace.step()?;
-                draft.add_row(None, b"", row.map_err(told))?;
-                require_count(&draft, &options)?;
-            }
+        while let Some((line, record)) = rows.record()? {
+            pace.step()?;
+            let row = row_of(&columns, rows.decimal_comma, &record).map_err(told);
+            draft.add_row(Some(line), record.as_slice().as_bytes(), row)?;
+            require_count(&draft, options)?;
         }
-        Ok(draft)
-    });
-    read.await
+        return Ok(draft);
+    }
+    let source = TableSource::File(file);
+    let rows = TableRows::new(form, source, options.evaluate_max_bytes)?;
+    let columns = columns_of(&rows.titles)?;
+    for chunk in rows {
+        for row in rows_of(&columns, &chunk?) {
+            pace.step()?;
+            draft.add_row(None, b"", row.map_err(told))?;
+            require_count(&draft, options)?;
+        }
+    }
+    Ok(draft)
 }
 
 fn require_count(draft: &BatchUpload, options: &HttpOptions) -> Result<(), ApiError> {

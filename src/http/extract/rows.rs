@@ -3,6 +3,7 @@ use std::collections::HashSet;
 use std::fmt;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
+use std::time::Duration;
 
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
@@ -11,6 +12,7 @@ use multer::{Field, Multipart};
 use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
+use tokio::io::AsyncWriteExt;
 use tokio::time::timeout;
 use utoipa::ToSchema;
 use uuid::Uuid;
@@ -20,12 +22,13 @@ use crate::contact::evaluate::varied::Values;
 use crate::http::extract::json::{BodyReader, Strict, essence, read_json, unreadable, weigh_case};
 use crate::http::extract::tables::{TableForm, TableRows, TableSource, unsupported};
 use crate::http::extract::titles::{NamedColumns, faulty, require_few};
-use crate::http::limits::{Memory, Permit};
+use crate::http::limits::{Memory, Pace, Permit};
 use crate::http::options::HttpOptions;
 use crate::http::problem::{ApiError, ProblemKind};
 use crate::jobs::Jobs;
 use crate::jobs::codec::table::COLUMNS_MAX;
 use crate::jobs::run::draft::RunDraft;
+use crate::jobs::run::model::RunColumn;
 
 /// The bytes that a request's body may have, or has as far as it says.
 #[must_use]
@@ -59,19 +62,25 @@ pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes,
     Ok(text.into())
 }
 
-/// A template and columns of numbers or texts from JSON, `{"template": …, "columns": {"<JSON pointer>": […], …}}`.
+/// A template and columns of numbers or texts from JSON, `{"template": …, "columns": {"<JSON pointer>": […], …}}`; the client may have said
+/// what columns are.
 ///
 /// # Errors
-/// `malformed-json` with its position, and with column and row where the fault is in a column.
-pub fn read_json_columns(text: &[u8]) -> Result<(Value, NamedValues), ApiError> {
+/// `malformed-json` with its position, and with column and row where the fault is in a column; or as [`NamedColumns::columns`].
+pub fn read_json_columns(
+    text: &[u8],
+    named: &NamedColumns,
+) -> Result<(Value, Vec<RunColumn>, Vec<Values>), ApiError> {
     let read: RowsBody =
         serde_json::from_slice(text).map_err(|error| ApiError::malformed(&error))?;
     require_few(read.columns.count)?;
-    Ok((read.template.0, read.columns.columns))
+    let columns = read.columns.columns;
+    let titles = columns.iter();
+    let titles = titles.map(|(title, values)| (&**title, None, matches!(values, Values::Texts(_))));
+    let titles = named.columns(titles)?;
+    let values = columns.into_iter().map(|(_, values)| values).collect();
+    Ok((read.template.0, titles, values))
 }
-
-/// Columns with their names.
-pub type NamedValues = Vec<(String, Values)>;
 
 /// The JSON body of rows.
 #[derive(Deserialize)]
@@ -84,7 +93,7 @@ struct RowsBody {
 /// Columns; of those beyond [`COLUMNS_MAX`] only the count is kept.
 #[derive(Default)]
 struct RowColumns {
-    columns: NamedValues,
+    columns: Vec<(String, Values)>,
     count: usize,
 }
 
@@ -183,67 +192,94 @@ enum First {
     Text(String),
 }
 
+/// What JSON is in a request with rows; NDJSON is a table.
+pub const JSON: (&str, bool) = ("`application/json` with `template` and `columns`", false);
+
 /// The part that holds the case.
 const TEMPLATE: &str = "template";
 /// The part that holds the table.
 const TABLE: &str = "table";
 
-/// The case whose members the columns of a table replace.
+/// A table whose columns replace members of a case.
 #[derive(Debug)]
-pub enum Template {
-    /// The case of a job.
-    Job(Uuid),
-    /// A case of this request, with the memory that it takes.
-    Case(Value, Option<Permit>),
+pub struct Table {
+    /// The form of the table.
+    pub form: TableForm,
+    /// The case.
+    pub template: Value,
+    /// The memory that the case takes, if it came with the request.
+    pub share: Option<Permit>,
 }
 
-impl Template {
-    /// The case, and the memory that it takes.
-    ///
-    /// # Errors
-    /// The job does not exist or has expired.
-    pub async fn case(self, jobs: &Jobs) -> Result<(Value, Option<Permit>), ApiError> {
-        match self {
-            Template::Case(case, share) => Ok((case, share)),
-            Template::Job(id) => {
-                let case = jobs.case(id).await;
-                let case = case.map_err(|error| ApiError::from(error).about(TEMPLATE))?;
-                Ok((read_json(&case)?, None))
-            }
-        }
-    }
-}
-
-/// The fault of a table without a template.
-pub fn template_missing() -> ApiError {
-    ApiError::bad_parameter(
-        TEMPLATE,
-        "a table needs a template, the case whose members its columns replace: send both as `multipart/form-data` with the parts `template` (JSON) and \
-         `table`, or name a job with `?template=`",
-    )
-}
-
-/// Separates the template from the table, if the request is `multipart/form-data`. The request returned has the table as its body, with the content
-/// type of its part; other requests are returned as they are. `job` is the job that the query names as template.
+/// Separates the table of a request from its template, a part of `multipart/form-data` or the case of `job`. The request returned has the table as
+/// its body. There is none in a request with JSON, which is `json` here, and with `lines` none in NDJSON without a template.
 ///
 /// # Errors
-/// The parts are not `template` and then `table`, the template is not JSON or too large, or the query names a template as well.
-pub async fn separate_template(
+/// The content type is none of these; a template is missing, not wanted, or given twice; the parts are not `template` and then `table`; or the
+/// template is not JSON, too large, or that of a job that does not exist.
+pub async fn separate_table(
+    (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
+    job: Option<Uuid>,
+    (json, lines): (&str, bool),
+    request: Request,
+) -> Result<(Request, Option<Table>), ApiError> {
+    let (request, part) = match essence(request.headers()) == "multipart/form-data" {
+        true if job.is_some() => {
+            return Err(ApiError::bad_parameter(
+                TEMPLATE,
+                "the template is a part of the body; leave `?template=` out",
+            ));
+        }
+        true => separate_parts(jobs, memory, options, request).await?,
+        false => (request, None),
+    };
+    let alone = part.is_none() && job.is_none();
+    let essence = essence(request.headers());
+    let form = match TableForm::of(&essence) {
+        Some(TableForm::Ndjson) if alone && lines => return Ok((request, None)),
+        Some(form) => form,
+        None if essence != "application/json" => return Err(unsupported(&essence, json)),
+        None if alone => return Ok((request, None)),
+        None => {
+            return Err(ApiError::bad_parameter(
+                TEMPLATE,
+                "`template` belongs to a table, such as `text/csv`; leave it out with JSON",
+            ));
+        }
+    };
+    let (template, share) = match (part, job) {
+        (Some(part), _) => part,
+        (None, Some(job)) => {
+            let case = jobs.case(job).await;
+            let case = case.map_err(|error| ApiError::from(error).about(TEMPLATE))?;
+            (read_json(&case)?, None)
+        }
+        (None, None) => {
+            return Err(ApiError::bad_parameter(
+                TEMPLATE,
+                "a table needs a template, the case whose members its columns replace: send both as `multipart/form-data` with the parts `template` \
+                 (JSON) and `table`, or name a job with `?template=`",
+            ));
+        }
+    };
+    let table = Table {
+        form,
+        template,
+        share,
+    };
+    Ok((request, Some(table)))
+}
+
+/// A case and the memory that it takes.
+type Held = (Value, Option<Permit>);
+
+/// The template of `multipart/form-data`, and a request whose body is the table, with the content type of its part.
+async fn separate_parts(
     jobs: &Jobs,
     memory: &Memory,
     options: &HttpOptions,
-    job: Option<Uuid>,
     request: Request,
-) -> Result<(Request, Option<Template>), ApiError> {
-    if essence(request.headers()) != "multipart/form-data" {
-        return Ok((request, job.map(Template::Job)));
-    }
-    if job.is_some() {
-        return Err(ApiError::bad_parameter(
-            TEMPLATE,
-            "the template is a part of the body; leave `?template=` out",
-        ));
-    }
+) -> Result<(Request, Option<Held>), ApiError> {
     let content_type = request.headers().get(header::CONTENT_TYPE);
     let content_type = content_type.and_then(|value| value.to_str().ok());
     let boundary = multer::parse_boundary(content_type.unwrap_or_default()).map_err(|error| {
@@ -270,7 +306,7 @@ pub async fn separate_template(
     drop(reader);
     let weight = weigh_case(&text, options.parsed_max_bytes)?;
     let share = memory.parsed(jobs.tenant(), weight).await?;
-    let template = Template::Case(read_json(&text)?, share);
+    let template = (read_json(&text)?, share);
     let table = next_part(&mut parts, options, TABLE).await?;
     head.headers
         .insert(header::CONTENT_TYPE, content_type_of(&table));
@@ -342,117 +378,82 @@ pub(crate) struct TableUpload {
 /// Memory that a table takes while a piece of it is read.
 const PIECE_BYTES: usize = 64 << 20;
 
-/// A table with its template; nothing for JSON with `template` and `columns`.
-///
-/// # Errors
-/// The content type is none of these, or the template is missing or not wanted.
-pub fn form(
-    headers: &HeaderMap,
-    template: Option<Template>,
-) -> Result<Option<(TableForm, Template)>, ApiError> {
-    let essence = essence(headers);
-    match (TableForm::of(&essence), template) {
-        (Some(form), Some(template)) => Ok(Some((form, template))),
-        (Some(_), None) => Err(template_missing()),
-        (None, _) if essence != "application/json" => Err(unsupported(
-            &essence,
-            "`application/json` with `template` and `columns`",
-        )),
-        (None, None) => Ok(None),
-        (None, Some(_)) => Err(ApiError::bad_parameter(
-            "template",
-            "`template` belongs to a table; JSON has a `template` of its own",
-        )),
-    }
-}
-
-/// Reads the rows into a draft. A table is spooled into a nameless file while it arrives, so that a large one takes little memory.
+/// Reads the rows into a draft: of a table, or of JSON, which has a template of its own.
 ///
 /// # Errors
 /// The body is too large, too slow, broken or not of its form; or what the draft says of its rows.
 pub async fn read_run(
-    jobs: &Jobs,
-    memory: &Memory,
-    options: &HttpOptions,
-    (table, named): (Option<(TableForm, Template)>, NamedColumns),
+    (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
+    (table, named): (Option<Table>, NamedColumns),
     request: Request<Body>,
 ) -> Result<RunDraft, ApiError> {
-    let rows_max = options.run_max_rows;
-    let jobs = jobs.clone();
-    let Some((form, template)) = table else {
-        return from_json(jobs, memory, options, named, request).await;
+    let (rows_max, bytes_max) = (options.run_max_rows, options.evaluate_max_bytes);
+    let drafts = jobs.clone();
+    let Some(table) = table else {
+        let bytes = 2 * declared_bytes(&request, options).min(bytes_max);
+        let share = memory.rows(jobs.tenant(), bytes).await?;
+        let text = read_body(request, options).await?;
+        let mut computation = memory.computation(jobs.tenant());
+        let read = computation.run(move |_| {
+            let _held = share;
+            let (template, columns, values) = read_json_columns(&text, &named)?;
+            drop(text);
+            let mut draft = drafts.draft_run(template, columns, rows_max)?;
+            draft.push(values)?;
+            draft.cut_all()?;
+            Ok(draft)
+        });
+        return read.await;
     };
-    let (template, template_share) = template.case(&jobs).await?;
-    let (timeout, most) = (options.body_timeout, options.run_max_bytes);
-    let reader = BodyReader::new(timeout, most, "one run", request)?;
-    let file = spool(&jobs, reader).await?;
-    let bytes_max = options.evaluate_max_bytes;
+    let limits = (options.body_timeout, options.run_max_bytes, "one run");
     // An archive is read as a whole, once packed and once as numbers.
-    let bytes = match form {
+    let bytes = match table.form {
         TableForm::Npz => 2 * bytes_max,
         _ => PIECE_BYTES,
     };
-    let share = memory.rows(jobs.tenant(), bytes).await?;
-    let mut computation = memory.computation(jobs.tenant());
-    let read = computation.run(move |pace| {
-        let _held = (share, template_share);
-        let rows = TableRows::new(form, TableSource::File(file), bytes_max)?;
-        let mut draft = jobs.draft_run(template, rows.named(&named)?, rows_max)?;
+    read_spooled((jobs, memory), limits, bytes, request, move |file, pace| {
+        let _held = table.share;
+        let rows = TableRows::new(table.form, TableSource::File(file), bytes_max)?;
+        let mut draft = drafts.draft_run(table.template, rows.named(&named)?, rows_max)?;
         for chunk in rows {
             pace.step()?;
             draft.push(chunk?)?;
         }
         draft.cut_all()?;
         Ok(draft)
-    });
-    read.await
+    })
+    .await
 }
 
-/// Rows in JSON, which has a template of its own and is held in memory.
-async fn from_json(
-    jobs: Jobs,
-    memory: &Memory,
-    options: &HttpOptions,
-    named: NamedColumns,
-    request: Request<Body>,
-) -> Result<RunDraft, ApiError> {
-    let rows_max = options.run_max_rows;
-    let bytes = 2 * declared_bytes(&request, options).min(options.evaluate_max_bytes);
-    let share = memory.rows(jobs.tenant(), bytes).await?;
-    let text = read_body(request, options).await?;
-    let mut computation = memory.computation(jobs.tenant());
-    let read = computation.run(move |_| {
-        let _held = share;
-        let (template, columns) = read_json_columns(&text)?;
-        drop(text);
-        let (titles, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
-        let kinds = titles.iter().zip(&values);
-        let kinds = kinds.map(|(title, values): (&String, _)| {
-            (&**title, None, matches!(values, Values::Texts(_)))
-        });
-        let mut draft = jobs.draft_run(template, named.columns(kinds)?, rows_max)?;
-        draft.push(values)?;
-        draft.cut_all()?;
-        Ok(draft)
-    });
-    read.await
-}
-
-/// A body in a nameless file, which is at its beginning.
+/// Reads a table from a nameless file into which it is spooled while it arrives, so that a large one takes little memory. `limits` are the time
+/// that a piece of it may take, its largest size, and what it is; the reader takes `bytes` of memory.
 ///
 /// # Errors
-/// The body is too large, too slow or broken, or the file cannot be written.
-pub async fn spool(jobs: &Jobs, mut reader: BodyReader) -> Result<File, ApiError> {
+/// The body is too large, too slow or broken; the file cannot be written; or the error of `read`.
+pub async fn read_spooled<T: Send + 'static>(
+    (jobs, memory): (&Jobs, &Memory),
+    (timeout, most, what): (Duration, u64, &'static str),
+    bytes: usize,
+    request: Request<Body>,
+    read: impl FnOnce(File, &mut Pace) -> Result<T, ApiError> + Send + 'static,
+) -> Result<T, ApiError> {
+    let mut reader = BodyReader::new(timeout, most, what, request)?;
     let file = jobs.spool_file()?;
     let mut file = tokio::fs::File::from_std(file);
     while let Some(piece) = reader.next().await? {
-        let written = tokio::io::AsyncWriteExt::write_all(&mut file, &piece).await;
+        let written = file.write_all(&piece).await;
         written.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
     }
     let mut file = file.into_std().await;
     let ready = file.flush().and_then(|()| file.seek(SeekFrom::Start(0)));
     ready.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
-    Ok(file)
+    let share = memory.rows(jobs.tenant(), bytes).await?;
+    let mut computation = memory.computation(jobs.tenant());
+    let read = computation.run(move |pace| {
+        let _held = share;
+        read(file, pace)
+    });
+    read.await
 }
 
 #[cfg(test)]
@@ -463,7 +464,7 @@ mod tests {
     fn faults_name_row_and_column() {
         let text = |error: ApiError| format!("{error:?}");
         let null = br#"{"template":{},"columns":{"/motion/creepage_x":[0.1,null]}}"#;
-        let fault = text(read_json_columns(null).unwrap_err());
+        let fault = text(read_json_columns(null, &NamedColumns::default()).unwrap_err());
         assert!(
             fault.contains("/motion/creepage_x") && fault.contains("row 1"),
             "{fault}"

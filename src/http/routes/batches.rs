@@ -16,10 +16,10 @@ use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::Solution;
 use crate::http::dto::{Cases, JobResult};
 use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::batch::{form, read_draft};
+use crate::http::extract::batch::read_draft;
 use crate::http::extract::caller::{BatchId, Caller, Credential};
 use crate::http::extract::query::{Parameters, Repeated, id, query, reader, word};
-use crate::http::extract::rows::{TableUpload, separate_template};
+use crate::http::extract::rows::{TableUpload, separate_table};
 use crate::http::layers::response::StreamedUnbuffered;
 use crate::http::limits::{Memory, Permit, hold_while_sent};
 use crate::http::options::HttpOptions;
@@ -92,11 +92,10 @@ pub(crate) async fn submit(
     request: Request,
 ) -> Result<Response, ApiError> {
     named.read_into(&mut work, &jobs)?;
-    let (request, template) =
-        separate_template(&jobs, &memory, &options, own.template, request).await?;
-    let (form, template_share) = form(&jobs, request.headers(), template).await?;
-    let draft = read_draft(&jobs, &memory, &options, form, request).await?;
-    drop(template_share);
+    let state = (&jobs, &memory, &options);
+    let json = "an array with `application/json`, one case per line with `application/x-ndjson`";
+    let (request, table) = separate_table(state, own.template, (json, true), request).await?;
+    let draft = read_draft(state, table, request).await?;
     if draft.cases == draft.rejected || (draft.rejected > 0 && !own.on_invalid.unwrap_or(false)) {
         return Err(refusal(&draft));
     }

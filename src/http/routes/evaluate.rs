@@ -25,7 +25,7 @@ use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::Caller;
 use crate::http::extract::query::{Parameters, id, query};
 use crate::http::extract::rows::{
-    TableUpload, declared_bytes, form, read_body, read_json_columns, separate_template,
+    JSON, TableUpload, declared_bytes, read_body, read_json_columns, separate_table,
 };
 use crate::http::extract::tables::{Chunk, TableForm, TableRows, TableSource, too_large};
 use crate::http::extract::titles::{NamedColumns, faulty};
@@ -184,16 +184,9 @@ pub(crate) async fn evaluate(
 ) -> Result<Response, ApiError> {
     let EvaluateQuery { template, format } = EvaluateQuery::read(request.uri(), &())?;
     let format = choose(request.headers(), format, FORMATS)?;
-    let (request, template) =
-        separate_template(&jobs, &memory, &options, template, request).await?;
-    let (form, template, template_share) = match form(request.headers(), template)? {
-        Some((form, template)) => {
-            let (case, share) = template.case(&jobs).await?;
-            (Some(form), case, share)
-        }
-        None => (None, Value::Null, None),
-    };
-    let packed = form.is_some_and(TableForm::packed);
+    let state = (&jobs, &memory, &options);
+    let (request, table) = separate_table(state, template, JSON, request).await?;
+    let packed = table.as_ref().is_some_and(|table| table.form.packed());
     // First the text and its numbers, then these and the answer: about twice the text at any time.
     let bytes = match packed {
         true => options.evaluate_max_bytes,
@@ -213,20 +206,15 @@ pub(crate) async fn evaluate(
         time: options.evaluate_time,
     };
     let work = computation.run(move |pace| {
-        let _held = template_share;
-        let (template, columns) = match form {
-            Some(form) => (
-                template,
-                read_columns(form, &text, (evaluation.rows_max, bytes_max), pace)?,
-            ),
+        let (template, columns, _held) = match table {
+            Some(table) => {
+                let limits = (evaluation.rows_max, bytes_max);
+                let columns = read_columns(table.form, &text, limits, pace)?;
+                (table.template, columns, table.share)
+            }
             None => {
-                let (template, columns) = read_json_columns(&text)?;
-                let titles = columns.iter();
-                let titles = titles
-                    .map(|(title, values)| (&**title, None, matches!(values, Values::Texts(_))));
-                let named = NamedColumns::default().columns(titles)?;
-                let values = columns.into_iter().map(|(_, values)| values).collect();
-                (template, varied(&named, values)?)
+                let (template, named, values) = read_json_columns(&text, &NamedColumns::default())?;
+                (template, varied(&named, values)?, None)
             }
         };
         drop(text);

@@ -17,7 +17,7 @@ use crate::http::dto::{AnswerColumn, RunRequest, answer_columns};
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::{Caller, Credential, RunId, RunRowId};
 use crate::http::extract::query::{Parameters, Reader, Repeated, id, query, reader};
-use crate::http::extract::rows::{TableUpload, form, read_run, separate_template};
+use crate::http::extract::rows::{JSON, TableUpload, read_run, separate_table};
 use crate::http::extract::titles::{NamedColumns, named_column};
 use crate::http::limits::{Memory, hold_while_sent};
 use crate::http::options::HttpOptions;
@@ -91,14 +91,13 @@ pub(crate) async fn submit(
     request: Request,
 ) -> Result<Response, ApiError> {
     named.read_into(&mut work, &jobs)?;
-    let (request, template) =
-        separate_template(&jobs, &memory, &options, run.template, request).await?;
-    let table = form(request.headers(), template)?;
+    let state = (&jobs, &memory, &options);
+    let (request, table) = separate_table(state, run.template, JSON, request).await?;
     let carried = run.carry.unwrap_or_default().into_iter();
     let named = run.column.unwrap_or_default().into_iter();
     let named = named.chain(carried.map(|title| (title, String::new())));
     let read = (table, NamedColumns(named.collect()));
-    let draft = read_run(&jobs, &memory, &options, read, request).await?;
+    let draft = read_run(state, read, request).await?;
     let run = jobs.submit_run(draft, work).await?;
     reply.send(&jobs, &memory, run, None).await
 }
