@@ -44,17 +44,12 @@ pub mod sqlite;
 pub trait Store:
     SubmitJobs
     + Batches
-    + BatchLists
     + ClientJobs
-    + JobLists
     + Profiles
     + Claims
-    + Leases
-    + Slices
     + Ends
     + Upkeep
     + ResultKeys
-    + Statistics
     + KeyStore
     + Debug
 {
@@ -167,11 +162,7 @@ pub trait Batches: Send + Sync {
         id: Uuid,
         limit: u32,
     ) -> Result<Vec<String>, StoreError>;
-}
 
-/// Batches and runs with the counts of their jobs.
-#[async_trait]
-pub trait BatchLists: Send + Sync {
     /// One page of the acknowledged batches of a tenant with their counts, newest first, from the first one older than `after`.
     async fn batches(
         &self,
@@ -188,7 +179,7 @@ pub trait BatchLists: Send + Sync {
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError>;
 }
 
-/// What clients ask of one job.
+/// What clients ask of jobs, one by one and as lists.
 #[async_trait]
 pub trait ClientJobs: Send + Sync {
     /// Cancels a queued job at once, and marks a running one as to be cancelled; an ended one stays as it is. Returns the
@@ -210,11 +201,7 @@ pub trait ClientJobs: Send + Sync {
 
     /// The case of a job as it was submitted.
     async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>, StoreError>;
-}
 
-/// Lists of jobs, and what changed lately.
-#[async_trait]
-pub trait JobLists: Send + Sync {
     /// One page of the jobs of a tenant, newest first, from the first job older than `after`. It reads no more rows than it
     /// returns, up to a constant.
     async fn list(
@@ -266,7 +253,7 @@ pub trait Profiles: Send + Sync {
     async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool, StoreError>;
 }
 
-/// Claims of queued jobs.
+/// Claims of queued jobs, and what workers do while they hold a lease.
 #[async_trait]
 pub trait Claims: Send + Sync {
     /// Queues with jobs in them, and how many.
@@ -275,11 +262,7 @@ pub trait Claims: Send + Sync {
     /// Claims the first job of a queue, by priority and then by age, together with those behind it that are small
     /// enough, in their order. A suspect comes alone, and no job of a batch that is not acknowledged.
     async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError>;
-}
 
-/// What workers do while they hold a lease.
-#[async_trait]
-pub trait Leases: Send + Sync {
     /// The cases of claimed jobs, with what has happened to them meanwhile.
     async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>, StoreError>;
 
@@ -298,11 +281,7 @@ pub trait Leases: Send + Sync {
         why: ReleaseReason,
         now: i64,
     ) -> Result<Vec<(Uuid, State)>, StoreError>;
-}
 
-/// Solved slices of jobs that are not solved whole.
-#[async_trait]
-pub trait Slices: Send + Sync {
     /// Stores a solved slice in place of what there was from its number on; `false` if the lease is lost. Attempts are
     /// counted from the last slice. The same call again changes nothing.
     async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool, StoreError>;
@@ -326,7 +305,7 @@ pub trait Ends: Send + Sync {
     async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, StoreError>;
 }
 
-/// What ends or goes by itself.
+/// What ends or goes by itself, and what there is: counts and sizes.
 #[async_trait]
 pub trait Upkeep: Send + Sync {
     /// Takes running jobs from their workers: to `cancelled` if the client asked for that, to `failed` if `attempts_max` are
@@ -353,6 +332,15 @@ pub trait Upkeep: Send + Sync {
 
     /// Was there a job or a batch of this tenant that has expired?
     async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool, StoreError>;
+
+    /// What a tenant has; the bytes that its unfinished batches stand for are not known here.
+    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError>;
+
+    /// Counts and sizes, read from indices alone.
+    async fn stats(&self) -> Result<Stats, StoreError>;
+
+    /// What comes before a queued job among the jobs of its tenant, counted no further than `limit` jobs.
+    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError>;
 }
 
 /// Keys of large results.
@@ -366,19 +354,6 @@ pub trait ResultKeys: Send + Sync {
 
     /// Which of these large results no job refers to.
     async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans, StoreError>;
-}
-
-/// Counts and sizes.
-#[async_trait]
-pub trait Statistics: Send + Sync {
-    /// What a tenant has; the bytes that its unfinished batches stand for are not known here.
-    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError>;
-
-    /// Counts and sizes, read from indices alone.
-    async fn stats(&self) -> Result<Stats, StoreError>;
-
-    /// What comes before a queued job among the jobs of its tenant, counted no further than `limit` jobs.
-    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError>;
 }
 
 /// API keys.

@@ -5,7 +5,7 @@ use railhead::jobs::model::Queue;
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
 use railhead::jobs::store::{
-    ClaimKind, ClaimRequest, Claims, Ending, Ends, Lease, Leases, ReleaseReason, StoredResult,
+    ClaimKind, ClaimRequest, Claims, Ending, Ends, Lease, ReleaseReason, StoredResult,
 };
 use sqlx::{Connection, PgConnection};
 

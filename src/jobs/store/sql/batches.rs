@@ -20,8 +20,8 @@ use super::submit::{Places, insert_jobs};
 use crate::jobs::error::StoreError;
 use crate::jobs::model::{Batch, BatchItem, ItemResult, Kind, RunRecord, State, created_at};
 use crate::jobs::store::{
-    BatchBegun, BatchLists, Batches, FilledHere, Filter, NewBatch, NewJob, Page, QueueBounds,
-    Refusal, Total, first_id_at,
+    BatchBegun, Batches, FilledHere, Filter, NewBatch, NewJob, Page, QueueBounds, Refusal, Total,
+    first_id_at,
 };
 
 const CANCEL: &str = concat!(
@@ -335,6 +335,60 @@ impl Batches for SqlStore {
         };
         rows.iter().map(key).collect()
     }
+
+    async fn batches(
+        &self,
+        tenant: &str,
+        filter: &Filter,
+        after: Option<Uuid>,
+        limit: u32,
+    ) -> Result<Page<Batch>, StoreError> {
+        let mut query = page_query(tenant, filter, after);
+        query.push(" LIMIT ").push_bind(i64::from(limit) + 1);
+        let mut rows = query.build().fetch_all(&self.readers).await?;
+        let more = rows.len() > limit as usize;
+        rows.truncate(limit as usize);
+        let batches = self.with_counts(&rows).await?;
+        let last = batches.last().filter(|_| more);
+        let total = self.count_batches(tenant, filter).await?;
+        Ok(Page {
+            next_cursor: last.map(|batch| filter.cursor_after(batch.id)),
+            total,
+            entries: batches,
+        })
+    }
+
+    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError> {
+        let mut query = QueryBuilder::new("SELECT ");
+        query
+            .push(COLUMNS)
+            .push(" FROM batches WHERE complete = 1 AND id = ");
+        query
+            .push_bind(id.to_string())
+            .push(" AND tenant = ")
+            .push_bind(tenant)
+            .push(" AND kind = ")
+            .push_bind(kind.name());
+        let rows = query.build().fetch_all(&self.readers).await?;
+        Ok(self.with_counts(&rows).await?.pop())
+    }
+
+    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError> {
+        let row = query(GET_RUN)
+            .bind(id.to_string())
+            .bind(tenant)
+            .fetch_optional(&self.readers)
+            .await?;
+        let Some(row) = row else { return Ok(None) };
+        let template: Vec<u8> = row.try_get("body")?;
+        let head: Option<Vec<u8>> = row.try_get("head")?;
+        Ok(Some(RunRecord {
+            template: template.into(),
+            head: head.map(Bytes::from),
+            without_answer: read_count(&row, "without_answer")?,
+            running: row.try_get("running")?,
+        }))
+    }
 }
 
 /// Stores the idempotency key of a batch. A key that is still there belongs to the rest of a batch that failed.
@@ -522,61 +576,3 @@ const GET_RUN: &str = "SELECT body, head, \
      (SELECT CAST(COALESCE(SUM(progress), 0.0) AS double precision) FROM jobs WHERE batch_id = batches.id AND state = 'running') AS running \
      FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
      WHERE batches.id = $1 AND batches.tenant = $2 AND kind = 'rows' AND complete = 1";
-
-#[repeat_conflicts]
-#[async_trait]
-impl BatchLists for SqlStore {
-    async fn batches(
-        &self,
-        tenant: &str,
-        filter: &Filter,
-        after: Option<Uuid>,
-        limit: u32,
-    ) -> Result<Page<Batch>, StoreError> {
-        let mut query = page_query(tenant, filter, after);
-        query.push(" LIMIT ").push_bind(i64::from(limit) + 1);
-        let mut rows = query.build().fetch_all(&self.readers).await?;
-        let more = rows.len() > limit as usize;
-        rows.truncate(limit as usize);
-        let batches = self.with_counts(&rows).await?;
-        let last = batches.last().filter(|_| more);
-        let total = self.count_batches(tenant, filter).await?;
-        Ok(Page {
-            next_cursor: last.map(|batch| filter.cursor_after(batch.id)),
-            total,
-            entries: batches,
-        })
-    }
-
-    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError> {
-        let mut query = QueryBuilder::new("SELECT ");
-        query
-            .push(COLUMNS)
-            .push(" FROM batches WHERE complete = 1 AND id = ");
-        query
-            .push_bind(id.to_string())
-            .push(" AND tenant = ")
-            .push_bind(tenant)
-            .push(" AND kind = ")
-            .push_bind(kind.name());
-        let rows = query.build().fetch_all(&self.readers).await?;
-        Ok(self.with_counts(&rows).await?.pop())
-    }
-
-    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError> {
-        let row = query(GET_RUN)
-            .bind(id.to_string())
-            .bind(tenant)
-            .fetch_optional(&self.readers)
-            .await?;
-        let Some(row) = row else { return Ok(None) };
-        let template: Vec<u8> = row.try_get("body")?;
-        let head: Option<Vec<u8>> = row.try_get("head")?;
-        Ok(Some(RunRecord {
-            template: template.into(),
-            head: head.map(Bytes::from),
-            without_answer: read_count(&row, "without_answer")?,
-            running: row.try_get("running")?,
-        }))
-    }
-}

@@ -17,8 +17,8 @@ use super::rows::{
 use crate::jobs::error::StoreError;
 use crate::jobs::model::{Queue, State};
 use crate::jobs::store::{
-    Claim, ClaimRequest, ClaimedCase, Claims, Lease, Leases, NewSlice, ReleaseReason, Renewal,
-    SliceRecord, Slices, StoredCase, StoredResult,
+    Claim, ClaimRequest, ClaimedCase, Claims, Lease, NewSlice, ReleaseReason, Renewal, SliceRecord,
+    StoredCase, StoredResult,
 };
 
 /// Selects the first jobs of the queue $1 and $5, at most `$most`; suspects if `$suspects` is 1.
@@ -84,38 +84,7 @@ impl Claims for SqlStore {
         claims.sort_unstable_by_key(|(rank, claim)| (*rank, claim.id));
         Ok(claims.into_iter().map(|(_, claim)| claim).collect())
     }
-}
 
-/// A token that no other claim has: also a database that was set back in time does not give it out again.
-fn new_token() -> Result<i64, StoreError> {
-    let random = getrandom::u64().map_err(|error| StoreError::Failed(Arc::new(error)))?;
-    Ok(count(random >> 1))
-}
-
-/// Writes when a lease that begins now runs out.
-pub(crate) fn push_lease_until(query: &mut QueryBuilder, store: &SqlStore, lease: Lease) {
-    query.push(engine::LEASE_NOW.0);
-    query.push_bind(store.lease_now(lease.now));
-    query.push(engine::LEASE_NOW.1).push(" + ");
-    query.push_bind(lease.ms);
-}
-
-fn read_claim(row: &DbRow) -> Result<Claim, StoreError> {
-    Ok(Claim {
-        id: read_id(row)?,
-        attempt: read_small(row, "attempt")?,
-        lease_token: read_count(row, "lease_token")?,
-        method: row.try_get("method")?,
-        traceparent: row.try_get("traceparent")?,
-        cache_key: read_cache_key(row)?,
-        suspect: read_flag(row, "suspect")?,
-        slices: read_small(row, "slices")?,
-    })
-}
-
-#[repeat_conflicts]
-#[async_trait]
-impl Leases for SqlStore {
     async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>, StoreError> {
         if ids.is_empty() {
             return Ok(HashMap::new());
@@ -250,50 +219,7 @@ impl Leases for SqlStore {
             .map(|row| read_move(row, State::Running))
             .collect()
     }
-}
 
-impl SqlStore {
-    /// The template of a batch, and the head of a run.
-    async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>, StoreError> {
-        let row = query(
-            "SELECT body, head FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
-             WHERE batches.id = $1",
-        )
-        .bind(batch)
-        .fetch_optional(&self.readers)
-        .await?;
-        // It goes with the last job of its batch.
-        let Some(row) = row else { return Ok(None) };
-        let (body, head): (Vec<u8>, Option<Vec<u8>>) = (row.try_get("body")?, row.try_get("head")?);
-        Ok(Some((body.into(), head.map(Bytes::from))))
-    }
-}
-
-/// The end of an update of claimed jobs, as long as their leases are held.
-const OF_HELD: &str = concat!(
-    " FROM held WHERE jobs.id = held.id AND jobs.lease_token = held.lease_token AND ",
-    unordered!("jobs.state"),
-    " = 'running' RETURNING "
-);
-
-fn with_held(claims: &[Claim]) -> QueryBuilder {
-    let mut query = QueryBuilder::new("WITH held (id, lease_token) AS (");
-    query.push_values(claims, |mut row, claim| {
-        row.push_bind(claim.id.to_string()).push_bind(fence(claim));
-    });
-    query.push(")");
-    query
-}
-
-pub(crate) const NOTES: &str =
-    "SELECT number, motions, digest, spent_us FROM job_slices WHERE job_id = $1 ORDER BY number";
-
-pub(crate) const RESULTS: &str = "SELECT key, bytes, solution, fields FROM job_slices JOIN blobs ON blobs.id = blob_id \
-     WHERE job_id = $1 ORDER BY number";
-
-#[repeat_conflicts]
-#[async_trait]
-impl Slices for SqlStore {
     async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool, StoreError> {
         let id = claim.id.to_string();
         let note = &slice.note;
@@ -387,3 +313,69 @@ impl Slices for SqlStore {
             .collect()
     }
 }
+
+/// A token that no other claim has: also a database that was set back in time does not give it out again.
+fn new_token() -> Result<i64, StoreError> {
+    let random = getrandom::u64().map_err(|error| StoreError::Failed(Arc::new(error)))?;
+    Ok(count(random >> 1))
+}
+
+/// Writes when a lease that begins now runs out.
+pub(crate) fn push_lease_until(query: &mut QueryBuilder, store: &SqlStore, lease: Lease) {
+    query.push(engine::LEASE_NOW.0);
+    query.push_bind(store.lease_now(lease.now));
+    query.push(engine::LEASE_NOW.1).push(" + ");
+    query.push_bind(lease.ms);
+}
+
+fn read_claim(row: &DbRow) -> Result<Claim, StoreError> {
+    Ok(Claim {
+        id: read_id(row)?,
+        attempt: read_small(row, "attempt")?,
+        lease_token: read_count(row, "lease_token")?,
+        method: row.try_get("method")?,
+        traceparent: row.try_get("traceparent")?,
+        cache_key: read_cache_key(row)?,
+        suspect: read_flag(row, "suspect")?,
+        slices: read_small(row, "slices")?,
+    })
+}
+
+impl SqlStore {
+    /// The template of a batch, and the head of a run.
+    async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>, StoreError> {
+        let row = query(
+            "SELECT body, head FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
+             WHERE batches.id = $1",
+        )
+        .bind(batch)
+        .fetch_optional(&self.readers)
+        .await?;
+        // It goes with the last job of its batch.
+        let Some(row) = row else { return Ok(None) };
+        let (body, head): (Vec<u8>, Option<Vec<u8>>) = (row.try_get("body")?, row.try_get("head")?);
+        Ok(Some((body.into(), head.map(Bytes::from))))
+    }
+}
+
+/// The end of an update of claimed jobs, as long as their leases are held.
+const OF_HELD: &str = concat!(
+    " FROM held WHERE jobs.id = held.id AND jobs.lease_token = held.lease_token AND ",
+    unordered!("jobs.state"),
+    " = 'running' RETURNING "
+);
+
+fn with_held(claims: &[Claim]) -> QueryBuilder {
+    let mut query = QueryBuilder::new("WITH held (id, lease_token) AS (");
+    query.push_values(claims, |mut row, claim| {
+        row.push_bind(claim.id.to_string()).push_bind(fence(claim));
+    });
+    query.push(")");
+    query
+}
+
+pub(crate) const NOTES: &str =
+    "SELECT number, motions, digest, spent_us FROM job_slices WHERE job_id = $1 ORDER BY number";
+
+pub(crate) const RESULTS: &str = "SELECT key, bytes, solution, fields FROM job_slices JOIN blobs ON blobs.id = blob_id \
+     WHERE job_id = $1 ORDER BY number";

@@ -15,7 +15,7 @@ use super::rows::{
 use crate::jobs::error::StoreError;
 use crate::jobs::model::{Job, State};
 use crate::jobs::store::{
-    Change, ClientJobs, Deleted, Filter, JobLists, Page, ResultRef, StoredCase, StoredResult, Total,
+    Change, ClientJobs, Deleted, Filter, Page, ResultRef, StoredCase, StoredResult, Total,
 };
 
 #[repeat_conflicts]
@@ -131,16 +131,7 @@ impl ClientJobs for SqlStore {
             body: body.into(),
         }))
     }
-}
 
-/// Most jobs that are examined for one page where no index finds them.
-const EXAMINED_MAX: i64 = 20_000;
-/// How far the jobs of a list are counted.
-const COUNTED: i64 = 1_000;
-
-#[repeat_conflicts]
-#[async_trait]
-impl JobLists for SqlStore {
     async fn list(
         &self,
         tenant: &str,
@@ -206,6 +197,11 @@ impl JobLists for SqlStore {
         rows.iter().map(change).collect()
     }
 }
+
+/// Most jobs that are examined for one page where no index finds them.
+const EXAMINED_MAX: i64 = 20_000;
+/// How far the jobs of a list are counted.
+const COUNTED: i64 = 1_000;
 
 impl SqlStore {
     async fn count(&self, tenant: &str, filter: &Filter) -> Result<Total, StoreError> {

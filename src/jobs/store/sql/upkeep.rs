@@ -12,8 +12,8 @@ use super::submit::stored;
 use crate::jobs::error::StoreError;
 use crate::jobs::model::{Failure, Job, State};
 use crate::jobs::store::{
-    Claims, Cluster, Moment, Overdue, QueueAhead, Reap, RetentionRule, Statistics, Stats, Store,
-    Upkeep, Usage, first_id_at,
+    Claims, Cluster, Moment, Overdue, QueueAhead, Reap, RetentionRule, Stats, Store, Upkeep, Usage,
+    first_id_at,
 };
 
 /// Those whose lease has run out: a job that was claimed alone counts the attempt; those of a group do not, and come alone next
@@ -165,6 +165,63 @@ impl Upkeep for SqlStore {
             .await?;
         Ok(found.is_some())
     }
+
+    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError> {
+        let rows = query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state")
+            .bind(tenant)
+            .fetch_all(&self.readers)
+            .await?;
+        let mut usage = Usage::default();
+        for row in &rows {
+            usage
+                .jobs
+                .insert(read_state(row)?, read_count(row, "number")?);
+        }
+        let reserved = query(
+            "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) AS reserved FROM batches WHERE complete = 0 AND tenant = $1",
+        );
+        let reserved = reserved.bind(tenant);
+        let row = reserved.fetch_one(&self.readers).await?;
+        usage.reserved = read_count(&row, "reserved")?;
+        usage.stored_bytes = stored(&mut *self.readers.acquire().await?, tenant).await?;
+        Ok(usage)
+    }
+
+    async fn stats(&self) -> Result<Stats, StoreError> {
+        let rows = query(COUNT).fetch_all(&self.readers).await?;
+        let mut jobs: BTreeMap<State, u64> =
+            State::ALL.into_iter().map(|state| (state, 0)).collect();
+        for row in &rows {
+            jobs.insert(read_state(row)?, read_count(row, "jobs")?);
+        }
+        let oldest_queued_at = query_scalar(OLDEST).fetch_one(&self.readers).await?;
+        let mean_cost_us: f64 = query_scalar(MEAN_COST).fetch_one(&self.readers).await?;
+        let result_bytes: i64 = query_scalar(RESULT_BYTES).fetch_one(&self.readers).await?;
+        Ok(Stats {
+            jobs,
+            oldest_queued_at,
+            mean_cost_us,
+            database_bytes: self.database_bytes().await?,
+            result_bytes: u64::try_from(result_bytes).unwrap_or(0),
+        })
+    }
+
+    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError> {
+        let row = query(BEFORE)
+            .bind(&job.tenant)
+            .bind(job.priority.rank())
+            .bind(job.id.to_string())
+            .bind(i64::from(limit))
+            .fetch_one(&self.readers)
+            .await?;
+        let queues = self.queues().await?;
+        let tenants: HashSet<&str> = queues.iter().map(|(queue, _)| &*queue.tenant).collect();
+        Ok(QueueAhead {
+            jobs: read_count(&row, "jobs")?,
+            cost_us: read_count(&row, "cost_us")?,
+            tenants: tenants.len(),
+        })
+    }
 }
 
 /// Late at $1; what was submitted before $2 is late only if it is at $3.
@@ -233,67 +290,6 @@ pub(crate) const OLDEST: &str = "SELECT MIN(first) FROM (SELECT (SELECT created_
 
 pub(crate) const RESULT_BYTES: &str =
     "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM blobs WHERE key IS NOT NULL";
-
-#[repeat_conflicts]
-#[async_trait]
-impl Statistics for SqlStore {
-    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError> {
-        let rows = query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state")
-            .bind(tenant)
-            .fetch_all(&self.readers)
-            .await?;
-        let mut usage = Usage::default();
-        for row in &rows {
-            usage
-                .jobs
-                .insert(read_state(row)?, read_count(row, "number")?);
-        }
-        let reserved = query(
-            "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) AS reserved FROM batches WHERE complete = 0 AND tenant = $1",
-        );
-        let reserved = reserved.bind(tenant);
-        let row = reserved.fetch_one(&self.readers).await?;
-        usage.reserved = read_count(&row, "reserved")?;
-        usage.stored_bytes = stored(&mut *self.readers.acquire().await?, tenant).await?;
-        Ok(usage)
-    }
-
-    async fn stats(&self) -> Result<Stats, StoreError> {
-        let rows = query(COUNT).fetch_all(&self.readers).await?;
-        let mut jobs: BTreeMap<State, u64> =
-            State::ALL.into_iter().map(|state| (state, 0)).collect();
-        for row in &rows {
-            jobs.insert(read_state(row)?, read_count(row, "jobs")?);
-        }
-        let oldest_queued_at = query_scalar(OLDEST).fetch_one(&self.readers).await?;
-        let mean_cost_us: f64 = query_scalar(MEAN_COST).fetch_one(&self.readers).await?;
-        let result_bytes: i64 = query_scalar(RESULT_BYTES).fetch_one(&self.readers).await?;
-        Ok(Stats {
-            jobs,
-            oldest_queued_at,
-            mean_cost_us,
-            database_bytes: self.database_bytes().await?,
-            result_bytes: u64::try_from(result_bytes).unwrap_or(0),
-        })
-    }
-
-    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError> {
-        let row = query(BEFORE)
-            .bind(&job.tenant)
-            .bind(job.priority.rank())
-            .bind(job.id.to_string())
-            .bind(i64::from(limit))
-            .fetch_one(&self.readers)
-            .await?;
-        let queues = self.queues().await?;
-        let tenants: HashSet<&str> = queues.iter().map(|(queue, _)| &*queue.tenant).collect();
-        Ok(QueueAhead {
-            jobs: read_count(&row, "jobs")?,
-            cost_us: read_count(&row, "cost_us")?,
-            tenants: tenants.len(),
-        })
-    }
-}
 
 /// Jobs of the tenant before one of this rank and id, and their expected µs; no further than the limit.
 pub(crate) const BEFORE: &str = "SELECT COUNT(*) AS jobs, CAST(COALESCE(SUM(cost_us), 0) AS bigint) AS cost_us FROM (SELECT cost_us FROM jobs \
