@@ -12,8 +12,8 @@ use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::remark::list::Remark;
 use railhead::jobs::model::{Kind, Queue, SubmitOptions};
 use railhead::jobs::store::{
-    Claim, ClaimKind, ClaimRequest, Ending, Enqueued, Lease, NewBatch, NewJob, QueueBounds,
-    ReleaseReason, Renewal, Store, StoredResult,
+    Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, Filter, Lease, NewBatch, NewJob,
+    Page, QueueBounds, Reap, ReleaseReason, Renewal, ResultRef, Store, StoredResult,
 };
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
@@ -129,13 +129,43 @@ impl Table {
         Some((case.body, cancelled))
     }
 
+    /// A job of the usual tenant.
+    pub async fn job(&self, id: Uuid) -> Option<Job> {
+        self.store.job("anonymous", id).await.unwrap()
+    }
+
     pub async fn state(&self, id: Uuid) -> State {
-        self.store
-            .job("anonymous", id)
-            .await
-            .unwrap()
-            .unwrap()
-            .state
+        self.job(id).await.unwrap().state
+    }
+
+    pub async fn result(&self, id: Uuid) -> Option<(Job, Option<ResultRef>)> {
+        self.store.result("anonymous", id).await.unwrap()
+    }
+
+    pub async fn cancel(&self, id: Uuid, now: i64) -> Option<Job> {
+        self.store.cancel("anonymous", id, now).await.unwrap()
+    }
+
+    pub async fn delete(&self, id: Uuid) -> Deleted {
+        self.store.delete("anonymous", id).await.unwrap()
+    }
+
+    pub async fn list(&self, filter: &Filter, after: Option<Uuid>, limit: u32) -> Page<Job> {
+        let page = self.store.list("anonymous", filter, after, limit);
+        page.await.unwrap()
+    }
+
+    pub async fn job_by_key(&self, key: &str, digest: &[u8; 32]) -> Option<Enqueued> {
+        let found = self.store.job_by_key("anonymous", key, digest);
+        found.await.unwrap()
+    }
+
+    pub async fn reap(&self, which: Reap, now: i64, attempts_max: u32) -> Vec<(Uuid, State)> {
+        self.store.reap(which, now, attempts_max).await.unwrap()
+    }
+
+    pub async fn released_blobs(&self, done: &[String], limit: u32) -> Vec<String> {
+        self.store.released_blobs(done, limit).await.unwrap()
     }
 }
 

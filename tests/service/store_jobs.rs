@@ -18,10 +18,7 @@ async fn a_job_comes_back_as_it_was_queued(kind: StoreKind) {
         ..labelled("line", "A12")
     };
     let job = table.add(new.clone()).await;
-    assert_eq!(
-        table.store.job("anonymous", new.id).await.unwrap(),
-        Some(job.clone())
-    );
+    assert_eq!(table.job(new.id).await, Some(job.clone()));
     assert_eq!(job.state, State::Queued);
     assert_eq!((job.name, job.labels), (new.name, new.labels));
     assert_eq!(
@@ -30,10 +27,7 @@ async fn a_job_comes_back_as_it_was_queued(kind: StoreKind) {
     );
     assert_eq!((job.attempt, job.failure), (0, None));
     assert_eq!(table.case(new.id).await, Some((new.body, false)));
-    assert_eq!(
-        table.store.job("anonymous", Uuid::now_v7()).await.unwrap(),
-        None
-    );
+    assert_eq!(table.job(Uuid::now_v7()).await, None);
     assert_eq!(table.case(Uuid::now_v7()).await, None);
 }
 
@@ -84,12 +78,7 @@ async fn a_job_ends_once_and_says_how(kind: StoreKind) {
             (state, Some(5), Some(9))
         );
         assert_eq!(job.failure.is_some(), state == State::Failed);
-        let (_, stored) = table
-            .store
-            .result("anonymous", claim.id)
-            .await
-            .unwrap()
-            .unwrap();
+        let (_, stored) = table.result(claim.id).await.unwrap();
         assert_eq!(stored.is_some(), state == State::Succeeded);
         if state == State::Succeeded {
             assert_eq!(job.remarks, [remark()]);
@@ -107,14 +96,7 @@ async fn a_lease_ends_at_its_time_and_not_before(kind: StoreKind) {
     let table = Table::new(kind).await;
     let id = table.add(new_job()).await.id;
     let claim = table.claim(100).await.unwrap();
-    assert_eq!(
-        table
-            .store
-            .reap(Reap::Expired { now: 1_099 }, 1_099, 5)
-            .await
-            .unwrap(),
-        []
-    );
+    assert_eq!(table.reap(Reap::Expired { now: 1_099 }, 1_099, 5).await, []);
     let renewed = table.renew(&claim, 0.25, 1_000).await;
     assert_eq!(
         renewed,
@@ -122,23 +104,12 @@ async fn a_lease_ends_at_its_time_and_not_before(kind: StoreKind) {
             cancel_requested: false
         }
     );
+    assert_eq!(table.reap(Reap::Expired { now: 1_999 }, 1_999, 5).await, []);
     assert_eq!(
-        table
-            .store
-            .reap(Reap::Expired { now: 1_999 }, 1_999, 5)
-            .await
-            .unwrap(),
-        []
-    );
-    assert_eq!(
-        table
-            .store
-            .reap(Reap::Expired { now: 2_000 }, 2_000, 5)
-            .await
-            .unwrap(),
+        table.reap(Reap::Expired { now: 2_000 }, 2_000, 5).await,
         [(id, State::Queued)]
     );
-    let job = table.store.job("anonymous", id).await.unwrap().unwrap();
+    let job = table.job(id).await.unwrap();
     assert_eq!(
         (job.state, job.attempt, job.started_at),
         (State::Queued, 1, None)
@@ -149,22 +120,18 @@ async fn a_worker_that_lost_its_lease_changes_nothing(kind: StoreKind) {
     let table = Table::new(kind).await;
     let id = table.add(new_job()).await.id;
     let stale = table.claim(0).await.unwrap();
-    table
-        .store
-        .reap(Reap::Expired { now: LEASE }, LEASE, 5)
-        .await
-        .unwrap();
-    let queued = table.store.job("anonymous", id).await.unwrap();
+    table.reap(Reap::Expired { now: LEASE }, LEASE, 5).await;
+    let queued = table.job(id).await;
     for claimed_again in [false, true] {
         if claimed_again {
             assert_eq!(table.claim(LEASE).await.unwrap().attempt, 2);
         }
-        let before = table.store.job("anonymous", id).await.unwrap();
+        let before = table.job(id).await;
         assert_eq!(before == queued, !claimed_again);
         assert_eq!(table.renew(&stale, 0.9, LEASE).await, Renewal::Lost);
         assert_eq!(table.finish(&stale, &success(), LEASE).await, None);
         assert_eq!(table.release(&stale, LEASE).await, None);
-        assert_eq!(table.store.job("anonymous", id).await.unwrap(), before);
+        assert_eq!(table.job(id).await, before);
     }
 }
 
@@ -173,7 +140,7 @@ async fn an_attempt_handed_back_does_not_count_but_still_fences(kind: StoreKind)
     let id = table.add(new_job()).await.id;
     let first = table.claim(0).await.unwrap();
     assert_eq!(table.release(&first, 1).await, Some(State::Queued));
-    let queued = table.store.job("anonymous", id).await.unwrap().unwrap();
+    let queued = table.job(id).await.unwrap();
     assert_eq!((queued.attempt, queued.started_at), (0, None));
 
     let second = table.claim(2).await.unwrap();
@@ -194,15 +161,11 @@ async fn a_job_that_loses_every_worker_fails_after_the_allowed_attempts(kind: St
             State::Failed
         };
         assert_eq!(
-            table
-                .store
-                .reap(Reap::Expired { now: LEASE }, 7_000, 3)
-                .await
-                .unwrap(),
+            table.reap(Reap::Expired { now: LEASE }, 7_000, 3).await,
             [(id, expected)]
         );
     }
-    let job = table.store.job("anonymous", id).await.unwrap().unwrap();
+    let job = table.job(id).await.unwrap();
     assert_eq!(job.failure.unwrap().kind, FailureKind::WorkerLost);
     assert_eq!((job.attempt, job.ended_at), (3, Some(7_000)));
     assert_eq!(table.claim(0).await, None);
@@ -211,35 +174,19 @@ async fn a_job_that_loses_every_worker_fails_after_the_allowed_attempts(kind: St
 async fn cancelling_ends_a_queued_job_asks_a_running_one_and_leaves_an_ended_one(kind: StoreKind) {
     let table = Table::new(kind).await;
     let queued = table.add(new_job()).await;
-    let cancelled = table
-        .store
-        .cancel("anonymous", queued.id, 4)
-        .await
-        .unwrap()
-        .unwrap();
+    let cancelled = table.cancel(queued.id, 4).await.unwrap();
     assert_eq!(
         (cancelled.state, cancelled.ended_at),
         (State::Cancelled, Some(4))
     );
     assert_eq!(table.claim(0).await, None);
-    assert_eq!(
-        table.store.cancel("anonymous", queued.id, 5).await.unwrap(),
-        Some(cancelled)
-    );
+    assert_eq!(table.cancel(queued.id, 5).await, Some(cancelled));
 
     let running = table.add(new_job()).await.id;
     let claim = table.claim(0).await.unwrap();
-    let asked = table
-        .store
-        .cancel("anonymous", running, 6)
-        .await
-        .unwrap()
-        .unwrap();
+    let asked = table.cancel(running, 6).await.unwrap();
     assert_eq!((asked.state, asked.ended_at), (State::Running, None));
-    assert_eq!(
-        table.store.cancel("anonymous", running, 7).await.unwrap(),
-        Some(asked)
-    );
+    assert_eq!(table.cancel(running, 7).await, Some(asked));
     assert!(table.case(running).await.unwrap().1);
     let renewed = table.renew(&claim, 0.5, 8).await;
     assert_eq!(
@@ -249,40 +196,26 @@ async fn cancelling_ends_a_queued_job_asks_a_running_one_and_leaves_an_ended_one
         }
     );
     let ended = table.finish(&claim, &success(), 9).await;
-    assert_eq!(
-        table.store.cancel("anonymous", running, 10).await.unwrap(),
-        ended
-    );
-    assert_eq!(
-        table
-            .store
-            .cancel("anonymous", Uuid::now_v7(), 0)
-            .await
-            .unwrap(),
-        None
-    );
+    assert_eq!(table.cancel(running, 10).await, ended);
+    assert_eq!(table.cancel(Uuid::now_v7(), 0).await, None);
 }
 
 async fn a_cancelled_job_never_goes_back_to_the_queue(kind: StoreKind) {
     let table = Table::new(kind).await;
     let lost = table.add(new_job()).await.id;
     table.claim(0).await.unwrap();
-    table.store.cancel("anonymous", lost, 1).await.unwrap();
+    table.cancel(lost, 1).await;
     assert_eq!(
-        table
-            .store
-            .reap(Reap::Expired { now: LEASE }, LEASE, 1)
-            .await
-            .unwrap(),
+        table.reap(Reap::Expired { now: LEASE }, LEASE, 1).await,
         [(lost, State::Cancelled)]
     );
 
     let released = table.add(new_job()).await.id;
     let claim = table.claim(0).await.unwrap();
-    table.store.cancel("anonymous", released, 1).await.unwrap();
+    table.cancel(released, 1).await;
     assert_eq!(table.release(&claim, 2).await, Some(State::Cancelled));
     for id in [lost, released] {
-        let job = table.store.job("anonymous", id).await.unwrap().unwrap();
+        let job = table.job(id).await.unwrap();
         assert_eq!((job.state, job.failure), (State::Cancelled, None));
         assert!(job.ended_at.is_some());
     }
@@ -295,50 +228,23 @@ async fn only_an_ended_job_can_be_deleted_and_all_that_hung_on_it_goes(kind: Sto
         ..labelled("line", "A12")
     };
     let id = table.add(new).await.id;
-    assert_eq!(
-        table.store.delete("anonymous", id).await.unwrap(),
-        Deleted::NotEnded(State::Queued)
-    );
+    assert_eq!(table.delete(id).await, Deleted::NotEnded(State::Queued));
     let claim = table.claim(0).await.unwrap();
-    assert_eq!(
-        table.store.delete("anonymous", id).await.unwrap(),
-        Deleted::NotEnded(State::Running)
-    );
+    assert_eq!(table.delete(id).await, Deleted::NotEnded(State::Running));
     table.finish(&claim, &success(), 1).await;
-    assert_eq!(
-        table.store.delete("anonymous", id).await.unwrap(),
-        Deleted::Done
-    );
-    assert_eq!(
-        table.store.delete("anonymous", id).await.unwrap(),
-        Deleted::NotFound
-    );
+    assert_eq!(table.delete(id).await, Deleted::Done);
+    assert_eq!(table.delete(id).await, Deleted::NotFound);
 
     assert_eq!(table.case(id).await, None);
-    assert_eq!(
-        table
-            .store
-            .job_by_key("anonymous", "k", &[1; 32])
-            .await
-            .unwrap(),
-        None
-    );
+    assert_eq!(table.job_by_key("k", &[1; 32]).await, None);
     let filter = Filter {
         labels: vec![("line".to_owned(), "A12".to_owned())],
         ..Filter::default()
     };
-    assert_eq!(
-        table
-            .store
-            .list("anonymous", &filter, None, 10)
-            .await
-            .unwrap()
-            .entries,
-        []
-    );
-    let released = table.store.released_blobs(&[], 10).await.unwrap();
+    assert_eq!(table.list(&filter, None, 10).await.entries, []);
+    let released = table.released_blobs(&[], 10).await;
     assert_eq!(released, ["results/1"], "its result is left to be removed");
-    let released = table.store.released_blobs(&released, 10).await.unwrap();
+    let released = table.released_blobs(&released, 10).await;
     assert!(released.is_empty(), "what was removed is forgotten");
 }
 
@@ -346,7 +252,7 @@ async fn the_table_outlives_its_process(kind: StoreKind) {
     let table = Table::new(kind).await;
     let id = table.add(keyed("k", 1)).await.id;
     let claim = table.claim(0).await.unwrap();
-    let before = table.store.job("anonymous", id).await.unwrap();
+    let before = table.job(id).await;
     // Not closed: the second opening finds what a killed process would leave.
     let again = table.open_again().await;
     assert_eq!(again.job("anonymous", id).await.unwrap(), before);
@@ -401,9 +307,9 @@ async fn an_end_that_is_written_again_because_its_answer_was_lost_keeps_its_resu
     // The worker takes the job for lost and leaves the result to be removed.
     assert_eq!(table.finish(&claim, &success(), 2).await, None);
     table.store.abandon_blob("results/1").await.unwrap();
-    assert!(table.store.released_blobs(&[], 9).await.unwrap().is_empty());
-    table.store.delete("anonymous", claim.id).await.unwrap();
-    let released = table.store.released_blobs(&[], 9).await.unwrap();
+    assert!(table.released_blobs(&[], 9).await.is_empty());
+    table.delete(claim.id).await;
+    let released = table.released_blobs(&[], 9).await;
     assert_eq!(released, ["results/1"]);
 }
 

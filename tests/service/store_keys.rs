@@ -51,21 +51,10 @@ async fn one_idempotency_key_makes_one_job(kind: StoreKind) {
         Enqueued::Conflict
     );
     assert_eq!(
-        table
-            .store
-            .job_by_key("anonymous", "k", &[2; 32])
-            .await
-            .unwrap(),
+        table.job_by_key("k", &[2; 32]).await,
         Some(Enqueued::Conflict)
     );
-    assert_eq!(
-        table
-            .store
-            .job_by_key("anonymous", "other", &[1; 32])
-            .await
-            .unwrap(),
-        None
-    );
+    assert_eq!(table.job_by_key("other", &[1; 32]).await, None);
     assert!(matches!(
         table
             .store

@@ -20,11 +20,7 @@ async fn pages_neither_repeat_nor_skip_while_jobs_arrive(kind: StoreKind) {
     let mut cursor: Option<String> = None;
     loop {
         let after = cursor.map(|cursor| filter.read_cursor(&cursor).unwrap());
-        let page = table
-            .store
-            .list("anonymous", &filter, after, 10)
-            .await
-            .unwrap();
+        let page = table.list(&filter, after, 10).await;
         seen.extend(page.entries.iter().map(|job| job.id));
         // A newcomer belongs before the first page; a job that ends stays where it is.
         table.add(new_job()).await;
@@ -44,11 +40,7 @@ async fn a_full_last_page_has_no_next_one(kind: StoreKind) {
         table.add(new_job()).await;
     }
     for (limit, more) in [(3, true), (4, false), (5, false)] {
-        let page = table
-            .store
-            .list("anonymous", &Filter::default(), None, limit)
-            .await
-            .unwrap();
+        let page = table.list(&Filter::default(), None, limit).await;
         assert_eq!(page.next_cursor.is_some(), more, "limit {limit}");
     }
 }
@@ -67,11 +59,7 @@ async fn filters_combine_and_windows_are_half_open(kind: StoreKind) {
     }
     table.claim(0).await.unwrap();
     let ids = async |filter: &Filter| {
-        let page = table
-            .store
-            .list("anonymous", filter, None, 100)
-            .await
-            .unwrap();
+        let page = table.list(filter, None, 100).await;
         page.entries
             .iter()
             .map(|job| jobs.iter().position(|id| *id == job.id).unwrap())
@@ -100,10 +88,8 @@ async fn a_cursor_of_another_filter_is_refused(kind: StoreKind) {
         table.add(new_job()).await;
     }
     let cursor = table
-        .store
-        .list("anonymous", &Filter::default(), None, 1)
+        .list(&Filter::default(), None, 1)
         .await
-        .unwrap()
         .next_cursor
         .unwrap();
     let other = Filter {

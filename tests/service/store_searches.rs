@@ -49,11 +49,7 @@ async fn several_states_labels_and_words_of_the_name_are_found_page_by_page(kind
     let found = async |filter: &Filter| {
         let (mut found, mut after, mut total) = (Vec::new(), None, None);
         loop {
-            let page = table
-                .store
-                .list("anonymous", filter, after, 2)
-                .await
-                .unwrap();
+            let page = table.list(filter, after, 2).await;
             assert!(page.entries.len() <= 2);
             found.extend(
                 page.entries
@@ -125,13 +121,7 @@ async fn a_search_that_finds_little_ends_its_page_and_goes_on_from_there(kind: S
             states,
             ..Filter::default()
         };
-        let list = async |after| {
-            table
-                .store
-                .list("anonymous", &filter, after, 50)
-                .await
-                .unwrap()
-        };
+        let list = async |after| table.list(&filter, after, 50).await;
         let first = list(None).await;
         assert!(first.entries.is_empty() && first.next_cursor.is_some());
         let second = list(filter.read_cursor(&first.next_cursor.unwrap())).await;
@@ -145,7 +135,7 @@ async fn a_search_that_finds_little_ends_its_page_and_goes_on_from_there(kind: S
         member: Some(Membership::Batch(batch.id)),
         ..Filter::default()
     };
-    let page = table.store.list("anonymous", &all, None, 1).await.unwrap();
+    let page = table.list(&all, None, 1).await;
     assert_eq!(page.total, Total::AtLeast(1_000));
 }
 
