@@ -86,11 +86,11 @@ async fn claims_and_ends_do_not_walk_over_dead_rows_and_miss_nothing_that_came_b
         assert_eq!(claims.len(), GROUP);
         if group == GROUPS / 2 {
             // The next claim begins with them.
-            let back = Leases::release(&store, &claims, ReleaseReason::NotBegun, 0).await;
+            let back = Claims::release(&store, &claims, ReleaseReason::NotBegun, 0).await;
             assert_eq!(back.unwrap().len(), GROUP);
             let again = store.claim(&request(&queue_of("north"))).await.unwrap();
             assert_eq!(again[0].id, claims[0].id);
-            Leases::release(&store, &again, ReleaseReason::NotBegun, 0)
+            Claims::release(&store, &again, ReleaseReason::NotBegun, 0)
                 .await
                 .unwrap();
             continue;
