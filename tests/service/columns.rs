@@ -198,7 +198,7 @@ async fn columns_are_known_bounded_and_there_once_in_every_form() {
     for (form, body) in in_every_form(&twice) {
         if ["text/csv", ARROW, NPZ].contains(&form) {
             let refused = evaluate(form, body).await;
-            assert_problem(&refused, 422, "faulty-table", "twice");
+            assert_problem(&refused, 422, "faulty-case", "for one member");
         }
     }
     let plain = evaluate(

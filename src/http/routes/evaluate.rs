@@ -18,7 +18,7 @@ use uuid::Uuid;
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::answer::RowsAnswer;
 use crate::contact::evaluate::many::{NotAtOnce, SOLVED_ROWS_MAX};
-use crate::contact::evaluate::varied::{Values, VariedColumn, column_pointer, of_values};
+use crate::contact::evaluate::varied::VariedColumn;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::http::dto::CellValue;
 use crate::http::extract::accept::{choose, one_of};
@@ -27,7 +27,7 @@ use crate::http::extract::query::{Parameters, id, query};
 use crate::http::extract::rows::{
     JSON, TableUpload, declared_bytes, read_body, read_json_columns, separate_table,
 };
-use crate::http::extract::tables::{Chunk, TableForm, TableRows, TableSource, too_large};
+use crate::http::extract::tables::{TableForm, TableRows, TableSource, too_large};
 use crate::http::extract::titles::{NamedColumns, faulty};
 use crate::http::limits::{Memory, Pace, hold_while_sent};
 use crate::http::options::HttpOptions;
@@ -36,6 +36,7 @@ use crate::http::render::format::Format;
 use crate::http::render::npz;
 use crate::http::render::row_tables::{json_body, table_body};
 use crate::jobs::Jobs;
+use crate::jobs::run::draft::ReceivedRows;
 use crate::jobs::run::model::RunColumn;
 
 /// The forms of an answer.
@@ -206,19 +207,21 @@ pub(crate) async fn evaluate(
         time: options.evaluate_time,
     };
     let work = computation.run(move |pace| {
-        let (template, columns, _held) = match table {
+        let (template, rows, _held) = match table {
             Some(table) => {
                 let limits = (evaluation.rows_max, bytes_max);
-                let columns = read_columns(table.form, &text, limits, pace)?;
-                (table.template, columns, table.share)
+                let rows = read_rows(table.form, &text, limits, pace)?;
+                (table.template, rows, table.share)
             }
             None => {
                 let (template, named, values) = read_json_columns(&text, &NamedColumns::default())?;
-                (template, varied(&named, values)?, None)
+                let mut rows = varied_alone(named)?;
+                rows.push(values)?;
+                (template, rows, None)
             }
         };
         drop(text);
-        let answer = evaluation.answer(template, &columns, pace)?;
+        let answer = evaluation.answer(template, rows, pace)?;
         let (bytes, body) = match format {
             Format::Json => (answer.bytes(), json_body(answer)),
             Format::Npz => {
@@ -242,72 +245,39 @@ pub(crate) async fn evaluate(
     Ok(hold_while_sent(response, share))
 }
 
-/// All rows of a table, at most `most` rows and, if it is packed, bytes of numbers.
-fn read_columns(
+/// All rows of a table, within these limits of their number and, if it is packed, of their bytes.
+fn read_rows(
     form: TableForm,
     text: &Bytes,
     (rows_max, bytes_max): (usize, usize),
     pace: &mut Pace,
-) -> Result<Vec<VariedColumn>, ApiError> {
+) -> Result<ReceivedRows, ApiError> {
     let source = TableSource::Memory(text.clone());
     let table = TableRows::new(form, source, bytes_max)?;
-    let named = table.named(&NamedColumns::default())?;
-    let mut values: Option<Chunk> = None;
+    let columns = table.titles.len();
+    let mut rows = varied_alone(table.named(&NamedColumns::default())?)?;
     for chunk in table {
         pace.step()?;
-        let chunk = chunk?;
-        let Some(held) = &mut values else {
-            values = Some(chunk);
-            continue;
-        };
-        for (place, (held, more)) in held.iter_mut().zip(chunk).enumerate() {
-            match (held, more) {
-                (Values::Numbers(held), Values::Numbers(more)) => held.extend(more),
-                (Values::Texts(held), Values::Texts(more)) => held.extend(more),
-                _ => {
-                    let name = &named[place].name;
-                    return Err(faulty(format!(
-                        "the column `{name}` holds numbers in some rows and texts in others"
-                    )));
-                }
-            }
+        rows.push(chunk?)?;
+        if rows.held() > rows_max {
+            return Err(too_many(rows.held(), rows_max));
         }
-        let rows = held.first().map_or(0, Values::len);
-        if rows > rows_max {
-            return Err(too_many(rows, rows_max));
-        }
-        if form.packed() && rows * held.len() * size_of::<f64>() > bytes_max {
+        if form.packed() && rows.held() * columns * size_of::<f64>() > bytes_max {
             return Err(too_large(bytes_max));
         }
     }
-    varied(&named, values.unwrap_or_default())
+    Ok(rows)
 }
 
-/// Columns that all stand for something in the case.
-fn varied(named: &[RunColumn], values: Chunk) -> Result<Vec<VariedColumn>, ApiError> {
-    let mut varied: Vec<VariedColumn> = Vec::new();
-    for (column, values) in named.iter().zip(values) {
-        let title = &column.name;
-        let Some(pointer) = column.pointer.clone() else {
-            return Err(faulty(format!(
-                "the column `{title}` stands for nothing in the case; only runs carry columns along"
-            )));
-        };
-        if varied.iter().any(|before| before.pointer == pointer) {
-            return Err(faulty(format!(
-                "the column `{title}` is there twice: another one stands for `{pointer}` too"
-            )));
-        }
-        let values = match values {
-            Values::Numbers(numbers) => {
-                let numbers = numbers.into_iter();
-                Values::Numbers(numbers.map(|number| column.in_case(number)).collect())
-            }
-            texts @ Values::Texts(_) => texts,
-        };
-        varied.push(VariedColumn { pointer, values });
+/// No rows of these columns, all of which stand for something in the case.
+fn varied_alone(columns: Vec<RunColumn>) -> Result<ReceivedRows, ApiError> {
+    let carried = columns.iter().find(|column| column.pointer.is_none());
+    match carried {
+        None => Ok(ReceivedRows::new(columns)?),
+        Some(RunColumn { name, .. }) => Err(faulty(format!(
+            "the column `{name}` stands for nothing in the case; only runs carry columns along"
+        ))),
     }
-    Ok(varied)
 }
 
 fn too_many(rows: usize, rows_max: usize) -> ApiError {
@@ -327,25 +297,24 @@ impl Evaluation {
     fn answer(
         &self,
         template: Value,
-        columns: &[VariedColumn],
+        rows: ReceivedRows,
         pace: &mut Pace,
     ) -> Result<RowsAnswer, ApiError> {
-        let rows_max = self.rows_max;
-        let rows = columns.first().map_or(0, |column| column.values.len());
+        let (rows_max, held) = (self.rows_max, rows.held());
+        let (names, columns): (Vec<String>, Vec<VariedColumn>) = rows.into_varied().unzip();
+        let (rows, columns) = (held, &columns);
         if rows == 0 || rows > rows_max {
             return Err(too_many(rows, rows_max));
         }
-        let faults = faults_of_columns(columns, rows);
-        if !faults.is_empty() {
-            return Err(CaseError(faults).into());
-        }
         let template = Handle::current().block_on(self.jobs.with_profiles(template))?;
         let profiles = self.jobs.profiles_of(columns)?;
-        let pointers = columns.iter().map(|column| &*column.pointer);
-        let pointers: Vec<_> = pointers.map(|pointer| (pointer, pointer)).collect();
+        let names = columns.iter().zip(&names);
+        let names: Vec<(&str, &str)> = names
+            .map(|(column, name)| (&*column.pointer, &**name))
+            .collect();
         let first = self
             .jobs
-            .first_row(&template, columns, &profiles, &pointers, |_| None);
+            .first_row(&template, columns, &profiles, &names, |_| None);
         let (case, checked) = first?;
         // Beyond this number of rows the solver is not used.
         let solver_bytes = match rows <= SOLVED_ROWS_MAX {
@@ -381,23 +350,6 @@ impl Evaluation {
             }),
         })
     }
-}
-
-/// Columns of unlike length, and values that no case may have in their place.
-fn faults_of_columns(columns: &[VariedColumn], rows: usize) -> Vec<Fault> {
-    let mut faults = Vec::new();
-    for VariedColumn { pointer, values } in columns {
-        if values.len() == rows {
-            faults.extend(of_values(pointer, pointer, values, 0));
-        } else {
-            let detail = format!(
-                "{} values given, the first column has {rows}; all columns need as many",
-                values.len()
-            );
-            faults.push(Fault::new(column_pointer(pointer), detail));
-        }
-    }
-    faults
 }
 
 fn too_long(reason: &str) -> ApiError {

@@ -40,12 +40,10 @@ pub struct RunDraft {
     jobs: Jobs,
     upload: BatchUpload,
     template: Value,
-    columns: Vec<RunColumn>,
-    /// Rows that are in no chunk yet, column by column.
-    held: Vec<Values>,
+    /// Those that are in no chunk yet.
+    rows: ReceivedRows,
     /// Known once the first rows are there.
     begun: Option<Begun>,
-    rows: u64,
     rows_max: u64,
     /// Kept profiles that rows name, and the bytes that they take.
     profiles: KnownSections,
@@ -72,10 +70,7 @@ impl Jobs {
         columns: Vec<RunColumn>,
         rows_max: u64,
     ) -> Result<RunDraft, JobsError> {
-        let faults = faults_of_columns(&columns);
-        if !faults.is_empty() {
-            return Err(CaseError(faults).into());
-        }
+        let rows = ReceivedRows::new(columns)?;
         let mut profiles = KnownSections::new();
         let template = self.with_profiles_here(template, &mut profiles)?;
         Ok(RunDraft {
@@ -83,11 +78,9 @@ impl Jobs {
             profile_bytes: 0,
             upload: self.draft(Kind::Rows)?,
             jobs: self.clone(),
-            held: columns.iter().map(|column| empty(column.text)).collect(),
             template,
-            columns,
+            rows,
             begun: None,
-            rows: 0,
             rows_max,
         })
     }
@@ -125,45 +118,21 @@ impl Jobs {
 }
 
 impl RunDraft {
-    /// The columns in their order.
-    #[must_use]
-    pub fn columns(&self) -> &[RunColumn] {
-        &self.columns
-    }
-
-    /// Rows that were added so far.
-    #[must_use]
-    pub fn row_count(&self) -> u64 {
-        self.rows
-    }
-
     /// Adds rows, column by column. Blocks; not to be called on a thread that answers requests.
     ///
     /// # Errors
     /// [`JobsError::Case`]: the columns differ in length or kind, or hold what no case may have; more rows than are allowed; or as
     /// [`BatchUpload::add`].
     pub fn push(&mut self, columns: Vec<Values>) -> Result<(), JobsError> {
-        let mut faults = self.faults_of_rows(&columns);
-        if faults.is_empty() {
-            faults = self.find_profiles(&columns)?;
-        }
+        let faults = self.find_profiles(&columns)?;
         if !faults.is_empty() {
             return Err(CaseError(faults).into());
         }
-        self.rows += columns.first().map_or(0, Values::len) as u64;
-        if self.rows > self.rows_max {
+        self.rows.push(columns)?;
+        if self.rows.received > self.rows_max {
             return Err(JobsError::TooManyRows(self.rows_max));
         }
-        for ((held, more), column) in self.held.iter_mut().zip(columns).zip(&self.columns) {
-            match (held, more) {
-                (Values::Numbers(held), Values::Numbers(more)) => {
-                    held.extend(more.into_iter().map(|number| column.in_case(number)));
-                }
-                (Values::Texts(held), Values::Texts(more)) => held.extend(more),
-                _ => unreachable!("kinds were compared"),
-            }
-        }
-        if self.held_rows() >= CHUNK_ROWS_MAX {
+        if self.rows.held() >= CHUNK_ROWS_MAX {
             self.cut(false)?;
         }
         Ok(())
@@ -174,7 +143,7 @@ impl RunDraft {
     /// # Errors
     /// [`JobsError::Case`]: there are no rows, or the case of the first one is faulty; or as [`BatchUpload::add`].
     pub fn cut_all(&mut self) -> Result<(), JobsError> {
-        if self.rows == 0 {
+        if self.rows.received == 0 {
             let fault = Fault::new("/columns", "0 rows given; at least one is needed");
             return Err(CaseError(vec![fault]).into());
         }
@@ -190,17 +159,13 @@ impl RunDraft {
             ..
         }) = self.begun
         {
-            head.rows = self.rows;
+            head.rows = self.rows.received;
             head.profiles = self.profiles.into_iter().collect();
             let whole = head.whole();
             let (common, own) = head.into_parts(&self.template, first_row);
             self.upload.set_head(common, own, &whole);
         }
         Ok(self.upload)
-    }
-
-    fn held_rows(&self) -> usize {
-        self.held.first().map_or(0, Values::len)
     }
 
     /// Stages whole chunks of what is held, at the end all of it.
@@ -212,17 +177,13 @@ impl RunDraft {
             return Ok(());
         };
         let each = begun.head.chunk_rows as usize;
-        let held = self.held_rows();
+        let (held, rows) = (self.rows.held(), &self.rows);
         let mut begin = 0;
         while held - begin >= each || (last && begin < held) {
             let end = (begin + each).min(held);
             let chunk = RunChunk {
-                first_row: self.rows - (held - begin) as u64,
-                columns: self
-                    .held
-                    .iter()
-                    .map(|values| part(values, begin..end))
-                    .collect(),
+                first_row: rows.received - (held - begin) as u64,
+                columns: rows.part(begin..end),
             };
             let seconds = begun.row_seconds * (end - begin) as f64;
             let body = chunk
@@ -232,28 +193,15 @@ impl RunDraft {
                 .add_chunk(&begun.head.method, microseconds(seconds), &body)?;
             begin = end;
         }
-        for values in &mut self.held {
-            *values = part(values, begin..held);
-        }
+        self.rows.values = self.rows.part(begin..held);
         Ok(())
     }
 
     /// What the first rows decide: is the case good, and how many rows are a chunk?
     fn begin(&self) -> Result<Begun, JobsError> {
-        let pairs = self.columns.iter().zip(&self.held);
-        let varied: Vec<VariedColumn> = pairs
-            .filter_map(|(column, values)| {
-                Some(VariedColumn {
-                    pointer: column.pointer.clone()?,
-                    values: part(values, 0..values.len().min(CHUNK_ROWS_MAX)),
-                })
-            })
-            .collect();
+        let varied = self.rows.varied(CHUNK_ROWS_MAX);
         let profiles: BTreeMap<String, Value> = self.profiles.clone().into_iter().collect();
-        let names = self.columns.iter();
-        let names: Vec<(&str, &str)> = names
-            .filter_map(|column| Some((column.pointer.as_deref()?, &*column.name)))
-            .collect();
+        let names = self.rows.names();
         let first =
             self.jobs
                 .first_row(&self.template, &varied, &profiles, &names, fields_asked_for);
@@ -279,7 +227,7 @@ impl RunDraft {
         let names = NumberColumns::of(&checked).names();
         let mut head = RunHead::new(
             case,
-            self.columns.clone(),
+            self.rows.columns.clone(),
             names.into_iter().map(str::to_owned).collect(),
             checked.run.method_asked.name().to_owned(),
         );
@@ -295,16 +243,113 @@ impl RunDraft {
 
     /// Reads the kept profiles that rows name.
     fn find_profiles(&mut self, columns: &[Values]) -> Result<Vec<Fault>, JobsError> {
-        let named = self.columns.iter().zip(columns);
+        let named = self.rows.columns.iter().zip(columns);
         let named = named.filter_map(|(column, values)| {
             Some((&*column.name, column.pointer.as_deref()?, values))
         });
         let found = (&mut self.profiles, &mut self.profile_bytes);
         let jobs = &self.jobs;
-        jobs.find_sections(named, self.rows, found, PROFILE_BYTES_MAX)
+        jobs.find_sections(named, self.rows.received, found, PROFILE_BYTES_MAX)
+    }
+}
+
+/// Rows that are being received.
+#[derive(Debug)]
+pub struct ReceivedRows {
+    columns: Vec<RunColumn>,
+    /// Those that are held, column by column, in the units of the case.
+    values: Vec<Values>,
+    /// Number of rows so far, those included that are held no more.
+    received: u64,
+}
+
+impl ReceivedRows {
+    /// No rows of these columns.
+    ///
+    /// # Errors
+    /// A column is there twice or has a name that it may not have, or there is none that varies the case.
+    pub fn new(columns: Vec<RunColumn>) -> Result<ReceivedRows, CaseError> {
+        let faults = faults_of_columns(&columns);
+        if !faults.is_empty() {
+            return Err(CaseError(faults));
+        }
+        let values = columns.iter().map(|column| match column.text {
+            true => Values::Texts(Vec::new()),
+            false => Values::Numbers(Vec::new()),
+        });
+        Ok(ReceivedRows {
+            values: values.collect(),
+            columns,
+            received: 0,
+        })
     }
 
-    fn faults_of_rows(&self, columns: &[Values]) -> Vec<Fault> {
+    /// Adds rows, column by column.
+    ///
+    /// # Errors
+    /// The columns differ in length or kind, or hold what no case may have.
+    pub fn push(&mut self, columns: Vec<Values>) -> Result<(), CaseError> {
+        let faults = self.faults_of(&columns);
+        if !faults.is_empty() {
+            return Err(CaseError(faults));
+        }
+        self.received += columns.first().map_or(0, Values::len) as u64;
+        for ((held, more), column) in self.values.iter_mut().zip(columns).zip(&self.columns) {
+            match (held, more) {
+                (Values::Numbers(held), Values::Numbers(more)) => {
+                    held.extend(more.into_iter().map(|number| column.in_case(number)));
+                }
+                (Values::Texts(held), Values::Texts(more)) => held.extend(more),
+                _ => unreachable!("kinds were compared"),
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of rows that are held.
+    #[must_use]
+    pub fn held(&self) -> usize {
+        self.values.first().map_or(0, Values::len)
+    }
+
+    /// The columns that vary the case, with the first rows that are held, at most this many.
+    #[must_use]
+    pub fn varied(&self, most: usize) -> Vec<VariedColumn> {
+        let values = self.part(0..self.held().min(most));
+        let varied = self.columns.iter().zip(values);
+        let varied = varied.filter_map(|(column, values)| {
+            let pointer = column.pointer.clone()?;
+            Some(VariedColumn { pointer, values })
+        });
+        varied.collect()
+    }
+
+    /// The columns that vary the case, with their names.
+    pub fn into_varied(self) -> impl Iterator<Item = (String, VariedColumn)> {
+        let varied = self.columns.into_iter().zip(self.values);
+        varied.filter_map(|(RunColumn { name, pointer, .. }, values)| {
+            let pointer = pointer?;
+            Some((name, VariedColumn { pointer, values }))
+        })
+    }
+
+    /// The places in the case of the columns that vary it, with their names.
+    #[must_use]
+    pub fn names(&self) -> Vec<(&str, &str)> {
+        let names = self.columns.iter();
+        let names = names.filter_map(|column| Some((column.pointer.as_deref()?, &*column.name)));
+        names.collect()
+    }
+
+    fn part(&self, range: std::ops::Range<usize>) -> Vec<Values> {
+        let values = self.values.iter().map(|values| match values {
+            Values::Numbers(numbers) => Values::Numbers(numbers[range.clone()].to_vec()),
+            Values::Texts(texts) => Values::Texts(texts[range.clone()].to_vec()),
+        });
+        values.collect()
+    }
+
+    fn faults_of(&self, columns: &[Values]) -> Vec<Fault> {
         let rows = columns.first().map_or(0, Values::len);
         let mut faults = Vec::new();
         for (column, values) in self.columns.iter().zip(columns) {
@@ -321,9 +366,9 @@ impl RunDraft {
                     format!("a value of another kind given; {needed} are needed in this column");
                 faults.push(Fault::new(pointer, detail));
             } else if let Values::Texts(texts) = values {
-                faults.extend(faults_of_texts(&column.name, texts, self.rows));
+                faults.extend(faults_of_texts(&column.name, texts, self.received));
             } else if let Some(place) = &column.pointer {
-                faults.extend(of_values(&column.name, place, values, self.rows));
+                faults.extend(of_values(&column.name, place, values, self.received));
             }
         }
         faults
@@ -408,18 +453,4 @@ fn faults_of_texts(name: &str, texts: &[Option<String>], first: u64) -> Vec<Faul
 
 fn has_controls(text: &str) -> bool {
     text.chars().any(char::is_control)
-}
-
-fn empty(text: bool) -> Values {
-    match text {
-        true => Values::Texts(Vec::new()),
-        false => Values::Numbers(Vec::new()),
-    }
-}
-
-fn part(values: &Values, range: std::ops::Range<usize>) -> Values {
-    match values {
-        Values::Numbers(numbers) => Values::Numbers(numbers[range].to_vec()),
-        Values::Texts(texts) => Values::Texts(texts[range].to_vec()),
-    }
 }
