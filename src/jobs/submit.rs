@@ -54,7 +54,7 @@ impl Jobs {
         let check = |jobs: &Jobs, case: &Value| {
             let mut checked = jobs.check(case)?;
             jobs.bind(&mut checked.label.labels).map_err(CaseError)?;
-            Ok(jobs.new_job(checked, Bytes::new()))
+            Ok(jobs.new_job(checked))
         };
         let case = self.with_profiles(case).await?;
         let small = is_small(&case);
@@ -181,14 +181,13 @@ impl Jobs {
     }
 
     /// A checked case as a job about to be queued.
-    fn new_job(&self, checked: CheckedCase, body: Bytes) -> NewJob {
+    pub(crate) fn new_job(&self, checked: CheckedCase) -> NewJob {
         NewJob {
             method: checked.run.method.name().to_owned(),
             outputs: outputs_text(&checked.run.outputs),
             cost_us: cost_us(&checked),
             slice_us: self.slice_us(&checked),
             cache_key: self.cache_key(&checked.label.digest),
-            body,
             name: checked.label.name,
             labels: checked.label.labels,
             ..self.blank_job()

@@ -8,7 +8,7 @@ use futures_util::stream::BoxStream;
 use tokio::time::Instant;
 use uuid::Uuid;
 
-use crate::jobs::batch::upload::{BatchUpload, StagedCase};
+use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::{BatchItem, ItemFault, Kind, State, SubmitOptions, WorkOptions};
@@ -175,17 +175,21 @@ impl Jobs {
             if cases.is_empty() {
                 break;
             }
-            let mut some: Vec<_> = cases
+            let mut some: Vec<(u32, NewJob)> = cases
                 .into_iter()
-                .map(|(staged, case)| {
-                    let traceparent = traceparent.clone();
-                    (
-                        staged.index,
-                        NewJob {
-                            kind: new.kind.of_job(),
-                            ..self.staged_job(staged, case, options, traceparent)
-                        },
-                    )
+                .map(|((index, own, staged), body)| {
+                    let blank = self.blank_job();
+                    let job = NewJob {
+                        id: blank.id,
+                        tenant: blank.tenant,
+                        created_at: blank.created_at,
+                        kind: new.kind.of_job(),
+                        body: body.into(),
+                        traceparent: traceparent.clone(),
+                        options: options.of_case(own),
+                        ..staged
+                    };
+                    (index, job)
                 })
                 .collect();
             if !options.bypass_cache {
@@ -206,32 +210,6 @@ impl Jobs {
             self.shared.abandon(draft.id);
             draft.settle();
             self.shared.drop_abandoned().await;
-        }
-    }
-
-    fn staged_job(
-        &self,
-        staged: StagedCase,
-        case: Vec<u8>,
-        options: SubmitOptions,
-        traceparent: Option<Arc<str>>,
-    ) -> NewJob {
-        NewJob {
-            name: staged.name,
-            labels: staged.labels,
-            method: staged.method,
-            outputs: staged.outputs,
-            cost_us: staged.cost_us,
-            slice_us: staged.slice_us,
-            body: Bytes::from(case),
-            row: staged.row,
-            // A chunk of rows has none.
-            cache_key: Some(staged.digest)
-                .filter(|digest| !digest.is_empty())
-                .and_then(|digest| self.cache_key(&digest)),
-            traceparent,
-            options: options.of_case(staged.own),
-            ..self.blank_job()
         }
     }
 }

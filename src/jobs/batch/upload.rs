@@ -1,5 +1,4 @@
 //! A batch under way: its cases are checked, counted and staged in a file, and rows fill a template.
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -20,24 +19,11 @@ use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
 use crate::jobs::model::{CaseOptions, Kind, SubmitOptions, WorkOptions, created_at};
 use crate::jobs::profiles::KnownSections;
-use crate::jobs::store::{NewBatch, StoredCase};
-use crate::jobs::submit::{cost_us, outputs_text};
+use crate::jobs::store::{NewBatch, NewJob, StoredCase};
+use crate::jobs::submit::outputs_text;
 
-/// The columns of the job table for a case, without its text.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct StagedCase {
-    pub(crate) index: u32,
-    /// The text is what a row of a table puts into the template.
-    pub(crate) row: bool,
-    pub(crate) name: Option<String>,
-    pub(crate) labels: BTreeMap<String, String>,
-    pub(crate) method: String,
-    pub(crate) outputs: String,
-    pub(crate) cost_us: u32,
-    pub(crate) slice_us: u32,
-    pub(crate) digest: String,
-    pub(crate) own: CaseOptions,
-}
+/// A job that waits in a file: its place in what was sent, the options that it has for itself, and the job without its body.
+type Staged = (u32, CaseOptions, NewJob);
 
 /// Staged cases, first in, first out.
 #[derive(Debug)]
@@ -53,7 +39,7 @@ impl Staging {
     }
 
     /// Appends a case.
-    pub(crate) fn push(&mut self, staged: &StagedCase, case: &[u8]) -> io::Result<()> {
+    pub(crate) fn push(&mut self, staged: &Staged, case: &[u8]) -> io::Result<()> {
         for part in [serde_json::to_vec(staged)?.as_slice(), case] {
             self.0.write_all(&(part.len() as u64).to_le_bytes())?;
             self.0.write_all(part)?;
@@ -75,11 +61,7 @@ pub(crate) struct StagingReader(BufReader<File>);
 
 impl StagingReader {
     /// The next cases: at most `jobs`, and no further one once `bytes` are reached.
-    pub(crate) fn take(
-        &mut self,
-        jobs: usize,
-        bytes: usize,
-    ) -> io::Result<Vec<(StagedCase, Vec<u8>)>> {
+    pub(crate) fn take(&mut self, jobs: usize, bytes: usize) -> io::Result<Vec<(Staged, Vec<u8>)>> {
         let mut taken = Vec::new();
         let mut size = 0;
         while taken.len() < jobs && size < bytes {
@@ -406,30 +388,27 @@ impl BatchUpload {
     ) -> Result<(), JobsError> {
         self.count(body.len())?;
         self.digest.update(body);
-        let staged = StagedCase {
-            index: self.cases,
+        let job = NewJob {
             row: true,
             method: method.to_owned(),
             outputs: outputs_text(&[]),
             cost_us,
             slice_us: cost_us,
-            digest: String::new(),
-            name: None,
-            labels: BTreeMap::new(),
-            own: CaseOptions::default(),
+            ..NewJob::default()
         };
-        self.stage(&staged, body)
+        self.stage(CaseOptions::default(), job, body)
     }
 
     /// Counts the next case as a good one and stages what is kept of it.
-    fn stage(&mut self, staged: &StagedCase, kept: &[u8]) -> Result<(), JobsError> {
+    fn stage(&mut self, own: CaseOptions, job: NewJob, kept: &[u8]) -> Result<(), JobsError> {
+        let staged = (self.cases, own, job);
         self.cases += 1;
         self.require_place()?;
         let Some(staging) = &mut self.staging else {
             return Ok(());
         };
         self.kept += kept.len() as u64;
-        let written = staging.push(staged, kept);
+        let written = staging.push(&staged, kept);
         written.map_err(|source| self.jobs.staging_failed(source))
     }
 
@@ -496,19 +475,11 @@ impl BatchUpload {
                 return Ok(());
             }
         };
-        let staged = StagedCase {
-            index: self.cases,
+        let job = NewJob {
             row,
-            method: checked.run.method.name().to_owned(),
-            outputs: outputs_text(&checked.run.outputs),
-            cost_us: cost_us(&checked),
-            slice_us: self.jobs.slice_us(&checked),
-            digest: checked.label.digest,
-            name: checked.label.name,
-            labels: checked.label.labels,
-            own,
+            ..self.jobs.new_job(checked)
         };
-        self.stage(&staged, kept)
+        self.stage(own, job, kept)
     }
 
     fn count(&mut self, bytes: usize) -> Result<(), JobsError> {
@@ -636,17 +607,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut staging = Staging::new(folder.path()).unwrap();
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-        let staged = |index| StagedCase {
-            index,
-            row: false,
-            name: Some("a\nb".to_owned()),
-            labels: BTreeMap::new(),
-            method: "auto".to_owned(),
-            outputs: "[]".to_owned(),
-            cost_us: 7,
-            slice_us: 7,
-            digest: "d".to_owned(),
-            own: CaseOptions::default(),
+        let staged = |index| {
+            let job = NewJob {
+                name: Some("a\nb".to_owned()),
+                cost_us: 7,
+                cache_key: Some([3; 16]),
+                ..NewJob::default()
+            };
+            (index, CaseOptions::default(), job)
         };
         for index in 0..5 {
             staging

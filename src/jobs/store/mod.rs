@@ -23,6 +23,7 @@ use std::time::Duration;
 use async_trait::async_trait;
 use bytes::Bytes;
 use object_store::ObjectStore;
+use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use crate::contact::remark::entry::RemarkEntry;
@@ -1011,16 +1012,20 @@ pub struct Overdue {
 /// Equal for cases of one tenant that have the same answer.
 pub type CacheKey = [u8; 16];
 
-/// A job about to be queued.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// A job about to be queued. One of a batch is written to a file while the batch arrives, with what is known of it by then.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct NewJob {
     /// UUIDv7.
+    #[serde(skip)]
     pub id: Uuid,
     /// Whose it is.
+    #[serde(skip)]
     pub tenant: Arc<str>,
     /// [`Kind::Case`], or [`Kind::Rows`] for a chunk of a run.
+    #[serde(skip)]
     pub kind: Kind,
     /// Time of submission.
+    #[serde(skip)]
     pub created_at: i64,
     /// Free text of the client.
     pub name: Option<String>,
@@ -1029,6 +1034,7 @@ pub struct NewJob {
     /// The method asked for, for the logs.
     pub method: String,
     /// The case as submitted, as JSON text; of a row of a table what it puts into the template of its batch.
+    #[serde(skip)]
     pub body: Bytes,
     /// It is such a row.
     pub row: bool,
@@ -1041,12 +1047,16 @@ pub struct NewJob {
     /// The key under which later identical cases find the result of this job.
     pub cache_key: Option<CacheKey>,
     /// A succeeded job whose result this one gets, instead of being queued, and the time at which it ends so.
+    #[serde(skip)]
     pub source: Option<(Uuid, i64)>,
     /// The client's idempotency key with the digest of case and options; not used inside a batch.
+    #[serde(skip)]
     pub idempotency: Option<(String, [u8; 32])>,
     /// W3C trace context of its submission, if its trace is collected.
+    #[serde(skip)]
     pub traceparent: Option<Arc<str>>,
     /// Options of the submission.
+    #[serde(skip)]
     pub options: SubmitOptions,
 }
 
