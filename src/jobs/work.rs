@@ -7,6 +7,7 @@ use tokio::time::{Instant, sleep, timeout_at};
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt::StopReason;
+use crate::jobs::batch::control::DELETED_AT_ONCE;
 use crate::jobs::error::JobsError;
 use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
 use crate::jobs::model::{Batch, Job, Kind, Labels, QueuePlace, State};
@@ -22,9 +23,6 @@ const PAUSE_PER_JOB: Duration = Duration::from_micros(10);
 
 /// Beyond this place in the queue the place of a job is not given.
 const PLACES_COUNTED: u32 = 10_000;
-
-/// Jobs that are removed in one transaction.
-pub(crate) const DELETED_AT_ONCE: u32 = 500;
 
 /// Jobs of a batch that are cancelled in one transaction.
 const CANCELLED_AT_ONCE: u32 = 2000;

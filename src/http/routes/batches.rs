@@ -100,8 +100,11 @@ pub(crate) async fn submit(
         return Err(refusal(&draft));
     }
     let errors = faults(&draft);
-    let batch = jobs.submit_batch(draft, work).await?;
-    reply.send(&jobs, &memory, batch, Some(errors)).await
+    let (id, replayed) = jobs.submit_batch(draft, work).await?;
+    let batch = jobs.of_kind(Kind::Cases).work(id).await?;
+    reply
+        .send(&jobs, &memory, (batch, replayed), Some(errors))
+        .await
 }
 
 /// Why a batch is not taken.

@@ -98,8 +98,9 @@ pub(crate) async fn submit(
     let named = named.chain(carried.map(|title| (title, String::new())));
     let read = (table, NamedColumns(named.collect()));
     let draft = read_run(state, read, request).await?;
-    let run = jobs.submit_run(draft, work).await?;
-    reply.send(&jobs, &memory, run, None).await
+    let (id, replayed) = jobs.submit_run(draft, work).await?;
+    let run = jobs.of_kind(Kind::Rows).work(id).await?;
+    reply.send(&jobs, &memory, (run, replayed), None).await
 }
 
 /// What a reader of answers holds: a chunk as columns and as text.

@@ -17,7 +17,9 @@ use crate::jobs::storage_fault::StoragePlace;
 use crate::jobs::store::{BatchBegun, NewBatch, NewJob};
 use crate::jobs::sync::blocking;
 use crate::jobs::trace::KeyValue;
-use crate::jobs::work::{DELETED_AT_ONCE, Work};
+
+/// Jobs that are removed in one transaction.
+pub(crate) const DELETED_AT_ONCE: u32 = 500;
 
 impl Shared {
     /// From now on this batch is not filled, its jobs are not shown, and no worker takes one.
@@ -68,7 +70,7 @@ const FILLING_PAUSE: (Duration, Duration) = (Duration::from_millis(50), Duration
 
 impl Jobs {
     /// Queues the good cases of an upload. Once this returns all of them survive the death of the process; if it fails,
-    /// none of them will be there. Workers begin once all are there. Also says whether the batch is that of an
+    /// none of them will be there. Workers begin once all are there. Returns the id of the batch, and whether it is that of an
     /// earlier submission with the same idempotency key.
     ///
     /// # Errors
@@ -78,13 +80,13 @@ impl Jobs {
         &self,
         draft: BatchUpload,
         options: WorkOptions,
-    ) -> Result<(Work, bool), JobsError> {
+    ) -> Result<(Uuid, bool), JobsError> {
         let span = self.submit_span();
         let jobs = draft.cases - draft.rejected;
         let submitted = self.store_batch(draft, options, span.traceparent());
-        span.end(submitted.await, |(batch, _)| {
+        span.end(submitted.await, |(id, _)| {
             vec![
-                KeyValue::new("railhead.batch.id", batch.id().to_string()),
+                KeyValue::new("railhead.batch.id", id.to_string()),
                 KeyValue::new("railhead.batch.jobs", i64::from(jobs)),
             ]
         })
@@ -95,8 +97,8 @@ impl Jobs {
         mut draft: BatchUpload,
         options: WorkOptions,
         traceparent: Option<Arc<str>>,
-    ) -> Result<(Work, bool), JobsError> {
-        let (kind, id, submit) = (draft.kind, draft.id, options.submit);
+    ) -> Result<(Uuid, bool), JobsError> {
+        let (id, submit) = (draft.id, options.submit);
         let new = draft.as_new(options);
         let filled_here = |id| self.shared.unfinished_batches().living.contains(&id);
         let mut pause = FILLING_PAUSE.0;
@@ -117,7 +119,7 @@ impl Jobs {
             };
             match begun {
                 BatchBegun::Created => break,
-                BatchBegun::Existing(id) => return Ok((self.of_kind(kind).work(id).await?, true)),
+                BatchBegun::Existing(id) => return Ok((id, true)),
                 BatchBegun::Conflict => return Err(JobsError::IdempotencyConflict),
                 BatchBegun::Refused(refusal) => {
                     self.give_up(draft).await;
@@ -146,7 +148,7 @@ impl Jobs {
             .await
             .map_err(|error| JobsError::Damaged(error.to_string()))?;
         self.observe_write(filled)?;
-        Ok((self.of_kind(kind).work(id).await?, false))
+        Ok((id, false))
     }
 
     async fn fill(

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
 
 use serde_json::Value;
+use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::{CaseError, Fault};
@@ -21,7 +22,6 @@ use crate::jobs::profiles::KnownSections;
 use crate::jobs::run::model::{REASON, RunChunk, RunColumn, RunHead};
 use crate::jobs::submit::microseconds;
 use crate::jobs::sync::blocking;
-use crate::jobs::work::Work;
 
 /// Expected solve time of a chunk in s: much longer than a claim takes, shorter than a lease, and soon done again.
 const CHUNK_SECONDS: f64 = 3.0;
@@ -100,8 +100,8 @@ impl Jobs {
         self.staging_failed(source)
     }
 
-    /// Queues a run. Once this returns it survives the death of the process. Also says whether it is that of an earlier submission with the same
-    /// idempotency key.
+    /// Queues a run. Once this returns it survives the death of the process. Returns its id, and whether it is that of an earlier submission
+    /// with the same idempotency key.
     ///
     /// # Errors
     /// As [`Jobs::submit_batch`], and [`JobsError::Case`] with every fault of the first row.
@@ -109,7 +109,7 @@ impl Jobs {
         &self,
         draft: RunDraft,
         mut options: WorkOptions,
-    ) -> Result<(Work, bool), JobsError> {
+    ) -> Result<(Uuid, bool), JobsError> {
         let upload = blocking(move || draft.finish()).await??;
         // Rows have no digests to be found by.
         options.submit.bypass_cache = true;
