@@ -6,7 +6,7 @@ use crate::contact::rolling::task::Resolution;
 const SLOPES: [f64; 2] = [-0.9, 0.6];
 /// The vertical force may be missed by this fraction; it bounds the change of friction's share in one round. Half of it makes a third of the rows of a pair
 /// at a target of 0.02 solve their tractions twice.
-pub(crate) const BALANCE: f64 = 1e-3;
+const BALANCE: f64 = 1e-3;
 /// Upper limit of that fraction, relative to the target error. Chosen by judgement; how much it matters was not measured.
 const BALANCE_OF_TARGET: f64 = 0.1;
 

@@ -15,16 +15,16 @@ use crate::contact::geometry::wheel_rail::Placement;
 use crate::contact::geometry::wheelset_pose::WheelsetMotion;
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel::WheelTask;
-use crate::contact::numerics::roots::{FRACTION_MAX, RootExit, find_searched};
+use crate::contact::numerics::equilibrium::{Equilibrium, Search, Termination, Trial};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::{Problem, Run};
 use crate::contact::profile_assessment::trust;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::force_places::CubicLaw;
+use crate::contact::remark::entry::RemarkEntry;
+use crate::contact::rolling::force_places::{CubicLaw, PLACE_MAX};
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::task::{Motion, PrescribedForces, RelativeTo};
 use crate::contact::solution::words::answer::{Fields, PatchSolution, Solution};
-use crate::contact::vertical_equilibrium::BALANCE;
+use crate::contact::vertical_equilibrium::tolerance;
 use crate::contact::wheel_on_rail::SolvedWheel;
 
 /// A force may be missed by this part of the target, and by this part of μN at least: what the normal problem leaves open from trial to
@@ -215,10 +215,7 @@ impl ForceSearch<'_> {
         first: &FirstEstimate,
         reach: &mut Reach,
     ) -> Result<(), SolveError> {
-        let ends = [
-            self.end(-FRACTION_MAX, first)?,
-            self.end(FRACTION_MAX, first)?,
-        ];
+        let ends = [self.end(-PLACE_MAX, first)?, self.end(PLACE_MAX, first)?];
         reach.ends = ends;
         let slack = TARGET_FIRST * first.limit;
         let half = ends[0]
@@ -235,7 +232,7 @@ impl ForceSearch<'_> {
         let unit = half.unwrap_or(0.0).max(first.limit);
         let place = ((force - first.lateral) / unit).clamp(-1.0, 1.0);
         reach.units[1] = unit;
-        reach.open = BALANCE * first.lateral_normal;
+        reach.open = tolerance(self.case.run.resolution) * first.lateral_normal;
         reach.start[1] = place;
         if self.forces[0].is_some() {
             reach.start = first.law.places_of_forces(reach.start);
@@ -296,11 +293,11 @@ impl ForceSearch<'_> {
     }
 
     /// The error of a search that ended without the forces.
-    fn missed(&self, exit: RootExit, reach: &Reach) -> SolveError {
-        if self.forces[1].is_some() && exit == RootExit::SignKept {
+    fn missed(&self, end: Termination, reach: &Reach) -> SolveError {
+        if self.forces[1].is_some() && end == Termination::AtLimit {
             return self.unreached(reach.ends);
         }
-        let (asked, reason) = (self.asked(), exit.reason());
+        let (asked, reason) = (self.asked(), end.reason());
         SolveError::NormalProblem {
             reason: format!(
                 "no creepage was found that gives what was asked for, {asked}: {reason}; friction may not carry it beside what else is given"
@@ -316,38 +313,36 @@ impl ForceSearch<'_> {
             RelativeTo::FrictionLimit => target,
             RelativeTo::Force => target * (wanted[0].hypot(wanted[1]) / first.limit).min(1.0),
         };
-        let allowed = (MISSED_OF_TARGET * target)
-            .max(MISSED_LEAST)
-            .max(reach.open / first.limit);
+        let along = (MISSED_OF_TARGET * target).max(MISSED_LEAST);
+        let allowed = along.max(reach.open / first.limit);
+        // The balance of the vertical force leaves only the lateral force open.
+        let units = [along / allowed * first.limit, first.limit];
         // Outputs never change forces, so that trials need none.
         let run = self.case.run.for_resultants(0.0);
-        let (mut trials, mut nearest) = (0.0, f64::INFINITY);
+        let mut trials = 0.0;
         let creepages_at = |place: [f64; 2]| [0, 1].map(|k| first.law.creepage(k, place[k]));
-        let searched = self.forces.map(|force| force.is_some());
-        let root = find_searched(searched, reach.start, |place, tolerance: &mut f64| {
-            let share = (PROGRESS[1] - PROGRESS[0]) / TRIALS_USUAL;
-            let part = MonitorPart {
-                inner: self.monitor,
-                before: PROGRESS[0] + share * f64::min(trials, TRIALS_USUAL - 1.0),
-                own: share,
-            };
-            trials += 1.0;
-            let case = self.at(creepages_at(place), first.rolling, &run);
-            let total = self.judged(&case, part)?.solution.total[0];
-            let found = [total.force_x_n, total.force_y_n];
-            let off = [0, 1].map(|k| {
-                let missed = self.forces[k].map(|force| found[k] - force);
-                missed.unwrap_or(0.0) / first.limit
-            });
-            nearest = nearest.min(off[0].hypot(off[1]));
-            let units = reach.units.map(|unit| first.limit / unit);
-            let sought = usize::from(self.forces[1].is_some());
-            *tolerance = allowed * units[sought];
-            Ok::<[f64; 2], SolveError>([off[0] * units[0], off[1] * units[1]])
-        })?;
+        let scale = [0, 1].map(|k| self.forces[k].map(|_| units[k] / reach.units[k]));
+        let root: Equilibrium<2, ()> =
+            Search::new(scale, [PLACE_MAX; 2]).find(reach.start, |place| {
+                let share = (PROGRESS[1] - PROGRESS[0]) / TRIALS_USUAL;
+                let part = MonitorPart {
+                    inner: self.monitor,
+                    before: PROGRESS[0] + share * f64::min(trials, TRIALS_USUAL - 1.0),
+                    own: share,
+                };
+                trials += 1.0;
+                let case = self.at(creepages_at(place), first.rolling, &run);
+                let total = self.judged(&case, part)?.solution.total[0];
+                let found = [total.force_x_n, total.force_y_n];
+                Ok::<_, SolveError>(Trial {
+                    residual: [0, 1].map(|k| (found[k] - wanted[k]) / units[k]),
+                    tolerance: allowed,
+                    value: (),
+                })
+            })?;
         // Where the trials alternate between two meshes the force jumps by what both are allowed to miss.
-        if !root.exit.converged() && (root.exit == RootExit::SignKept || nearest > target) {
-            return Err(self.missed(root.exit, reach));
+        if !root.converged() && (root.end == Termination::AtLimit || root.residual > target) {
+            return Err(self.missed(root.end, reach));
         }
         let part = MonitorPart {
             inner: self.monitor,
@@ -356,15 +351,9 @@ impl ForceSearch<'_> {
         };
         let case = self.at(creepages_at(root.place), first.rolling, &self.case.run);
         let mut found = self.judged(&case, part)?;
-        if !root.exit.converged() {
-            let remark = Remark::IterationInexact {
-                iteration: "the search for the creepages of the prescribed force",
-                reason: root.exit.reason(),
-                residual: nearest,
-                tolerance: allowed,
-            };
-            found.solution.remarks.push(remark.into());
-        }
+        let remark = root.inexact("the search for the creepages of the prescribed force");
+        let remarks = &mut found.solution.remarks;
+        remarks.extend(remark.map(RemarkEntry::from));
         let found = trust::trusted(self.operators, &case, self.contact, found, self.monitor)?;
         let mut solution = found.solution;
         if let Some(wheelset) = case.problem.wheelset {

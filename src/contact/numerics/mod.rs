@@ -2,7 +2,8 @@
 //!
 //! | For | There is |
 //! | --- | --- |
-//! | roots of one value or of two, the boundary of a condition, the largest value in an interval | [`roots`] |
+//! | unknowns at which loads, forces, heights and torques balance | [`equilibrium`] |
+//! | the root of a monotone function in a bracket, the boundary of a condition, the largest value in an interval | [`roots`] |
 //! | values between nodes | [`interpolation`] |
 //! | integrals; evenly spread samples, normal distribution | [`quadrature`] |
 //! | linear equations; few unknowns fitted to samples | [`lu`], [`gmres`] |
@@ -15,9 +16,8 @@
 //!   is upright, it keeps the start instead of failing.
 //! - [`spline`](crate::contact::rolling::methods::table::spline) of the creep table always takes six steps, without a test in
 //!   between, because it is evaluated for millions of rows.
-//! - The [search](crate::contact::rolling::history::plan) of a history looks for two creepages at once as [`roots`] does, and keeps its
-//!   compliance from step to step.
 
+pub mod equilibrium;
 pub mod flood_fill;
 pub mod gmres;
 pub mod interpolation;

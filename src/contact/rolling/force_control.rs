@@ -1,8 +1,7 @@
 //! The creepages that give prescribed tangential forces.
 //!
-//! The friction law is monotone: while the other components are kept, a force grows with its creepage. A single force is therefore
-//! bracketed between a creepage that gives too little and one that gives too much; two forces are sought together, see
-//! `numerics::pair_root`. The unknown is not the creepage but its *place*, see `force_places`.
+//! The friction law is monotone: while the other components are kept, a force grows with its creepage. The unknown is not the creepage but its
+//! *place*, see `force_places`, so that the change of a force with its place is about μN.
 //!
 //! A rough search on the coarsest mesh finds where to begin. The adaptive solve of that motion fixes the meshes, on which value and estimate
 //! are one smooth function of the creepage.
@@ -10,10 +9,9 @@
 use crate::contact::error::SolveError;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
-use crate::contact::numerics::roots::{RootExit, find_searched};
-use crate::contact::remark::list::Remark;
+use crate::contact::numerics::equilibrium::{Equilibrium, Search, Termination, Trial};
 use crate::contact::rolling::answer::{MotionAnswer, Work};
-use crate::contact::rolling::force_places::{ForcePlaces, total};
+use crate::contact::rolling::force_places::{ForcePlaces, length, total};
 use crate::contact::rolling::refinement::adapt;
 use crate::contact::rolling::refinement::interpolate::RefinementState;
 use crate::contact::rolling::refinement::mesh_family::MeshFamily;
@@ -54,26 +52,24 @@ pub fn solve(
     }
     let began = monitor.elapsed();
     let mut search = ForceSearch::new(task, state, index, monitor);
-    let mut place = search.places.start(&motion);
-    if search.adapts {
-        place = search.start_on_coarsest(place)?;
-        for _ in 0..MESH_CHOICES_MAX {
-            search.choose_meshes(place)?;
-            place = search.find(place)?;
-            // Where the force jumps, other meshes do not help either.
-            let jumps = search.exit == RootExit::BracketClosed;
-            if search.met() || search.saturated || jumps {
-                break;
-            }
-        }
-    } else {
-        place = search.find(place)?;
-    }
-    let mut point = search.finish(place)?;
+    let start = search.places.start(&motion);
+    let found = match task.method == Method::BoundaryElement && task.target().is_some() {
+        true => search.find_on_chosen_meshes(start)?,
+        false => search.find(start, false)?,
+    };
+    let saturated = found.end == Termination::AtLimit;
+    let remark = found.inexact("the search for the creepages of the prescribed force");
+    let mut point = found.value;
+    point.remarks.extend(remark.filter(|_| !saturated));
+    point.saturated = saturated;
+    point.work = search.work;
     adapt::add_slips(task, state, index, &mut point, monitor)?;
     point.seconds = (monitor.elapsed() - began).as_secs_f64();
     Ok(point)
 }
+
+/// Places with the answer at them.
+type FoundPlaces = Equilibrium<2, MotionAnswer>;
 
 /// The search for the creepages of one motion.
 struct ForceSearch<'a, 's, 'p> {
@@ -85,19 +81,11 @@ struct ForceSearch<'a, 's, 'p> {
     /// μN of all patches in N.
     limit: f64,
     places: ForcePlaces<'a>,
+    search: Search<2>,
     /// The meshes of a trial, coarse to fine; those of the method if empty.
     meshes: Vec<MeshPlan>,
-    /// The error decides the meshes.
-    adapts: bool,
-    /// Forces are sought on the coarsest mesh, to find where to begin.
-    rough: bool,
-    /// The answer nearest to the forces on these meshes, and how far it is from them, relative to μN.
-    best: Option<(f64, MotionAnswer)>,
     /// Largest force of the first trial, relative to μN.
     first: Option<f64>,
-    saturated: bool,
-    /// How the last search ended.
-    exit: RootExit,
     work: Work,
 }
 
@@ -109,22 +97,38 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         monitor: &'a dyn Monitor,
     ) -> ForceSearch<'a, 's, 'p> {
         let limit = task.friction.limit_of_all(task.footprint);
+        let places = ForcePlaces::new(task, state, limit, task.forces[index]);
         ForceSearch {
             task,
-            places: ForcePlaces::new(task, state, limit, task.forces[index]),
+            search: places.search(),
+            places,
             state,
             index,
             monitor,
             forces: task.forces[index],
             limit,
             meshes: Vec::new(),
-            adapts: task.method == Method::BoundaryElement && task.target().is_some(),
-            rough: false,
-            best: None,
             first: None,
-            saturated: false,
-            exit: RootExit::Found,
             work: Work::default(),
+        }
+    }
+
+    /// Finds the places on meshes on which the motion that is found meets its target.
+    fn find_on_chosen_meshes(&mut self, start: [f64; 2]) -> Result<FoundPlaces, SolveError> {
+        let mut place = self.start_on_coarsest(start)?;
+        let target = self.task.target().unwrap_or(f64::INFINITY);
+        let mut choices = 0;
+        loop {
+            self.choose_meshes(place)?;
+            let found = self.find(place, false)?;
+            choices += 1;
+            let met = found.value.error().is_some_and(|error| error <= target);
+            // Where the force jumps, other meshes do not help either.
+            let ends = matches!(found.end, Termination::AtLimit | Termination::Jump);
+            if met || ends || choices == MESH_CHOICES_MAX {
+                return Ok(found);
+            }
+            place = found.place;
         }
     }
 
@@ -132,16 +136,15 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
     fn start_on_coarsest(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
         let family = MeshFamily::of(self.task, &self.motion(start));
         self.meshes = vec![family.mesh(family.cells_first())];
-        self.rough = true;
-        let found = match self.find(start) {
-            Ok(place) if self.exit == RootExit::Found => place,
+        match self.find(start, true) {
+            Ok(found) if found.converged() => Ok(found.place),
             // What the coarsest mesh cannot answer may have an answer all the same.
-            Ok(_) | Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => start,
-            Err(error) => return Err(error),
-        };
-        self.rough = false;
-        self.end(RootExit::Found);
-        Ok(found)
+            Ok(_) | Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => {
+                self.search = self.places.search();
+                Ok(start)
+            }
+            Err(error) => Err(error),
+        }
     }
 
     /// Chooses the meshes that the adaptive solve of the motion at two places compares.
@@ -151,41 +154,23 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         self.work.add(point.work);
         self.first.get_or_insert(length(self.relative(&point)));
         self.meshes = meshes;
-        self.best = None;
         Ok(())
     }
 
-    /// Finds the places at which the forces are as prescribed, or as near to that as can be.
-    fn find(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
-        let searched = self.forces.map(|force| force.is_some());
-        let root = find_searched(searched, start, |place, tolerance| {
-            let off = self.trial(place)?;
-            *tolerance = self.tolerance();
-            Ok::<[f64; 2], SolveError>(off)
-        })?;
-        self.end(root.exit);
-        Ok(root.place)
-    }
-
-    fn end(&mut self, exit: RootExit) {
-        self.saturated = exit == RootExit::SignKept;
-        self.exit = exit;
-    }
-
-    /// The remark if the forces are neither met nor out of reach.
-    fn inexact(&self) -> Option<Remark> {
-        let (residual, _) = self.best.as_ref()?;
-        let tolerance = self.tolerance();
-        (!self.saturated && *residual > tolerance).then(|| Remark::IterationInexact {
-            iteration: "the search for the creepages of the prescribed force",
-            reason: self.exit.reason(),
-            residual: *residual,
-            tolerance,
-        })
+    /// Finds the places at which the forces are as prescribed, or as near to that as can be; `roughly` to find where to begin.
+    fn find(&mut self, start: [f64; 2], roughly: bool) -> Result<FoundPlaces, SolveError> {
+        let mut search = self.search;
+        let found = search.find(start, |place| self.trial(place, roughly));
+        self.search = search;
+        found
     }
 
     /// Solves the motion of two places; how far its forces are from those prescribed, relative to μN.
-    fn trial(&mut self, place: [f64; 2]) -> Result<[f64; 2], SolveError> {
+    fn trial(
+        &mut self,
+        place: [f64; 2],
+        roughly: bool,
+    ) -> Result<Trial<2, MotionAnswer>, SolveError> {
         let asked = self.asked(place);
         let point = match &*self.meshes {
             [] => adapt::solve_forces(self.task, self.state, asked, self.monitor)?.0,
@@ -194,12 +179,11 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         self.work.add(point.work);
         let forces = self.relative(&point);
         self.first.get_or_insert(length(forces));
-        let off = [0, 1].map(|k| self.forces[k].map_or(0.0, |f| forces[k] - f / self.limit));
-        let least = self.best.as_ref().map(|(least, _)| *least);
-        if least.is_none_or(|least| length(off) <= least) {
-            self.best = Some((length(off), point));
-        }
-        Ok(off)
+        Ok(Trial {
+            residual: [0, 1].map(|k| forces[k] - self.wanted()[k]),
+            tolerance: self.tolerance(roughly),
+            value: point,
+        })
     }
 
     fn asked(&self, place: [f64; 2]) -> MotionTask {
@@ -215,20 +199,25 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         [sum.force_x / self.limit, sum.force_y / self.limit]
     }
 
+    /// The forces that are prescribed, relative to μN.
+    fn wanted(&self) -> [f64; 2] {
+        self.forces.map(|force| force.unwrap_or(0.0) / self.limit)
+    }
+
     /// By how much forces may be missed, relative to μN.
-    fn tolerance(&self) -> f64 {
+    fn tolerance(&self, roughly: bool) -> f64 {
         let most = match self.task.resolution {
             Resolution::Target(target) if self.task.method != Method::Fastsim => {
                 (SHARE_OF_TARGET * target).max(MISSED_FOR_TARGET)
             }
             _ => MISSED,
         };
-        let wanted = length(self.forces.map(|f| f.unwrap_or(0.0) / self.limit));
+        let wanted = length(self.wanted());
         // Where pressure alone pulls, the forces of the first motion tried say nothing of the size of those to be sought.
         let first = self.first.filter(|_| !self.task.is_coupled());
         let scale = first.unwrap_or(1.0).max(wanted).min(1.0);
         let left = (NEAR_LIMIT * (1.0 - wanted)).max(0.0);
-        let most = if self.rough {
+        let most = if roughly {
             MISSED_ON_COARSEST.max(most)
         } else {
             most
@@ -239,30 +228,4 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
     fn motion(&self, place: [f64; 2]) -> Motion {
         self.places.motion(place, &self.task.motions[self.index])
     }
-
-    /// Whether the best answer meets the target.
-    fn met(&self) -> bool {
-        let error = self.best.as_ref().and_then(|(_, point)| point.error());
-        let target = self.task.target().unwrap_or(f64::INFINITY);
-        error.is_some_and(|error| error <= target)
-    }
-
-    fn finish(mut self, place: [f64; 2]) -> Result<MotionAnswer, SolveError> {
-        let inexact = self.inexact();
-        let mut point = match self.best.take() {
-            Some((_, point)) => point,
-            None => {
-                let asked = self.asked(place);
-                adapt::solve_forces(self.task, self.state, asked, self.monitor)?.0
-            }
-        };
-        point.remarks.extend(inexact);
-        point.work = self.work;
-        point.saturated = self.saturated;
-        Ok(point)
-    }
-}
-
-fn length([x, y]: [f64; 2]) -> f64 {
-    x.hypot(y)
 }

@@ -3,9 +3,11 @@
 //! By Vermeulen and Johnson's cubic law with Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3) the creepage at
 //! place r gives the force r μN, so that the force found is close to r. A search starts where the table of creep forces has the forces.
 
+use std::convert::Infallible;
+
 use crate::contact::friction::path_dependent::Interface;
 use crate::contact::half_space::unlike_bodies::Elasticity;
-use crate::contact::numerics::roots::FRACTION_MAX;
+use crate::contact::numerics::equilibrium::{Search, Trial};
 use crate::contact::rolling::answer::Resultants;
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::load_ellipse::LoadEllipse;
@@ -13,9 +15,9 @@ use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::refinement::interpolate::RefinementState;
 use crate::contact::rolling::task::{Motion, PrescribedForces, RollingTask};
 
-/// Steps by which a start is moved to where the table has the forces; they fall short where the force hardly grows with its place.
-/// Chosen by judgement; how much it matters was not measured.
-const TABLE_STEPS: u32 = 40;
+/// Largest place: a hundred times the creepage at which the cubic law predicts full slip. Chosen by judgement; how much it matters was not
+/// measured.
+pub(crate) const PLACE_MAX: f64 = 65.0;
 /// The start is good enough when the table misses the forces by no more than this, relative to μN: about what the table is off.
 const TABLE_MISSED: f64 = 1e-3;
 
@@ -64,12 +66,19 @@ impl<'a> ForcePlaces<'a> {
         self.by_table(force, rest, cubic).unwrap_or(cubic)
     }
 
-    /// Places at which the table has the forces, from a start: a force is close to its place, so that what is missed is the step.
+    /// A search for the places of the prescribed forces: a force over μN is close to its place.
+    pub(crate) fn search(&self) -> Search<2> {
+        Search::new(self.forces.map(|force| force.map(|_| 1.0)), [PLACE_MAX; 2])
+    }
+
+    /// Places at which the table has the forces, from a start.
     fn by_table(&self, force: [f64; 2], rest: &Motion, start: [f64; 2]) -> Option<[f64; 2]> {
+        if self.ellipses.is_empty() {
+            return None;
+        }
         let modulus = self.task.interface.reduction * self.task.elasticity.shear_modulus;
         let poisson_ratio = self.task.elasticity.poisson_ratio;
-        let mut place = start;
-        for _ in 0..TABLE_STEPS * u32::from(!self.ellipses.is_empty()) {
+        let Ok(found) = self.search().find(start, |place| {
             let motion = self.motion(place, rest);
             let mut found = [0.0; 2];
             for (k, ellipse) in self.ellipses.iter().enumerate() {
@@ -77,13 +86,13 @@ impl<'a> ForcePlaces<'a> {
                 let own = table::forces(modulus, poisson_ratio, ellipse, limit, &motion);
                 found = [0, 1].map(|k| found[k] + own[k] / self.limit);
             }
-            let off = [0, 1].map(|k| self.forces[k].map_or(0.0, |_| found[k] - force[k]));
-            if length(off) <= TABLE_MISSED {
-                return Some(place);
-            }
-            place = [0, 1].map(|k| (place[k] - off[k]).clamp(-FRACTION_MAX, FRACTION_MAX));
-        }
-        None
+            Ok::<_, Infallible>(Trial {
+                residual: [0, 1].map(|k| found[k] - force[k]),
+                tolerance: TABLE_MISSED,
+                value: (),
+            })
+        });
+        found.converged().then_some(found.place)
     }
 
     /// A motion with the creepages of these places where forces are prescribed.
@@ -106,7 +115,8 @@ pub(crate) fn total(resultants: &[Resultants]) -> Resultants {
     resultants.iter().fold(sum, |sum, r| sum.plus(*r))
 }
 
-fn length([x, y]: [f64; 2]) -> f64 {
+/// Length of two components.
+pub(crate) fn length([x, y]: [f64; 2]) -> f64 {
     x.hypot(y)
 }
 
@@ -167,7 +177,7 @@ impl CubicLaw {
         let knee = CubicLaw::linear(CUBIC_UNTIL);
         let inside = 1.0 - (1.0 - linear.min(knee) / 3.0).powi(3);
         let beyond = (linear - knee).max(0.0) * (1.0 - CUBIC_UNTIL).powf(2.0 / 3.0);
-        (inside + beyond).min(FRACTION_MAX).copysign(creepage)
+        (inside + beyond).min(PLACE_MAX).copysign(creepage)
     }
 
     /// Places of the creepages that give forces relative to μN by the cubic law without spin, where both share the friction.

@@ -2,7 +2,7 @@
 //! the angular velocity at which the rails balance a torque.
 //!
 //! Each wheel carries a given vertical force, so that at a given roll it has a height of its own. The difference of the two heights falls
-//! by the distance of the contacts per radian; a Newton step from the rigid wheelset leaves so little that one more solve suffices.
+//! by the distance of the contacts per radian, and torques over friction limit and radius grow with the slip over that of linear theory.
 //!
 //! Gathers the answers for both wheels in all positions into one, with the sums in track axes.
 //!
@@ -14,10 +14,11 @@ use crate::contact::error::SolveError;
 use crate::contact::geometry::wheelset_pose::{PairOfRails, RigidPose, WheelsetMotion};
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel::{WheelTask, WheelsetTask};
-use crate::contact::numerics::roots::find_root;
+use crate::contact::numerics::equilibrium::{Search, Trial};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_assessment::trust;
 use crate::contact::remark::entry::{RemarkEntry, merged};
+use crate::contact::rolling::force_places::PLACE_MAX;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::answer::{
     ErrorEstimate, Fields, Kinematics, Origin, PatchSolution, Solution, Total, WheelOnRail,
@@ -31,9 +32,7 @@ use crate::contact::wheelset::kinematics;
 
 /// The heights of the centre by both wheels may differ by so much in mm. It leaves a roll of 2e-7 rad, which moves a contact by 1e-4 mm.
 const LEVEL: f64 = 3e-4;
-/// Rounds for the roll. Each leaves about a hundredth of the difference before.
-const ROUNDS_MAX: u32 = 8;
-/// After the last round, so much is answered all the same: it moves a contact by 5e-3 mm.
+/// If nothing better is found, so much is answered with a remark: it moves a contact by 5e-3 mm.
 const LEVEL_POOR: f64 = 1e-2;
 /// A torque is balanced to this part of the target of forces, and at least to this part of the friction limit.
 const TORQUE_OF_TARGET: f64 = 0.2;
@@ -65,6 +64,9 @@ pub(crate) struct AtRest {
 
 /// Both wheels solved at one roll and one angular velocity.
 struct Both {
+    /// Shift in mm, yaw and roll in rad.
+    pose: [f64; 3],
+    angular_velocity: f64,
     wheels: [WheelTask; 2],
     cases: [CheckedCase; 2],
     found: [SolvedWheel; 2],
@@ -81,10 +83,13 @@ impl Both {
         0.5 * (self.found[0].wheel.centre + self.found[1].wheel.centre)
     }
 
-    /// Distance across of what carries the load, in mm.
-    fn distance(&self) -> f64 {
-        let [left, right] = [0, 1].map(|k| self.found[k].solution.origin.y_mm);
-        left - right
+    /// Torque of the rails on the wheelset about its axle in N mm, positive if it drives forward.
+    fn torque_of_rails(&self) -> f64 {
+        let [lateral_shift, yaw, roll] = self.pose;
+        let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
+        let centre = [0.0, lateral_shift, self.height()];
+        let patches = self.found.iter().flat_map(|found| &found.solution.patches);
+        patches.map(|patch| torque(patch, centre, axle)).sum()
     }
 }
 
@@ -123,14 +128,11 @@ impl WheelsetSolve<'_> {
                 reason: "a wheelset has no motion".to_owned(),
             });
         };
-        let mut pose = [rigid.lateral_shift, rigid.yaw, rigid.roll];
-        let (both, angular_velocity) = match problem.drive_torque {
-            None => (self.level(&mut pose, &motion)?, motion.angular_velocity),
-            Some(torque) => self.driven(&mut pose, rigid, motion, torque)?,
-        };
-        let height = both.height();
-        let torque = -torque_of_rails(&both.found, pose, height);
+        let both = self.balanced(rigid, &motion, problem.drive_torque)?;
+        let (height, torque) = (both.height(), -both.torque_of_rails());
         let Both {
+            pose,
+            angular_velocity,
             wheels,
             cases,
             found: [left, right],
@@ -148,68 +150,68 @@ impl WheelsetSolve<'_> {
         })
     }
 
-    /// Both wheels at the roll at which their heights agree; `pose` has it afterwards.
-    fn level(&self, pose: &mut [f64; 3], motion: &WheelsetMotion) -> Result<Both, SolveError> {
-        let mut rounds = 1;
-        loop {
-            let both = self.both(*pose, motion)?;
-            let above = both.above();
-            if above.abs() <= LEVEL || rounds == ROUNDS_MAX && above.abs() <= LEVEL_POOR {
-                return Ok(both);
-            }
-            if rounds == ROUNDS_MAX {
-                return Err(SolveError::NormalProblem {
-                    reason: format!(
-                        "at a lateral shift of {} mm no roll was found at which both wheels carry their loads: their heights still differ by \
-                         {above:.4} mm after {ROUNDS_MAX} rounds",
-                        pose[0]
-                    ),
-                });
-            }
-            pose[2] += above / both.distance();
-            rounds += 1;
-        }
-    }
-
-    /// Both wheels with the angular velocity at which the rails balance a torque.
-    fn driven(
+    /// Both wheels at the roll at which their heights agree, and with the angular velocity at which the rails balance a torque, where there is one.
+    fn balanced(
         &self,
-        pose: &mut [f64; 3],
         rigid: &RigidPose,
-        motion: WheelsetMotion,
-        torque: f64,
-    ) -> Result<(Both, f64), SolveError> {
+        motion: &WheelsetMotion,
+        torque: Option<f64>,
+    ) -> Result<Both, SolveError> {
         let radius = 0.5 * (rigid.touches[0].radius + rigid.touches[1].radius);
-        let free = motion.speed / radius;
         let target = self.case.run.resolution.target_or_usual();
+        let tolerance = (TORQUE_OF_TARGET * target).max(TORQUE_LEAST);
+        let per_mm = tolerance / LEVEL;
         // What the search calls 1: the slip at which linear theory reaches the limit of friction.
-        let (mut unit, mut last) = (None, None);
-        let root = find_root(0.0, |place, tolerance: &mut f64| {
-            let velocity = free * (1.0 + unit.unwrap_or(0.0) * place);
-            let moving = WheelsetMotion {
-                angular_velocity: velocity,
-                ..motion
+        let mut unit = None;
+        let scale = [
+            Some(-1.0 / (per_mm * rigid.contact_distance())),
+            torque.map(|_| 1.0),
+        ];
+        let limit = [f64::INFINITY, PLACE_MAX];
+        let found = Search::new(scale, limit).find([rigid.roll, 0.0], |[roll, place]| {
+            let pose = [rigid.lateral_shift, rigid.yaw, roll];
+            let angular_velocity = match torque {
+                Some(_) => motion.speed / radius * (1.0 + unit.unwrap_or(0.0) * place),
+                None => motion.angular_velocity,
             };
-            let both = self.level(pose, &moving)?;
+            let moving = WheelsetMotion {
+                angular_velocity,
+                ..*motion
+            };
+            let both = self.both(pose, &moving)?;
             let patches = both.found.iter().flat_map(|found| &found.solution.patches);
             let (limit, law) = limit_and_law(&self.case.problem, patches);
             unit.get_or_insert(1.0 / law.stiffness[0]);
-            let rails = torque_of_rails(&both.found, *pose, both.height());
-            last = Some((both, velocity));
-            *tolerance = (TORQUE_OF_TARGET * target).max(TORQUE_LEAST);
-            Ok::<f64, SolveError>(-(torque + rails) / (limit * radius).max(f64::MIN_POSITIVE))
+            let missed = torque.map_or(0.0, |torque| -(torque + both.torque_of_rails()));
+            let missed = missed / (limit * radius).max(1.0);
+            Ok::<_, SolveError>(Trial {
+                residual: [per_mm * both.above(), missed],
+                tolerance,
+                value: (both, missed.abs() <= tolerance),
+            })
         })?;
-        if !root.exit.converged() {
-            return Err(SolveError::NormalProblem {
-                reason: format!(
-                    "at a lateral shift of {} mm no angular velocity was found at which the rails balance a drive torque of {torque} N mm: {}; \
-                     friction may not carry it",
-                    pose[0],
-                    root.exit.reason()
-                ),
-            });
-        }
-        last.ok_or(SolveError::Cancelled)
+        let (remark, reason) = (
+            found.inexact("the balance of the wheelset"),
+            found.end.reason(),
+        );
+        let (mut both, is_driven) = found.value;
+        let above = both.above();
+        let failure = match torque.filter(|_| !is_driven) {
+            Some(torque) => format!(
+                "no angular velocity was found at which the rails balance a drive torque of {torque} N mm: {reason}; friction may not carry it"
+            ),
+            None if above.abs() > LEVEL_POOR => format!(
+                "no roll was found at which both wheels carry their loads: their heights still differ by {above:.4} mm, {reason}"
+            ),
+            None => {
+                let remarks = &mut both.found[0].solution.remarks;
+                remarks.extend(remark.map(RemarkEntry::from));
+                return Ok(both);
+            }
+        };
+        Err(SolveError::NormalProblem {
+            reason: format!("at a lateral shift of {} mm {failure}", rigid.lateral_shift),
+        })
     }
 
     /// Both wheels at a shift, a yaw and a roll.
@@ -239,6 +241,8 @@ impl WheelsetSolve<'_> {
         };
         let found = [found(0)?, found(1)?];
         Ok(Both {
+            pose,
+            angular_velocity: motion.angular_velocity,
             wheels,
             cases,
             found,
@@ -266,22 +270,7 @@ impl WheelsetSolve<'_> {
     }
 }
 
-/// Torque of the rails on the wheelset about its axle in N mm, positive if it drives forward.
-fn torque_of_rails(found: &[SolvedWheel; 2], pose: [f64; 3], height: f64) -> f64 {
-    let [_, yaw, roll] = pose;
-    let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
-    let centre = [0.0, pose[0], height];
-    let patches = |found: &SolvedWheel| -> f64 {
-        let Solution { patches, .. } = &found.solution;
-        patches
-            .iter()
-            .map(|patch| torque(patch, centre, axle))
-            .sum()
-    };
-    found.iter().map(patches).sum()
-}
-
-/// That of one patch, whose force acts at its load centre.
+/// Torque of the rail on the wheelset about its axle in N mm by one patch, whose force acts at its load centre.
 fn torque(patch: &PatchSolution, centre: [f64; 3], axle: [f64; 3]) -> f64 {
     let (Some(position), Some(point)) = (&patch.position, patch.points.first()) else {
         return 0.0;

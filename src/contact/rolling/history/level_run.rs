@@ -9,11 +9,11 @@ use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::mesh::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::numerics::equilibrium::{Search, Trial};
 use crate::contact::rolling::answer::{LevelFailure, Work};
 use crate::contact::rolling::displacement_memory::LeadingEdges;
 use crate::contact::rolling::history::plan::{
-    HistoryStep, HistoryTask, PointRecord, StepEquations, StepKind, StepSearch, memory, steady,
-    steps, weights,
+    HistoryStep, HistoryTask, PointRecord, StepEquations, StepKind, memory, steady, steps, weights,
 };
 use crate::contact::rolling::methods::boundary_element::fixed_point::slide_along;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
@@ -189,7 +189,7 @@ impl<'a> LevelRun<'a> {
     }
 
     /// The search for the forces of steps of a kind.
-    fn search(&self, kind: StepKind) -> StepSearch {
+    fn search(&self, kind: StepKind) -> Search<2> {
         let limit = self.limit;
         let patch = self.task.footprint.patches()[0].extent;
         let stiffness = STIFFNESS / limit;
@@ -200,8 +200,8 @@ impl<'a> LevelRun<'a> {
             }
             StepKind::Steady => RELAXATION * 0.5 * (patch[1] - patch[0]) / self.level.scale.length,
         };
-        let searched = self.task.forces[0].map(|force| force.is_some());
-        StepSearch::new(searched, [1.0 / (stiffness * reach); 2])
+        let scale = self.task.forces[0].map(|force| force.map(|_| 1.0 / (stiffness * reach)));
+        Search::new(scale, [f64::INFINITY; 2])
     }
 
     /// One step: its motion, or the one that gives its forces.
@@ -209,7 +209,7 @@ impl<'a> LevelRun<'a> {
         &mut self,
         of: &StepEquations,
         step: &HistoryStep,
-        search: &mut StepSearch,
+        search: &mut Search<2>,
     ) -> Result<(), LevelFailure> {
         if let Some(track) = &self.track {
             track.lay(step.travelled(self.history), &mut self.bound);
@@ -222,34 +222,34 @@ impl<'a> LevelRun<'a> {
         }
         let (given, forces) = self.asked(step);
         let memory = self.memory(of);
-        let motion_before = self.state.motion;
-        let mut solved = None;
         if forces == [None; 2] {
-            solved = Some((given, self.solve(of, &given, &memory)?));
-        } else {
-            let limit = self.task.friction.limit_of_all(self.task.footprint);
-            let wanted = forces.map(|force| force.unwrap_or(0.0) / limit);
-            let start = match of.kind {
-                StepKind::Shift => [given.creepage_x, given.creepage_y],
-                _ => [motion_before.creepage_x, motion_before.creepage_y],
-            };
-            let motion = |place: [f64; 2]| Motion {
+            let tractions = self.solve(of, &given, &memory)?;
+            self.advance(of, given, tractions);
+            return Ok(());
+        }
+        let limit = self.task.friction.limit_of_all(self.task.footprint);
+        let wanted = forces.map(|force| force.unwrap_or(0.0) / limit);
+        let start = match of.kind {
+            StepKind::Shift => given,
+            _ => self.state.motion,
+        };
+        let tolerance = self.tolerance[1];
+        let found = search.find([start.creepage_x, start.creepage_y], |place| {
+            let motion = Motion {
                 creepage_x: forces[0].map_or(given.creepage_x, |_| place[0]),
                 creepage_y: forces[1].map_or(given.creepage_y, |_| place[1]),
                 ..given
             };
-            let found = search.find(start, self.tolerance[1], |place| {
-                let motion = motion(place);
-                let tractions = self.solve(of, &motion, &memory)?;
-                let forces = self.forces(&tractions);
-                solved = Some((motion, tractions));
-                Ok::<_, LevelFailure>([0, 1].map(|k| forces[k] - wanted[k]))
-            })?;
-            self.state.saturated |= found.off > 10.0 * self.tolerance[1];
-        }
-        let Some((motion, tractions)) = solved else {
-            return Ok(());
-        };
+            let tractions = self.solve(of, &motion, &memory)?;
+            let forces = self.forces(&tractions);
+            Ok::<_, LevelFailure>(Trial {
+                residual: [0, 1].map(|k| forces[k] - wanted[k]),
+                tolerance,
+                value: (motion, tractions),
+            })
+        })?;
+        self.state.saturated |= found.residual > 10.0 * tolerance;
+        let (motion, tractions) = found.value;
         self.advance(of, motion, tractions);
         Ok(())
     }
