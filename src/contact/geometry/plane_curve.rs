@@ -5,7 +5,7 @@
 
 use std::cell::Cell;
 
-use crate::contact::numerics::interpolation::Spline;
+use crate::contact::numerics::interpolation::{Spline, akima_slopes};
 
 /// A curve `[y, z]` in mm over a parameter in mm, twice continuously differentiable except at sharp corners, straight beyond its ends.
 #[derive(Debug, Clone, PartialEq)]
@@ -64,14 +64,39 @@ impl PlaneCurve {
         let ends: Vec<usize> = std::iter::once(0).chain(corners).chain([last]).collect();
         let piece = |pair: &[usize]| {
             let (from, to) = (pair[0], pair[1]);
-            [0, 1].map(|part| {
-                let values: Vec<f64> = at[from..=to].iter().map(|at| at[part]).collect();
-                let pinned = [from > 0, to < last];
-                Spline::pinned(&along[from..=to], &values, cut_wavelength, pinned)
-            })
+            let values = [0, 1].map(|part| at[from..=to].iter().map(|at| at[part]).collect());
+            let pinned = [from > 0, to < last];
+            Spline::pair(&along[from..=to], values, cut_wavelength, pinned)
         };
         let pieces: Vec<[Spline; 2]> = ends.windows(2).map(piece).collect();
         PlaneCurve::new(&pieces)
+    }
+
+    /// Akima's curve through points `at` in mm, whose parameters are `along`; only its first derivative is continuous.
+    #[must_use]
+    pub fn akima(at: &[[f64; 2]], along: &[f64]) -> PlaneCurve {
+        let [y, z] = [0, 1].map(|part| {
+            let values: Vec<f64> = at.iter().map(|at| at[part]).collect();
+            akima_slopes(along, &values)
+        });
+        let slopes = |k: usize| [y[k], z[k]];
+        let between = |k: usize| {
+            let ends = [along[k], along[k + 1]];
+            let step = ends[1] - ends[0];
+            let (leaving, arriving) = (slopes(k), slopes(k + 1));
+            let rise = [0, 1].map(|part| (at[k + 1][part] - at[k][part]) / step);
+            let second = |part: usize| 3.0 * rise[part] - 2.0 * leaving[part] - arriving[part];
+            let third = |part: usize| leaving[part] + arriving[part] - 2.0 * rise[part];
+            let powers = [
+                [0, 1].map(|part| second(part) / step),
+                [0, 1].map(|part| third(part) / (step * step)),
+            ];
+            CurveInterval {
+                ends,
+                cubic: [at[k], leaving, powers[0], powers[1]],
+            }
+        };
+        PlaneCurve::of((0..along.len() - 1).map(between).collect())
     }
 
     /// The curve of pieces, each two splines with the same knots, one after the other.
@@ -87,14 +112,20 @@ impl PlaneCurve {
             };
             knots.map(between).collect::<Vec<CurveInterval>>()
         };
-        let intervals: Vec<CurveInterval> = pieces.iter().flat_map(cubics).collect();
+        PlaneCurve::of(pieces.iter().flat_map(cubics).collect())
+    }
+
+    fn of(intervals: Vec<CurveInterval>) -> PlaneCurve {
         // Two cells an interval: on evenly spaced knots hardly any place is more than one interval beyond that of its cell.
         let count = 2 * intervals.len();
         let range = [intervals[0].ends[0], intervals[intervals.len() - 1].ends[1]];
         let length = range[1] - range[0];
+        let mut after = 0;
         let begins = |cell: usize| {
             let place = range[0] + length * cell as f64 / count as f64;
-            let after = intervals.partition_point(|interval| interval.ends[0] <= place);
+            while after < intervals.len() && intervals[after].ends[0] <= place {
+                after += 1;
+            }
             (after.max(1) - 1) as u32
         };
         PlaneCurve {
@@ -130,6 +161,15 @@ impl PlaneCurve {
             point.bend = [0.0; 2];
         }
         point
+    }
+
+    /// Position at a parameter within the range.
+    #[inline]
+    pub(crate) fn position(&self, s: f64) -> [f64; 2] {
+        let CurveInterval { ends, cubic } = self.interval(s);
+        let d = s - ends[0];
+        let [c0, c1, c2, c3] = cubic;
+        [0, 1].map(|k| c0[k] + d * (c1[k] + d * (c2[k] + d * c3[k])))
     }
 
     /// The interval of knots that a place within the range lies in.
@@ -178,30 +218,39 @@ impl PlaneCurve {
     }
 }
 
-/// Turn of the chords at a corner, in rad (30°). A chain that is fine enough for its shape turns less.
-const TURN: f64 = 0.52;
+/// Tangent of the turn of the chords at a corner (30°). A chain that is fine enough for its shape turns less.
+const TURN: f64 = 0.573;
 /// A corner turns by more than this multiple of both neighbouring points: next to a displaced point it is 2, and on a coarse arc all turn
 /// alike.
 const CONCENTRATED: f64 = 2.5;
 /// A neighbour beyond a chord longer than this multiple of the chord on the other side does not count: a chamfer has corners at both ends.
 const FAR: f64 = 4.0;
 
+/// Sine and cosine of the angle between the chords before and after a point, times the lengths of both; the angle is positive to the left.
+fn turning(points: &[[f64; 2]], k: usize) -> [f64; 2] {
+    let [before, after] = [chord(points, k - 1), chord(points, k)];
+    [
+        before[0] * after[1] - before[1] * after[0],
+        before[0] * after[0] + before[1] * after[1],
+    ]
+}
+
 /// The angle in rad between the chords before and after a point, positive to the left; 0 at the ends.
 pub(crate) fn turn(points: &[[f64; 2]], k: usize) -> f64 {
     if k == 0 || k + 1 >= points.len() {
         return 0.0;
     }
-    let [before, after] = [chord(points, k - 1), chord(points, k)];
-    let cross = before[0] * after[1] - before[1] * after[0];
-    cross.atan2(before[0] * after[0] + before[1] * after[1])
+    let [sine, cosine] = turning(points, k);
+    sine.atan2(cosine)
 }
 
-/// Whether the points have a sharp corner at this one.
+/// Whether the points have a sharp corner at this one, which is not the first or the last.
 pub(crate) fn is_corner(points: &[[f64; 2]], k: usize) -> bool {
-    let own = turn(points, k).abs();
-    if own <= TURN {
+    let [sine, cosine] = turning(points, k);
+    if sine.abs() <= TURN * cosine {
         return false;
     }
+    let own = turn(points, k).abs();
     let length = |k: usize| {
         let [y, z] = chord(points, k);
         y.hypot(z)
@@ -315,10 +364,9 @@ mod tests {
         let knots: Vec<f64> = (0..40)
             .map(|k| f64::from(k) + if k % 7 == 3 { 0.997 } else { 0.0 })
             .collect();
-        [f64::sin as fn(f64) -> f64, f64::cos].map(|f| {
-            let values: Vec<f64> = knots.iter().map(|s| f(0.3 * s)).collect();
-            Spline::new(&knots, &values, 0.0)
-        })
+        let values = [f64::sin as fn(f64) -> f64, f64::cos]
+            .map(|f| knots.iter().map(|s| f(0.3 * s)).collect());
+        Spline::pair(&knots, values, 0.0, [false; 2])
     }
 
     #[test]
@@ -382,7 +430,7 @@ mod tests {
     }
 
     fn corners(points: &[[f64; 2]]) -> Vec<usize> {
-        (0..points.len())
+        (1..points.len() - 1)
             .filter(|k| is_corner(points, *k))
             .collect()
     }

@@ -11,8 +11,7 @@ use std::f64::consts::{PI, TAU};
 
 use realfft::RealFftPlanner;
 
-use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve, is_corner, turn};
-use crate::contact::numerics::interpolation::{akima_slopes, value};
+use crate::contact::geometry::plane_curve::{PlaneCurve, is_corner, turn};
 use crate::contact::numerics::lu::first_coefficient;
 
 /// Chords in one window of the noise estimate.
@@ -497,9 +496,9 @@ impl<'a> Points<'a> {
     }
 }
 
-/// Bounds of the spacing of the comparison in mm. With 0.1 as the upper one and five places from point to point rows of a pair take some per
-/// cent more time; it was not measured how the readings differ beyond the tests, and the class *damaged profile* of `docs/stability.md`.
-const STEP: [f64; 2] = [0.05, 0.2];
+/// Bounds of the spacing of the comparison in mm. How much the readings depend on them was not measured beyond the tests and the class *damaged profile* of
+/// `docs/stability.md`.
+const STEP: [f64; 2] = [0.1, 0.2];
 /// Places of the comparison from one point to the next, within these bounds. Chosen by judgement: a cubic between two points is seen.
 const PLACES: f64 = 4.0;
 /// Distance in mm by which the comparison extends beyond twice the half width of the contact.
@@ -522,8 +521,6 @@ pub struct Roughness {
     pub ambiguity: f64,
 }
 
-/// Length in mm to whose multiples stretches are cut, so that contacts that lie near each other are judged on the same one. Chosen by judgement.
-const STRETCH: f64 = 10.0;
 /// How the readings of a stretch of a profile differ, at places with equal distances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProfileStretch {
@@ -556,11 +553,11 @@ pub struct PointsRead<'a> {
 
 /// Both ends of the stretch that the roughness at a contact is taken from, in mm along the profile.
 fn stretch_about(points: Points, [low, high]: [f64; 2]) -> [f64; 2] {
-    let half = 0.5 * (high - low);
+    let beyond = 0.5 * (high - low) + BEYOND;
     let last = points.along.len() - 1;
     [
-        (((low - half - BEYOND) / STRETCH).floor() * STRETCH).max(points.along[0]),
-        (((high + half + BEYOND) / STRETCH).ceil() * STRETCH).min(points.along[last]),
+        (low - beyond).max(points.along[0]),
+        (high + beyond).min(points.along[last]),
     ]
 }
 
@@ -585,22 +582,22 @@ impl ProfileStretch {
         let step = (spacing / PLACES).clamp(STEP[0], STEP[1]);
         let step = step.max((window[1] - window[0]) / SAMPLES_MAX as f64);
         let count = ((window[1] - window[0]) / step).floor() as usize + 1;
-        let places: Vec<f64> = (0..count).map(|k| window[0] + step * k as f64).collect();
-        let used: Vec<CurvePoint> = places.iter().map(|s| curve.at(*s)).collect();
-        let pressures = |other: &dyn Fn(f64) -> [f64; 2]| {
-            let heights: Vec<f64> = (used.iter().zip(&places))
-                .map(|(used, s)| above(used, other(*s)))
+        let places = || (0..count).map(|k| window[0] + step * k as f64);
+        let used: Vec<([f64; 2], [f64; 2])> = places()
+            .map(|s| curve.at(s))
+            .map(|used| (used.at, used.tangent()))
+            .collect();
+        let pressures = |other: &PlaneCurve| {
+            let heights: Vec<f64> = (used.iter().zip(places()))
+                .map(|(used, s)| above(*used, other.position(s)))
                 .collect();
             flattening(&heights, step, 1.0)
         };
-        let smoother = PlaneCurve::through(part.at, part.along, reference);
-        let waves = pressures(&|s| smoother.at(s).at);
+        let waves = pressures(&PlaneCurve::through(part.at, part.along, reference));
         let ambiguity = if smoothing > 0.0 {
             Vec::new()
         } else {
-            let values = [0, 1].map(|k| part.at.iter().map(|at| at[k]).collect::<Vec<_>>());
-            let slopes = [0, 1].map(|k| akima_slopes(part.along, &values[k]));
-            pressures(&|s| [0, 1].map(|k| value(part.along, &values[k], &slopes[k], s)))
+            pressures(&PlaneCurve::akima(part.at, part.along))
         };
         let mut sizes: Vec<f64> = waves.iter().map(|pressure| pressure.abs()).collect();
         ProfileStretch {
@@ -634,10 +631,9 @@ impl ProfileStretch {
     }
 }
 
-/// Distance from a point of a spline to that of another curve along its normal, positive if the spline is above.
-fn above(CurvePoint { at, slope, .. }: &CurvePoint, [other_y, other_z]: [f64; 2]) -> f64 {
-    let length = slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE);
-    (slope[0] * (at[1] - other_z) - slope[1] * (at[0] - other_y)) / length
+/// Distance from a point of a curve, given with its unit tangent, to another curve along its normal, positive if the first is above.
+fn above((at, tangent): ([f64; 2], [f64; 2]), other: [f64; 2]) -> f64 {
+    tangent[0] * (at[1] - other[1]) - tangent[1] * (at[0] - other[0])
 }
 
 /// Length in mm over which heights are tapered to 0 at both ends.

@@ -294,25 +294,25 @@ pub struct SplineValue {
 }
 
 impl Spline {
-    /// The spline through `values` at strictly increasing `knots`, at least 2; waves shorter than about `cut_wavelength`
-    /// (same unit as the knots) are smoothed away, 0 for interpolation.
+    /// The splines through two series of `values` at strictly increasing `knots`, at least 2; waves shorter than about `cut_wavelength`
+    /// (same unit as the knots) are smoothed away, 0 for interpolation. Smoothed splines pass exactly through the first and the last value
+    /// where `ends` says so.
     #[must_use]
-    pub fn new(knots: &[f64], values: &[f64], cut_wavelength: f64) -> Spline {
-        Spline::pinned(knots, values, cut_wavelength, [false; 2])
-    }
-
-    /// Like [`Spline::new`]. A smoothed spline passes exactly through the first and the last value where `ends` says so.
-    #[must_use]
-    pub fn pinned(knots: &[f64], values: &[f64], cut_wavelength: f64, ends: [bool; 2]) -> Spline {
+    pub fn pair(
+        knots: &[f64],
+        values: [Vec<f64>; 2],
+        cut_wavelength: f64,
+        ends: [bool; 2],
+    ) -> [Spline; 2] {
         let n = knots.len();
         let lambda = (cut_wavelength / std::f64::consts::TAU).powi(4);
-        let mut spline = Spline {
+        let mut splines = values.map(|values| Spline {
             knots: knots.to_vec(),
-            values: values.to_vec(),
+            values,
             bends: vec![0.0; n],
-        };
+        });
         if n < 3 {
-            return spline;
+            return splines;
         }
         let step: Vec<f64> = knots.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let stiffness = |i: usize| {
@@ -323,41 +323,45 @@ impl Spline {
             let after = if i < n - 1 { step[i] } else { 0.0 };
             2.0 * lambda / (before + after)
         };
-        // Column i of the second differences has three entries, at the knots i − 1, i and i + 1.
-        let column = |i: usize| {
-            let (a, b) = (1.0 / step[i - 1], 1.0 / step[i]);
-            [a, -a - b, b]
-        };
+        let stiffness: Vec<f64> = (0..n).map(stiffness).collect();
+        // Column i of the second differences has three entries, at the knots i, i + 1 and i + 2.
+        let columns: Vec<[f64; 3]> = (step.windows(2))
+            .map(|pair| (1.0 / pair[0], 1.0 / pair[1]))
+            .map(|(a, b)| [a, -a - b, b])
+            .collect();
         let mut bands = vec![[0.0; 3]; n - 2];
-        let mut right = vec![0.0; n - 2];
-        for (k, band) in bands.iter_mut().enumerate() {
-            let i = k + 1;
-            let own = column(i);
-            band[0] = (step[i - 1] + step[i]) / 3.0;
+        for (i, band) in bands.iter_mut().enumerate() {
+            let own = columns[i];
+            band[0] = (step[i] + step[i + 1]) / 3.0;
             band[0] += (0..3)
-                .map(|j| own[j] * own[j] * stiffness(i - 1 + j))
+                .map(|j| own[j] * own[j] * stiffness[i + j])
                 .sum::<f64>();
-            if i + 1 < n - 1 {
-                let next = column(i + 1);
-                band[1] = step[i] / 6.0
-                    + own[1] * next[0] * stiffness(i)
-                    + own[2] * next[1] * stiffness(i + 1);
+            if let Some(next) = columns.get(i + 1) {
+                band[1] = step[i + 1] / 6.0
+                    + own[1] * next[0] * stiffness[i + 1]
+                    + own[2] * next[1] * stiffness[i + 2];
             }
-            if i + 2 < n - 1 {
-                band[2] = own[2] * column(i + 2)[0] * stiffness(i + 1);
+            if let Some(next) = columns.get(i + 2) {
+                band[2] = own[2] * next[0] * stiffness[i + 2];
             }
-            right[k] = (0..3).map(|j| own[j] * values[i - 1 + j]).sum();
         }
+        let rise =
+            |spline: &Spline, i: usize| (0..3).map(|j| columns[i][j] * spline.values[i + j]).sum();
+        let mut right: Vec<[f64; 2]> = (0..n - 2)
+            .map(|i| [rise(&splines[0], i), rise(&splines[1], i)])
+            .collect();
         solve(&mut bands, &mut right);
-        spline.bends[1..n - 1].copy_from_slice(&right);
-        if lambda > 0.0 {
-            for i in 1..n - 1 {
-                for (j, entry) in column(i).into_iter().enumerate() {
-                    spline.values[i - 1 + j] -= stiffness(i - 1 + j) * entry * spline.bends[i];
+        for (k, spline) in splines.iter_mut().enumerate() {
+            for (i, right) in right.iter().enumerate() {
+                spline.bends[i + 1] = right[k];
+                if lambda > 0.0 {
+                    for (j, entry) in columns[i].into_iter().enumerate() {
+                        spline.values[i + j] -= stiffness[i + j] * entry * right[k];
+                    }
                 }
             }
         }
-        spline
+        splines
     }
 
     /// First and last knot.
@@ -381,10 +385,16 @@ impl Spline {
     /// Coefficients of the cubic between the knots i and i + 1, by powers of the distance from knot i.
     #[must_use]
     pub fn cubic(&self, i: usize) -> [f64; 4] {
-        let jet = self.at_in(i, self.knots[i]);
         let step = self.knots[i + 1] - self.knots[i];
-        let bends = self.bends[i + 1] - self.bends[i];
-        [jet.value, jet.slope, 0.5 * jet.bend, bends / (6.0 * step)]
+        let [first, last] = [self.bends[i], self.bends[i + 1]];
+        let rise = (self.values[i + 1] - self.values[i]) / step;
+        let slope = rise - (2.0 * first + last) * step / 6.0;
+        [
+            self.values[i],
+            slope,
+            0.5 * first,
+            (last - first) / (6.0 * step),
+        ]
     }
 
     /// The interval of knots that a place lies in, or the nearest one.
@@ -421,32 +431,30 @@ impl Spline {
     }
 }
 
-/// Solves a symmetric positive definite system with two side bands by LDLᵀ; `bands[i]` holds the entries `(i, i)`,
-/// `(i, i + 1)`, `(i, i + 2)`. The solution replaces the right-hand side.
-fn solve(bands: &mut [[f64; 3]], right: &mut [f64]) {
+/// Solves a symmetric positive definite system with two side bands for two right-hand sides by LDLᵀ; `bands[i]` holds the entries `(i, i)`,
+/// `(i, i + 1)`, `(i, i + 2)`. The solutions replace the right-hand sides.
+fn solve(bands: &mut [[f64; 3]], right: &mut [[f64; 2]]) {
     let n = right.len();
     for i in 0..n {
         let [pivot, near, far] = bands[i];
+        let own = right[i];
         if i + 1 < n {
             bands[i + 1][0] -= near * near / pivot;
             bands[i + 1][1] -= near * far / pivot;
-            right[i + 1] -= near / pivot * right[i];
+            let share = near / pivot;
+            (0..2).for_each(|k| right[i + 1][k] -= share * own[k]);
         }
         if i + 2 < n {
             bands[i + 2][0] -= far * far / pivot;
-            right[i + 2] -= far / pivot * right[i];
+            let share = far / pivot;
+            (0..2).for_each(|k| right[i + 2][k] -= share * own[k]);
         }
     }
     for i in (0..n).rev() {
         let [pivot, near, far] = bands[i];
-        let mut value = right[i];
-        if i + 1 < n {
-            value -= near * right[i + 1];
-        }
-        if i + 2 < n {
-            value -= far * right[i + 2];
-        }
-        right[i] = value / pivot;
+        let after = |by: usize, k: usize| right.get(i + by).map_or(0.0, |right| right[k]);
+        let known = [0, 1].map(|k| near * after(1, k) + far * after(2, k));
+        right[i] = [0, 1].map(|k| (right[i][k] - known[k]) / pivot);
     }
 }
 
@@ -531,12 +539,18 @@ mod spline_tests {
         (knots, values)
     }
 
+    fn spline(knots: &[f64], values: &[f64], cut_wavelength: f64, ends: [bool; 2]) -> Spline {
+        let both = [values.to_vec(), vec![0.0; values.len()]];
+        let [spline, _] = Spline::pair(knots, both, cut_wavelength, ends);
+        spline
+    }
+
     #[test]
     fn interpolation_meets_its_samples_and_is_of_fourth_order_inside() {
         let mut errors = Vec::new();
         for step in [0.02, 0.01] {
             let (knots, values) = sampled(step, f64::sin);
-            let spline = Spline::new(&knots, &values, 0.0);
+            let spline = spline(&knots, &values, 0.0, [false; 2]);
             for (s, value) in knots.iter().zip(&values) {
                 assert!((spline.at(*s).value - value).abs() < 1e-14);
             }
@@ -558,7 +572,7 @@ mod spline_tests {
                     *knot += shift;
                 }
                 let values: Vec<f64> = knots.iter().map(|s| wave(*s)).collect();
-                let spline = Spline::new(&knots, &values, 2.0);
+                let spline = spline(&knots, &values, 2.0, [false; 2]);
                 let found = spline.at(4.0).value;
                 assert!(
                     (found - kept).abs() < 0.02,
@@ -572,10 +586,10 @@ mod spline_tests {
     fn a_pinned_end_stays_where_its_sample_is() {
         let (knots, values) = sampled(0.1, |s| (3.0 * s).sin() + 0.1 * (40.0 * s).cos());
         let last = knots.len() - 1;
-        let spline = Spline::pinned(&knots, &values, 3.0, [true, false]);
+        let spline = spline(&knots, &values, 3.0, [true, false]);
         assert!((spline.at(0.0).value - values[0]).abs() < 1e-12);
         assert!((spline.at(knots[last]).value - values[last]).abs() > 1e-3);
-        let free = Spline::new(&knots, &values, 3.0);
+        let free = spline(&knots, &values, 3.0, [false; 2]);
         assert!((free.at(0.0).value - values[0]).abs() > 1e-3);
         // Far from the ends both are the same.
         assert!((free.at(20.0).value - spline.at(20.0).value).abs() < 1e-9);
@@ -584,7 +598,7 @@ mod spline_tests {
     #[test]
     fn lines_are_kept_by_any_smoothing() {
         let (knots, values) = sampled(0.1, |s| 3.0 - 0.5 * s);
-        let spline = Spline::new(&knots, &values, 50.0);
+        let spline = spline(&knots, &values, 50.0, [false; 2]);
         for s in [-1.0, 0.0, 3.33, 40.0, 45.0] {
             assert!((spline.at(s).value - (3.0 - 0.5 * s)).abs() < 1e-9);
         }
