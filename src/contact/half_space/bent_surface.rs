@@ -80,12 +80,12 @@ pub struct BentOperator {
     coefficients: Vec<f64>,
 }
 
-/// Factors of the influence of each strip on each, at `acted_on * strips + acting`.
+/// Factors of the influence of each strip on each, at `acting * strips + acted_on`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StripFactors(Vec<f32>);
 
-/// Transforms of an influence by the distance of two strips: for each group of [`WAVES`] waves, and there for each distance, real numbers. An odd
-/// influence has `i` times these.
+/// Transforms of an influence by the distance of two strips: for each group of [`WAVES`] waves, and there for each distance from the largest negative to
+/// the largest positive one, real numbers. An odd influence has `i` times these.
 type Spectrum = Vec<[f32; WAVES]>;
 
 impl BentOperator {
@@ -188,7 +188,9 @@ impl BentOperator {
             }
         }
         self.transform(&*self.plans.forward, lines, &mut workspace.scratch);
-        let mut spectrum = vec![[0.0; WAVES]; used.len() * self.groups()];
+        let last = used.len() - 1;
+        let distances = 2 * last + 1;
+        let mut spectrum = vec![[0.0; WAVES]; distances * self.groups()];
         for (pair, line) in needed.chunks(2).zip(lines.chunks_exact(width)) {
             for (wave, value) in line[..=width / 2].iter().enumerate() {
                 // The spectrum of an even line is real, that of an odd one imaginary.
@@ -196,8 +198,11 @@ impl BentOperator {
                     true => [value.re, value.im],
                     false => [value.im, -value.re],
                 };
+                let group = wave / WAVES * distances;
                 for (j, part) in pair.iter().zip(parts) {
-                    spectrum[wave / WAVES * used.len() + j][wave % WAVES] = part;
+                    for distance in [last - j, last + j] {
+                        spectrum[group + distance][wave % WAVES] = part;
+                    }
                 }
             }
         }
@@ -235,11 +240,12 @@ impl BentOperator {
 
     /// Factors by the number of the strip acted on and of the one that acts.
     fn factors(&self, of: impl Fn(usize, usize) -> f64) -> StripFactors {
-        let strips = 0..self.strips.number.len();
-        let pairs = strips
-            .clone()
-            .flat_map(|j| strips.clone().map(move |k| (j, k)));
-        StripFactors(pairs.map(|(j, k)| of(j, k) as f32).collect())
+        let count = self.strips.number.len();
+        let mut factors = Vec::with_capacity(count * count);
+        for k in 0..count {
+            factors.extend((0..count).map(|j| of(j, k) as f32));
+        }
+        StripFactors(factors)
     }
 
     /// Sines and cosines of the angles of the strips times a factor: those of turns follow by products.
@@ -307,7 +313,7 @@ impl BentOperator {
             for (j, row) in gap.chunks_exact_mut(nx).enumerate() {
                 let first = number[j].abs_diff(number[strip]) * (2 * nx - 1) + nx - 1 - column;
                 let line = &self.coefficients[first..first + nx];
-                let share = pressure * f64::from(factors.0[j * number.len() + strip]);
+                let share = pressure * f64::from(factors.0[strip * number.len() + j]);
                 for (gap, influence) in row.iter_mut().zip(line) {
                     *gap += share * influence;
                 }
@@ -357,8 +363,8 @@ impl BentOperator {
     fn unlike_factors(&self) -> [StripFactors; 2] {
         let even = self.pressure_factors();
         let StripFactors(mut odd) = even.clone();
-        for (j, row) in odd.chunks_exact_mut(self.strips.number.len()).enumerate() {
-            row[j..].iter_mut().for_each(|factor| *factor = -*factor);
+        for (k, row) in odd.chunks_exact_mut(self.strips.number.len()).enumerate() {
+            row[..=k].iter_mut().for_each(|factor| *factor = -*factor);
         }
         [even, StripFactors(odd)]
     }
@@ -470,15 +476,19 @@ impl BentOperator {
 
     /// Derivative along x by central differences, one-sided at the ends of a strip.
     fn derivative(&self, values: &[f64]) -> Vec<f64> {
-        let (nx, dx) = (self.nx, self.step[0]);
-        let of_row = |row: &[f64]| -> Vec<f64> {
-            let slope = |i: usize| {
-                let (low, high) = (i.saturating_sub(1), (i + 1).min(nx - 1));
-                (row[high] - row[low]) / ((high - low) as f64 * dx)
+        let (last, per_step) = (self.nx - 1, self.step[0].recip());
+        let mut slopes = Vec::with_capacity(values.len());
+        for row in values.chunks_exact(self.nx) {
+            let end = |low: usize, high: usize| {
+                (row[high] - row[low]) * per_step / (high - low).max(1) as f64
             };
-            (0..nx).map(slope).collect()
-        };
-        values.chunks_exact(nx).flat_map(of_row).collect()
+            slopes.push(end(0, last.min(1)));
+            slopes.extend(row.windows(3).map(|of| 0.5 * per_step * (of[2] - of[0])));
+            if last > 0 {
+                slopes.push(end(last - 1, last));
+            }
+        }
+        slopes
     }
 }
 
@@ -529,8 +539,8 @@ struct GroupSums<'a> {
 }
 
 impl GroupSums<'_> {
-    /// The real and the imaginary parts of `STRIPS` successive strips, the first of which is `first`. Each transform that acts is loaded once for all of them, and
-    /// their sums are independent of each other, which hides the latency of the additions.
+    /// The real and the imaginary parts of `STRIPS` strips that adjoin each other, the first of which is `first`. Each transform that acts is loaded once for
+    /// all of them, and their sums are independent of each other, which hides the latency of the additions.
     #[inline(always)]
     fn of<S: Simd, const STRIPS: usize>(
         &self,
@@ -538,16 +548,17 @@ impl GroupSums<'_> {
         first: usize,
     ) -> [[[f32; WAVES]; 2]; STRIPS] {
         let count = self.number.len();
-        let number = &self.number[first..first + STRIPS];
-        let factors = &self.factors[first * count..(first + STRIPS) * count];
+        let from_zero = self.number[first] + self.kernel.len() / 2;
         let mut found = [[[0.0; WAVES]; 2]; STRIPS];
         for lanes in 0..WAVES / S::F32_LANES {
             let mut sums = [[simd.splat_f32s(0.0); 2]; STRIPS];
             for ([re, im], strip) in self.from.iter().zip(self.acting) {
                 let [re, im] = [re, im].map(|part| S::as_simd_f32s(part).0[lanes]);
-                for (k, [real, imaginary]) in sums.iter_mut().enumerate() {
-                    let kernel = &self.kernel[number[k].abs_diff(self.number[*strip])];
-                    let factor = simd.splat_f32s(factors[k * count + strip]);
+                let kernels = &self.kernel[from_zero - self.number[*strip]..][..STRIPS];
+                let factors = &self.factors[strip * count + first..][..STRIPS];
+                for ((sum, kernel), factor) in sums.iter_mut().zip(kernels).zip(factors) {
+                    let [real, imaginary] = sum;
+                    let factor = simd.splat_f32s(*factor);
                     let influence = simd.mul_f32s(factor, S::as_simd_f32s(kernel).0[lanes]);
                     *real = simd.mul_add_e_f32s(influence, re, *real);
                     *imaginary = simd.mul_add_e_f32s(influence, im, *imaginary);
@@ -560,6 +571,23 @@ impl GroupSums<'_> {
             }
         }
         found
+    }
+
+    /// Leaves the sums of `STRIPS` strips from `first` on in `to` if they adjoin each other; says how many were summed.
+    #[inline(always)]
+    fn leave<S: Simd, const STRIPS: usize>(
+        &self,
+        simd: S,
+        first: usize,
+        to: &mut [[[f32; WAVES]; 2]],
+    ) -> usize {
+        let numbers = self.number[first..].get(..STRIPS);
+        if numbers.is_none_or(|numbers| numbers[STRIPS - 1] - numbers[0] >= STRIPS) {
+            return 0;
+        }
+        let sums: [_; STRIPS] = self.of(simd, first);
+        to[first..first + STRIPS].copy_from_slice(&sums);
+        STRIPS
     }
 }
 
@@ -588,15 +616,18 @@ impl WithSimd for StripSums<'_> {
             .take(acting.len().div_ceil(2))
             .enumerate()
         {
-            for wave in 0..waves {
-                let (here, there) = (line[wave], line[if wave == 0 { 0 } else { width - wave }]);
-                let (group, k) = (wave / WAVES, wave % WAVES);
+            for group in 0..groups {
                 let [one, other] = &mut from[group * from_all + 2 * pair..][..2] else {
                     unreachable!("two were taken")
                 };
-                // The even part belongs to the real line, the odd one to the imaginary line.
-                (one[0][k], one[1][k]) = (here.re + there.re, here.im - there.im);
-                (other[0][k], other[1][k]) = (here.im + there.im, there.re - here.re);
+                let first = group * WAVES;
+                for (k, here) in line[first..waves].iter().take(WAVES).enumerate() {
+                    let wave = first + k;
+                    let there = line[if wave == 0 { 0 } else { width - wave }];
+                    // The even part belongs to the real line, the odd one to the imaginary line.
+                    (one[0][k], one[1][k]) = (here.re + there.re, here.im - there.im);
+                    (other[0][k], other[1][k]) = (here.im + there.im, there.re - here.re);
+                }
             }
         }
         for group in 0..groups {
@@ -608,29 +639,38 @@ impl WithSimd for StripSums<'_> {
                 acting,
             };
             let to = &mut to[group * to_all..][..count];
-            let (blocks, rest) = to.as_chunks_mut::<4>();
-            let first = 4 * blocks.len();
-            for (block, to) in blocks.iter_mut().enumerate() {
-                *to = sums.of(simd, 4 * block);
-            }
-            for (k, to) in rest.iter_mut().enumerate() {
-                [*to] = sums.of(simd, first + k);
+            let mut first = 0;
+            while first < count {
+                // The sums of eight strips fit into the registers where these hold all waves of a group.
+                let mut done = 0;
+                if S::F32_LANES == WAVES {
+                    done = sums.leave::<S, 8>(simd, first, to);
+                }
+                if done == 0 {
+                    done = sums.leave::<S, 4>(simd, first, to);
+                }
+                if done == 0 {
+                    done = sums.leave::<S, 1>(simd, first, to);
+                }
+                first += done;
             }
         }
         for (pair, line) in lines.chunks_exact_mut(width).enumerate() {
-            for wave in 0..waves {
-                let (group, k) = (wave / WAVES, wave % WAVES);
+            for group in 0..groups {
                 let [one, other] = &to[group * to_all + 2 * pair..][..2] else {
                     unreachable!("two were taken")
                 };
-                let of = |strip: &[[f32; WAVES]; 2]| match odd {
+                let of = |strip: &[[f32; WAVES]; 2], k: usize| match odd {
                     true => [-strip[1][k], strip[0][k]],
                     false => [strip[0][k], strip[1][k]],
                 };
-                let ([a, b], [c, d]) = (of(one), of(other));
-                line[wave] = Complex::new(a - d, b + c);
-                if wave > 0 {
-                    line[width - wave] = Complex::new(a + d, c - b);
+                let first = group * WAVES;
+                for k in 0..WAVES.min(waves - first) {
+                    let ([a, b], [c, d]) = (of(one, k), of(other, k));
+                    line[first + k] = Complex::new(a - d, b + c);
+                    if first + k > 0 {
+                        line[width - first - k] = Complex::new(a + d, c - b);
+                    }
                 }
             }
         }
