@@ -115,7 +115,13 @@ fn a_straight_face_far_from_the_wheel_is_no_hole() {
 /// A face that ends the head next to the contact makes no bump on it.
 #[test]
 fn a_sharp_corner_beside_the_contact_changes_no_pressure() {
-    let sound = solved(&on_rail(&rail_60e1()));
+    // Fine enough for what the iteration of the pressures leaves open.
+    let finely = |rail: &[[f64; 2]]| {
+        let mut case = on_rail(rail);
+        case["solver"]["target_error"] = json!(0.002);
+        solved(&case)
+    };
+    let sound = finely(&rail_60e1());
     let edge = sound.patches[0]
         .quality
         .clone()
@@ -127,7 +133,7 @@ fn a_sharp_corner_beside_the_contact_changes_no_pressure() {
     rail.retain(|at| at[0] < edge);
     let [y, z] = rail[rail.len() - 1];
     rail.extend((1..8).map(|k| [y + 0.01 * f64::from(k), z + 3.0 * f64::from(k)]));
-    let found = solved(&on_rail(&rail));
+    let found = finely(&rail);
     let change = pressure_max(&found) / pressure_max(&sound) - 1.0;
     assert!(change.abs() < 1e-3, "{change}");
     assert!(!has(&found, "profile-waves"), "{:?}", found.remarks);

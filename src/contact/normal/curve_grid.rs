@@ -250,9 +250,34 @@ impl CurveGrid {
         any.then(|| CurveGrid::new(curve, along, &windows, self.step))
     }
 
-    /// Pressures of another grid at the cells, bilinearly; none beyond its cells.
+    /// Pressures of another grid at the cells: their squares bilinearly, which fall linearly to the edge of the contact and go on beyond it.
     pub(super) fn pressures(&self, other: &CurveGrid, pressure: &[f64]) -> Vec<f64> {
-        self.interpolated(other, pressure, false)
+        let [nx, ny] = other.cells();
+        let square = |k: usize| pressure[k] * pressure[k];
+        // The line through the two next cells in a direction, in which `left` cells are.
+        let from = |k: usize, left: usize, stride: isize| {
+            let at = |steps: isize| square(k.wrapping_add_signed(steps * stride));
+            match left {
+                0 => 0.0,
+                1 => -at(1),
+                _ => (2.0 * at(1) - at(2)).min(0.0),
+            }
+        };
+        let continued = |k: usize| {
+            let ([i, j], row) = ([k % nx, k / nx], nx as isize);
+            let along = from(k, i, -1).min(from(k, nx - 1 - i, 1));
+            let across = from(k, j, -row).min(from(k, ny - 1 - j, row));
+            along.min(across)
+        };
+        let squares: Vec<f64> = (0..pressure.len())
+            .map(|k| match pressure[k] > 0.0 {
+                true => square(k),
+                false => continued(k),
+            })
+            .collect();
+        let mut found = self.interpolated(other, &squares, false);
+        found.iter_mut().for_each(|p| *p = p.max(0.0).sqrt());
+        found
     }
 
     /// Gaps of another grid at the cells, bilinearly; beyond its cells those of the nearest ones.
@@ -261,13 +286,7 @@ impl CurveGrid {
     }
 
     fn interpolated(&self, other: &CurveGrid, values: &[f64], goes_on: bool) -> Vec<f64> {
-        let width = other.x.len() as i64;
-        let value = |i: i64, strip: Option<usize>| match strip {
-            Some(j) if goes_on || (0..width).contains(&i) => {
-                values[j * other.x.len() + i.clamp(0, width - 1) as usize]
-            }
-            _ => 0.0,
-        };
+        let width = other.x.len();
         let far = |number: i64, j: usize| (other.numbers[j] as i64 - number).abs();
         let strip_at = |number: i64| match other.strip(number) {
             None if goes_on => (0..other.numbers.len()).min_by_key(|j| far(number, *j)),
@@ -277,19 +296,30 @@ impl CurveGrid {
             let at = (at - first) / step;
             (at.floor() as i64, at - at.floor())
         };
-        let columns: Vec<(i64, f64)> = self
-            .x
-            .iter()
+        // A row has one more value at both ends.
+        let beyond = |i: i64| (i.clamp(-1, width as i64) + 1) as usize;
+        let columns: Vec<([usize; 2], f64)> = (self.x.iter())
             .map(|x| place(*x, other.x[0], other.step[0]))
+            .map(|(i, u)| ([i, i + 1].map(beyond), u))
             .collect();
+        let mut row = vec![0.0; width + 2];
         let mut out = Vec::with_capacity(self.x.len() * self.places.len());
         for strip in &self.places {
             let (j, v) = place(strip.s, other.places[0].s, other.step[1]);
-            let [low, high] = [j, j + 1].map(&strip_at);
-            for &(i, u) in &columns {
-                let row = |j| (1.0 - u) * value(i, j) + u * value(i + 1, j);
-                out.push((1.0 - v) * row(low) + v * row(high));
+            row.fill(0.0);
+            for (number, share) in [(j, 1.0 - v), (j + 1, v)] {
+                let Some(strip) = strip_at(number) else {
+                    continue;
+                };
+                let values = &values[strip * width..][..width];
+                (row[1..].iter_mut().zip(values)).for_each(|(sum, value)| *sum += share * value);
             }
+            if goes_on {
+                (row[0], row[width + 1]) = (row[1], row[width]);
+            }
+            out.extend(
+                (columns.iter()).map(|([low, high], u)| (1.0 - u) * row[*low] + u * row[*high]),
+            );
         }
         out
     }

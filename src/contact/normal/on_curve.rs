@@ -114,7 +114,7 @@ struct WeightedStrips<'a> {
 }
 
 impl PressureInfluence for WeightedStrips<'_> {
-    const CHANGES_MAX: usize = 6;
+    const CHANGES_MAX: usize = 24;
     type Workspace = BentWorkspace;
 
     fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut BentWorkspace) {

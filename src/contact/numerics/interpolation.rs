@@ -539,7 +539,7 @@ mod spline_tests {
         (knots, values)
     }
 
-    fn spline(knots: &[f64], values: &[f64], cut_wavelength: f64, ends: [bool; 2]) -> Spline {
+    fn splined(knots: &[f64], values: &[f64], cut_wavelength: f64, ends: [bool; 2]) -> Spline {
         let both = [values.to_vec(), vec![0.0; values.len()]];
         let [spline, _] = Spline::pair(knots, both, cut_wavelength, ends);
         spline
@@ -550,7 +550,7 @@ mod spline_tests {
         let mut errors = Vec::new();
         for step in [0.02, 0.01] {
             let (knots, values) = sampled(step, f64::sin);
-            let spline = spline(&knots, &values, 0.0, [false; 2]);
+            let spline = splined(&knots, &values, 0.0, [false; 2]);
             for (s, value) in knots.iter().zip(&values) {
                 assert!((spline.at(*s).value - value).abs() < 1e-14);
             }
@@ -572,7 +572,7 @@ mod spline_tests {
                     *knot += shift;
                 }
                 let values: Vec<f64> = knots.iter().map(|s| wave(*s)).collect();
-                let spline = spline(&knots, &values, 2.0, [false; 2]);
+                let spline = splined(&knots, &values, 2.0, [false; 2]);
                 let found = spline.at(4.0).value;
                 assert!(
                     (found - kept).abs() < 0.02,
@@ -586,10 +586,10 @@ mod spline_tests {
     fn a_pinned_end_stays_where_its_sample_is() {
         let (knots, values) = sampled(0.1, |s| (3.0 * s).sin() + 0.1 * (40.0 * s).cos());
         let last = knots.len() - 1;
-        let spline = spline(&knots, &values, 3.0, [true, false]);
+        let spline = splined(&knots, &values, 3.0, [true, false]);
         assert!((spline.at(0.0).value - values[0]).abs() < 1e-12);
         assert!((spline.at(knots[last]).value - values[last]).abs() > 1e-3);
-        let free = spline(&knots, &values, 3.0, [false; 2]);
+        let free = splined(&knots, &values, 3.0, [false; 2]);
         assert!((free.at(0.0).value - values[0]).abs() > 1e-3);
         // Far from the ends both are the same.
         assert!((free.at(20.0).value - spline.at(20.0).value).abs() < 1e-9);
@@ -598,7 +598,7 @@ mod spline_tests {
     #[test]
     fn lines_are_kept_by_any_smoothing() {
         let (knots, values) = sampled(0.1, |s| 3.0 - 0.5 * s);
-        let spline = spline(&knots, &values, 50.0, [false; 2]);
+        let spline = splined(&knots, &values, 50.0, [false; 2]);
         for s in [-1.0, 0.0, 3.33, 40.0, 45.0] {
             assert!((spline.at(s).value - (3.0 - 0.5 * s)).abs() < 1e-9);
         }
