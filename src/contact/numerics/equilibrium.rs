@@ -364,7 +364,7 @@ mod tests {
             let between =
                 |dimension: usize, least: f64, most: f64| least + (most - least) * share[dimension];
             let size = 0.995 * share[0].cbrt();
-            let (sin, cos) = between(1, 0.0, 6.28).sin_cos();
+            let (sin, cos) = between(1, 0.0, std::f64::consts::TAU).sin_cos();
             let goal = [size * cos, size * sin];
             let shift = [2, 3].map(|k| between(k, -0.3, 0.3));
             let stretch = [4, 5].map(|k| between(k, 0.5, 1.5));
