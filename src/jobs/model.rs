@@ -198,7 +198,7 @@ pub struct SubmitOptions {
     pub bypass_cache: bool,
 }
 
-/// What a submission says of its work, besides what is to be solved.
+/// The options of a submission.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct WorkOptions {
     /// Free text of the client; that of a single case is in the case.

@@ -140,7 +140,7 @@ impl Jobs {
         }
     }
 
-    /// Work as clients see it: a job unless it has expired, a run with its head.
+    /// Work as clients see it: a job that has not expired, a batch, or a run with its head.
     async fn shown(&self, work: Work) -> Result<Work, JobsError> {
         let batch = match work {
             Work::Job(job) => return Ok(self.unexpired(*job)?.into()),
@@ -266,7 +266,7 @@ impl Jobs {
             }
             seen = Some(work.version());
         }
-        // The place in the queue is for those who look at it.
+        // The place in the queue is only read for clients that ask for it.
         let work = self.read(id, Duration::ZERO).await?;
         self.shown(work).await
     }
@@ -355,7 +355,7 @@ impl Jobs {
         }
     }
 
-    /// Tells those who wait for a cancelled job, or who solve it.
+    /// Announces a cancelled job to those who wait for it and to the worker that solves it.
     fn tell_cancelled(&self, job: Uuid, state: State) {
         let shared = &self.shared;
         if state.ended() {
@@ -507,7 +507,7 @@ impl Follower {
         Ok(())
     }
 
-    /// What changed, and its tag; nothing but the tag if that was told.
+    /// What changed, with its tag; only the tag if the change was announced before.
     async fn read_changed(
         &self,
         kind: Kind,

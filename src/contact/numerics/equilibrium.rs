@@ -1,21 +1,22 @@
 //! Equilibrium: the unknowns at which residuals vanish, by Broyden's iteration (Broyden 1965) with limited steps.
 //!
-//! Each residual must grow with its own unknown, as a force with its creepage. A step is then too long where the residuals point back along it: the
-//! iteration stays where it was, and the update shortens the next step.
+//! Each residual must grow with its own unknown, as a force does with its creepage. A step was then too long if the residuals after it point back along
+//! it. Unless it has shortened the residuals it is rejected, and the next one, from the same place, is shorter.
 
 use crate::contact::remark::list::Remark;
 
-/// Most trials. Keeps the numbers safe; not tuned.
+/// Most trials of one search.
 const TRIALS_MAX: u32 = 40;
-/// Longest first step, in residuals that it is expected to remove. It doubles with every step that is not too long. Chosen by judgement.
+/// Bound of the first step: the length of the residuals that it is expected to remove. It doubles after every accepted step that reached it. Chosen by
+/// judgement.
 const STRIDE: f64 = 0.5;
-/// The inverse of the derivatives grows by at most 1 over this along a step, where residuals hardly change.
+/// An update multiplies the inverse of the derivatives along a step by at most the reciprocal of this, however little the residuals change there.
 const FLAT: f64 = 0.1;
-/// Steps in a row that were too long, after which the derivatives are taken from the scale again.
+/// After so many rejected steps in a row the derivatives are those of the scale again.
 const REJECTED_MAX: u32 = 2;
-/// An unknown that may only do this part of a step is at its limit.
+/// An unknown is at its limit if only this part of a step is left to it.
 const AT_LIMIT: f64 = 1e-9;
-/// A step expected to remove less than this part of the tolerance, from residuals that exceed it, is at a jump.
+/// The residuals jump where steps shorter than this part of the tolerance no longer bring them within it.
 const JUMP: f64 = 0.01;
 
 /// Residuals at a place.
@@ -85,10 +86,10 @@ impl<const N: usize, T> Equilibrium<N, T> {
     }
 }
 
-/// A search, with the derivatives that it has found; these stay for the next search.
+/// A search. It keeps the derivatives that it has found for the next one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Search<const N: usize> {
-    /// About the change of each unknown that changes its residual by 1; `None` where the unknown is given.
+    /// For each unknown the change that changes its residual by about 1; `None` where the unknown is given.
     scale: [Option<f64>; N],
     /// Largest size of each unknown.
     limit: [f64; N],
@@ -97,7 +98,7 @@ pub(crate) struct Search<const N: usize> {
 }
 
 impl<const N: usize> Search<N> {
-    /// A search that knows of the derivatives only their scale.
+    /// A search that starts from the scale as its derivatives.
     pub(crate) fn new(scale: [Option<f64>; N], limit: [f64; N]) -> Search<N> {
         Search {
             scale,

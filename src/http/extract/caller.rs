@@ -181,10 +181,10 @@ async fn read_id<S: Send + Sync>(
     work_id(kind, &text)
 }
 
-/// The id of work of this kind that a text is.
+/// Reads the id of work of this kind from a text.
 ///
 /// # Errors
-/// The text is none, so it names no work.
+/// The text is not an id.
 pub(crate) fn work_id(kind: Kind, text: &str) -> Result<Uuid, ApiError> {
     let id = Uuid::try_parse(text).map_err(|_| {
         let detail = format!("`{text}` is no {} id; ids are UUIDs", kind.noun());

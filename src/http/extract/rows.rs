@@ -203,7 +203,7 @@ const TABLE: &str = "table";
 /// A table whose columns replace members of a case.
 #[derive(Debug)]
 pub struct Table {
-    /// The form of the table.
+    /// The format of the table.
     pub form: TableForm,
     /// The case.
     pub template: Value,

@@ -69,7 +69,7 @@ impl RowWriter {
         Ok([writer.head()?, writer.write(table)?, writer.finish()?].concat())
     }
 
-    /// Tables of these columns that are written as they come, with what stands before and after them.
+    /// Writes tables of these columns piece by piece as they come, with the text before and after them.
     ///
     /// # Errors
     /// The stream or the file cannot be begun.

@@ -242,7 +242,7 @@ pub struct Items {
     pub until: Option<Instant>,
     /// States of the jobs that are returned; all if there is none.
     pub states: Vec<State>,
-    /// What was read and not taken yet.
+    /// Jobs of the page that was read last that are still to be returned.
     pub read: VecDeque<BatchItem>,
 }
 

@@ -40,7 +40,7 @@ pub struct RunDraft {
     jobs: Jobs,
     upload: BatchUpload,
     template: Value,
-    /// Those that are in no chunk yet.
+    /// Rows that are in no chunk yet.
     rows: ReceivedRows,
     /// Known once the first rows are there.
     begun: Option<Begun>,
@@ -111,7 +111,7 @@ impl Jobs {
         mut options: WorkOptions,
     ) -> Result<(Uuid, bool), JobsError> {
         let upload = blocking(move || draft.finish()).await??;
-        // Rows have no digests to be found by.
+        // Results of rows cannot be found again by a digest.
         options.submit.bypass_cache = true;
         self.submit_batch(upload, options).await
     }
@@ -257,14 +257,14 @@ impl RunDraft {
 #[derive(Debug)]
 pub struct ReceivedRows {
     columns: Vec<RunColumn>,
-    /// Those that are held, column by column, in the units of the case.
+    /// Rows that are not yet in a chunk, column by column, in the units of the case.
     values: Vec<Values>,
-    /// Number of rows so far, those included that are held no more.
+    /// Number of rows received so far, with those already in chunks.
     received: u64,
 }
 
 impl ReceivedRows {
-    /// No rows of these columns.
+    /// No rows yet, of these columns.
     ///
     /// # Errors
     /// A column is there twice or has a name that it may not have, or there is none that varies the case.

@@ -180,7 +180,7 @@ pub trait Batches: Send + Sync {
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError>;
 }
 
-/// What clients ask of jobs, one by one and as lists.
+/// Reads, lists and cancels jobs for clients.
 #[async_trait]
 pub trait ClientJobs: Send + Sync {
     /// Cancels a queued job at once, and marks a running one as to be cancelled; an ended one stays as it is. Returns the
@@ -306,7 +306,7 @@ pub trait Ends: Send + Sync {
     async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, StoreError>;
 }
 
-/// What ends or goes by itself, and what there is: counts and sizes.
+/// Takes jobs from workers that no longer answer, removes what has expired, and counts what there is.
 #[async_trait]
 pub trait Upkeep: Send + Sync {
     /// Takes running jobs from their workers: to `cancelled` if the client asked for that, to `failed` if `attempts_max` are
@@ -340,7 +340,7 @@ pub trait Upkeep: Send + Sync {
     /// Counts and sizes, read from indices alone.
     async fn stats(&self) -> Result<Stats, StoreError>;
 
-    /// What comes before a queued job among the jobs of its tenant, counted no further than `limit` jobs.
+    /// Counts the jobs of the same tenant that come before a queued job, at most `limit` of them.
     async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError>;
 }
 

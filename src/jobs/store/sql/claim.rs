@@ -314,7 +314,7 @@ impl Claims for SqlStore {
     }
 }
 
-/// A token that no other claim has: also a database that was set back in time does not give it out again.
+/// A token that no other claim has, not even after the database was restored from a backup.
 fn new_token() -> Result<i64, StoreError> {
     let random = getrandom::u64().map_err(|error| StoreError::Failed(Arc::new(error)))?;
     Ok(count(random >> 1))
