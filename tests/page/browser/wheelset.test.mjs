@@ -48,7 +48,7 @@ test('the slider of the shift moves both wheels, their patches and pressures', (
   await page.getByText(`4.5 mm, Δr ${kinematics.radius_difference_mm[place].toFixed(3)} mm`).waitFor();
   await until(async () => (await pressure.innerText()) !== before[0]);
   assert.notEqual(await wheel.getAttribute('d'), before[1]);
-  // The same wheel as a case of its own has the same pressure.
+  // The same wheel as a case of its own, at another target error, has the same pressure to the digits that are shown.
   const { right, kinematics: asked, combine, yaw_rad, ...contact } = wheelset.contact;
   const radius = (kinematics.left.rolling_radius_mm[place] + kinematics.right.rolling_radius_mm[place]) / 2;
   const alone = await service.solved({
@@ -56,7 +56,7 @@ test('the slider of the shift moves both wheels, their patches and pressures', (
     motion: { wheelset: { speed_mm_per_s: 20000, free_rolling_radius_mm: radius } }, outputs: ['resultants'],
   });
   const largest = Math.max(...alone.result.patches.map((/** @type {{ pressure_max_mpa: number }} */ patch) => patch.pressure_max_mpa));
-  await until(async () => Math.abs(Number(await pressure.innerText()) - largest) < 1e-3 * largest);
+  await until(async () => Math.abs(Number(await pressure.innerText()) - largest) < 2e-3 * largest);
   // The place of contact that is drawn is that of the kinematics.
   const dot = await page.locator('.shifting .dot').first().evaluate((mark) => {
     const rail = /** @type {SVGGeometryElement} */ (mark.parentElement?.querySelector('.rail'));
