@@ -541,7 +541,7 @@ impl Follower {
         Ok(())
     }
 
-    /// Notes the state of work and tells of it, unless that was told before.
+    /// Records the state of some work, and queues an event for it unless this state was sent before.
     fn tell(&mut self, id: Uuid, at: i64, tag: String, work: Option<Work>) {
         let before = self.known.insert(id, (at, tag.clone()));
         if before.is_none_or(|(_, known)| known != tag)
@@ -552,7 +552,7 @@ impl Follower {
     }
 }
 
-/// A text that differs between any two states that are told.
+/// Identifies a state of work in events: differs between any two states that clients can tell apart.
 fn tag(work: &Work) -> String {
     match work {
         Work::Job(job) => format!("{} {:.2}", job.version, job.progress),

@@ -257,7 +257,7 @@ const NUMBERS_LEFT_OUT: [&str; 4] = [
 /// `error_estimate` is that of the less certain of both forces.
 pub type RowNumbers = [f64; NUMBER_NAMES.len()];
 
-/// What is found for a force or a torque that a row prescribes.
+/// An unknown that is solved for where a row prescribes a force or a torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Found {
     /// Longitudinal creepage.
@@ -271,7 +271,7 @@ pub enum Found {
 }
 
 impl Found {
-    /// What is found for a question of one motion.
+    /// The unknowns that a case of one motion leaves to the solver.
     #[must_use]
     pub fn of(problem: &Problem) -> Vec<Found> {
         let [creep_x, creep_y] = problem.forces.first().copied().unwrap_or_default();
@@ -317,7 +317,7 @@ impl Found {
 /// The columns of numbers of an answer.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct NumberColumns {
-    /// What is found for prescribed forces.
+    /// The unknowns solved for, one column each.
     pub found: Vec<Found>,
     /// Are there derivatives?
     pub gradients: bool,
@@ -414,7 +414,7 @@ pub struct ManyAnswer {
 }
 
 impl ManyAnswer {
-    /// Answers to so many rows, none of which is there yet.
+    /// The answer to this number of rows before any of them is solved.
     pub(crate) fn new(rows: usize, columns: NumberColumns) -> ManyAnswer {
         ManyAnswer {
             status: vec![RowStatus::SolverFailed; rows],

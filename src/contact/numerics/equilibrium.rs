@@ -12,7 +12,7 @@ const TRIALS_MAX: u32 = 40;
 const STRIDE: f64 = 0.5;
 /// An update multiplies the inverse of the derivatives along a step by at most the reciprocal of this, however little the residuals change there.
 const FLAT: f64 = 0.1;
-/// After so many rejected steps in a row the derivatives are those of the scale again.
+/// Number of successive rejected steps after which the derivatives are reset to the scale.
 const REJECTED_MAX: u32 = 2;
 /// An unknown is at its limit if only this part of a step is left to it.
 const AT_LIMIT: f64 = 1e-9;
@@ -25,7 +25,7 @@ pub(crate) struct Trial<const N: usize, T> {
     pub(crate) residual: [f64; N],
     /// The length of the residuals that counts as 0.
     pub(crate) tolerance: f64,
-    /// What else was found there.
+    /// Further results of the evaluation, returned with the best trial.
     pub(crate) value: T,
 }
 
@@ -59,7 +59,7 @@ impl Termination {
 pub(crate) struct Equilibrium<const N: usize, T> {
     /// The unknowns.
     pub(crate) place: [f64; N],
-    /// What was found there.
+    /// Further results of its evaluation.
     pub(crate) value: T,
     /// Length of the residuals.
     pub(crate) residual: f64,
