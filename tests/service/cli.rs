@@ -292,28 +292,3 @@ async fn a_backup_of_a_working_service_can_be_started() {
     }
     service.until(&endless, "running").await;
 }
-
-#[cfg(not(any(feature = "cluster", feature = "otlp")))]
-#[test]
-fn a_flag_of_an_absent_feature_is_refused_with_the_command_that_builds_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let database = "postgres://railhead@127.0.0.1:1/railhead";
-    let data_dir = folder.path().join("data");
-    let data_dir = data_dir.to_str().unwrap();
-    let serve = ["serve", "--listen", "127.0.0.1:0", "--data-dir", data_dir];
-    let commands: [(&[&str], &[&str], &str); 6] = [
-        (&serve, &["--database-url", database], "cluster"),
-        (&serve, &["--results-url", "s3://bucket"], "cluster"),
-        (&serve, &["--results-url", "gs://bucket"], "gs"),
-        (&serve, &["--otlp-endpoint", "http://127.0.0.1:1"], "otlp"),
-        (&["migrate"], &["--database-url", database], "cluster"),
-        (&["keys", "list"], &["--database-url", database], "cluster"),
-    ];
-    for (command, flags, feature) in commands {
-        let output = railhead().args(command).args(flags).output().unwrap();
-        assert!(!output.status.success(), "{command:?} {flags:?}");
-        let complaint = complaints(&output);
-        let build = format!("cargo build --release --features {feature}");
-        assert!(complaint.contains(&build), "{command:?}: {complaint}");
-    }
-}

@@ -238,12 +238,6 @@ mod tests {
             #[cfg(feature = "cluster")]
             ("s3://b/a//b", "prefix"),
             ("file://folder", "from the root"),
-            #[cfg(not(feature = "cluster"))]
-            ("s3://bucket", "the feature `cluster`"),
-            #[cfg(not(feature = "gs"))]
-            ("gs://bucket", "the feature `gs`"),
-            #[cfg(not(feature = "az"))]
-            ("az://container", "the feature `az`"),
         ] {
             let said = text.parse::<ResultsUrl>().unwrap_err();
             assert!(said.contains(word), "{text}: {said}");
